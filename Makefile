@@ -1,0 +1,107 @@
+# steptwin: every target sets up what it needs by itself. `make help` lists them.
+
+PYTHON ?= python3
+ARGS ?=
+
+UV := .tools/bin/uv
+BIN := .venv/bin
+
+# The environment belongs to one interpreter; another one (PYTHON=, PYENV_VERSION=) makes it anew.
+PYTHON_ID := $(shell $(PYTHON) -c 'import sys; print("%d.%d.%d" % sys.version_info[:3] if sys.version_info >= (3, 11) else "")' 2>/dev/null)
+PYTHON_STAMP := .venv/.python-$(PYTHON_ID)
+RUN_STAMP := .venv/.ready-run
+DEV_STAMP := .venv/.ready-dev
+
+# uv takes the interpreter it is given and what the lock files name, whatever project or environment surrounds it.
+export UV_PYTHON_DOWNLOADS := never
+unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
+INSTALL := $(UV) pip install --quiet --python $(BIN)/python
+
+PEER_PACKAGES := mbpoll libmodbus-dev gcc libc6-dev pkg-config make
+
+.DEFAULT_GOAL := help
+.PHONY: help run test lint format types imports bench docs peers lock clean
+
+help:  ## Show the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+run: $(RUN_STAMP)  ## Start a virtual MIC488 with home switches (ARGS="--firmware 1.23 ...")
+	@exec $(BIN)/steptwin serve mic488 --demo $(ARGS)
+
+test: $(DEV_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
+	$(BIN)/pytest -n auto $(ARGS)
+
+lint: $(DEV_STAMP)  ## Check style and formatting
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(DEV_STAMP)  ## Repair style and formatting
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: $(DEV_STAMP)  ## Check the types
+	$(BIN)/pyrefly check
+
+imports: $(DEV_STAMP)  ## Check that imports go down only and that pure packages are pure
+	$(BIN)/lint-imports --no-logo
+
+bench: $(DEV_STAMP)  ## Measure requests per second and latencies against other servers
+	$(BIN)/python -m bench $(ARGS)
+
+docs: $(DEV_STAMP)  ## Build the documentation into build/docs
+	$(BIN)/sphinx-build -W --keep-going --quiet -b html -d build/doctrees docs build/docs
+	@echo "build/docs/index.html"
+
+peers:  ## Install the system packages the tests talk to (Debian)
+	@missing=""; \
+	for package in $(PEER_PACKAGES); do \
+	  dpkg -s $$package 2>/dev/null | grep -q '^Status: install ok installed' || missing="$$missing $$package"; \
+	done; \
+	if [ -z "$$missing" ]; then echo "peers: all installed"; exit 0; fi; \
+	echo "peers: installing$$missing"; \
+	if [ "$$(id -u)" -eq 0 ]; then sudo=""; else sudo="sudo"; fi; \
+	apt="$$sudo env DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=120"; \
+	$$apt install -y --no-install-recommends $$missing </dev/null \
+	|| { $$apt update </dev/null && $$apt install -y --no-install-recommends $$missing </dev/null; }
+
+lock: $(UV)  ## Pin the dependencies anew (ARGS="--upgrade" takes newer ones)
+	$(COMPILE) requirements/tools.in -o requirements/tools.txt
+	$(COMPILE) pyproject.toml --extra fast --group build -o requirements/run.txt
+	$(COMPILE) pyproject.toml --all-extras --group build --group dev -c requirements/run.txt -o requirements/dev.txt
+
+COMPILE := env -u UV_FIND_LINKS -u PIP_FIND_LINKS UV_CUSTOM_COMPILE_COMMAND="make lock" \
+  $(UV) pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest --generate-hashes --no-annotate $(ARGS)
+
+clean:  ## Remove everything that was built, downloaded or cached here
+	rm -rf .venv .tools build dist .pytest_cache .hypothesis .ruff_cache .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+NEED_PYTHON := [ -n "$(PYTHON_ID)" ] || { \
+  echo "steptwin needs Python 3.11 or newer, '$(PYTHON)' is not. Name one: make PYTHON=python3.12 ..." >&2; exit 1; }
+NEED_VENV := $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+  echo "'$(PYTHON)' cannot make environments. On Debian: apt-get install python3-venv" >&2; exit 1; }
+
+$(UV): requirements/tools.txt
+	@$(NEED_PYTHON)
+	@$(NEED_VENV)
+	@echo "setting up .tools"
+	@$(PYTHON) -m venv --clear .tools
+	@.tools/bin/pip install -qq --disable-pip-version-check --require-hashes -r requirements/tools.txt
+	@touch $@
+
+$(PYTHON_STAMP): | $(UV)
+	@$(NEED_PYTHON)
+	@echo "setting up .venv for Python $(PYTHON_ID)"
+	@$(UV) venv --quiet --clear --no-project --python "$$($(PYTHON) -c 'import sys; print(sys.executable)')" .venv
+	@touch $@
+
+$(RUN_STAMP): $(PYTHON_STAMP) requirements/run.txt pyproject.toml
+	@echo "installing steptwin"
+	@$(INSTALL) --require-hashes -r requirements/run.txt
+	@$(INSTALL) --no-build-isolation --no-deps --editable .
+	@touch $@
+
+$(DEV_STAMP): $(RUN_STAMP) requirements/dev.txt
+	@echo "installing what tests, checks and documentation need"
+	@$(INSTALL) --require-hashes -r requirements/dev.txt
+	@touch $@
