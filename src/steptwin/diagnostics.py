@@ -1,0 +1,127 @@
+"""Messages about source text: one type for the command line, the studio and the editor.
+
+Offsets count characters of the text from 0; lines and columns shown to people count from 1.
+"""
+
+from __future__ import annotations
+
+import enum
+import re
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+_LINE_END = re.compile(r"\r\n|\n|\r")
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Span:
+    """Characters ``start`` (included) to ``end`` (excluded) of a source text."""
+
+    start: int
+    end: int
+
+
+class Severity(enum.Enum):
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """Replace ``span`` by ``text``."""
+
+    span: Span
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding. ``code`` is stable (``M101``, ``W204``), ``message`` says what was found, ``hint`` what is allowed."""
+
+    code: str
+    severity: Severity
+    span: Span
+    message: str
+    hint: str | None = None
+    fix: Fix | None = None
+
+
+@dataclass(frozen=True)
+class Source:
+    """A named text that knows its lines.
+
+    Lines end where editors end them: at a line feed, a carriage return or both. Other separators that
+    ``str.splitlines`` knows (form feed, U+2028) stay inside a line. After a final line end comes an empty last line.
+    """
+
+    name: str
+    text: str
+    _starts: list[int] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_starts", [0, *(end.end() for end in _LINE_END.finditer(self.text))])
+
+    def position(self, offset: int) -> tuple[int, int]:
+        """Line and column of a character offset, both from 1. The offset after the last character has a place too."""
+        line = bisect_right(self._starts, offset)
+        return line, offset - self._starts[line - 1] + 1
+
+    def line(self, number: int) -> str:
+        """Text of a line (from 1) without its end."""
+        first, after = self._starts[number - 1], self._starts[number : number + 1]
+        return self.text[first : after[0] if after else None].rstrip("\r\n")
+
+
+def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """The diagnostics as they come in the text."""
+    return sorted(diagnostics, key=lambda d: (d.span.start, d.span.end, d.code))
+
+
+def render(source: Source, diagnostics: Sequence[Diagnostic]) -> str:
+    """The diagnostics as text: place, severity, code, message, source line with carets, hint, suggestion."""
+    parts: list[str] = []
+    for d in diagnostics:
+        line, column = source.position(d.span.start)
+        text = source.line(line)
+        before = len(text[: column - 1].expandtabs(4))
+        marked = text[: column - 1 + d.span.end - d.span.start]
+        width = max(1, len(marked.expandtabs(4)) - before)
+        gutter = str(line)
+        pad = " " * len(gutter)
+        shown = text.expandtabs(4)
+        parts.append(f"{source.name}:{line}:{column}: {d.severity.value} {d.code}: {d.message}")
+        parts.append(f"  {gutter} | {shown}")
+        parts.append(f"  {pad} | {' ' * before}{'^' * width}")
+        if d.hint:
+            parts.append(f"  {pad} = {d.hint}")
+        if d.fix:
+            parts.append(f"  {pad} = suggestion: {d.fix.text.strip() or ('start a new line' if d.fix.text else 'remove it')}")
+    return "\n".join(parts)
+
+
+def to_json(source: Source, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:
+    """The diagnostics as plain data: file, line, column, end_line, end_column, severity, code, message, hint, fix."""
+    rows: list[dict[str, object]] = []
+    for d in diagnostics:
+        line, column = source.position(d.span.start)
+        end_line, end_column = source.position(d.span.end)
+        row: dict[str, object] = {
+            "file": source.name,
+            "line": line,
+            "column": column,
+            "end_line": end_line,
+            "end_column": end_column,
+            "severity": d.severity.value,
+            "code": d.code,
+            "message": d.message,
+            "hint": d.hint,
+            "fix": None,
+        }
+        if d.fix:
+            fl, fc = source.position(d.fix.span.start)
+            el, ec = source.position(d.fix.span.end)
+            row["fix"] = {"line": fl, "column": fc, "end_line": el, "end_column": ec, "text": d.fix.text}
+        rows.append(row)
+    return rows

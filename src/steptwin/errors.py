@@ -1,0 +1,30 @@
+"""The three families of errors: the caller's misuse, the peer's refusal, the line's failure."""
+
+from __future__ import annotations
+
+
+class SteptwinError(Exception):
+    """Base of every error this package raises on purpose. Its text is meant for the user."""
+
+
+class Misuse(SteptwinError, ValueError):
+    """The caller gave something that is not permitted; the text names value, permitted range and unit."""
+
+
+class TimeReversal(Misuse):
+    """A machine was asked to go back in time."""
+
+    def __init__(self, now: int, asked: int) -> None:
+        super().__init__(f"time cannot go back: the machine is at {now} ns, asked for {asked} ns")
+
+
+class Runaway(SteptwinError, RuntimeError):
+    """More events in one instant than a machine can have: a loop that takes no time."""
+
+
+class Refusal(SteptwinError):
+    """The peer understood and refused (Modbus exception code, M1486 5EH)."""
+
+
+class LineFailure(SteptwinError, OSError):
+    """The line failed: time-out, bad CRC, disconnect."""

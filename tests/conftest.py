@@ -1,0 +1,163 @@
+"""What all tests share, above all the peers: programs that were not written here and that the tests talk to.
+
+A test takes the fixture `require_peer` or `require_library` and thereby gets the marker ``peers``. Where the peer is not
+installed the test is skipped and says what to install; with ``STEPTWIN_REQUIRE_PEERS=1`` it fails instead.
+``make peers`` installs them all.
+
+The fixture `serve` starts the real command.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+from hypothesis import settings
+
+pytest_plugins = ["pytester"]
+
+# A deadline on the wall clock would make a test depend on what else the machine is doing.
+settings.register_profile("steptwin", deadline=None)
+settings.load_profile("steptwin")
+
+STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
+
+PEER_FIXTURES = {"require_peer", "require_library"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if PEER_FIXTURES.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.peers)
+
+
+def _missing(peer: str) -> NoReturn:
+    reason = f"{peer} is not installed; 'make peers' installs it"
+    if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def require_peer() -> Callable[[str], str]:
+    """``require_peer("mbpoll")`` gives the path of an installed program."""
+
+    def find(program: str) -> str:
+        return shutil.which(program) or _missing(program)
+
+    return find
+
+
+@pytest.fixture(scope="session")
+def require_library(require_peer: Callable[[str], str]) -> Callable[[str], list[str]]:
+    """``require_library("libmodbus")`` gives the arguments a C compiler needs to use an installed library.
+
+    Compile with ``[require_peer("cc"), "prog.c", "-o", out, *require_library("libmodbus")]``.
+    """
+
+    def find(library: str) -> list[str]:
+        asked = subprocess.run(
+            [require_peer("pkg-config"), "--cflags", "--libs", library], capture_output=True, text=True, check=False
+        )
+        return asked.stdout.split() if asked.returncode == 0 else _missing(library)
+
+    return find
+
+
+class Served:
+    """A twin served by the real command in a process of its own."""
+
+    def __init__(self, directory: Path, *options: str) -> None:
+        self.directory = directory
+        self.ready_file = directory / "ready.json"
+        self.pty = directory / "pty"
+        self._end_points: dict[str, dict[str, Any]] = {}
+        # What twins share is theirs alone.
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(directory), "COLUMNS": "200", "TERM": "dumb"}
+        self._out = (directory / "out").open("w+")
+        self._err = (directory / "err").open("w+")
+        where = ["--tcp", "127.0.0.1:0", "--rtu-tcp", "127.0.0.1:0", "--pty", str(self.pty), "--ready-file", str(self.ready_file)]
+        self.process = subprocess.Popen(
+            [STEPTWIN, "serve", "mic488", *where, *options], stdout=self._out, stderr=self._err, env=self.environment
+        )
+
+    def wait_until_ready(self) -> None:
+        until(lambda: self.ready_file.exists() or self.process.poll() is not None, "the ready file is there")
+        if self.process.poll() is not None:
+            raise AssertionError(f"the server ended with {self.process.returncode}: {self.errors}{self.lines}")
+        self._end_points = {point["kind"]: point for point in json.loads(self.ready_file.read_text())["end_points"]}
+
+    @property
+    def lines(self) -> list[str]:
+        return (self.directory / "out").read_text().splitlines()
+
+    @property
+    def errors(self) -> str:
+        return (self.directory / "err").read_text()
+
+    @property
+    def tcp_port(self) -> int:
+        return self._end_points["tcp"]["port"]
+
+    @property
+    def rtu_tcp_port(self) -> int:
+        return self._end_points["rtu-tcp"]["port"]
+
+    def command(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run ``steptwin`` where this twin is the only one."""
+        return subprocess.run([STEPTWIN, *arguments], capture_output=True, text=True, env=self.environment, check=False)
+
+    def state(self) -> dict[str, Any]:
+        return json.loads(self.command("state", "--json").stdout)
+
+    def end(self, number: int = signal.SIGINT) -> None:
+        """End it as Ctrl-C does; nothing may be left behind and nothing complained about."""
+        self.process.send_signal(number)
+        assert self.process.wait(10) == 0, self.errors
+        assert self.errors == ""
+        left = {path.relative_to(self.directory).as_posix() for path in self.directory.rglob("*") if not path.is_dir()}
+        assert {name for name in left if not name.startswith("state/")} == {"out", "err"}
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._out.close()
+        self._err.close()
+
+
+def until(condition: Callable[[], object], what: str, seconds: float = 10.0) -> None:
+    """Wait for a condition; the test fails when it does not come."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, f"after {seconds} s not yet: {what}"
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Served]]:
+    """``serve("--demo", ...)`` starts a twin on free ports and a pty of its own; it is ended cleanly after the test."""
+    served: list[Served] = []
+
+    def start(*options: str, directory: Path | None = None) -> Served:
+        twin = Served(directory or tmp_path_factory.mktemp("twin"), *options)
+        served.append(twin)
+        twin.wait_until_ready()
+        return twin
+
+    yield start
+    try:
+        for twin in served:
+            if twin.process.poll() is None:
+                twin.end()
+    finally:
+        for twin in served:
+            twin.close()

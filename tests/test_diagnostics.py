@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.diagnostics import Diagnostic, Fix, Severity, Source, Span, in_order, render, to_json
+
+
+def found(start: int, end: int, code: str = "W101", hint: str | None = None, fix: Fix | None = None) -> Diagnostic:
+    return Diagnostic(code, Severity.ERROR, Span(start, end), "unknown statement", hint, fix)
+
+
+@pytest.mark.parametrize(
+    ("text", "offset", "place"),
+    [
+        ("", 0, (1, 1)),
+        ("abc", 0, (1, 1)),
+        ("abc", 3, (1, 4)),  # after the last character
+        ("ab\ncd", 2, (1, 3)),  # the line end belongs to the line it ends
+        ("ab\ncd", 3, (2, 1)),
+        ("ab\r\ncd", 4, (2, 1)),  # two characters, one line end
+        ("ab\rcd", 3, (2, 1)),
+        ("ab\n", 3, (2, 1)),  # where an editor puts the cursor after the final line end
+        ("a\n\nb", 2, (2, 1)),
+        ("a\x0cb\u2028c\x85d", 6, (1, 7)),  # separators for splitlines, not for editors
+    ],
+)
+def test_position(text: str, offset: int, place: tuple[int, int]) -> None:
+    assert Source("p", text).position(offset) == place
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [("", [""]), ("a", ["a"]), ("a\n", ["a", ""]), ("a\r\n\r\nb\rc", ["a", "", "b", "c"]), ("\t x \n", ["\t x ", ""])],
+)
+def test_line(text: str, lines: list[str]) -> None:
+    source = Source("p", text)
+    assert [source.line(number) for number in range(1, len(lines) + 1)] == lines
+
+
+@given(st.text(alphabet="ab\t\r\n\x0c\u2028"))
+def test_every_offset_is_found_again(text: str) -> None:
+    source = Source("p", text)
+    lines = re.split(r"\r\n|\n|\r", text)
+    for offset in range(len(text) + 1):
+        line, column = source.position(offset)
+        assert source.line(line) == lines[line - 1]
+        if column <= len(lines[line - 1]):
+            assert lines[line - 1][column - 1] == text[offset]
+
+
+def test_sources_compare_by_name_and_text() -> None:
+    assert Source("p", "a\nb") == Source("p", "a\nb") != Source("p", "a")
+
+
+def test_in_order_follows_the_text_then_the_code() -> None:
+    shuffled = [found(5, 6), found(0, 9), found(0, 3, "W202"), found(0, 3, "W102")]
+    assert in_order(shuffled) == [shuffled[3], shuffled[2], shuffled[1], shuffled[0]]
+
+
+def test_render_shows_the_place_the_hint_and_the_suggestion() -> None:
+    source = Source("feed.prg", "SPEED 60\nMOVEE 10 // out\n")
+    diagnostic = found(9, 14, hint="statements: MOVE, MOVER", fix=Fix(Span(9, 14), "MOVE"))
+    assert render(source, [diagnostic]) == (
+        "feed.prg:2:1: error W101: unknown statement\n"
+        "  2 | MOVEE 10 // out\n"
+        "    | ^^^^^\n"
+        "    = statements: MOVE, MOVER\n"
+        "    = suggestion: MOVE"
+    )
+
+
+def test_render_says_remove_it_for_an_empty_replacement() -> None:
+    assert render(Source("p", "END END"), [found(4, 7, fix=Fix(Span(3, 7), ""))]).endswith("= suggestion: remove it")
+
+
+@pytest.mark.parametrize(
+    ("text", "span", "carets"),
+    [
+        ("\tGO 1", Span(1, 3), "    |     ^^"),  # a tab before
+        ("GO\t1", Span(0, 4), "    | ^^^^^"),  # a tab inside: the carets reach as far as the text does
+        ("GO\nEND", Span(0, 6), "    | ^^"),  # more than a line: to the end of the first
+        ("GO", Span(2, 2), "    |   ^"),  # nothing to mark: one caret where it is missing
+        ("GO\n", Span(3, 3), "    | ^"),
+    ],
+)
+def test_render_puts_carets_under_the_text(text: str, span: Span, carets: str) -> None:
+    assert render(Source("p", text), [found(span.start, span.end)]).split("\n")[2] == carets
+
+
+def test_render_keeps_the_gutter_as_wide_as_the_number() -> None:
+    source = Source("p", "\n" * 99 + "GO")
+    assert render(source, [found(99, 101, hint="h")]).split("\n")[1:] == ["  100 | GO", "      | ^^", "      = h"]
+
+
+def test_render_joins_several_and_of_none_is_empty() -> None:
+    source = Source("p", "GO\nGO")
+    assert render(source, []) == ""
+    assert [row for row in render(source, [found(0, 2), found(3, 5)]).split("\n") if row.startswith("p:")] == [
+        "p:1:1: error W101: unknown statement",
+        "p:2:1: error W101: unknown statement",
+    ]
+
+
+def test_to_json_is_plain_data_with_places_from_one() -> None:
+    source = Source("feed.prg", "GO\nEND\n")
+    rows = to_json(source, [found(3, 6, fix=Fix(Span(2, 6), "")), Diagnostic("W300", Severity.NOTE, Span(0, 2), "m", "h")])
+    assert json.loads(json.dumps(rows)) == [
+        {
+            "file": "feed.prg",
+            "line": 2,
+            "column": 1,
+            "end_line": 2,
+            "end_column": 4,
+            "severity": "error",
+            "code": "W101",
+            "message": "unknown statement",
+            "hint": None,
+            "fix": {"line": 1, "column": 3, "end_line": 2, "end_column": 4, "text": ""},
+        },
+        {
+            "file": "feed.prg",
+            "line": 1,
+            "column": 1,
+            "end_line": 1,
+            "end_column": 3,
+            "severity": "note",
+            "code": "W300",
+            "message": "m",
+            "hint": "h",
+            "fix": None,
+        },
+    ]
