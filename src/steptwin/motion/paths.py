@@ -1,0 +1,292 @@
+"""Straight lines and circular arcs of two axes: a path profile drives both, and each follows a profile of its own.
+
+The *way* is a profile of the position along the path, in any unit of length; it only goes forward. A course says where one
+axis is at every position of the way. Axes along a line follow ordinary profiles; along an arc they follow an `ArcProfile`.
+
+Suffixes as in `steptwin.motion.profile`; ``_q`` quarter turns, counted from +X towards +Y; ``w`` positions of the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil, floor, inf, sqrt
+from typing import Any, NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.motion.profile import NEAR_P, Profile, Segment
+from steptwin.motion.trig import QUARTER, arcsine_below_45, cosine, direction, length, sine
+
+MOST_TURNS = 1000
+"""Turns of one arc: bounds its segments."""
+
+BEYOND_P = 1e-6
+"""What goes this little beyond an edge (pulses) does not cross it: more than rounding errors, less than any pulse."""
+
+
+# ---------------------------------------------------------------------- shapes in the plane
+
+
+class Arc(NamedTuple):
+    """Part of a circle, in the units of the plane; ``sweep_q`` > 0 is counter-clockwise (X right, Y up)."""
+
+    centre_x: float
+    centre_y: float
+    radius: float
+    begin_q: float
+    sweep_q: float
+
+    @property
+    def length(self) -> float:
+        return abs(self.sweep_q) * QUARTER * self.radius
+
+    @property
+    def begin(self) -> tuple[float, float]:
+        return self.at(self.begin_q)
+
+    @property
+    def end(self) -> tuple[float, float]:
+        return self.at(self.begin_q + self.sweep_q)
+
+    def at(self, angle_q: float) -> tuple[float, float]:
+        return self.centre_x + self.radius * cosine(angle_q), self.centre_y + self.radius * sine(angle_q)
+
+
+def circle(centre_x: float, centre_y: float, radius: float, sweep_q: float) -> Arc:
+    """An arc that begins at the point of the circle nearest to (0, 0); at its +X side where all are equally near.
+
+    `Misuse` for a radius not above 0 and for more than `MOST_TURNS`.
+    """
+    _check(radius, sweep_q)
+    here = centre_x == 0.0 and centre_y == 0.0
+    return Arc(centre_x, centre_y, radius, 0.0 if here else direction(-centre_x, -centre_y), sweep_q)
+
+
+def arc_between(x0: float, y0: float, x1: float, y1: float, radius: float, *, outward: bool, slack: float = 0.0) -> Arc:
+    """The arc of at most half a turn from (x0, y0) to (x1, y1).
+
+    ``outward``: bulging away from (0, 0), else towards it; where the chord points at (0, 0), outward is clockwise. A radius
+    that is up to ``slack`` too small to reach is taken as half the distance. `Misuse` where there is no such arc.
+    """
+    chord = length(x1 - x0, y1 - y0)
+    half = 0.5 * chord
+    if chord == 0.0:
+        raise Misuse("an arc needs an end point other than its beginning")
+    if radius < half:
+        if radius <= 0.0 or half - radius > slack:
+            raise Misuse(f"radius = {radius:g}: must be at least {half:g}, half the distance of the ends")
+        radius = half
+    # To the left of the chord, and on which side of it the origin is.
+    left_x, left_y = (y0 - y1) / chord, (x1 - x0) / chord
+    middle_x, middle_y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+    clockwise = (left_x * middle_x + left_y * middle_y >= 0.0) is outward
+    bulge = 1.0 if clockwise else -1.0
+    rise = sqrt(max((radius - half) * (radius + half), 0.0))
+    centre_x, centre_y = middle_x - bulge * left_x * rise, middle_y - bulge * left_y * rise
+    # From both legs of the triangle: its sine alone would lose half the digits of an arc of nearly half a turn.
+    sweep_q = 2.0 * direction(rise, half)
+    _check(radius, sweep_q)
+    return Arc(centre_x, centre_y, radius, direction(x0 - centre_x, y0 - centre_y), -bulge * sweep_q)
+
+
+def _check(radius: float, sweep_q: float) -> None:
+    if not 0.0 < radius < inf:
+        raise Misuse(f"radius = {radius:g}: must be greater than 0")
+    if not abs(sweep_q) <= 4 * MOST_TURNS:
+        raise Misuse(f"angle = {90 * sweep_q:g}°: must be within ±{360 * MOST_TURNS}°")
+
+
+# ---------------------------------------------------------------------- courses of one axis
+
+
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """One axis along a line: at ``origin_p`` where the way begins, ``slope`` pulses further per unit of it."""
+
+    origin_p: float
+    slope: float
+
+    def position(self, w: float) -> float:
+        return self.origin_p + self.slope * w
+
+    def first_beyond(self, edge_p: float, side: int, begin_w: float, end_w: float) -> float | None:
+        """Position of the way at which the axis first goes beyond ``edge_p`` towards ``side`` (±1); None if it does not."""
+        if self.slope * side <= 0.0 or (self.position(end_w) - edge_p) * side <= BEYOND_P:
+            return None
+        return max((edge_p - self.origin_p) / self.slope, begin_w)
+
+    def profile(self, way: Profile, count: int, final: int | None) -> Profile:
+        """The profile of the axis that stands at ``count`` when the way begins; it ends at ``final``, if that is given."""
+        origin = self.origin_p - count + self.slope * way.base
+        end_p = origin + self.slope * way.final_p if final is None else float(final - count)
+        if self.slope == 0.0:
+            return Profile(way.start, count, (), end_p)
+        k = self.slope
+        sign = 1 if k > 0.0 else -1
+        segments = [
+            Segment(s.end_s, s.anchor_s, origin + k * s.c0, k * s.c1, k * s.c2, k * s.c3, sign * s.direction)
+            for s in way.segments
+        ]
+        if segments and segments[-1].anchor_s == segments[-1].end_s:
+            segments[-1].c0 = end_p
+        return Profile(way.start, count, tuple(segments), end_p)
+
+
+@dataclass(frozen=True, slots=True)
+class Circular:
+    """One axis along an arc: ``centre_p + radius_p · cos(angle_q + turn_q · w)``."""
+
+    centre_p: float
+    radius_p: float
+    angle_q: float
+    turn_q: float
+
+    def position(self, w: float) -> float:
+        return self.centre_p + self.radius_p * cosine(self.angle_q + self.turn_q * w)
+
+    def first_beyond(self, edge_p: float, side: int, begin_w: float, end_w: float) -> float | None:
+        """As `Straight.first_beyond`."""
+        for part in self.parts(begin_w, end_w):
+            if part.direction != side or (part.end_p - edge_p) * side <= BEYOND_P:
+                continue
+            if (self.position(part.begin_w) - edge_p) * side >= 0.0:
+                return part.begin_w
+            return min(max((_angle_q(self, part.half, edge_p) - self.angle_q) / self.turn_q, part.begin_w), part.end_w)
+        return None
+
+    def parts(self, begin_w: float, end_w: float) -> Iterator[Part]:
+        """The stretches of one direction."""
+        forward = self.turn_q > 0.0
+        angle_q = self.angle_q + self.turn_q * begin_w
+        half = floor(0.5 * angle_q)
+        if not forward and angle_q == 2.0 * half:
+            half -= 1
+        while begin_w < end_w:
+            turning_q = 2.0 * (half + 1 if forward else half)
+            until_w = (turning_q - self.angle_q) / self.turn_q
+            falls = (half & 1 == 0) is forward
+            if until_w >= end_w:
+                yield Part(begin_w, end_w, half, -1 if falls else 1, self.position(end_w))
+                return
+            if until_w > begin_w:
+                yield Part(begin_w, until_w, half, -1 if falls else 1, self.centre_p + self.radius_p * (-1.0 if falls else 1.0))
+            begin_w = until_w
+            half += 1 if forward else -1
+
+    def profile(self, way: Profile, count: int, final: int | None) -> ArcProfile:
+        """As `Straight.profile`."""
+        local = Circular(self.centre_p - count, self.radius_p, self.angle_q + self.turn_q * way.base, self.turn_q)
+        segments: list[ArcSegment] = []
+        begin_w = way.segments[0].position(0.0) if way.segments else way.final_p
+        for i, s in enumerate(way.segments):
+            end_w = way.final_p if i == len(way.segments) - 1 else s.position(s.end_s)
+            for part in local.parts(begin_w, end_w):
+                end_s = s.end_s if part.end_w >= end_w else s.when(part.end_w)
+                segments.append(ArcSegment(end_s, part.direction, s, local, part.half, part.end_p))
+            begin_w = end_w
+        profile = ArcProfile(way.start, count, tuple(segments), local.position(way.final_p))
+        if final is None:
+            return profile
+        missing = final - count - profile.counts[-1]
+        if segments and missing * segments[-1].direction < 0:
+            # Just turned round, the axis stands a pulse behind: it comes at the very end.
+            segments.append(replace(segments[-1], direction=-segments[-1].direction))
+        return ArcProfile(way.start, count, tuple(segments), float(final - count))
+
+
+class Part(NamedTuple):
+    """A stretch of a `Circular` course in which the axis does not turn round.
+
+    The angle is between ``2 · half`` and ``2 · half + 2`` quarter turns; the axis goes in ``direction`` to ``end_p``.
+    """
+
+    begin_w: float
+    end_w: float
+    half: int
+    direction: int
+    end_p: float
+
+
+def _angle_q(course: Circular, half: int, position: float) -> float:
+    """The angle within ``half`` (as in `Part`) at which the axis is at ``position``; beyond a turning point, that point.
+
+    `steptwin.motion.pulses` does the same operations in the same order.
+    """
+    x = (position - course.centre_p) / course.radius_p
+    x = min(max(x, -1.0), 1.0)
+    angle_q = 2.0 * arcsine_below_45(sqrt(0.5 * (1.0 - abs(x))), sqrt)
+    if (x < 0.0) is (half & 1 == 0):
+        angle_q = 2.0 - angle_q
+    return 2.0 * half + angle_q
+
+
+@dataclass(slots=True)
+class ArcSegment:
+    """A stretch of an arc in which neither the axis turns round nor the acceleration of the way changes. Never changed.
+
+    Answers as a `Segment` does.
+    """
+
+    end_s: float
+    direction: int
+    way: Segment
+    course: Circular
+    half: int
+    """As in `Part`."""
+    end_p: float
+
+    def position(self, t_s: float) -> float:
+        return self.course.position(self.way.position(t_s))
+
+    def velocity(self, t_s: float) -> float:
+        course = self.course
+        angle_q = course.angle_q + course.turn_q * self.way.position(t_s)
+        return -course.radius_p * sine(angle_q) * QUARTER * course.turn_q * self.way.velocity(t_s)
+
+    def when(self, position: float) -> float:
+        """Seconds at which the axis is at ``position``."""
+        course = self.course
+        return self.way.when((_angle_q(course, self.half, position) - course.angle_q) / course.turn_q)
+
+
+class ArcProfile(Profile):
+    """One axis along an arc. What `Profile` says of pulses and rounding holds here too."""
+
+    __slots__ = ()
+
+    segments: Any
+    """`ArcSegment`s, which answer as a `Segment` does."""
+
+    def __init__(self, start: Nanos, base: int, segments: Any, final_p: float) -> None:
+        super().__init__(start, base, segments, final_p)
+
+    def position(self, now: Nanos) -> float:
+        n = now - self.start
+        for s, end in zip(self.segments, self.ends, strict=True):
+            if n < end:
+                return self.base + s.position(n / 1e9)
+        return self.base + self.final_p
+
+    def velocity(self, now: Nanos) -> float:
+        n = now - self.start
+        for s, end in zip(self.segments, self.ends, strict=True):
+            if n < end:
+                return s.velocity(n / 1e9)
+        return 0.0
+
+    def count(self, now: Nanos) -> int:
+        n = now - self.start
+        for i, end in enumerate(self.ends):
+            if n < end:
+                s = self.segments[i]
+                p = s.position(n / 1e9)
+                reached = floor(p) if s.direction > 0 else ceil(p)
+                if abs(p - round(p)) < NEAR_P:
+                    reached = self._count_near(i, p, n)
+                count = self.counts[i]
+                return self.base + (reached if (reached - count) * s.direction > 0 else count)
+        return self.base + self.counts[-1]
+
+    def _end_p(self, index: int) -> float:
+        return self.final_p if index == len(self.segments) - 1 else self.segments[index].end_p

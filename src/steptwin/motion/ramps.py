@@ -1,0 +1,175 @@
+"""Start/stop motion: a jump to a start speed, a linear ramp, a parabolic one, the mirror image down again.
+
+One unit ``u`` of position throughout: u, u/s, u/s². For the M1486 it is the minimum microstep (full step/64): its speeds and
+accelerations, which are in full steps, are multiplied by 64 before they come here.
+
+Suffixes: ``_u`` positions and distances, ``_s`` seconds.
+"""
+
+from __future__ import annotations
+
+from math import ceil, inf, sqrt
+from typing import NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.motion.planner import FARTHEST_P, MotionState, refuse_range
+from steptwin.motion.profile import Profile, Segment, at_rest, cruise
+
+_SAME_U = 1e-3
+"""A forced stop that ends this little beyond a landing position ends on it: a stop forced in the last ramp of a move, which
+is braking already, must not go a microstep further for a rounding error. (The speed says little about the place near the
+top of a parabola.)"""
+
+
+class SpeedCurve(NamedTuple):
+    """How a motion gains speed, and mirrored loses it."""
+
+    start: float
+    """S: the motion begins and ends with this speed (u/s)."""
+    acc: float
+    """A: constant acceleration (u/s²) up to ``knee``."""
+    knee: float
+    """P: from this speed (u/s) on the acceleration falls linearly in time to 0 at ``top``, M-6; not below ``top``: never."""
+    top: float
+    """V: highest speed (u/s). At or below ``start`` there is no ramp: constant ``top``, M-8."""
+
+
+def plan_distance(now: Nanos, begin: int, target: int, curve: SpeedCurve) -> Profile:
+    """From rest at ``begin`` to rest at ``target`` (u). A short move leaves the curve half-way, at the speed at which the
+    remaining distance is the braking distance, M-7.
+
+    Raises `Misuse` for speeds and accelerations that are not finite and positive.
+    """
+    _check(curve)
+    if abs(target - begin) > FARTHEST_P:
+        raise Misuse(f"distance = {target - begin} u: must be within ±{FARTHEST_P}")
+    distance = float(abs(target - begin))
+    if distance == 0.0:
+        return at_rest(now, begin)
+    sign = 1 if target > begin else -1
+    rise: list[_Part] = []
+    left = 0.5 * distance
+    for part in _parts(curve):
+        if part.distance >= left:
+            rise.append(part.until_distance(left))
+            left = 0.0
+            break
+        rise.append(part)
+        left -= part.distance
+    segments = _rising(rise, sign)
+    t = segments[-1].end_s if segments else 0.0
+    if left > 0.0:
+        from_u = 0.5 * distance - left
+        end = t + 2.0 * left / curve.top
+        segments.append(cruise(t, end, sign * from_u, sign * curve.top))
+        t = end
+    for part in rise:
+        t += part.duration
+    segments += _falling(rise, sign, t, distance)
+    return Profile(now, begin, tuple(segments), sign * distance)
+
+
+def plan_endless(now: Nanos, begin: int, direction: int, curve: SpeedCurve) -> Profile:
+    """From rest at ``begin`` (u) to ``top``, until further notice. ``direction`` is +1 or −1. Errors as `plan_distance`."""
+    _check(curve)
+    parts = _parts(curve)
+    segments = _rising(parts, direction)
+    t = segments[-1].end_s if segments else 0.0
+    segments.append(cruise(t, inf, direction * sum(part.distance for part in parts), direction * curve.top))
+    return Profile(now, begin, tuple(segments), 0.0)
+
+
+def plan_forced_stop(state: MotionState, curve: SpeedCurve, landing: int, origin: int = 0) -> Profile:
+    """From any point of a motion with ``curve``: down its slope to the start speed (no ramp where the speed is not above it),
+    then on to the first position that is ``origin`` + n·``landing`` (u), and rest there.
+
+    Errors as `plan_distance`.
+    """
+    _check(curve)
+    now, count, phase, velocity = state
+    if velocity == 0.0:
+        return Profile(now, count, (), phase)
+    sign = 1 if velocity > 0.0 else -1
+    speed = abs(velocity)
+    fall: list[_Part] = []
+    for part in _parts(curve):
+        if part.speed >= speed:
+            break
+        fall.append(part.until_speed(speed))
+    # Along the direction of motion, from the counted position.
+    stop_u = sign * phase + sum(part.distance for part in fall)
+    lead = sign * (count - origin) % landing
+    landing_u = float(ceil((stop_u - _SAME_U + lead) / landing) * landing - lead)
+    t = sum(part.duration for part in fall)
+    segments = _falling(fall, sign, t, min(stop_u, landing_u))
+    if landing_u > stop_u:
+        final_speed = min(speed, curve.start)
+        segments.append(cruise(t, t + (landing_u - stop_u) / final_speed, sign * stop_u, sign * final_speed))
+    return Profile(now, count, tuple(segments), sign * landing_u)
+
+
+class _Part(NamedTuple):
+    """One part of the speed curve, from its slow end: ``speed·t + c2·t² + c3·t³``."""
+
+    speed: float
+    c2: float
+    c3: float
+    duration: float
+    distance: float
+
+    def until_distance(self, distance: float) -> _Part:
+        """The slow end of this part, ``distance`` long."""
+        return self._replace(duration=self._segment().when(distance), distance=distance)
+
+    def until_speed(self, speed: float) -> _Part:
+        """The slow end of this part, up to ``speed``; the whole part when it does not reach it."""
+        segment = self._segment()
+        duration = segment.when_speed(speed)
+        return self if duration >= self.duration else self._replace(duration=duration, distance=segment.position(duration))
+
+    def _segment(self) -> Segment:
+        return Segment(self.duration, 0.0, 0.0, self.speed, self.c2, self.c3, 1)
+
+
+def _parts(curve: SpeedCurve) -> list[_Part]:
+    """Slow to fast; none when there is no ramp (M-8)."""
+    start, acc, knee, top = curve
+    parts: list[_Part] = []
+    middle = min(knee, top)
+    if start < middle:
+        duration = (middle - start) / acc
+        parts.append(_Part(start, 0.5 * acc, 0.0, duration, 0.5 * (start + middle) * duration))
+    low = max(knee, start)
+    if low < top:
+        # M-6: v(t) = P + A·t − A²·t² / (4·(V − P)). A motion that starts above P enters this curve at its start speed.
+        steepness = acc * sqrt((top - low) / (top - knee))
+        duration = 2.0 * (top - low) / steepness
+        c3 = -steepness * steepness / (12.0 * (top - low))
+        parts.append(_Part(low, 0.5 * steepness, c3, duration, duration * (low + 2.0 * top) / 3.0))
+    return parts
+
+
+def _rising(parts: list[_Part], sign: int) -> list[Segment]:
+    segments: list[Segment] = []
+    t = p = 0.0
+    for speed, c2, c3, duration, distance in parts:
+        segments.append(Segment(t + duration, t, sign * p, sign * speed, sign * c2, sign * c3, sign))
+        t += duration
+        p += distance
+    return segments
+
+
+def _falling(parts: list[_Part], sign: int, end_s: float, end_u: float) -> list[Segment]:
+    """The mirror image of `_rising`: ends at ``end_s``, ``end_u`` along the direction of motion."""
+    segments: list[Segment] = []
+    for speed, c2, c3, duration, distance in parts:
+        segments.append(Segment(end_s, end_s, sign * end_u, sign * speed, -sign * c2, sign * c3, sign))
+        end_s -= duration
+        end_u -= distance
+    segments.reverse()
+    return segments
+
+
+def _check(curve: SpeedCurve) -> None:
+    refuse_range(start=(curve.start, "u/s"), acc=(curve.acc, "u/s²"), knee=(curve.knee, "u/s"), top=(curve.top, "u/s"))
