@@ -1,0 +1,335 @@
+"""Modbus protocol data units: function code and data, without address and checksum.
+
+The six functions of the MIC488 in both directions (Modbus application protocol V1.1b3, section 6). Requests and responses
+are plain values; each side encodes what it sends (`Misuse` when a value is not permitted) and decodes what it receives.
+Addresses are those on the wire, from 0; ``count`` is a number of bits or of 16-bit registers.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+from steptwin.errors import LineFailure, Misuse, Refusal
+
+READ_COILS = 0x01
+READ_DISCRETE_INPUTS = 0x02
+READ_HOLDING_REGISTERS = 0x03
+WRITE_SINGLE_COIL = 0x05
+WRITE_SINGLE_REGISTER = 0x06
+WRITE_MULTIPLE_REGISTERS = 0x10
+
+BIT_READS = frozenset({READ_COILS, READ_DISCRETE_INPUTS})
+READS = BIT_READS | {READ_HOLDING_REGISTERS}
+WRITES = frozenset({WRITE_SINGLE_COIL, WRITE_SINGLE_REGISTER, WRITE_MULTIPLE_REGISTERS})
+REFUSED = 0x80
+"""Added to the function code in an exception response."""
+
+ILLEGAL_FUNCTION = 0x01
+ILLEGAL_DATA_ADDRESS = 0x02
+ILLEGAL_DATA_VALUE = 0x03
+DEVICE_FAILURE = 0x04
+DEVICE_BUSY = 0x06
+GATEWAY_TARGET_FAILED = 0x0B
+EXCEPTION_NAMES = {
+    ILLEGAL_FUNCTION: "illegal function",
+    ILLEGAL_DATA_ADDRESS: "illegal data address",
+    ILLEGAL_DATA_VALUE: "illegal data value",
+    DEVICE_FAILURE: "device failure",
+    0x05: "acknowledge",
+    DEVICE_BUSY: "device busy",
+    0x08: "memory parity error",
+    0x0A: "gateway path unavailable",
+    GATEWAY_TARGET_FAILED: "gateway target failed to respond",
+}
+
+# MIC-24: the limits of the protocol are those of the device.
+MAX_BITS = 2000
+MAX_REGISTERS = 125
+MAX_WRITTEN_REGISTERS = 123
+MAX_PDU = 253
+
+COIL_ON = 0xFF00
+COIL_OFF = 0x0000
+
+_THREE_FIELDS = struct.Struct(">BHH")
+_WRITE_HEAD = struct.Struct(">BHHB")
+
+
+class ModbusException(Refusal):
+    """The peer answered with an exception; inside a slave: the request has to be answered with one (`pdu`)."""
+
+    def __init__(self, function: int, code: int, detail: str = "") -> None:
+        self.function = function
+        self.code = code
+        self.detail = detail
+        text = f"function {function:02X} refused with exception {code:02X} ({EXCEPTION_NAMES.get(code, 'unknown code')})"
+        super().__init__(f"{text}: {detail}" if detail else text)
+
+    @property
+    def pdu(self) -> bytes:
+        return exception_pdu(self.function, self.code)
+
+
+class BadResponse(LineFailure):
+    """What came back is no answer to what was asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Request 01, 02 or 03."""
+
+    function: int
+    address: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class WriteCoil:
+    """Request 05, and its response, which repeats it."""
+
+    function: ClassVar[int] = WRITE_SINGLE_COIL
+    address: int
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class WriteRegister:
+    """Request 06, and its response, which repeats it."""
+
+    function: ClassVar[int] = WRITE_SINGLE_REGISTER
+    address: int
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class WriteRegisters:
+    """Request 16."""
+
+    function: ClassVar[int] = WRITE_MULTIPLE_REGISTERS
+    address: int
+    values: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Bits:
+    """Response 01 or 02. A frame carries whole bytes: ``packed`` has up to seven bits more than were asked for."""
+
+    function: int
+    packed: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Registers:
+    """Response 03."""
+
+    function: ClassVar[int] = READ_HOLDING_REGISTERS
+    values: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Response 16."""
+
+    function: ClassVar[int] = WRITE_MULTIPLE_REGISTERS
+    address: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Exception response to ``function``."""
+
+    function: int
+    code: int
+
+
+Request: TypeAlias = Read | WriteCoil | WriteRegister | WriteRegisters
+Response: TypeAlias = Bits | Registers | WriteCoil | WriteRegister | Written | Refused
+
+
+def exception_pdu(function: int, code: int) -> bytes:
+    return bytes((function | REFUSED, code))
+
+
+def pack_bits(values: Iterable[bool]) -> bytes:
+    """First value in the lowest bit of the first byte, as functions 01 and 02 answer."""
+    packed = count = 0
+    for on in values:
+        if on:
+            packed |= 1 << count
+        count += 1
+    return packed.to_bytes((count + 7) // 8, "little")
+
+
+def unpack_bits(packed: bytes, count: int) -> list[bool]:
+    """The first ``count`` bits of ``packed``."""
+    if not 0 <= count <= 8 * len(packed):
+        raise Misuse(f"cannot take {count} bits from {len(packed)} bytes: permitted are 0 to {8 * len(packed)}")
+    whole = int.from_bytes(packed, "little")
+    return [bool(whole >> i & 1) for i in range(count)]
+
+
+def _within(what: str, value: int, least: int, most: int) -> int:
+    if not least <= value <= most:
+        raise Misuse(f"{what} {value} is outside {least} to {most}")
+    return value
+
+
+def _check_span(address: int, count: int, most: int, what: str) -> None:
+    _within("address", address, 0, 0xFFFF)
+    _within(f"number of {what}", count, 1, most)
+    if address + count > 0x10000:
+        raise Misuse(f"{count} {what} from address {address} end above 65535")
+
+
+def _register_bytes(values: Sequence[int]) -> bytes:
+    for value in values:
+        _within("register value", value, 0, 0xFFFF)
+    return struct.pack(f">{len(values)}H", *values)
+
+
+def encode_request(request: Request) -> bytes:
+    """The PDU of a request; `Misuse` when a field is outside the protocol's range."""
+    match request:
+        case Read(function, address, count):
+            if function not in READS:
+                raise Misuse(f"function {function} does not read: permitted are 1, 2 and 3")
+            bits = function in BIT_READS
+            _check_span(address, count, MAX_BITS if bits else MAX_REGISTERS, "bits" if bits else "registers")
+            return _THREE_FIELDS.pack(function, address, count)
+        case WriteRegisters(address, values):
+            _check_span(address, len(values), MAX_WRITTEN_REGISTERS, "registers")
+            payload = _register_bytes(values)
+            return _WRITE_HEAD.pack(WRITE_MULTIPLE_REGISTERS, address, len(values), len(payload)) + payload
+    return encode_response(request)
+
+
+def decode_request(pdu: bytes) -> Request:
+    """The request in a PDU, or `ModbusException` with the code a slave answers: 01 for a function outside the six,
+    03 for a quantity, coil value, byte count or length that is not permitted (MIC-1, MIC-7, MIC-24).
+
+    Whether the addresses exist is the device's affair (02).
+    """
+    function = pdu[0] if pdu else 0
+    if function in READS:
+        if len(pdu) != 5:
+            raise _bad_length(function, len(pdu), 5)
+        _, address, count = _THREE_FIELDS.unpack(pdu)
+        most = MAX_REGISTERS if function == READ_HOLDING_REGISTERS else MAX_BITS
+        if not 1 <= count <= most:
+            raise ModbusException(function, ILLEGAL_DATA_VALUE, f"quantity {count} is outside 1 to {most}")
+        return Read(function, address, count)
+    if function not in WRITES:
+        raise ModbusException(function, ILLEGAL_FUNCTION)
+    if function == WRITE_MULTIPLE_REGISTERS:
+        return _decode_write_registers(pdu)
+    if len(pdu) != 5:
+        raise _bad_length(function, len(pdu), 5)
+    _, address, value = _THREE_FIELDS.unpack(pdu)
+    if function == WRITE_SINGLE_REGISTER:
+        return WriteRegister(address, value)
+    if value not in (COIL_ON, COIL_OFF):
+        raise ModbusException(function, ILLEGAL_DATA_VALUE, f"coil value {value:04X} is neither FF00 nor 0000")
+    return WriteCoil(address, value == COIL_ON)
+
+
+def _decode_write_registers(pdu: bytes) -> WriteRegisters:
+    function = WRITE_MULTIPLE_REGISTERS
+    if len(pdu) < 6:
+        raise _bad_length(function, len(pdu), 8)
+    _, address, count, byte_count = _WRITE_HEAD.unpack_from(pdu)
+    if not 1 <= count <= MAX_WRITTEN_REGISTERS:
+        raise ModbusException(function, ILLEGAL_DATA_VALUE, f"quantity {count} is outside 1 to {MAX_WRITTEN_REGISTERS}")
+    if byte_count != 2 * count:
+        raise ModbusException(function, ILLEGAL_DATA_VALUE, f"byte count {byte_count} does not match {count} registers")
+    if len(pdu) != 6 + byte_count:
+        raise _bad_length(function, len(pdu), 6 + byte_count)
+    return WriteRegisters(address, struct.unpack_from(f">{count}H", pdu, 6))
+
+
+def _bad_length(function: int, length: int, wanted: int) -> ModbusException:
+    return ModbusException(function, ILLEGAL_DATA_VALUE, f"the PDU has {length} bytes instead of {wanted}")
+
+
+def encode_response(response: Response) -> bytes:
+    """The PDU of a response; `Misuse` when a field is outside the protocol's range."""
+    match response:
+        case Bits(function, packed):
+            if function not in BIT_READS:
+                raise Misuse(f"function {function} does not answer with bits: permitted are 1 and 2")
+            return bytes((function, _within("number of bytes", len(packed), 1, MAX_BITS // 8))) + packed
+        case Registers(values):
+            count = _within("number of registers", len(values), 1, MAX_REGISTERS)
+            return bytes((READ_HOLDING_REGISTERS, 2 * count)) + _register_bytes(values)
+        case WriteCoil(address, on):
+            _within("address", address, 0, 0xFFFF)
+            return _THREE_FIELDS.pack(WRITE_SINGLE_COIL, address, COIL_ON if on else COIL_OFF)
+        case WriteRegister(address, value):
+            _within("address", address, 0, 0xFFFF)
+            return _THREE_FIELDS.pack(WRITE_SINGLE_REGISTER, address, _within("register value", value, 0, 0xFFFF))
+        case Written(address, count):
+            _check_span(address, count, MAX_WRITTEN_REGISTERS, "registers")
+            return _THREE_FIELDS.pack(WRITE_MULTIPLE_REGISTERS, address, count)
+        case Refused(function, code):
+            return exception_pdu(_within("function", function, 1, 0x7F), _within("exception code", code, 1, 0xFF))
+
+
+def decode_response(pdu: bytes) -> Response:
+    """The response in a PDU by its own form alone; `BadResponse` when it has none of the six functions.
+
+    Whether it answers a given request says `answer`.
+    """
+    if len(pdu) < 2:
+        raise BadResponse(f"a response of {len(pdu)} bytes is too short")
+    function = pdu[0]
+    if function & REFUSED:
+        if len(pdu) != 2:
+            raise _bad_response(pdu, 2)
+        return Refused(function & ~REFUSED, pdu[1])
+    if function in READS:
+        if len(pdu) != 2 + pdu[1]:
+            raise _bad_response(pdu, 2 + pdu[1])
+        if function in BIT_READS:
+            return Bits(function, pdu[2:])
+        if pdu[1] % 2:
+            raise BadResponse(f"response to function 03 has an odd byte count: {pdu[1]}")
+        return Registers(struct.unpack_from(f">{pdu[1] // 2}H", pdu, 2))
+    if function not in WRITES:
+        raise BadResponse(f"response to function {function:02X}, which is none of 01, 02, 03, 05, 06, 10")
+    if len(pdu) != 5:
+        raise _bad_response(pdu, 5)
+    _, address, value = _THREE_FIELDS.unpack(pdu)
+    if function == WRITE_MULTIPLE_REGISTERS:
+        return Written(address, value)
+    if function == WRITE_SINGLE_REGISTER:
+        return WriteRegister(address, value)
+    if value not in (COIL_ON, COIL_OFF):
+        raise BadResponse(f"response to function 05 repeats the coil value {value:04X}, neither FF00 nor 0000")
+    return WriteCoil(address, value == COIL_ON)
+
+
+def _bad_response(pdu: bytes, wanted: int) -> BadResponse:
+    return BadResponse(f"response {pdu[0]:02X} has {len(pdu)} bytes instead of {wanted}")
+
+
+def answer(request: Request, pdu: bytes) -> Response:
+    """The response in ``pdu`` if it answers ``request``.
+
+    Raises `ModbusException` when the peer refused, `BadResponse` when this is the answer to something else.
+    """
+    response = decode_response(pdu)
+    match request, response:
+        case _, Refused(function, code) if function == request.function:
+            raise ModbusException(function, code)
+        case Read(function, _, count), Bits(answered, packed) if function == answered and len(packed) == (count + 7) // 8:
+            return response
+        case Read(function, _, count), Registers(values) if function == READ_HOLDING_REGISTERS and len(values) == count:
+            return response
+        case WriteRegisters(address, values), Written(written, count) if address == written and len(values) == count:
+            return response
+        case ((WriteCoil() | WriteRegister()), _) if response == request:
+            return response
+    raise BadResponse(f"{response} does not answer {request}")

@@ -1,0 +1,277 @@
+"""Modbus RTU frames in a stream of bytes.
+
+A frame is cut where its function says that it ends and its CRC is right; silence does not cut frames, because pseudo
+terminals, USB adapters and networks deliver in bursts (MIC-15). The gap only brings the framer back in step after rubbish.
+
+A line with several slaves carries requests and responses, and both have to be cut so that nothing inside them is taken for
+a frame. At the front of the held bytes the framer tries the length that the function has as a request and the one it has
+as a response. When neither can match any more, one byte is given up and the rest looked at again, so that a good frame behind
+rubbish is found at once. When the gap has passed, nothing is waited for: complete frames are taken wherever they are, and
+a rest with a right CRC is a frame even where the function tells no length.
+"""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections.abc import Collection
+from typing import NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.machine import MICROSECOND, MILLISECOND, Nanos
+from steptwin.wire.crc import crc16, with_crc
+from steptwin.wire.pdu import REFUSED
+
+BROADCAST = 0
+MAX_UNIT = 247
+MIN_FRAME = 4
+MAX_FRAME = 256
+
+# MIC-15: the manual's gap belongs to a real UART; elsewhere delivery is bursty.
+UART_GAP_NS: Nanos = 750 * MICROSECOND
+BURSTY_GAP_NS: Nanos = 20 * MILLISECOND
+# UART FIFOs and USB adapters (16 ms latency timer) hand over one frame in pieces with more than 750 us between them. The
+# beginning of a frame is therefore kept beyond the gap for as long as such a piece can be late, and no longer.
+LATE_NS: Nanos = 50 * MILLISECOND
+
+# function: (length of the frame, index of a byte to be added to it or 0). Modbus application protocol V1.1b3, section 6.
+_REQUEST_LENGTHS = {
+    **dict.fromkeys((0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08), (8, 0)),
+    **dict.fromkeys((0x07, 0x0B, 0x0C, 0x11), (4, 0)),
+    **dict.fromkeys((0x0F, 0x10), (9, 6)),
+    **dict.fromkeys((0x14, 0x15), (5, 2)),
+    0x16: (10, 0),
+    0x17: (13, 10),
+    0x18: (6, 0),
+    0x2B: (7, 0),
+}
+_RESPONSE_LENGTHS = {
+    **dict.fromkeys((0x01, 0x02, 0x03, 0x04, 0x0C, 0x11, 0x14, 0x15, 0x17), (5, 2)),
+    **dict.fromkeys((0x05, 0x06, 0x08, 0x0B, 0x0F, 0x10), (8, 0)),
+    0x07: (5, 0),
+    0x16: (10, 0),
+    0x18: (6, 3),
+    **{function | REFUSED: (5, 0) for function in range(1, 0x80)},
+}
+_REQUESTS = tuple(_REQUEST_LENGTHS.get(function) for function in range(256))
+_RESPONSES = tuple(_RESPONSE_LENGTHS.get(function) for function in range(256))
+_IMPOSSIBLE = -1
+_UNKNOWN_YET = MAX_FRAME + 1
+"""Longer than anything held: the byte that tells the length has not arrived."""
+
+_KNOWN = re.escape(bytes(sorted(_REQUEST_LENGTHS | _RESPONSE_LENGTHS)))
+_FRAME_START = re.compile(rb"[\x00-\xf7](?:[" + _KNOWN + rb"]|\Z)", re.DOTALL)
+
+
+class Role(enum.Enum):
+    """What a frame is. A response that repeats its request (05, 06) is told apart only when the request was seen before."""
+
+    REQUEST = "request"
+    RESPONSE = "response"
+    UNKNOWN = "unknown"
+    """Right CRC, but a function or length outside the protocol's tables."""
+
+
+class RtuFrame(NamedTuple):
+    raw: bytes
+    """The whole frame with unit and CRC."""
+    role: Role
+    end: int
+    """How many bytes had been fed up to and with the last of this frame."""
+
+    @property
+    def unit(self) -> int:
+        return self.raw[0]
+
+    @property
+    def pdu(self) -> bytes:
+        return self.raw[1:-2]
+
+
+def encode_frame(unit: int, pdu: bytes) -> bytes:
+    """Unit, PDU and CRC. `Misuse` for a unit outside 0 to 247 or a PDU outside 1 to 253 bytes."""
+    if not 0 <= unit <= MAX_UNIT:
+        raise Misuse(f"unit {unit} is outside 0 to {MAX_UNIT}")
+    if not 1 <= len(pdu) <= MAX_FRAME - 3:
+        raise Misuse(f"a PDU of {len(pdu)} bytes is outside 1 to {MAX_FRAME - 3}")
+    return with_crc(bytes((unit,)) + pdu)
+
+
+def request_length(frame: bytes | bytearray, start: int = 0) -> int:
+    """Bytes of the request frame that begins at ``start``: more than 256 while unknown, -1 when it cannot be a request."""
+    return _length(_REQUESTS, frame, start)
+
+
+def response_length(frame: bytes | bytearray, start: int = 0) -> int:
+    """Bytes of the response frame that begins at ``start``: more than 256 while unknown, -1 when it cannot be a response."""
+    return _length(_RESPONSES, frame, start)
+
+
+def _length(table: tuple[tuple[int, int] | None, ...], frame: bytes | bytearray, start: int) -> int:
+    if len(frame) < start + 2:
+        return _UNKNOWN_YET
+    row = table[frame[start + 1]]
+    if row is None:
+        return _IMPOSSIBLE
+    length, index = row
+    if index:
+        if len(frame) <= start + index:
+            return _UNKNOWN_YET
+        length += frame[start + index]
+    return length if length <= MAX_FRAME else _IMPOSSIBLE
+
+
+class RtuFramer:
+    """Cuts the frames of one line, at most 256 bytes held between calls.
+
+    ``own`` are the units on this side: what begins with one of them, or with the broadcast address, can only be a request
+    (an adapter that echoes has to be silenced before). Call `expire` when `deadline` has come.
+    """
+
+    __slots__ = ("_asked", "_burst", "_fed", "_framed", "_last", "_own", "_scan", "gap_ns", "held")
+
+    def __init__(self, own: Collection[int] = (), gap_ns: Nanos = BURSTY_GAP_NS) -> None:
+        if gap_ns < 1:
+            raise Misuse(f"a gap of {gap_ns} ns is not positive")
+        self.gap_ns = gap_ns
+        self.held = bytearray()
+        """Bytes not yet cut. Always the same object; empty means in step."""
+        self._own = frozenset(own)
+        self._scan = 0  # index in `held`: no known frame begins before
+        self._burst = 0  # index in `held` where the bytes after the last cut or gap begin
+        self._last: Nanos = 0
+        self._fed = 0
+        self._framed = 0
+        self._asked: tuple[int, int] | None = None  # unit and function of the last request, until its response
+
+    @property
+    def fed(self) -> int:
+        """Bytes received so far."""
+        return self._fed
+
+    @property
+    def rubbish(self) -> int:
+        """Bytes received and given up so far."""
+        return self._fed - self._framed - len(self.held)
+
+    def deadline(self) -> Nanos | None:
+        """When the gap ends, if there is something to give up then."""
+        return None if len(self.held) == self._burst else self._last + self.gap_ns
+
+    def feed(self, data: bytes, now: Nanos, end: Nanos | None = None) -> list[RtuFrame]:
+        """The frames completed by ``data``, whose first byte came at ``now`` and whose last at ``end`` (default ``now``)."""
+        if self.held:
+            frames = self.expire(now)
+            if now - self._last > LATE_NS and len(self.held) == self._burst:
+                self._drop(len(self.held))
+        else:
+            frames = []
+        self.held += data
+        self._fed += len(data)
+        self._last = now if end is None else end
+        self._cut_frames(frames)
+        return frames
+
+    def expire(self, now: Nanos) -> list[RtuFrame]:
+        """The frames found when the gap has passed at ``now``; before that, nothing."""
+        frames: list[RtuFrame] = []
+        deadline = self.deadline()
+        if deadline is None or now < deadline:
+            return frames
+        held = self.held
+        while held:
+            if self._is_one_unknown():
+                self._take(self._burst, len(held) - self._burst, Role.UNKNOWN, frames)
+                self._drop(len(held))
+                break
+            beginning = len(held)
+            start = self._next_start(self._scan)
+            while start < len(held):
+                length, role = self._look(start, waiting=False)
+                if length > 0:
+                    break
+                if length == 0:
+                    beginning = min(beginning, start)
+                start = self._next_start(start + 1)
+            else:
+                self._drop(beginning)
+                break
+            self._take(start, length, role, frames)
+            self._drop(start + length)
+        self._burst = len(held)
+        return frames
+
+    def _is_one_unknown(self) -> bool:
+        """Whether all that came since the last cut or gap is one frame whose function does not tell its length."""
+        rest = self.held[self._burst :]
+        return MIN_FRAME <= len(rest) <= MAX_FRAME and crc16(rest) == 0 and self._look(self._burst, waiting=False)[0] <= 0
+
+    def _cut_frames(self, frames: list[RtuFrame]) -> None:
+        held = self.held
+        size = len(held)
+        done = 0
+        start = self._scan
+        while start < size:
+            length, role = self._look(start, waiting=True)
+            if length == 0 and start < self._burst < size:
+                # What came before the gap may have been given up by its sender: then a frame begins after it.
+                after, after_role = self._look(self._burst, waiting=True)
+                if after > 0:
+                    start, length, role = self._burst, after, after_role
+            if length == 0:
+                break
+            if length < 0:
+                start = self._next_start(start + 1)
+                continue
+            self._take(start, length, role, frames)
+            start += length
+            done = start
+        self._scan = start
+        if done:
+            self._drop(done)
+            self._scan = start - done
+        if len(held) > MAX_FRAME:
+            # Too long for one frame: what was given up already serves nothing any more.
+            self._drop(self._scan)
+
+    def _next_start(self, start: int) -> int:
+        found = _FRAME_START.search(self.held, start)
+        return len(self.held) if found is None else found.start()
+
+    def _take(self, start: int, length: int, role: Role, frames: list[RtuFrame]) -> None:
+        raw = bytes(self.held[start : start + length])
+        self._framed += length
+        self._asked = (raw[0], raw[1]) if role is Role.REQUEST else None
+        frames.append(RtuFrame(raw, role, self._fed - len(self.held) + start + length))
+
+    def _drop(self, count: int) -> None:
+        """Forget the first ``count`` bytes; what remains is looked at from its start."""
+        del self.held[:count]
+        self._burst = 0
+        self._scan = 0
+
+    def _look(self, start: int, *, waiting: bool) -> tuple[int, Role]:
+        """Length and role of the frame that begins at ``start``; length 0: it may still become one, -1: it cannot."""
+        held = self.held
+        unit = held[start]
+        if unit > MAX_UNIT:
+            return _IMPOSSIBLE, Role.UNKNOWN
+        have = len(held) - start
+        mine = unit == BROADCAST or unit in self._own
+        request = _length(_REQUESTS, held, start)
+        response = _IMPOSSIBLE if mine else _length(_RESPONSES, held, start)
+        first, first_role, second, second_role = request, Role.REQUEST, response, Role.RESPONSE
+        if not mine and have > 1 and self._asked == (unit, held[start + 1]):
+            first, first_role, second, second_role = response, Role.RESPONSE, request, Role.REQUEST
+        if first > have:
+            # A short response can be the beginning of a longer request by chance; the next bytes or the gap tell.
+            if waiting and first <= 8:
+                return 0, Role.UNKNOWN
+        elif first > 0 and crc16(held[start : start + first]) == 0:
+            # The CRC stays right when zeros follow: the shorter of two that both match is the frame.
+            if 0 < second < first and crc16(held[start : start + second]) == 0:
+                return second, second_role
+            return first, first_role
+        if 0 < second <= have and crc16(held[start : start + second]) == 0:
+            return second, second_role
+        return (0 if max(first, second) > have else _IMPOSSIBLE), Role.UNKNOWN

@@ -1,0 +1,207 @@
+"""Devices behind a Modbus line: the frames addressed to them are executed and answered.
+
+A port serves one line or one connection. `exchange` is the short way for a shell that has bytes and wants to send what is
+to be answered now; `receive` and `to_send` are the same as a `steptwin.machine.WirePort`.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from typing import Protocol, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos, WirePort
+from steptwin.wire import mbap, rtu
+from steptwin.wire.crc import crc16, with_crc
+from steptwin.wire.pdu import GATEWAY_TARGET_FAILED, REFUSED, WRITE_MULTIPLE_REGISTERS, WRITES, exception_pdu
+
+_PLAIN = bytes(3)
+"""Protocol 0 and a length below 256, in an MBAP header from its third byte."""
+
+
+class Device(Protocol):
+    """What a unit does with a request."""
+
+    def execute(self, pdu: bytes, now: Nanos) -> bytes:
+        """Advance to ``now``, then the response PDU to a request PDU of 1 to 253 bytes: a refusal is an exception PDU."""
+        ...
+
+
+class Direction(enum.Enum):
+    IN = "in"
+    OUT = "out"
+
+
+FrameObserver: TypeAlias = Callable[[Nanos, Direction, bytes], None]
+"""Told of every whole frame as it is on the wire, foreign ones and broadcasts too."""
+
+
+class SlavePort(WirePort, Protocol):
+    """A port with devices behind it. A shell calls `to_send` whenever `deadline` has come."""
+
+    on_frame: FrameObserver | None
+
+    @property
+    def broken(self) -> str | None:
+        """Why the connection has to be closed, or None."""
+        ...
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        """Receive ``data`` and return what is to be sent at ``now``, response after response."""
+        ...
+
+
+def check_units(devices: Mapping[int, Device]) -> None:
+    """`Misuse` unless there are devices and their units are 1 to 247."""
+    if not devices:
+        raise Misuse("a slave port needs at least one unit")
+    for unit in devices:
+        if not 1 <= unit <= rtu.MAX_UNIT:
+            raise Misuse(f"unit {unit} is outside 1 to {rtu.MAX_UNIT}")
+
+
+def execute_frame(devices: Mapping[int, Device], frame: rtu.RtuFrame, now: Nanos) -> bytes:
+    """Give an RTU frame to whom it is addressed; the response frame, empty where the line stays silent.
+
+    Foreign units and function codes no request can have are passed over (MIC-1). A broadcast write is executed by every
+    device and never answered, a broadcast read ignored (MIC-2).
+    """
+    raw = frame.raw
+    unit, function = raw[0], raw[1]
+    if not 0 < function < REFUSED:
+        return b""
+    if unit == rtu.BROADCAST:
+        if function in WRITES:
+            for device in devices.values():
+                device.execute(raw[1:-2], now)
+        return b""
+    device = devices.get(unit)
+    if device is None:
+        return b""
+    return with_crc(raw[:1] + device.execute(raw[1:-2], now))
+
+
+class RtuSlavePort:
+    """One RTU line, by default without the time a wire takes (`steptwin.wire.timed` has it).
+
+    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15).
+    """
+
+    broken = None
+    """A line cannot be broken by what is on it; a connection can."""
+
+    __slots__ = ("_devices", "_framer", "_held", "_out", "on_frame")
+
+    def __init__(
+        self, devices: Mapping[int, Device], *, gap_ns: Nanos = rtu.BURSTY_GAP_NS, on_frame: FrameObserver | None = None
+    ) -> None:
+        check_units(devices)
+        self._devices = dict(devices)
+        self._framer = rtu.RtuFramer(self._devices, gap_ns)
+        self._held = self._framer.held
+        self._out: list[tuple[Nanos, bytes]] = []
+        self.on_frame = on_frame
+
+    @property
+    def rubbish(self) -> int:
+        """Bytes received so far that belonged to no frame."""
+        return self._framer.rubbish
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        # Nearly always one whole request comes alone; this is that case without a framer.
+        size = len(data)
+        if size >= 8 and not self._held:
+            device = self._devices.get(data[0])
+            if device is not None:
+                function = data[1]
+                wanted = 8 if function <= 6 else 9 + data[6] if function == WRITE_MULTIPLE_REGISTERS else 0
+                if size == wanted and function > 0 and size <= rtu.MAX_FRAME and crc16(data) == 0:
+                    response = data[:1] + device.execute(data[1:-2], now)
+                    response += crc16(response).to_bytes(2, "little")
+                    if self.on_frame is not None:
+                        self.on_frame(now, Direction.IN, data)
+                        self.on_frame(now, Direction.OUT, response)
+                    return response
+        return self._execute(self._framer.feed(data, now), now)
+
+    def _execute(self, frames: list[rtu.RtuFrame], now: Nanos) -> bytes:
+        responses = []
+        for frame in frames:
+            response = execute_frame(self._devices, frame, now)
+            if self.on_frame is not None:
+                self.on_frame(now, Direction.IN, frame.raw)
+                if response:
+                    self.on_frame(now, Direction.OUT, response)
+            responses.append(response)
+        return b"".join(responses)
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        response = self.exchange(data, now)
+        if response:
+            self._out.append((now, response))
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        if self._held:
+            response = self._execute(self._framer.expire(now), now)
+            if response:
+                self._out.append((now, response))
+        out, self._out = self._out, []
+        return out
+
+    def deadline(self) -> Nanos | None:
+        return self._framer.deadline()
+
+
+class TcpSlavePort:
+    """One Modbus TCP connection. ``devices`` is read once.
+
+    MIC-23: a single device is addressed by 0 and 255 too. Any other unit is answered with exception 0B, as gateways do: a
+    client that waits for a response is told at once that nobody is there. When `broken` says why, the shell sends what it
+    has and closes the connection.
+    """
+
+    __slots__ = ("_devices", "_framer", "_out", "on_frame")
+
+    def __init__(self, devices: Mapping[int, Device], *, on_frame: FrameObserver | None = None) -> None:
+        check_units(devices)
+        self._devices = dict(devices)
+        if len(devices) == 1:
+            (device,) = devices.values()
+            self._devices[0] = self._devices[255] = device
+        self._framer = mbap.TcpFramer()
+        self._out: list[tuple[Nanos, bytes]] = []
+        self.on_frame = on_frame
+
+    @property
+    def broken(self) -> str | None:
+        """Why the connection has to be closed, or None."""
+        return self._framer.broken
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        # Nearly always one whole request comes alone; this is that case without a framer.
+        framer = self._framer
+        if not framer.held and 8 <= len(data) == data[5] + 6 <= mbap.MAX_FRAME and data[2:5] == _PLAIN and framer.broken is None:
+            return self._answer(data, now)
+        return b"".join([self._answer(frame.raw, now) for frame in framer.feed(data)])
+
+    def _answer(self, raw: bytes, now: Nanos) -> bytes:
+        device = self._devices.get(raw[6])
+        pdu = exception_pdu(raw[7], GATEWAY_TARGET_FAILED) if device is None else device.execute(raw[7:], now)
+        response = raw[:4] + (len(pdu) + 1).to_bytes(2, "big") + raw[6:7] + pdu
+        if self.on_frame is not None:
+            self.on_frame(now, Direction.IN, raw)
+            self.on_frame(now, Direction.OUT, response)
+        return response
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        response = self.exchange(data, now)
+        if response:
+            self._out.append((now, response))
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        out, self._out = self._out, []
+        return out
+
+    def deadline(self) -> Nanos | None:
+        return None

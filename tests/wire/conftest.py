@@ -1,0 +1,115 @@
+"""A device to put behind a port, and the frames of the manuals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import pytest
+
+from steptwin.wire import pdu as modbus
+
+
+class RegisterBank:
+    """A device with plain memory: 3000 coils and registers of its own, function 02 reads the coils inverted."""
+
+    def __init__(self) -> None:
+        self.coils = [False] * 3000
+        self.registers = list(range(3000))
+        self.executed: list[tuple[int, bytes]] = []
+
+    def execute(self, pdu: bytes, now: int) -> bytes:
+        self.executed.append((now, pdu))
+        try:
+            return modbus.encode_response(self._respond(modbus.decode_request(pdu)))
+        except modbus.ModbusException as refusal:
+            return refusal.pdu
+
+    def _respond(self, request: modbus.Request) -> modbus.Response:
+        match request:
+            case modbus.Read(function, address, count):
+                self._check(function, address, count)
+                if function == modbus.READ_HOLDING_REGISTERS:
+                    return modbus.Registers(tuple(self.registers[address : address + count]))
+                inverted = function == modbus.READ_DISCRETE_INPUTS
+                return modbus.Bits(function, modbus.pack_bits(on != inverted for on in self.coils[address : address + count]))
+            case modbus.WriteCoil(address, on):
+                self._check(5, address, 1)
+                self.coils[address] = on
+                return request
+            case modbus.WriteRegister(address, value):
+                self._check(6, address, 1)
+                self.registers[address] = value
+                return request
+            case modbus.WriteRegisters(address, values):
+                self._check(16, address, len(values))
+                self.registers[address : address + len(values)] = values
+                return modbus.Written(address, len(values))
+
+    def _check(self, function: int, address: int, count: int) -> None:
+        if address + count > 3000:
+            raise modbus.ModbusException(function, modbus.ILLEGAL_DATA_ADDRESS)
+
+
+@pytest.fixture(scope="session")
+def new_bank() -> Callable[[], RegisterBank]:
+    return RegisterBank
+
+
+class Example(NamedTuple):
+    """One exchange as bytes and as values."""
+
+    request_pdu: str
+    request: modbus.Request
+    response_pdu: str
+    response: modbus.Response
+
+
+# Printed in the Modbus application protocol V1.1b3, sections 6.1 to 6.12 (addresses there count from 1 in the text).
+EXAMPLES = [
+    Example(
+        "01 00 13 00 13", modbus.Read(1, 0x13, 19),
+        "01 03 CD 6B 05", modbus.Bits(1, bytes.fromhex("CD6B05")),
+    ),
+    Example(
+        "02 00 C4 00 16", modbus.Read(2, 0xC4, 22),
+        "02 03 AC DB 35", modbus.Bits(2, bytes.fromhex("ACDB35")),
+    ),
+    Example(
+        "03 00 6B 00 03", modbus.Read(3, 0x6B, 3),
+        "03 06 02 2B 00 00 00 64", modbus.Registers((0x022B, 0, 0x64)),
+    ),
+    Example(
+        "05 00 AC FF 00", modbus.WriteCoil(0xAC, True),
+        "05 00 AC FF 00", modbus.WriteCoil(0xAC, True),
+    ),
+    Example(
+        "06 00 01 00 03", modbus.WriteRegister(1, 3),
+        "06 00 01 00 03", modbus.WriteRegister(1, 3),
+    ),
+    Example(
+        "10 00 01 00 02 04 00 0A 01 02", modbus.WriteRegisters(1, (10, 0x102)),
+        "10 00 01 00 02", modbus.Written(1, 2),
+    ),
+]  # fmt: skip
+
+
+@pytest.fixture(params=EXAMPLES, ids=lambda example: f"function {example.request_pdu[:2]}")
+def example(request: pytest.FixtureRequest) -> Example:
+    return request.param
+
+
+# Printed in the MIC488 manuals, with the misprinted CRC of the last one corrected (8E B4 instead of 04 7F).
+GOLDEN = {
+    "01 02 13 88 00 08 FD 62": modbus.Read(2, 5000, 8),
+    "01 05 17 71 00 00 98 65": modbus.WriteCoil(6001, False),
+    "01 03 03 FC 00 02 04 7F": modbus.Read(3, 1020, 2),
+    "01 03 27 24 00 02 8E B4": modbus.Read(3, 10020, 2),
+}
+
+
+@pytest.fixture(params=GOLDEN.items(), ids=lambda item: item[0])
+def golden(request: pytest.FixtureRequest) -> tuple[bytes, modbus.Request]:
+    """A whole RTU request frame of a manual and what it says."""
+    text, decoded = request.param
+    return bytes.fromhex(text), decoded

@@ -1,0 +1,380 @@
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymodbus.framer import FramerRTU
+from pymodbus.pdu import DecodePDU
+
+from steptwin.errors import Misuse
+from steptwin.wire import rtu
+from steptwin.wire.crc import crc16, with_crc
+from steptwin.wire.pdu import Read, Request, WriteRegister, WriteRegisters, decode_request, encode_request
+from steptwin.wire.rtu import BURSTY_GAP_NS, LATE_NS, Role, RtuFrame, RtuFramer, encode_frame, request_length, response_length
+
+GAP = BURSTY_GAP_NS
+
+
+def hexed(text: str) -> bytes:
+    """The frame of a body without CRC."""
+    return with_crc(bytes.fromhex(text))
+
+
+def cut(framer: RtuFramer, data: bytes, now: int = 0) -> list[tuple[str, Role]]:
+    return [(frame.raw[:-2].hex(" "), frame.role) for frame in framer.feed(data, now)]
+
+
+# A line with three slaves as it sounds: requests to others, their responses, refusals, a broadcast, and requests to unit 1.
+CONVERSATION = [
+    (hexed("02 03 27 24 00 04"), Role.REQUEST),
+    (hexed("02 03 08 00 01 00 02 00 03 00 04"), Role.RESPONSE),
+    (hexed("01 03 27 24 00 02"), Role.REQUEST),
+    (hexed("03 06 00 10 00 07"), Role.REQUEST),
+    (hexed("03 06 00 10 00 07"), Role.RESPONSE),
+    (hexed("00 05 17 71 FF 00"), Role.REQUEST),
+    (hexed("02 01 00 00 00 05"), Role.REQUEST),
+    (hexed("02 01 01 15"), Role.RESPONSE),
+    (hexed("02 01 00 00 00 18"), Role.REQUEST),
+    (hexed("02 01 03 15 AA 55"), Role.RESPONSE),
+    (hexed("01 10 27 38 00 02 04 41 20 00 00"), Role.REQUEST),
+    (hexed("03 10 00 10 00 02 04 00 01 00 02"), Role.REQUEST),
+    (hexed("03 10 00 10 00 02"), Role.RESPONSE),
+    (hexed("03 03 FF F0 00 01"), Role.REQUEST),
+    (hexed("03 83 02"), Role.RESPONSE),
+    (hexed("02 03 00 00 00 01"), Role.REQUEST),
+    (hexed("02 03 02 00 00"), Role.RESPONSE),
+    (hexed("00 06 00 01 00 02"), Role.REQUEST),
+    (hexed("03 11"), Role.REQUEST),
+    (hexed("03 11 05 41 42 43 44 FF"), Role.RESPONSE),
+    (hexed("02 18 00 10"), Role.REQUEST),
+    (hexed("02 18 00 06 00 02 01 B8 12 84"), Role.RESPONSE),
+    (hexed("03 17 00 03 00 06 00 0E 00 03 06 00 FF 00 FF 00 FF"), Role.REQUEST),
+    (hexed("03 17 0C 00 FE 0A CD 00 01 00 03 00 0D 00 FF"), Role.RESPONSE),
+    (hexed("01 01 17 70 00 08"), Role.REQUEST),
+]
+STREAM = b"".join(frame for frame, _ in CONVERSATION)
+
+
+def test_golden_frames_are_whole_requests(golden: tuple[bytes, Request]) -> None:
+    raw, request = golden
+    (frame,) = RtuFramer(own={1}).feed(raw, 0)
+    assert frame == RtuFrame(raw, Role.REQUEST, 8)
+    assert frame.unit == 1
+    assert decode_request(frame.pdu) == request
+    assert encode_frame(1, frame.pdu) == raw
+
+
+def test_frames_are_those_of_pymodbus(golden: tuple[bytes, Request]) -> None:
+    raw, _ = golden
+    used, unit, _, pdu = FramerRTU(DecodePDU(True)).decode(raw)
+    assert (used, unit, pdu) == (8, 1, raw[1:-2])
+    assert FramerRTU(DecodePDU(True)).encode(pdu, 1, 0) == encode_frame(1, pdu)
+
+
+@pytest.mark.parametrize("own", [{1}, set()], ids=["slave", "listener"])
+@pytest.mark.parametrize("size", [1, 2, 3, 5, 7, 8, 9, 64, 1000])
+def test_a_conversation_in_pieces_of_any_size(own: set[int], size: int) -> None:
+    framer = RtuFramer(own)
+    frames = [frame for at in range(0, len(STREAM), size) for frame in framer.feed(STREAM[at : at + size], at)]
+    assert [(frame.raw, frame.role) for frame in frames] == CONVERSATION
+    assert framer.deadline() is None
+    assert framer.rubbish == 0
+    assert frames[-1].end == len(STREAM)
+
+
+@given(st.lists(st.integers(0, len(STREAM)), max_size=60))
+def test_splits_do_not_matter(places: list[int]) -> None:
+    framer = RtuFramer({1})
+    edges = [0, *sorted(places), len(STREAM)]
+    frames = [frame for a, b in pairwise(edges) for frame in framer.feed(STREAM[a:b], 0)]
+    assert frames == RtuFramer({1}).feed(STREAM, 0)
+    assert len(frames) == len(CONVERSATION)
+
+
+words = st.integers(0, 0xFFFF)
+requests = st.one_of(
+    st.builds(Read, st.just(3), st.integers(0, 0xFF00), st.integers(1, 125)),
+    st.builds(WriteRegister, words, words),
+    st.builds(WriteRegisters, st.integers(0, 0xFF00), st.lists(words, min_size=1, max_size=123).map(tuple)),
+)
+
+
+@given(st.lists(st.tuples(st.sampled_from([0, 1, 5]), requests), max_size=12), st.randoms(use_true_random=False))
+def test_any_requests_in_any_pieces(sent: list[tuple[int, Request]], random: Any) -> None:
+    frames = [encode_frame(unit, encode_request(request)) for unit, request in sent]
+    stream, framer, found = b"".join(frames), RtuFramer({1, 5}), []
+    while stream:
+        size = random.randint(1, 20)
+        found += framer.feed(stream[:size], 0)
+        stream = stream[size:]
+    assert [frame.raw for frame in found] == frames
+    assert {frame.role for frame in found} <= {Role.REQUEST}
+
+
+@pytest.mark.parametrize(
+    "rubbish", ["FF", "00", "01", "01 03", "FF FF FF", "01 03 01", "C8 41 41", "F9 F9 03 10", "01 83 02 00 00"]
+)
+def test_a_frame_right_behind_rubbish_is_found_at_once(rubbish: str) -> None:
+    framer = RtuFramer({1})
+    good = hexed("01 03 27 24 00 02")
+    assert cut(framer, bytes.fromhex(rubbish) + good) == [("01 03 27 24 00 02", Role.REQUEST)]
+    assert framer.rubbish == len(bytes.fromhex(rubbish))
+    assert framer.deadline() is None
+
+
+def test_a_wrong_crc_costs_the_frame_and_not_the_next() -> None:
+    framer = RtuFramer({1})
+    good = hexed("01 03 27 24 00 02")
+    assert framer.feed(good[:-1] + b"\0" + good, 0) == [RtuFrame(good, Role.REQUEST, 16)]
+    assert framer.rubbish == 8
+
+
+def test_what_may_be_the_response_of_another_unit_delays_the_next_frame_by_a_gap_at_most() -> None:
+    """The end of this frame, 02 04 7F, announces 132 bytes of unit 2; what is inside those would be data."""
+    wrong, good = bytes.fromhex("01 03 27 24 00 02 04 7F"), hexed("01 03 27 24 00 02")
+    framer = RtuFramer({1})
+    assert framer.feed(wrong + good, 0) == []
+    assert framer.expire(GAP) == [RtuFrame(good, Role.REQUEST, 16)]
+    framer = RtuFramer({1})
+    framer.feed(wrong, 0)
+    assert framer.feed(good, GAP) == [RtuFrame(good, Role.REQUEST, 16)]
+
+
+def test_mic_15_a_pause_does_not_cut_a_frame() -> None:
+    framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
+    good = hexed("01 10 27 38 00 02 04 41 20 00 00")
+    assert framer.feed(good[:5], 0) == []
+    assert framer.expire(750_000) == []  # the gap of a UART passes, the adapter has not delivered yet
+    assert framer.feed(good[5:9], 16_000_000) == []
+    assert framer.expire(16_750_000) == []
+    assert [frame.raw for frame in framer.feed(good[9:], 32_000_000)] == [good]
+
+
+@pytest.mark.parametrize("body", ["01 03 27 24 00 02", "01 10 27 38 00 02 04 00 00 00 00", "01 05 17 71 00 00", "01 07"])
+def test_mic_15_a_pause_anywhere_does_not_cut_a_frame(body: str) -> None:
+    good = hexed(body)
+    for place in range(1, len(good)):
+        framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
+        framer.feed(good[:place], 0)
+        assert [frame.raw for frame in framer.feed(good[place:], LATE_NS)] == [good]
+    for size in (1, 2, 3):
+        framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
+        frames = [frame.raw for at in range(0, len(good), size) for frame in framer.feed(good[at : at + size], at * 1_000_000)]
+        assert frames == [good]
+
+
+def test_mic_15_a_beginning_given_up_does_not_delay_the_next_frame() -> None:
+    framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
+    good = hexed("01 03 27 24 00 02")
+    framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41"), 0)  # announces 255 bytes
+    assert [frame.raw for frame in framer.feed(good, 1_000_000)] == [good]
+    assert framer.rubbish == 8
+    assert framer.deadline() is None
+
+
+def test_mic_15_a_beginning_is_not_kept_for_ever() -> None:
+    framer = RtuFramer({1})
+    good = hexed("01 03 27 24 00 02")
+    framer.feed(good[:5], 0)
+    assert framer.feed(good[5:], LATE_NS + 1) == []
+    assert framer.rubbish == 5
+
+
+def test_mic_15_frames_swallowed_by_rubbish_come_when_the_gap_has_passed() -> None:
+    framer = RtuFramer({1})
+    good = hexed("01 03 27 24 00 02")
+    # What looks like a request of 255 bytes keeps the framer waiting.
+    assert framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41") + good + good, 5) == []
+    assert framer.deadline() == 5 + GAP
+    assert framer.expire(5 + GAP - 1) == []
+    frames = framer.expire(5 + GAP)
+    assert [(frame.raw, frame.end) for frame in frames] == [(good, 16), (good, 24)]
+    assert framer.deadline() is None
+
+
+def test_mic_15_a_late_shell_finds_the_same() -> None:
+    framer = RtuFramer({1})
+    good = hexed("01 03 27 24 00 02")
+    framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41") + good, 0)
+    assert [frame.end for frame in framer.feed(good, 10 * GAP)] == [16, 24]
+
+
+@pytest.mark.parametrize(
+    "body",
+    ["01 41 01 02 03", "01 64", "01 2B 0D 00 01 02 03 04", "01 08 00 00 01 02 03 04", "01 03 00 00 00 01 00", "09 41 01"],
+)
+def test_a_rest_with_a_right_crc_is_a_frame_of_unknown_length(body: str) -> None:
+    framer = RtuFramer({1})
+    raw = hexed(body)
+    before = hexed("02 03 27 24 00 04")
+    assert [frame.raw for frame in framer.feed(before + raw, 0)] == [before]
+    assert framer.expire(GAP) == [RtuFrame(raw, Role.UNKNOWN, len(before + raw))]
+    assert framer.rubbish == 0
+
+
+def test_an_unknown_frame_after_a_beginning_given_up() -> None:
+    framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
+    framer.feed(bytes.fromhex("01 10 27 38 00 7B F6 41"), 0)
+    framer.expire(750_000)
+    raw = hexed("01 41 01 02 03")
+    assert framer.feed(raw, 2_000_000) == []
+    assert [frame.raw for frame in framer.expire(2_750_000)] == [raw]
+
+
+@pytest.mark.parametrize(
+    ("body", "length"),
+    [
+        ("01 01 00 00 00 01", 8), ("01 04 00 00 00 01", 8), ("01 07", 4), ("01 08 00 00 A5 37", 8), ("01 0B", 4), ("01 0C", 4),
+        ("01 0F 00 13 00 0A 02 CD 01", 11), ("01 10 00 01 00 02 04 00 0A 01 02", 13), ("01 11", 4),
+        ("01 14 0E 06 00 04 00 01 00 02 06 00 03 00 09 00 02", 19), ("01 15 0D 06 00 04 00 07 00 03 06 AF 04 BE 10 0D", 18),
+        ("01 16 00 04 00 F2 00 25", 10), ("01 17 00 03 00 06 00 0E 00 03 06 00 FF 00 FF 00 FF", 19), ("01 18 04 DE", 6),
+        ("01 2B 0E 01 00", 7),
+    ],
+)  # fmt: skip
+def test_lengths_of_the_requests_of_the_specification(body: str, length: int) -> None:
+    raw = hexed(body)
+    assert request_length(raw) == length == len(raw)
+    assert RtuFramer({1}).feed(raw, 0) == [RtuFrame(raw, Role.REQUEST, length)]
+
+
+@pytest.mark.parametrize(
+    ("body", "length"),
+    [
+        ("01 01 03 CD 6B 05", 8), ("01 03 06 02 2B 00 00 00 64", 11), ("01 04 02 00 0A", 7), ("01 05 00 AC FF 00", 8),
+        ("01 07 6D", 5), ("01 08 00 00 A5 37", 8), ("01 0B FF FF 01 08", 8), ("01 0C 08 00 00 01 08 01 21 20 00", 13),
+        ("01 0F 00 13 00 0A", 8), ("01 10 00 01 00 02", 8), ("01 14 0C 05 06 0D FE 00 20 05 06 33 CD 00 40", 17),
+        ("01 16 00 04 00 F2 00 25", 10), ("01 17 0C 00 FE 0A CD 00 01 00 03 00 0D 00 FF", 17),
+        ("01 18 00 06 00 02 01 B8 12 84", 12), ("01 81 02", 5), ("01 C1 01", 5),
+    ],
+)  # fmt: skip
+def test_lengths_of_the_responses_of_the_specification(body: str, length: int) -> None:
+    raw = hexed(body)
+    assert response_length(raw) == length == len(raw)
+
+
+def test_lengths_not_known_yet_and_impossible_ones() -> None:
+    assert request_length(b"\x01") > rtu.MAX_FRAME
+    assert request_length(bytes.fromhex("01 10 00 00 00 01")) > rtu.MAX_FRAME
+    assert request_length(bytes.fromhex("01 41")) == -1
+    assert request_length(bytes.fromhex("01 10 00 00 00 7C F8")) == -1  # 257 bytes
+    assert response_length(bytes.fromhex("01 03 FC")) == -1
+    assert response_length(bytes.fromhex("FF 01 03 02"), 1) == 7
+
+
+def test_zeros_behind_a_response_belong_to_the_next_frame() -> None:
+    """The CRC of a frame stays right when zeros follow: eight bytes here look like a request."""
+    framer = RtuFramer({1})
+    response, broadcast = hexed("02 03 02 12 34"), hexed("00 06 00 01 00 02")
+    assert crc16(response + broadcast[:1]) == 0
+    assert [frame.raw for frame in framer.feed(response + broadcast, 0)] == [response, broadcast]
+
+
+LOOKALIKES = [
+    with_crc(head + count)
+    for unit in range(1, 248)
+    for address in range(0x100, 0x200)
+    for head in [bytes((unit, 1, address >> 8, address & 0xFF))]
+    for count in [crc16(head).to_bytes(2, "little")]
+    if 1 <= int.from_bytes(count, "big") <= 2000
+]
+"""Reads of bits whose first six bytes are an intact response with one byte of bits; what follows are zeros."""
+
+
+def test_a_request_to_this_side_is_not_taken_for_a_shorter_response() -> None:
+    assert len(LOOKALIKES) > 100
+    for raw in LOOKALIKES:
+        assert decode_request(raw[1:-2])
+        framer = RtuFramer({raw[0]})
+        frames = [frame for byte in raw for frame in framer.feed(bytes((byte,)), 0)]
+        assert frames == RtuFramer({raw[0]}).feed(raw, 0) == [RtuFrame(raw, Role.REQUEST, 8)]
+
+
+def test_a_request_inside_the_response_of_another_unit_is_data() -> None:
+    inner = hexed("01 06 00 01 00 02")
+    outer = with_crc(bytes((2, 3, 10)) + inner + b"\0\0")
+    for size in (1, 3, 100):
+        framer = RtuFramer({1})
+        stream = hexed("02 03 00 00 00 05") + outer
+        frames = [frame for at in range(0, len(stream), size) for frame in framer.feed(stream[at : at + size], 0)]
+        assert [(frame.raw, frame.role) for frame in frames[1:]] == [(outer, Role.RESPONSE)]
+
+
+def test_a_response_without_its_request_waits_for_what_tells_it_from_one() -> None:
+    framer = RtuFramer({1})
+    response = hexed("02 01 01 15")
+    assert framer.feed(response, 0) == []
+    assert framer.expire(GAP) == [RtuFrame(response, Role.RESPONSE, 6)]
+
+
+@pytest.mark.parametrize("unit", [248, 255])
+def test_reserved_units_are_rubbish(unit: int) -> None:
+    framer = RtuFramer({1})
+    assert framer.feed(with_crc(bytes((unit, 3, 0, 0, 0, 1))), 0) == []
+    good = hexed("01 03 27 24 00 02")
+    assert [frame.raw for frame in framer.feed(good, 1)] == [good]
+
+
+@given(st.lists(st.tuples(st.binary(max_size=300), st.integers(0, 2 * LATE_NS)), max_size=12))
+def test_whatever_comes_frames_are_intact_and_memory_is_bounded(pieces: list[tuple[bytes, int]]) -> None:
+    framer, now, framed, fed = RtuFramer({1}), 0, 0, 0
+    for data, pause in pieces:
+        now += pause
+        fed += len(data)
+        for frame in framer.feed(data, now):
+            assert crc16(frame.raw) == 0
+            assert rtu.MIN_FRAME <= len(frame.raw) <= rtu.MAX_FRAME
+            framed += len(frame.raw)
+        assert len(framer.held) <= rtu.MAX_FRAME
+        assert framer.rubbish == fed - framed - len(framer.held) >= 0
+    deadline = framer.deadline()
+    if deadline is not None:
+        framer.expire(deadline)
+        assert framer.deadline() is None
+
+
+# What keeps the framer busiest: starts of frames everywhere, announcements of long ones.
+@pytest.mark.parametrize(
+    "pattern", ["01", "01 03", "01 10", "02 17", "01 10 00 00 00 7B F6", "00 10 10 10 10 10 F6", "41 41", "00", "FF"]
+)
+def test_a_flood_of_rubbish_costs_a_bounded_number_of_looks_per_byte(pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    looks = 0
+    look = RtuFramer._look
+
+    def counted(self: RtuFramer, start: int, *, waiting: bool) -> tuple[int, Role]:
+        nonlocal looks
+        looks += 1
+        return look(self, start, waiting=waiting)
+
+    monkeypatch.setattr(RtuFramer, "_look", counted)
+    unit = bytes.fromhex(pattern)
+    data = (unit * (20_000 // len(unit) + 1))[:20_000]
+    for size in (20_000, 1000, 7):
+        looks = 0
+        framer = RtuFramer({1})
+        for at in range(0, len(data), size):
+            framer.feed(data[at : at + size], 0)
+        assert looks <= len(data) + 2 * (len(data) // size)
+        assert len(framer.held) <= rtu.MAX_FRAME
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "message"),
+    [
+        (248, 5, "unit 248 is outside 0 to 247"),
+        (-1, 5, "unit -1 is outside 0 to 247"),
+        (1, 0, "a PDU of 0 bytes is outside 1 to 253"),
+        (1, 254, "a PDU of 254 bytes is outside 1 to 253"),
+    ],
+)
+def test_frames_that_cannot_be(unit: int, size: int, message: str) -> None:
+    with pytest.raises(Misuse) as misuse:
+        encode_frame(unit, bytes(size))
+    assert str(misuse.value) == message
+
+
+def test_a_gap_takes_time() -> None:
+    with pytest.raises(Misuse, match="a gap of 0 ns is not positive"):
+        RtuFramer(gap_ns=0)

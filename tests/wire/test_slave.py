@@ -1,0 +1,377 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.wire import mbap, rtu
+from steptwin.wire.crc import is_intact, with_crc
+from steptwin.wire.line import SerialLine
+from steptwin.wire.pdu import (
+    ModbusException,
+    Read,
+    Request,
+    Response,
+    WriteCoil,
+    WriteRegister,
+    WriteRegisters,
+    answer,
+    encode_request,
+)
+from steptwin.wire.slave import Device, Direction, RtuSlavePort, SlavePort, TcpSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+
+NewBank = Callable[[], Any]
+GAP = rtu.BURSTY_GAP_NS
+
+
+def hexed(text: str) -> bytes:
+    return with_crc(bytes.fromhex(text))
+
+
+def over_rtu(port: RtuSlavePort, unit: int, request: Request, now: int = 0) -> Response:
+    """What a master on the other end makes of it."""
+    data = port.exchange(rtu.encode_frame(unit, encode_request(request)), now)
+    assert rtu.response_length(data) == len(data)
+    assert is_intact(data)
+    assert data[0] == unit
+    return answer(request, data[1:-2])
+
+
+def over_tcp(port: TcpSlavePort, unit: int, request: Request, transaction: int = 7) -> Response:
+    (frame,) = mbap.TcpFramer().feed(port.exchange(mbap.encode_frame(transaction, unit, encode_request(request)), 0))
+    assert (frame.transaction, frame.unit) == (transaction, unit)
+    return answer(request, frame.pdu)
+
+
+@pytest.fixture
+def bank(new_bank: NewBank) -> Any:
+    return new_bank()
+
+
+def test_golden_request_gets_a_golden_response(bank: Any) -> None:
+    port = RtuSlavePort({1: bank})
+    bank.registers[1020:1022] = [0x0000, 0x4120]  # 10.0, low word first
+    assert port.exchange(bytes.fromhex("01 03 03 FC 00 02 04 7F"), 5) == bytes.fromhex("01 03 04 00 00 41 20 CB BB")
+    assert bank.executed == [(5, bytes.fromhex("03 03 FC 00 02"))]
+
+
+@pytest.mark.parametrize("text", ["01 02 13 88 00 08 FD 62", "01 05 17 71 00 00 98 65", "01 03 27 24 00 02 8E B4"])
+def test_golden_requests_beyond_the_memory_of_the_bank_are_refused(bank: Any, text: str) -> None:
+    frame = bytes.fromhex(text)
+    assert RtuSlavePort({1: bank}).exchange(frame, 0) == with_crc(bytes((1, frame[1] | 0x80, 2)))
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        Read(1, 3, 10),
+        Read(2, 0, 2000),
+        Read(3, 0, 125),
+        WriteCoil(7, True),
+        WriteRegister(9, 0xABCD),
+        WriteRegisters(100, tuple(range(123))),
+    ],
+    ids=str,
+)
+def test_two_ends_joined(new_bank: NewBank, request_: Request) -> None:
+    """Both framings and both ways through a port give what the device answers."""
+    pdu = encode_request(request_)
+    expected = answer(request_, new_bank().execute(pdu, 0))
+    assert over_rtu(RtuSlavePort({1: new_bank()}), 1, request_) == expected
+    assert over_tcp(TcpSlavePort({1: new_bank()}), 1, request_) == expected
+    dribbled = RtuSlavePort({1: new_bank()})
+    replies = [dribbled.exchange(bytes((byte,)), 0) for byte in rtu.encode_frame(1, pdu)]
+    assert not any(replies[:-1])
+    assert answer(request_, replies[-1][1:-2]) == expected
+
+
+def test_a_refusal_of_the_device_reaches_the_master(bank: Any) -> None:
+    with pytest.raises(ModbusException) as refusal:
+        over_rtu(RtuSlavePort({1: bank}), 1, Read(3, 2999, 2))
+    assert refusal.value.code == 2
+
+
+def test_mic_1_other_functions_are_refused_at_once_where_their_length_is_known(bank: Any) -> None:
+    port = RtuSlavePort({1: bank})
+    assert port.exchange(hexed("01 04 00 00 00 01"), 0) == hexed("01 84 01")
+    assert port.exchange(hexed("01 07"), 0) == hexed("01 87 01")
+    assert port.exchange(hexed("01 0F 00 13 00 0A 02 CD 01"), 0) == hexed("01 8F 01")
+    assert port.exchange(hexed("01 17 00 03 00 01 00 0E 00 01 02 00 FF"), 0) == hexed("01 97 01")
+    assert port.exchange(hexed("01 2B 0E 01 00"), 0) == hexed("01 AB 01")
+
+
+def test_mic_1_and_after_the_gap_where_it_is_not(bank: Any) -> None:
+    port = RtuSlavePort({1: bank})
+    assert port.exchange(hexed("01 41 01 02"), 100) == b""
+    assert port.deadline() == 100 + GAP
+    assert port.to_send(100 + GAP - 1) == []
+    assert port.to_send(100 + GAP) == [(100 + GAP, hexed("01 C1 01"))]
+    assert port.deadline() is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        bytes.fromhex("01 03 27 24 00 02 04 7F"),
+        hexed("02 03 00 00 00 01"),
+        hexed("01 03 00 00 00 01")[:-1],
+        hexed("01 03 00 00 00 01")[:4],
+        hexed("01"),
+        b"\x01\x03",
+        hexed("01 83 02"),
+        hexed("01 C1 01 02 03"),
+        hexed("01 00 01 02 03 04"),
+        b"",
+    ],
+    ids=["wrong CRC", "foreign", "cut by one", "cut by four", "no function", "two bytes", "refusal", "refusal of unknown length",
+         "function 0", "nothing"],
+)  # fmt: skip
+def test_mic_1_silence(bank: Any, data: bytes) -> None:
+    port = RtuSlavePort({1: bank})
+    assert port.exchange(data, 0) == b""
+    assert port.to_send(GAP) == []
+    assert bank.executed == []
+    assert over_rtu(port, 1, Read(3, 5, 1), 2 * GAP) is not None
+
+
+def test_frames_longer_than_256_bytes_are_none(bank: Any) -> None:
+    for byte_count in (247, 248, 255):
+        port = RtuSlavePort({1: bank})
+        data = with_crc(bytes((1, 16, 0, 0, 0, 124, byte_count)) + bytes(byte_count))
+        assert port.exchange(data, 0) + b"".join(told for _, told in port.to_send(GAP)) == (
+            hexed("01 90 03") if byte_count == 247 else b""
+        )
+
+
+def test_mic_2_broadcast_writes_are_executed_everywhere_and_never_answered(new_bank: NewBank) -> None:
+    banks = {1: new_bank(), 5: new_bank()}
+    port = RtuSlavePort(banks)
+    for request in (WriteCoil(3, True), WriteRegister(4, 44), WriteRegisters(5, (55, 66))):
+        assert port.exchange(rtu.encode_frame(0, encode_request(request)), 9) == b""
+    for bank in banks.values():
+        assert bank.coils[3]
+        assert bank.registers[4:7] == [44, 55, 66]
+        assert [now for now, _ in bank.executed] == [9, 9, 9]
+
+
+@pytest.mark.parametrize(
+    "body", ["00 01 00 00 00 01", "00 02 00 00 00 01", "00 03 00 00 00 01", "00 07", "00 16 00 04 00 F2 00 25"]
+)
+def test_mic_2_other_broadcasts_are_ignored(bank: Any, body: str) -> None:
+    port = RtuSlavePort({1: bank})
+    assert port.exchange(hexed(body), 0) == b""
+    assert port.deadline() is None
+    assert bank.executed == []
+
+
+def test_several_units_on_one_line(new_bank: NewBank) -> None:
+    banks = {unit: new_bank() for unit in (1, 2, 247)}
+    port = RtuSlavePort(banks)
+    for unit in banks:
+        over_rtu(port, unit, WriteRegister(0, unit))
+    assert {unit: bank.registers[0] for unit, bank in banks.items()} == {1: 1, 2: 2, 247: 247}
+
+
+def test_other_slaves_on_the_line_do_not_disturb(bank: Any) -> None:
+    port = RtuSlavePort({1: bank})
+    mine = hexed("01 06 00 07 00 63")
+    trap = with_crc(bytes((2, 3, 10)) + hexed("01 06 00 07 00 01") + b"\0\0")  # a write to unit 1 within data of unit 2
+    line = hexed("02 03 00 00 00 05") + trap + mine + hexed("03 06 00 00 00 01") * 2 + hexed("02 90 02") + mine
+    for size in (1, 3, 8, 500):
+        bank.executed.clear()
+        assert b"".join(port.exchange(line[at : at + size], 0) for at in range(0, len(line), size)) == mine + mine
+        assert [pdu for _, pdu in bank.executed] == [mine[1:-2]] * 2
+
+
+@pytest.mark.parametrize("rubbish", ["FF FF FF", "00", "01 03", "F9 00 41 01"])
+def test_a_good_request_right_behind_rubbish_is_answered_at_once(bank: Any, rubbish: str) -> None:
+    port = RtuSlavePort({1: bank})
+    assert port.exchange(bytes.fromhex(rubbish), 0) == b""
+    assert port.exchange(hexed("01 03 00 05 00 01"), 1) == hexed("01 03 02 00 05")
+    assert port.rubbish == len(bytes.fromhex(rubbish))
+
+
+def test_a_good_request_after_the_gap_is_answered_at_once_whatever_was_before(bank: Any) -> None:
+    port = RtuSlavePort({1: bank})
+    port.exchange(bytes.fromhex("01 10 00 00 00 7B F6 00 00"), 0)
+    assert port.exchange(hexed("01 03 00 05 00 01"), GAP) == hexed("01 03 02 00 05")
+
+
+def test_glued_requests_are_answered_in_order(bank: Any) -> None:
+    port = RtuSlavePort({1: bank})
+    ask = [hexed(f"01 03 00 {n:02X} 00 01") for n in range(20)]
+    told = [hexed(f"01 03 02 00 {n:02X}") for n in range(20)]
+    assert port.exchange(b"".join(ask), 0) == b"".join(told)
+    assert port.exchange(b"".join(ask)[:-3], 0) == b"".join(told[:-1])
+    assert port.exchange(ask[-1][-3:], 0) == told[-1]
+
+
+@pytest.mark.parametrize("units", [[], [0], [248], [1, -1]])
+def test_units_of_a_line(new_bank: NewBank, units: list[int]) -> None:
+    devices: dict[int, Device] = {unit: new_bank() for unit in units}
+    for port in (RtuSlavePort, TcpSlavePort):
+        with pytest.raises(Misuse, match=r"at least one unit|is outside 1 to 247"):
+            port(devices)
+
+
+def test_a_wire_port_gives_what_exchange_gives(new_bank: NewBank) -> None:
+    ask, pdu = hexed("01 03 00 05 00 01"), bytes.fromhex("03 02 00 05")
+    ports: list[tuple[SlavePort, bytes, bytes]] = [
+        (RtuSlavePort({1: new_bank()}), ask, hexed("01 03 02 00 05")),
+        (TcpSlavePort({1: new_bank()}), mbap.encode_frame(1, 1, ask[1:-2]), mbap.encode_frame(1, 1, pdu)),
+    ]
+    for port, asked, told in ports:
+        port.receive(asked[:3], 10)
+        assert port.to_send(10) == []
+        port.receive(asked[3:], 20)
+        port.receive(asked, 30)
+        assert port.to_send(40) == [(20, told), (30, told)]
+        assert port.to_send(40) == []
+        assert port.deadline() is None
+
+
+def test_no_rubbish_breaks_a_line(bank: Any) -> None:
+    ports: list[SlavePort] = [RtuSlavePort({1: bank}), TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(38400)))]
+    for port in ports:
+        assert port.exchange(b"GET / HTTP/1.1\r\n", 0) == b""
+        assert port.broken is None
+
+
+def test_an_observer_sees_every_frame_on_the_line(bank: Any) -> None:
+    seen: list[tuple[int, Direction, bytes]] = []
+    port = RtuSlavePort({1: bank}, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
+    ask, told = hexed("01 03 00 05 00 01"), hexed("01 03 02 00 05")
+    foreign, broadcast = hexed("02 06 00 01 00 01"), hexed("00 06 00 01 00 01")
+    port.exchange(ask, 1)
+    port.exchange(foreign + broadcast + ask, 2)
+    assert seen == [
+        (1, Direction.IN, ask), (1, Direction.OUT, told),
+        (2, Direction.IN, foreign), (2, Direction.IN, broadcast), (2, Direction.IN, ask), (2, Direction.OUT, told),
+    ]  # fmt: skip
+    port.on_frame = None
+    port.exchange(ask, 3)
+    assert len(seen) == 6
+
+
+def test_an_observer_sees_tcp_frames_with_their_header(bank: Any) -> None:
+    seen: list[tuple[int, Direction, bytes]] = []
+    port = TcpSlavePort({1: bank}, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
+    ask = mbap.encode_frame(3, 1, bytes.fromhex("03 00 05 00 01"))
+    told = port.exchange(ask, 4)
+    assert seen == [(4, Direction.IN, ask), (4, Direction.OUT, told)]
+
+
+def test_tcp_requests_are_answered_in_order_with_their_transactions(bank: Any) -> None:
+    port = TcpSlavePort({1: bank})
+    ask = b"".join(mbap.encode_frame(0xFF00 + n, 1, encode_request(Read(3, n, 1))) for n in range(30))
+    told = b"".join(mbap.encode_frame(0xFF00 + n, 1, bytes((3, 2, 0, n))) for n in range(30))
+    for size in (1, 7, 12, 13, 1000):
+        assert b"".join(port.exchange(ask[at : at + size], 0) for at in range(0, len(ask), size)) == told
+
+
+@pytest.mark.parametrize("unit", [0, 255, 17])
+def test_mic_23_a_single_device_is_addressed_by_0_and_255_too(bank: Any, unit: int) -> None:
+    assert over_tcp(TcpSlavePort({17: bank}), unit, WriteRegister(0, 9)) == WriteRegister(0, 9)
+    assert bank.registers[0] == 9
+
+
+@pytest.mark.parametrize(("units", "asked"), [([1], 2), ([1, 2], 0), ([1, 2], 255), ([1, 2], 3)])
+def test_mic_23_any_other_unit_is_refused_as_a_gateway_does(new_bank: NewBank, units: list[int], asked: int) -> None:
+    banks = {unit: new_bank() for unit in units}
+    with pytest.raises(ModbusException) as refusal:
+        over_tcp(TcpSlavePort(banks), asked, WriteRegister(0, 9))
+    assert refusal.value.code == 0x0B
+    assert not any(bank.executed for bank in banks.values())
+
+
+@pytest.mark.parametrize("wrong", ["00 01 00 01 00 06 01 03 00 00 00 01", "00 01 00 00 00 01 01 03", "00 01 00 00 01 06 01 03"])
+def test_a_wrong_header_breaks_the_connection_and_good_requests_before_it_are_answered(bank: Any, wrong: str) -> None:
+    good = mbap.encode_frame(1, 1, bytes.fromhex("03 00 05 00 01"))
+    port = TcpSlavePort({1: bank})
+    assert port.exchange(good + bytes.fromhex(wrong), 0) == mbap.encode_frame(1, 1, bytes.fromhex("03 02 00 05"))
+    assert port.broken is not None
+    assert port.exchange(good, 0) == b""
+    assert len(bank.executed) == 1
+    port = TcpSlavePort({1: bank})
+    assert port.exchange(bytes.fromhex(wrong), 0) == b""
+    assert port.broken is not None
+
+
+def test_the_largest_tcp_frame_and_no_larger(bank: Any) -> None:
+    port = TcpSlavePort({1: bank})
+    assert len(port.exchange(mbap.encode_frame(1, 1, bytes(253)), 0)) == 9
+    assert bank.executed == [(0, bytes(253))]
+    port.exchange(bytes.fromhex("00 01 00 00 00 FF 01") + bytes(254), 0)
+    assert port.broken == "MBAP length 255 is outside 2 to 254 bytes"
+
+
+tcp_frames = st.builds(mbap.encode_frame, st.integers(0, 0xFFFF), st.integers(0, 2), st.binary(min_size=1, max_size=20))
+
+
+@given(st.lists(tcp_frames), st.lists(st.integers(0, 200), max_size=10))
+def test_tcp_answers_do_not_depend_on_pieces(new_bank: NewBank, sent: list[bytes], places: list[int]) -> None:
+    stream = b"".join(sent)
+    one_by_one = TcpSlavePort({1: new_bank()})
+    expected = b"".join(one_by_one.exchange(frame, 0) for frame in sent)
+    port = TcpSlavePort({1: new_bank()})
+    assert b"".join(port.exchange(stream[a:b], 0) for a, b in pairwise([0, *sorted(places), len(stream)])) == expected
+    assert len(mbap.TcpFramer().feed(expected)) == len(sent)
+
+
+def with_wrong_bit(frame: bytes, bit: int) -> bytes:
+    return (int.from_bytes(frame, "little") ^ 1 << bit % (8 * len(frame))).to_bytes(len(frame), "little")
+
+
+# Streams that come near frames: pieces of good ones, good ones with a wrong bit, and anything.
+good_frames = st.builds(
+    lambda unit, body: with_crc(bytes((unit,)) + body),
+    st.sampled_from([0, 1, 2]),
+    st.one_of(
+        st.sampled_from([encode_request(r) for r in (Read(3, 5, 1), WriteRegisters(1, (10, 258)), WriteCoil(1, True))]),
+        st.binary(min_size=1, max_size=30),
+    ),
+)
+pieces = st.one_of(
+    st.binary(max_size=40),
+    good_frames,
+    st.builds(lambda frame, cut: frame[: cut % len(frame)], good_frames, st.integers(0, 40)),
+    st.builds(with_wrong_bit, good_frames, st.integers(0, 400)),
+)
+
+
+@given(st.lists(st.tuples(pieces, st.sampled_from([0, 1000, GAP // 2, GAP, 3 * GAP])), max_size=12))
+def test_after_anything_and_a_gap_the_port_is_in_step_again(new_bank: NewBank, stream: list[tuple[bytes, int]]) -> None:
+    bank = new_bank()
+    port = RtuSlavePort({1: bank})
+    received, now = b"", 0
+    for data, pause in stream:
+        now += pause
+        deadline = port.deadline()
+        if deadline is not None and deadline <= now:
+            port.to_send(deadline)
+        port.receive(data, now)
+        received += data
+        for moment, responses in port.to_send(now):
+            assert moment == now
+            assert responses[0] == 1
+    for _, pdu in bank.executed:
+        # Nothing is executed that was not received behind a unit and before the right CRC.
+        assert any(with_crc(bytes((unit,)) + pdu) in received for unit in (0, 1))
+    good = hexed("01 03 00 05 00 01")
+    bank.registers[5] = 5
+    assert port.exchange(good, now + GAP).endswith(hexed("01 03 02 00 05"))
+
+
+@given(st.lists(st.binary(max_size=300), max_size=6))
+def test_tcp_takes_anything(new_bank: NewBank, stream: list[bytes]) -> None:
+    port = TcpSlavePort({1: new_bank()})
+    answered = b"".join(port.exchange(data, 0) for data in stream)
+    framer = mbap.TcpFramer()
+    framer.feed(answered)
+    assert (framer.broken, framer.held) == (None, b"")

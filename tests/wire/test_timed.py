@@ -1,0 +1,239 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.wire import rtu
+from steptwin.wire.crc import with_crc
+from steptwin.wire.line import SerialLine
+from steptwin.wire.slave import Direction
+from steptwin.wire.timed import FRAME_INTERVAL_NS, LINE_CHARACTERS, QUEUE_FRAMES, LineTiming, TimedRtuSlavePort
+
+NewBank = Callable[[], Any]
+LINE = SerialLine(38400)
+TIMING = LineTiming(LINE)
+GAP = rtu.BURSTY_GAP_NS
+TURN = 750_000
+
+READ = with_crc(bytes.fromhex("01 03 00 05 00 01"))
+TOLD = with_crc(bytes.fromhex("01 03 02 00 05"))
+READ_NS = 2_083_334  # 8 characters at 38400 bit/s
+TOLD_NS = 1_822_917  # 7 characters
+
+
+def run(port: TimedRtuSlavePort, until: int) -> list[tuple[int, bytes]]:
+    """As a shell does: call at every deadline."""
+    out = []
+    while True:
+        deadline = port.deadline()
+        if deadline is None or deadline > until:
+            return out
+        out += port.to_send(deadline)
+        after = port.deadline()
+        assert after is None or after > deadline
+
+
+@pytest.fixture
+def bank(new_bank: NewBank) -> Any:
+    return new_bank()
+
+
+def test_mic_32_a_response_takes_the_time_of_the_wire(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, TIMING)
+    assert port.exchange(READ, 1000) == b""
+    arrived = 1000 + READ_NS
+    assert port.deadline() == arrived
+    assert port.to_send(arrived - 1) == []
+    assert bank.executed == []
+    assert port.to_send(arrived) == []
+    assert bank.executed == [(arrived, READ[1:-2])]
+    sent = arrived + TURN + TOLD_NS
+    assert port.deadline() == sent
+    assert port.to_send(sent - 1) == []
+    assert port.to_send(sent) == [(sent, TOLD)]
+    assert port.deadline() is None
+
+
+def test_mic_32_exchange_returns_what_has_left_the_wire(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port.exchange(READ, 0)
+    run(port, READ_NS)
+    assert port.exchange(b"", READ_NS + TURN + TOLD_NS) == TOLD
+
+
+@pytest.mark.parametrize(("baud", "request_ns", "response_ns"), [(9600, 8_333_334, 7_291_667), (115200, 694_445, 607_639)])
+def test_mic_32_the_baud_rate_counts(bank: Any, baud: int, request_ns: int, response_ns: int) -> None:
+    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(baud), turnaround_ns=5))
+    port.receive(READ, 0)
+    assert run(port, 10**9) == [(request_ns + 5 + response_ns, TOLD)]
+
+
+def test_mic_32_at_most_100_requests_a_second(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(115200)))
+    out, now = [], 0
+    while now < 1_000_000_000:
+        port.receive(READ, now)
+        out += run(port, now + 2_500_000)
+        now += 2_500_000
+    moments = [moment for moment, _ in bank.executed]
+    assert min(b - a for a, b in pairwise(moments)) == FRAME_INTERVAL_NS
+    assert len(moments) == 100
+    assert port.dropped == 400 - 100 - QUEUE_FRAMES
+    assert len(out) == 100
+
+
+def test_mic_32_sixteen_wait_and_the_rest_is_dropped(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(115200)))
+    writes = [with_crc(bytes((1, 6, 0, 0, 0, n))) for n in range(40)]
+    port.receive(b"".join(writes), 0)
+    out = [response for _, response in run(port, 10**9)]
+    # 694 us a request: number 0 is taken at 0.7 ms, number 1 at 10.7 ms. With number 17 sixteen wait; number 29 is the
+    # first to arrive after number 2 was taken at 20.7 ms, and at 30.7 ms all have come.
+    assert out == [*writes[:18], writes[29]]
+    assert port.dropped == 40 - len(out)
+
+
+def test_mic_32_a_request_taken_makes_room_for_one_that_comes_at_that_moment(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(8000), turnaround_ns=0, interval_ns=20_000_000))
+    writes = [with_crc(bytes((0, 6, 0, 0, 0, n))) for n in range(1, 41)]  # number n has come at n times 10 ms
+    port.receive(b"".join(writes), 0)
+    run(port, 10**10)
+    # Every second one more waits; with number 32 there are 16. From then on each odd one comes when one is taken.
+    assert [pdu[-1] for _, pdu in bank.executed] == [*range(1, 34), 35, 37, 39]
+
+
+def test_mic_32_nothing_happens_before_it_could_be_known(bank: Any) -> None:
+    port = TimedRtuSlavePort({0x41: bank}, TIMING)
+    # Could be seven bytes of a request to unit 3; the request inside ends after six, 1.56 ms.
+    port.receive(bytes.fromhex("03 05") + with_crc(bytes.fromhex("41 07")) + b"\xff", 0)
+    port.receive(b"\xff", 1_700_000)
+    assert run(port, 10**9) == [(1_700_000 + TURN + LINE.duration(5), with_crc(bytes.fromhex("41 87 01")))]
+
+
+def test_what_is_due_happens_before_what_comes(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port.receive(READ, 0)
+    port.receive(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
+    assert bank.executed == [(READ_NS, READ[1:-2])]
+
+
+def test_mic_32_a_long_response_keeps_the_device_busy(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(9600)))
+    ask = with_crc(bytes.fromhex("01 03 00 00 00 7D"))
+    port.receive(ask + READ, 0)
+    (first, whole), (second, told) = run(port, 10**9)
+    assert first == 8_333_334 + TURN + 265_625_000
+    assert len(whole) == 255
+    assert bank.executed[1][0] == first
+    assert (second, told) == (first + TURN + 7_291_667, TOLD)
+
+
+def test_mic_32_characters_wait_for_the_line(bank: Any) -> None:
+    whole, pieces = TimedRtuSlavePort({1: bank}, TIMING), TimedRtuSlavePort({1: bank}, TIMING)
+    whole.receive(READ, 0)
+    pieces.receive(READ[:3], 0)
+    pieces.receive(READ[3:], 10)
+    assert whole.deadline() == pieces.deadline() == READ_NS
+    assert run(whole, 10**9) == run(pieces, 10**9)
+
+
+def test_mic_32_traffic_of_others_takes_the_line_and_no_slot(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, TIMING)
+    foreign = with_crc(bytes.fromhex("02 03 00 00 00 01")) + with_crc(bytes.fromhex("02 03 02 12 34"))
+    port.receive(foreign + READ, 0)
+    arrived = LINE.duration(23)
+    assert run(port, 10**9) == [(arrived + TURN + TOLD_NS, TOLD)]
+    assert bank.executed == [(arrived, READ[1:-2])]
+
+
+def test_mic_32_a_broadcast_is_executed_in_its_turn_and_not_answered(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port.receive(with_crc(bytes.fromhex("00 06 00 05 00 63")) + READ, 0)
+    ((_, told),) = run(port, 10**9)
+    assert told == with_crc(bytes.fromhex("01 03 02 00 63"))
+    assert [moment for moment, _ in bank.executed] == [READ_NS, READ_NS + FRAME_INTERVAL_NS]
+
+
+def test_mic_32_a_flood_is_bounded_and_the_line_recovers(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, TIMING)
+    for now in range(0, 1000, 10):
+        port.receive(b"\xff\x01\x41" * 10_000, now)
+    assert port.overrun == 3_000_000 - LINE_CHARACTERS
+    assert port.deadline() is not None
+    run(port, 10**12)
+    free = LINE.duration(LINE_CHARACTERS) + GAP
+    port.receive(READ, free)
+    assert run(port, 10**12) == [(free + READ_NS + TURN + TOLD_NS, TOLD)]
+    assert port.rubbish == LINE_CHARACTERS
+
+
+def test_mic_32_a_full_line_takes_nothing(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(115200)))
+    port.receive(bytes(4001), 0)
+    port.receive(
+        bytes(96), 86_805
+    )  # the first character has ended; by rounding 4097 are waiting now, one more than there is room
+    assert port.overrun == 0
+    port.receive(READ, 86_805)
+    assert port.overrun == 8
+    assert run(port, 10**12) == []
+
+
+def test_mic_15_frames_of_unknown_length_come_after_the_gap(bank: Any) -> None:
+    port = TimedRtuSlavePort({1: bank}, TIMING)
+    unknown = with_crc(bytes.fromhex("01 41 01 02 03"))
+    port.receive(unknown, 0)
+    cut = LINE.duration(7) + GAP
+    assert port.deadline() == cut
+    assert run(port, 10**9) == [(cut + TURN + LINE.duration(5), with_crc(bytes.fromhex("01 C1 01")))]
+
+
+def test_an_observer_sees_frames_at_their_wire_time(bank: Any) -> None:
+    seen: list[tuple[int, Direction, bytes]] = []
+    port = TimedRtuSlavePort({1: bank}, TIMING, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
+    foreign = with_crc(bytes.fromhex("02 06 00 00 00 01"))
+    port.receive(READ + foreign, 0)
+    run(port, 10**9)
+    assert seen == [
+        (READ_NS, Direction.IN, READ),
+        (LINE.duration(16), Direction.IN, foreign),
+        (READ_NS + TURN + TOLD_NS, Direction.OUT, TOLD),
+    ]
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([READ, READ[:5], TOLD, b"\xff\x00", READ + READ]), st.integers(0, 30_000_000)), max_size=12
+    )
+)
+def test_looking_in_between_changes_nothing(new_bank: NewBank, sent: list[tuple[bytes, int]]) -> None:
+    results = []
+    for looks in (0, 3):
+        bank = new_bank()
+        port, now, out = TimedRtuSlavePort({1: bank}, TIMING), 0, []
+        for data, pause in sent:
+            for part in range(1, looks + 1):
+                out += run(port, now + pause * part // (looks + 1))
+                out += port.to_send(now + pause * part // (looks + 1))
+            now += pause
+            out += run(port, now)
+            port.receive(data, now)
+        out += run(port, now + 10**9)
+        results.append((out, bank.executed, port.dropped))
+    assert results[0] == results[1]
+
+
+@pytest.mark.parametrize(
+    ("turnaround_ns", "interval_ns", "message"),
+    [(-1, 0, "a turnaround of -1 ns is negative"), (0, -5, "a frame interval of -5 ns is negative")],
+)
+def test_timing_that_is_none(turnaround_ns: int, interval_ns: int, message: str) -> None:
+    with pytest.raises(Misuse) as misuse:
+        LineTiming(LINE, turnaround_ns, interval_ns)
+    assert str(misuse.value) == message
