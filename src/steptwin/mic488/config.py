@@ -1,0 +1,337 @@
+"""The configuration of a MIC488, and how the vendor's ``.cfg`` file says it.
+
+The file itself is an `IniFile`, which loses nothing; here its values get types, ranges and meaning. Missing keys have their
+defaults (MIC-27), keys that are not known mean nothing. Numbers take a decimal point or a decimal comma.
+
+Diagnostics: C001–C004 form of the file; C005 name that looks misspelt; C006 no number; C007 no whole number; C008 not
+permitted; C009 limit switch on an encoder input of an axis that uses its encoder; C010 limit switch on a channel of an encoder
+that another axis uses. C001, C003, C005 and C010 are warnings.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from steptwin.diagnostics import Diagnostic, Fix, Severity, Source, in_order, render
+from steptwin.errors import Misuse
+from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, REAL_MAX
+from steptwin.mic488.inifile import Entry, IniFile
+from steptwin.mic488.ranges import Range
+from steptwin.mic488.registermap import Firmware
+from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, firmware
+
+PORTS = 2
+ANALOG_INPUTS = 2
+UNITS = ("imp", "rev", "degree", "mm", "cm", "m")
+BAUDS = (9600, 19200, 38400, 57600, 115200)
+
+NO_INPUT = 20
+"""``InKL``, ``InKR``: none. 0–7 are IN1–IN8, 8–19 channels C, B, A of encoders 1–4 used as inputs."""
+_FIRST_CHANNEL = 8
+_CHANNELS = "CBA"
+
+
+@dataclass(frozen=True, slots=True)
+class AxisConfig:
+    """``[Axis0]``…``[Axis3]``. Quantities in configured units (u, u/s, u/s²)."""
+
+    unit: int = 0
+    """Index into `UNITS`."""
+    gear: float = 1.0
+    """Pulses per unit."""
+    acc: float = 1000.0
+    dec: float = 1000.0
+    vel: float = 1000.0
+    mot_resol: int = 3200
+    """Pulses per motor revolution."""
+    enc_resol: int = 400
+    """Encoder counts per drive revolution, after ×4 quadrature."""
+    enc_offset: int = 0
+    """Encoder counter after reset."""
+    home_mode: int = 0
+    """HOME0–HOME4."""
+    limit_mode: int = 0
+    """0 off, 1 KL, 2 KR, 3 KL and KR."""
+    in_kl: int = NO_INPUT
+    """Input (from 0) of the left switch, for homing and as limit; `NO_INPUT` for none."""
+    in_kr: int = NO_INPUT
+    pos_ctrl_mode: int = 0
+    """0 off, 1 ENCODER, 2 ENCFOLLOW."""
+    err_ctrl_mode: int = 0
+    """0 NONE, 1 ERRMODE0, 2 ERRMODE1, 3 ERRMODE2."""
+    kp: float = 50.0
+    """Gain of the position correction."""
+
+    @property
+    def unit_name(self) -> str:
+        return UNITS[self.unit]
+
+    @property
+    def uses_encoder(self) -> bool:
+        """Position control needs the axis' encoder, and so does homing to its channel C (HOME3, HOME4)."""
+        return self.pos_ctrl_mode != 0 or self.home_mode >= 3
+
+
+@dataclass(frozen=True, slots=True)
+class InputConfig:
+    """``[IN0]``…``[IN19]``."""
+
+    filter: int = 0
+    """0 10 ms, 1 50 ms, 2 100 ms, 3 250 ms, 4 500 ms."""
+    level: int = 0
+    """0 active high, 1 active low."""
+    interrupt: int = 0
+    """Preset of CFGINT_INn: 0 off, 1 rising, 2 falling, 3 both edges."""
+
+
+@dataclass(frozen=True, slots=True)
+class AnalogConfig:
+    """``[AIN0]``, ``[AIN1]``: the values at 0 V and at 10 V."""
+
+    lo_val: float = 0.0
+    hi_val: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class PortConfig:
+    """Serial port COM1, COM2, which the file keeps in ``[AIN0]``, ``[AIN1]``."""
+
+    baud: int = 38400
+    address: int = 1
+    """Slave address, 1 to 247; read of COM1 only."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramConfig:
+    """``[WBC_PROGRAM]``: what runs at power-on."""
+
+    activate: int = 0
+    prog_bank: int = 0
+    pos_bank: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerConfig:
+    """Everything that is configured of a controller. The defaults are a controller without configuration (MIC-27)."""
+
+    axes: tuple[AxisConfig, ...] = (AxisConfig(),) * AXES
+    inputs: tuple[InputConfig, ...] = (InputConfig(),) * INPUTS
+    analog: tuple[AnalogConfig, ...] = (AnalogConfig(),) * ANALOG_INPUTS
+    ports: tuple[PortConfig, ...] = (PortConfig(),) * PORTS
+    program: ProgramConfig = ProgramConfig()
+
+    @property
+    def address(self) -> int:
+        """Slave address on both ports: that of COM1."""
+        return self.ports[0].address
+
+
+class ConfigError(Misuse):
+    """A configuration file with errors; the text shows them all with file, line, key and permitted values."""
+
+    def __init__(self, source: Source, findings: list[Diagnostic]) -> None:
+        self.source = source
+        self.findings = findings
+        super().__init__(render(source, findings))
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key of the file: the attribute it sets, what it may be, and how people are told."""
+
+    name: str
+    attribute: str
+    permitted: Range
+    whole: bool = True
+    choices: Mapping[int, str] = field(default_factory=dict)
+    """The permitted numbers with their meaning, where they are few."""
+    note: str = ""
+    """What is permitted, in words."""
+
+    def permits(self, value: float) -> bool:
+        return value in self.permitted and (not self.choices or value in self.choices)
+
+    @property
+    def hint(self) -> str:
+        if self.note:
+            return f"permitted: {self.note}"
+        if self.choices:
+            return "permitted: " + ", ".join(f"{v} = {text}" if text else str(v) for v, text in self.choices.items())
+        return f"permitted: {'a whole number' if self.whole else 'a number'} {self.permitted}"
+
+
+def _choice(name: str, attribute: str, *texts: str) -> Key:
+    return Key(name, attribute, Range(0, len(texts) - 1), choices=MappingProxyType(dict(enumerate(texts))))
+
+
+def _positive(name: str, attribute: str, unit: str) -> Key:
+    return Key(name, attribute, Range(0, REAL_MAX, above=True), whole=False, note=f"a number > 0 in {unit}")
+
+
+def _number(name: str, attribute: str) -> Key:
+    return Key(name, attribute, Range(-REAL_MAX, REAL_MAX), whole=False, note="a number")
+
+
+_SWITCHES = f"0…7 (IN1…IN8), 8…19 (channels C, B, A of encoders 1…4), {NO_INPUT} (none)"
+_COUNT = Range(1, DINT_MAX)
+
+AXIS_KEYS = (
+    _choice("Unit", "unit", *UNITS),
+    _positive("Gear", "gear", "pulses per unit"),
+    _positive("Acc", "acc", "units/s²"),
+    _positive("Dec", "dec", "units/s²"),
+    _positive("Vel", "vel", "units/s"),
+    Key("MotResol", "mot_resol", _COUNT, note="a whole number ≥ 1 in pulses per motor revolution"),
+    Key("EncResol", "enc_resol", _COUNT, note="a whole number ≥ 1 in encoder counts per drive revolution"),
+    Key("EncOffset", "enc_offset", Range(DINT_MIN, DINT_MAX)),
+    _choice("HomeMode", "home_mode", "HOME0", "HOME1", "HOME2", "HOME3", "HOME4"),
+    _choice("LimitMode", "limit_mode", "OFF", "KL", "KR", "KL+KR"),
+    Key("InKL", "in_kl", Range(0, NO_INPUT), note=_SWITCHES),
+    Key("InKR", "in_kr", Range(0, NO_INPUT), note=_SWITCHES),
+    _choice("PosCtrlMode", "pos_ctrl_mode", "OFF", "ENCODER", "ENCFOLLOW"),
+    _choice("ErrCtrlMode", "err_ctrl_mode", "NONE", "ERRMODE0", "ERRMODE1", "ERRMODE2"),
+    Key("Kp", "kp", Range(0, REAL_MAX), whole=False, note="a number ≥ 0"),
+)
+INPUT_KEYS = (
+    _choice("Filter", "filter", "10 ms", "50 ms", "100 ms", "250 ms", "500 ms"),
+    _choice("Level", "level", "active high", "active low"),
+    _choice("Int", "interrupt", "off", "rising", "falling", "both edges"),
+)
+ANALOG_KEYS = (_number("LoVal", "lo_val"), _number("HiVal", "hi_val"))
+BAUD_KEY = Key("Baud", "baud", Range(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
+ADDRESS_KEY = Key("ID", "address", Range(1, 247))
+
+
+def _program_keys(generation: Firmware) -> tuple[Key, ...]:
+    banks = Range(0, generation.banks - 1)
+    return (
+        _choice("Activate", "activate", "no program", "run at power-on"),
+        Key("ProgBankToRun", "prog_bank", banks),
+        Key("PosBankToRun", "pos_bank", banks),
+    )
+
+
+def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tuple[ControllerConfig, list[Diagnostic]]:
+    """The configuration a file describes for a firmware, and everything that is wrong with it, in order of the text.
+
+    A value with an error is replaced by its default. Raises `Misuse` for an unknown firmware.
+    """
+    reader = _Reader(file)
+    config = ControllerConfig(
+        axes=tuple(AxisConfig(**reader.values(f"Axis{n}", AXIS_KEYS)) for n in range(AXES)),
+        inputs=tuple(InputConfig(**reader.values(f"IN{n}", INPUT_KEYS)) for n in range(INPUTS)),
+        analog=tuple(AnalogConfig(**reader.values(f"AIN{n}", ANALOG_KEYS)) for n in range(ANALOG_INPUTS)),
+        ports=(
+            PortConfig(**reader.values("AIN0", (BAUD_KEY, ADDRESS_KEY))),
+            # The slave address is that of COM1; whatever COM2's says is not even checked.
+            PortConfig(**reader.values("AIN1", (BAUD_KEY,))),
+        ),
+        program=ProgramConfig(**reader.values("WBC_PROGRAM", _program_keys(firmware(firmware_name)))),
+    )
+    reader.ignore("AIN1", ADDRESS_KEY)
+    findings = [*file.findings, *reader.findings, *_switch_conflicts(file, config), *reader.misspelt()]
+    return config, in_order(findings)
+
+
+def read_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> ControllerConfig:
+    """The configuration a file describes for a firmware. Raises `ConfigError` with all errors at once; warnings pass."""
+    config, findings = examine_config(file, firmware_name)
+    errors = [finding for finding in findings if finding.severity is Severity.ERROR]
+    if errors:
+        raise ConfigError(file.source, errors)
+    return config
+
+
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d{1,3})?\Z", re.ASCII)
+
+
+class _Reader:
+    """Takes typed values from a file and collects what is wrong with them."""
+
+    def __init__(self, file: IniFile) -> None:
+        self._file = file
+        self._known: dict[str, set[str]] = {}
+        self.findings: list[Diagnostic] = []
+
+    def values(self, section: str, keys: Iterable[Key]) -> dict[str, Any]:
+        """Attribute -> value of the keys that are there and right."""
+        found: dict[str, Any] = {}
+        for key in keys:
+            self._known.setdefault(section, set()).add(key.name)
+            entry = self._file.find(section, key.name)
+            value = None if entry is None else self._value(entry, key)
+            if value is not None:
+                found[key.attribute] = value
+        return found
+
+    def ignore(self, section: str, key: Key) -> None:
+        """A key that is known and not read."""
+        self._known[section].add(key.name)
+
+    def _value(self, entry: Entry, key: Key) -> float | None:
+        if not _NUMBER.match(entry.value):
+            return self._refuse("C006", entry, key, "is no number" if entry.value else "has no value")
+        value = float(entry.value.replace(",", "."))
+        if key.whole and not value.is_integer():
+            return self._refuse("C007", entry, key, "is no whole number")
+        if not key.permits(value):
+            return self._refuse("C008", entry, key, "is not permitted")
+        return int(value) if key.whole else value
+
+    def _refuse(self, code: str, entry: Entry, key: Key, why: str) -> None:
+        message = f"[{entry.section}] {entry.key} = {entry.value} {why}"
+        self.findings.append(Diagnostic(code, Severity.ERROR, entry.value_span, message, key.hint))
+
+    def misspelt(self) -> Iterator[Diagnostic]:
+        """Names nobody asked for that look like one that is missing."""
+        import difflib
+
+        file, known = self._file, self._known
+        by_lower = {section.lower(): section for section in known}
+        present = {header.section.lower() for header in file.headers}
+        missing = [section for section in known if section.lower() not in present]
+        for header in file.headers:
+            near = difflib.get_close_matches(header.section, missing, n=1, cutoff=0.75)
+            if header.section.lower() not in by_lower and near:
+                message = f"the section [{header.section}] is not known; did you mean [{near[0]}]?"
+                yield Diagnostic("C005", Severity.WARNING, header.span, message, fix=Fix(header.span, f"[{near[0]}]"))
+        for entry in file.entries:
+            section = by_lower.get(entry.section.lower())
+            if section is None or entry.key.lower() in {key.lower() for key in known[section]}:
+                continue
+            open_keys = [key for key in known[section] if file.find(section, key) is None]
+            near = difflib.get_close_matches(entry.key, sorted(open_keys), n=1, cutoff=0.75)
+            if near:
+                message = f"[{section}] {entry.key} is not known; did you mean {near[0]}?"
+                yield Diagnostic("C005", Severity.WARNING, entry.key_span, message, fix=Fix(entry.key_span, near[0]))
+
+
+def encoder_channel(number: int) -> tuple[int, str] | None:
+    """Encoder (from 0) and channel letter behind an input number of ``InKL``/``InKR``; None for IN1–IN8 and none."""
+    if not _FIRST_CHANNEL <= number < NO_INPUT:
+        return None
+    encoder, channel = divmod(number - _FIRST_CHANNEL, len(_CHANNELS))
+    return encoder, _CHANNELS[channel]
+
+
+def _switch_conflicts(file: IniFile, config: ControllerConfig) -> Iterator[Diagnostic]:
+    """Encoder channels taken as switches while an encoder is used as such."""
+    for n, axis in enumerate(config.axes):
+        for name, number in (("InKL", axis.in_kl), ("InKR", axis.in_kr)):
+            entry = file.find(f"Axis{n}", name)
+            taken = encoder_channel(number)
+            if entry is None or taken is None:
+                continue
+            encoder, channel = taken
+            what = f"[{entry.section}] {entry.key} = {entry.value} is channel {channel} of encoder {encoder + 1}"
+            if axis.uses_encoder:
+                message = f"{what}, but the axis uses its encoder (PosCtrlMode {axis.pos_ctrl_mode}, HomeMode {axis.home_mode})"
+                hint = f"permitted: 0…7 (IN1…IN8), {NO_INPUT} (none)"
+                yield Diagnostic("C009", Severity.ERROR, entry.value_span, message, hint)
+            elif config.axes[encoder].uses_encoder:
+                message = f"{what}, which axis M{encoder + 1} uses"
+                yield Diagnostic("C010", Severity.WARNING, entry.value_span, message)

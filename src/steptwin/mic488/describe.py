@@ -1,0 +1,212 @@
+"""Modbus PDUs of a MIC488 in words: ``read M1_POS_ACT … M4_POS_ACT = 12.5, 0, 0, 0 mm``. For logs and live views.
+
+Never raises on what comes from the line: a PDU that says nothing sensible is described as such.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
+from steptwin.mic488.registermap import DataType, Kind, Piece, Register, RegisterMap, Space, Type, show_address
+from steptwin.mic488.registers import axes_of_mask
+from steptwin.wire import pdu as modbus
+
+MOST_VALUES = 8
+"""Longer lists of plain numbers are cut."""
+
+
+class Scale(NamedTuple):
+    """How an axis counts: its configured unit (``mm``) and the pulses per unit (GEAR)."""
+
+    unit: str
+    gear: float
+
+
+class Wording:
+    """What one needs to know to put the frames of one controller into words.
+
+    ``scales`` are those of axes 1–4; without them units are shown as ``u``. ``data_type`` is what DATA_TYPE says at the time.
+    """
+
+    __slots__ = ("data_type", "register_map", "scales")
+
+    def __init__(self, register_map: RegisterMap, scales: Sequence[Scale] = (), data_type: DataType = DataType.REAL) -> None:
+        self.register_map = register_map
+        self.scales = tuple(scales)
+        self.data_type = data_type
+
+    # ------------------------------------------------------------------ PDUs
+
+    def request(self, pdu: bytes) -> str:
+        """A request: what is read, or what is written with which values."""
+        try:
+            request = modbus.decode_request(pdu)
+        except modbus.ModbusException as refusal:
+            if not pdu:
+                return "empty request"
+            return f"function {pdu[0]:02X}: {refusal.detail or 'not implemented by the device'}"
+        match request:
+            case modbus.Read(function, address, count):
+                return f"read {self._names(_SPACES[function], address, count)}"
+            case modbus.WriteCoil(address, on):
+                return f"write {self._bits(Space.COIL, address, [on])}"
+            case modbus.WriteRegister(address, value):
+                return f"write {self._word(address, value)}"
+            case modbus.WriteRegisters(address, values):
+                return f"write {self._registers(address, values)}"
+
+    def response(self, pdu: bytes, request: bytes | None = None) -> str:
+        """A response. Values read and the place of an exception can only be named when the request is known."""
+        try:
+            response = modbus.decode_response(pdu)
+        except modbus.BadResponse as failure:
+            return f"malformed: {failure}"
+        asked = _decoded(request)
+        match response:
+            case modbus.Refused(function, code):
+                name = modbus.EXCEPTION_NAMES.get(code, "unknown exception")
+                where = f"function {function:02X}" if asked is None else str(asked.address)
+                return f"exception {code:02d} {name} ({where})"
+            case modbus.Bits(function, packed):
+                if isinstance(asked, modbus.Read) and asked.function == function and len(packed) == (asked.count + 7) // 8:
+                    states = modbus.unpack_bits(packed, asked.count)
+                    return f"read {self._bits(_SPACES[function], asked.address, states)}"
+                return f"read bits {packed.hex(' ')}"
+            case modbus.Registers(values):
+                if isinstance(asked, modbus.Read) and asked.function == pdu[0] and asked.count == len(values):
+                    return f"read {self._registers(asked.address, values)}"
+                return f"read registers {_numbers(values)}"
+            case modbus.WriteCoil(address, on):
+                return f"wrote {self._bits(Space.COIL, address, [on])}"
+            case modbus.WriteRegister(address, value):
+                return f"wrote {self._word(address, value)}"
+            case modbus.Written(address, count):
+                return f"wrote {self._names(Space.HOLDING, address, count)}"
+
+    # ------------------------------------------------------------------ parts of a request
+
+    def _groups(self, space: Space, address: int, count: int) -> Iterable[list[Piece]]:
+        """Pieces of a request, those of one row (all axes of a quantity) together."""
+        pieces = self.register_map.pieces(space, address, count)
+        return (list(group) for _, group in groupby(pieces, lambda p: (p.register and p.register.key, p.whole)))
+
+    def _names(self, space: Space, address: int, count: int) -> str:
+        return ", ".join(_name(group) for group in self._groups(space, address, count))
+
+    def _bits(self, space: Space, address: int, states: Sequence[bool]) -> str:
+        parts = []
+        for group in self._groups(space, address, len(states)):
+            start = group[0].address - address
+            shown = states[start : start + sum(p.size for p in group)]
+            parts.append(f"{_name(group)} = {_switches(group, shown)}")
+        return ", ".join(parts)
+
+    def _word(self, address: int, value: int) -> str:
+        """Function 06. On JOG_SPEED it carries a signed number in units (MIC-6)."""
+        register = self.register_map.find(Space.HOLDING, address)
+        if register is not None and register.word_write and address == register.address:
+            return f"{register.name} = {word_to_int(value)} {self._unit(register)}"
+        return self._registers(address, (value,))
+
+    def _registers(self, address: int, words: Sequence[int]) -> str:
+        parts = []
+        for group in self._groups(Space.HOLDING, address, len(words)):
+            start = group[0].address - address
+            shown = words[start : start + sum(p.size for p in group)]
+            parts.append(f"{_name(group)} = {self._values(group, shown)}")
+        return "; ".join(parts)
+
+    # ------------------------------------------------------------------ values
+
+    def _unit(self, register: Register) -> str:
+        scale = self._scale(register)
+        return register.unit(self.data_type, scale.unit if scale else "u")
+
+    def _scale(self, register: Register) -> Scale | None:
+        axis = register.axis
+        return self.scales[axis - 1] if axis is not None and axis <= len(self.scales) else None
+
+    def _values(self, group: list[Piece], words: Sequence[int]) -> str:
+        registers = [p.register for p in group if p.register is not None]
+        if not registers or not group[0].whole:
+            return " ".join(f"{word:04X}" for word in words)
+        first = registers[0]
+        if first.type.size == 1:
+            return ", ".join(_meaning(first, word) for word in words) if first.type is Type.WORD else _numbers(words)
+        pairs = zip(words[::2], words[1::2], strict=True)
+        if first.type is Type.DINT or (first.type is Type.VALUE and self.data_type is DataType.DINT):
+            return self._pulses(registers, [words_to_dint(low, high) for low, high in pairs])
+        shown = [f"{words_to_real(low, high):.7g}" for low, high in pairs]
+        return _with_units(shown, [self._unit(r) for r in registers])
+
+    def _pulses(self, registers: Sequence[Register], counts: Sequence[int]) -> str:
+        """DINT values, and what they are in units where that is known."""
+        text = _with_units([str(count) for count in counts], [self._unit(r) for r in registers])
+        scales = [self._scale(r) for r in registers]
+        if registers[0].kind is Kind.ENCODER or any(s is None or s.unit == "imp" or s.gear == 0 for s in scales):
+            return text
+        known = [s for s in scales if s is not None]
+        units = [r.unit(DataType.REAL, s.unit) for r, s in zip(registers, known, strict=True)]
+        return f"{text} ({_with_units([f'{count / s.gear:.7g}' for count, s in zip(counts, known, strict=True)], units)})"
+
+
+_SPACES = {
+    modbus.READ_COILS: Space.COIL,
+    modbus.READ_DISCRETE_INPUTS: Space.INPUT,
+    modbus.READ_HOLDING_REGISTERS: Space.HOLDING,
+}
+
+
+def _decoded(request: bytes | None) -> modbus.Request | None:
+    try:
+        return None if request is None else modbus.decode_request(request)
+    except modbus.ModbusException:
+        return None
+
+
+def _name(group: list[Piece]) -> str:
+    first, last = group[0], group[-1]
+    end = last.address + last.size - 1
+    if first.register is None or last.register is None:
+        where = str(first.address) if first.address == end else f"{first.address}…{end}"
+        return f"{where} (unmapped)"
+    if not first.whole:
+        return f"half of {first.register.name} at {show_address(first.address)}"
+    if first.register.cells > 1:
+        offset = first.register.address
+        cells = f"{first.address - offset}" if first.address == end else f"{first.address - offset} … {end - offset}"
+        return f"{first.register.name} {cells}"
+    return first.register.name if first is last else f"{first.register.name} … {last.register.name}"
+
+
+def _switches(group: list[Piece], states: Sequence[bool]) -> str:
+    if len(states) == 1:
+        return "ON" if states[0] else "OFF"
+    if not any(states):
+        return "all off"
+    if all(states):
+        return "all on"
+    if group[0].register is None:
+        return "".join("1" if on else "0" for on in states)
+    return ", ".join(p.register.name for p, on in zip(group, states, strict=True) if on and p.register is not None) + " on"
+
+
+def _meaning(register: Register, word: int) -> str:
+    if register.kind is Kind.MASK:
+        return f"{' '.join(f'M{axis}' for axis in axes_of_mask(word)) or 'none'} ({word})"
+    text = register.values.get(word)
+    return str(word) if text is None else f"{text} ({word})"
+
+
+def _numbers(words: Sequence[int]) -> str:
+    shown = ", ".join(str(word) for word in words[:MOST_VALUES])
+    return shown if len(words) <= MOST_VALUES else f"{shown}, … ({len(words)} words)"
+
+
+def _with_units(values: Sequence[str], units: Sequence[str]) -> str:
+    if len(set(units)) == 1:
+        return f"{', '.join(values)} {units[0]}"
+    return ", ".join(f"{value} {unit}" for value, unit in zip(values, units, strict=True))

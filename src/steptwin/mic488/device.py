@@ -1,0 +1,382 @@
+"""The MIC488 as a pure machine: four axes, inputs and outputs, memory, program control."""
+
+from __future__ import annotations
+
+from array import array
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from steptwin.errors import Misuse, Runaway, TimeReversal
+from steptwin.machine import Edge, Nanos
+from steptwin.mic488.axis import Axis
+from steptwin.mic488.config import ANALOG_INPUTS, ControllerConfig
+from steptwin.mic488.encoder import Coupling, Motion
+from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
+from steptwin.mic488.inputs import Inputs
+from steptwin.mic488.position_control import PositionControl
+from steptwin.mic488.program import ProgramControl
+from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
+from steptwin.mic488.slave import slave
+from steptwin.mic488.status import ControllerStatus, Status
+from steptwin.state import Plain, Stateful
+
+MAX_EVENTS_PER_INSTANT = 10_000
+"""More than this at one moment is a runaway, not a motion."""
+
+EVENTS_KEPT = 1000
+
+
+class Event(NamedTuple):
+    """Something worth telling that no register shows."""
+
+    time: Nanos
+    axis: int | None
+    code: str
+    text: str
+
+
+INPUT_PINS = {f"IN{n + 1}": n for n in range(INPUTS)}
+ANALOG_PINS = {f"AIN{n + 1}": n for n in range(ANALOG_INPUTS)}
+OUTPUT_PINS = tuple(f"OUT{n + 1}" for n in range(OUTPUTS))
+ENABLE_PINS = tuple(f"M{n + 1}_EN" for n in range(AXES))
+PINS = (*INPUT_PINS, *ANALOG_PINS, *OUTPUT_PINS, *ENABLE_PINS, "ERR")
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All state of a controller at a moment, and what it belongs to. It can be pickled; profiles are shared."""
+
+    config: ControllerConfig
+    firmware: str
+    state: Plain
+
+
+def check_pin(pin: str, value: float) -> None:
+    """`Misuse` unless ``pin`` is an input that can take ``value``."""
+    name = pin.upper()
+    if name in INPUT_PINS:
+        if value not in (0.0, 1.0):
+            raise Misuse(f"{name} = {value:g}: a digital input is 0 or 1")
+    elif name in ANALOG_PINS:
+        if not 0.0 <= value <= 10.0:
+            raise Misuse(f"{name} = {value:g} V: an analog input takes 0 to 10 V")
+    else:
+        raise Misuse(f"no input pin {pin!r}: inputs are IN1 to IN{INPUTS} and AIN1 to AIN{ANALOG_INPUTS}")
+
+
+def _nothing() -> None:
+    pass
+
+
+class Mic488(Stateful):
+    """One controller. Commands and inputs are applied after everything that is due at their moment.
+
+    ``memory`` are the stored user registers (two bytes each, high byte first; none stored: all 0); `Misuse` when their number
+    is wrong. ``lenient`` lets masters read holes and write-only registers (MIC-3).
+
+    Hooks: ``store`` is called with the stored user registers when they are saved and returns when they are safe; an `OSError`
+    says that they are not. ``changed`` is called whenever the next deadline or an output may have changed, ``on_event`` for
+    every event.
+    """
+
+    __slots__ = (
+        "_due",
+        "_edges",
+        "_slave",
+        "analog_v",
+        "axes",
+        "changed",
+        "config",
+        "data_type",
+        "error_led",
+        "events",
+        "firmware",
+        "inputs",
+        "jog_speed_u",
+        "lenient",
+        "memory",
+        "now",
+        "on_event",
+        "outputs",
+        "program",
+        "registers",
+        "store",
+        "trigger_mode",
+        "triggered",
+        "user",
+        "written",
+    )
+    FIXED = frozenset({"_slave", "changed", "config", "firmware", "lenient", "on_event", "registers", "store"})
+
+    def __init__(
+        self, config: ControllerConfig, firmware: str = DEFAULT_FIRMWARE, *, lenient: bool = False, memory: bytes | None = None
+    ) -> None:
+        self.config = config
+        self.registers = register_map(firmware)
+        self.firmware = self.registers.firmware
+        self.lenient = lenient
+        self._slave = slave(firmware, lenient=lenient)
+        self.store: Callable[[bytes], None] | None = None
+        self.changed: Callable[[], None] = _nothing
+        self.on_event: Callable[[Event], None] | None = None
+
+        self.now: Nanos = 0
+        self.memory = self._checked_memory(memory)
+        self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+        self._edges: list[Edge] = []
+        self._due: Nanos | None = None
+        self.inputs = Inputs(config.inputs)
+        self.analog_v = [0.0] * ANALOG_INPUTS
+        self.outputs = [False] * OUTPUTS
+        self.axes = tuple(Axis(n, config.axes[n - 1], self) for n in range(1, AXES + 1))
+        self.program = ProgramControl(self)
+        self.error_led = False
+        self._power_on()
+
+    def _power_on(self) -> None:
+        """MIC-27; axes, inputs and outputs are in that state already."""
+        self.data_type = 0
+        self.trigger_mode = 0
+        self.triggered = {"VEL_ABS": 0, "VEL_REL": 0, "POS_ABS": 0, "POS_REL": 0}
+        self.jog_speed_u = self.config.axes[0].vel
+        self.user = array("H", bytes(2 * self.firmware.user_registers))
+        self.written: dict[tuple[str, int | None], float] = {}
+        """Last values of write-only registers by key and number, in pulses where they have a unit; kept when lenient."""
+        self.program.power_on(self.now)
+        self.touch()
+
+    def power_cycle(self, now: Nanos) -> None:
+        """Off and on again: registers as after power-on; terminals, shafts and the non-volatile memory stay as they are."""
+        self.advance(now)
+        for number in range(OUTPUTS):
+            self.set_output(number, False)
+        for axis in self.axes:
+            axis.disable(now)
+            axis.power_on(now)
+        self.inputs.power_on()
+        self.event("power-on", "power-on")
+        self._power_on()
+
+    # ------------------------------------------------------------------ time
+
+    def advance(self, now: Nanos) -> None:
+        if now < self.now:
+            raise TimeReversal(self.now, now)
+        due = self._due
+        while due is not None and due <= now:
+            self._run_instant(due)
+            due = self._due
+        self.now = now
+
+    def _run_instant(self, at: Nanos) -> None:
+        self.now = at
+        for _ in range(MAX_EVENTS_PER_INSTANT):
+            due = self.inputs.deadline()
+            if due is not None and due <= at:
+                self.program.inputs_changed(self.inputs.settle(at), at)
+            for axis in self.axes:
+                due = axis.deadline()
+                if due is not None and due <= at:
+                    axis.advance(at)
+            due = self.program.deadline()
+            if due is not None and due <= at:
+                self.program.advance(at)
+            self.touch()
+            if self._due is None or self._due > at:
+                return
+        raise Runaway(f"more than {MAX_EVENTS_PER_INSTANT} events of one MIC488 at {at} ns")
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+    def touch(self) -> None:
+        """State changed: find the next deadline and the ERR lamp anew."""
+        due = self.inputs.deadline()
+        lit = self.program.error
+        for axis in self.axes:
+            at = axis.deadline()
+            if at is not None and (due is None or at < due):
+                due = at
+            if axis.status is Status.ERROR:
+                lit = True
+        at = self.program.deadline()
+        if at is not None and (due is None or at < due):
+            due = at
+        self._due = due
+        if lit is not self.error_led:
+            self.error_led = lit
+            self._edges.append(Edge(self.now, "ERR", float(lit)))
+        self.changed()
+
+    # ------------------------------------------------------------------ the Modbus face
+
+    def execute(self, pdu: bytes, now: Nanos) -> bytes:
+        """Apply a request at ``now`` and answer it; a request that cannot be served is answered with its exception."""
+        self.advance(now)
+        return self._slave.answer(self, pdu)
+
+    # ------------------------------------------------------------------ pins
+
+    def set_pin(self, pin: str, value: float, now: Nanos) -> None:
+        """Set IN1–IN20 (0 or 1) or AIN1–AIN2 (0 to 10 V)."""
+        check_pin(pin, value)
+        name = pin.upper()
+        self.advance(now)
+        if name in INPUT_PINS:
+            self._set_input(INPUT_PINS[name], value == 1.0, now)
+        else:
+            self.analog_v[ANALOG_PINS[name]] = value
+        self.touch()
+
+    def _set_input(self, number: int, high: bool, now: Nanos) -> None:
+        if self.inputs.set_pin(number, high, now):
+            active = self.inputs.raw[number]
+            for axis in self.axes:
+                axis.input_changed(number, active, now)
+
+    def pins(self) -> Mapping[str, float]:
+        enables = [axis.enabled for axis in self.axes]
+        levels = (*self.inputs.pins, *self.analog_v, *self.outputs, *enables, self.error_led)
+        return dict(zip(PINS, map(float, levels), strict=True))
+
+    def take_edges(self) -> list[Edge]:
+        edges, self._edges = self._edges, []
+        return edges
+
+    def set_output(self, number: int, on: bool) -> None:
+        """Set OUT ``number`` (from 0)."""
+        if self.outputs[number] is not on:
+            self.outputs[number] = on
+            self._edges.append(Edge(self.now, OUTPUT_PINS[number], float(on)))
+
+    def analog(self, number: int) -> float:
+        """Analog input ``number`` (from 0) scaled by LoVal…HiVal."""
+        scale = self.config.analog[number]
+        return scale.lo_val + (scale.hi_val - scale.lo_val) * self.analog_v[number] / 10.0
+
+    # ------------------------------------------------------------------ a hand on the shaft
+
+    def turn_encoder(self, axis: int, counts: int, now: Nanos) -> None:
+        """Turn the shaft of ``axis`` (from 1) by ``counts`` without the drive: a handwheel, or a slip."""
+        if not DINT_MIN <= counts <= DINT_MAX:
+            raise Misuse(f"M{axis}: {counts} encoder counts at once: permitted {DINT_MIN}…{DINT_MAX}")
+        chosen = self._axis(axis)
+        self.advance(now)
+        chosen.encoder.turn(counts)
+        chosen.control.encoder_moved(chosen, now)
+        self.touch()
+
+    def couple_encoder(self, axis: int, coupling: Coupling, now: Nanos) -> None:
+        """Say what turns the shaft of ``axis`` (from 1): the drive, nothing, or a blocked drive."""
+        chosen = self._axis(axis)
+        self.advance(now)
+        chosen.encoder.couple(coupling, chosen.profile.count(now), now)
+        chosen.control.encoder_moved(chosen, now)
+        self.touch()
+
+    def follow_shaft(self, axis: int, motion: Motion | None, now: Nanos) -> None:
+        """Mechanics turn the encoder's shaft of ``axis`` (from 1) by ``motion``; None: exactly as the drive."""
+        chosen = self._axis(axis)
+        self.advance(now)
+        chosen.encoder.follow(motion)
+        chosen.control.encoder_moved(chosen, now)
+        self.touch()
+
+    def gear_encoder(self, axis: int, counts: int, pulses: int, now: Nanos) -> None:
+        """The encoder of ``axis`` (from 1) gives ``counts`` per ``pulses`` of the drive, whatever is configured."""
+        if counts == 0 or pulses < 1:
+            raise Misuse(f"M{axis}: {counts} encoder counts per {pulses} pulses: counts must not be 0, pulses 1 or more")
+        chosen = self._axis(axis)
+        self.advance(now)
+        chosen.encoder.gear(counts, pulses, chosen.profile.count(now), now)
+        self.touch()
+
+    def _axis(self, number: int) -> Axis:
+        if not 1 <= number <= AXES:
+            raise Misuse(f"no axis M{number}: axes are M1 to M{AXES}")
+        return self.axes[number - 1]
+
+    # ------------------------------------------------------------------ what axes ask of their controller
+
+    def input_active(self, number: int) -> bool:
+        return self.inputs.raw[number]
+
+    def axis_event(self, axis: int, code: str, detail: str) -> None:
+        self._tell(Event(self.now, axis, code, detail))
+
+    def event(self, code: str, detail: str) -> None:
+        self._tell(Event(self.now, None, code, detail))
+
+    def _tell(self, event: Event) -> None:
+        self.events.append(event)
+        if self.on_event is not None:
+            self.on_event(event)
+
+    def drive_output(self, axis: int, on: bool) -> None:
+        self._edges.append(Edge(self.now, ENABLE_PINS[axis - 1], float(on)))
+
+    def position_error(self, axis: int) -> None:
+        self.axis_event(axis, "position-error", f"M{axis} did not reach its position")
+        reaction = self.config.axes[axis - 1].err_ctrl_mode
+        if reaction in (PositionControl.REACTION_PROGRAM, PositionControl.REACTION_OUT8):
+            self.program.interrupt_by_position_error(self.now)
+        if reaction == PositionControl.REACTION_OUT8:
+            self.set_output(OUTPUTS - 1, True)
+
+    # ------------------------------------------------------------------ state that registers show
+
+    def status(self) -> ControllerStatus:
+        """M_STATUS. A position error is shown before a program error."""
+        if any(axis.status is Status.ERROR for axis in self.axes):
+            return ControllerStatus.POSITION_ERROR
+        return ControllerStatus.PROGRAM_ERROR if self.program.error else ControllerStatus.OK
+
+    # ------------------------------------------------------------------ non-volatile user registers
+
+    def _checked_memory(self, memory: bytes | None) -> bytes:
+        stored = self.firmware.stored_user_registers or range(0)
+        if memory is None:
+            return bytes(2 * len(stored))
+        if len(memory) != 2 * len(stored):
+            raise Misuse(
+                f"the stored user registers of firmware {self.firmware.name} take {2 * len(stored)} bytes, not {len(memory)}"
+            )
+        return bytes(memory)
+
+    def _stored(self) -> slice:
+        stored = self.firmware.stored_user_registers or range(0)
+        return slice(stored.start, stored.stop)
+
+    def load_memory(self) -> None:
+        """USER_REG_READ."""
+        memory = self.memory
+        self.user[self._stored()] = array("H", (memory[i] << 8 | memory[i + 1] for i in range(0, len(memory), 2)))
+
+    def save_memory(self) -> None:
+        """USER_REG_SAVE. An `OSError` of the hook leaves the stored copy as it was."""
+        memory = b"".join(word.to_bytes(2, "big") for word in self.user[self._stored()])
+        if self.store is not None:
+            self.store(memory)
+        self.memory = memory
+
+    def zero_memory(self) -> None:
+        """USER_REG_ZERO: the registers, not their stored copy."""
+        stored = self._stored()
+        self.user[stored] = array("H", bytes(2 * (stored.stop - stored.start)))
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> Snapshot:
+        """All state at the present moment; hooks are no part of it."""
+        return Snapshot(self.config, self.firmware.name, self.copy_state())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take the state of a snapshot, its moment too. Raises `Misuse` when it belongs to another configuration or firmware."""
+        if snapshot.firmware != self.firmware.name:
+            raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {self.firmware.name}")
+        if snapshot.config != self.config:
+            raise Misuse("the snapshot is of a controller with another configuration")
+        self.set_state(snapshot.state)
+        self.changed()

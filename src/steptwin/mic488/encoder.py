@@ -1,0 +1,118 @@
+"""The encoder of an axis: its shaft, what turns it, and the counter that registers show.
+
+``motor`` in the methods is the drive's counted position in pulses since power-on; ``shaft`` counts what the shaft has turned
+(after ×4 quadrature) and never jumps, whatever is written into the counter.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Protocol
+
+from steptwin.machine import Nanos
+from steptwin.mic488.encoding import wrapped_dint
+from steptwin.state import Stateful
+
+
+class Coupling(enum.Enum):
+    """What turns the encoder's shaft besides a hand."""
+
+    DRIVE = "drive"
+    """The drive, without loss."""
+    FREE = "free"
+    """Nothing: a handwheel."""
+    BLOCKED = "blocked"
+    """Nothing: the drive is mechanically blocked and its steps are lost."""
+
+
+class Motion(Protocol):
+    """Where mechanics turn the shaft; never changed."""
+
+    def count(self, now: Nanos) -> int:
+        """Position in pulses of the drive, in the same frame as the drive's counted position."""
+        ...
+
+
+class Encoder(Stateful):
+    """``enc_resol`` counts per ``mot_resol`` pulses of the drive, as the controller is told; unless `gear` says otherwise, that
+    is how the encoder is built.
+    """
+
+    __slots__ = ("_built", "_lost", "_motion", "_standing", "_turned", "_zero", "coupling", "enc_resol", "mot_resol")
+    FIXED = frozenset({"enc_resol", "mot_resol"})
+
+    def __init__(self, enc_resol: int, mot_resol: int, coupling: Coupling) -> None:
+        self.enc_resol = enc_resol
+        self.mot_resol = mot_resol
+        self.coupling = coupling
+        self._built = (enc_resol, mot_resol)
+        """Counts per pulses; negative counts: it counts backwards."""
+        self._turned = 0
+        """Counts by hand."""
+        self._lost = 0
+        """Pulses of the drive that did not turn the shaft while it was coupled to something else."""
+        self._standing = 0
+        """Pulses at which the shaft stands while nothing turns it."""
+        self._motion: Motion | None = None
+        self._zero = 0
+        """Shaft at which the counter shows 0."""
+
+    def shaft(self, motor: int, now: Nanos) -> int:
+        counts, pulses = self._built
+        return self._turned + self._driven(motor, now) * counts // pulses
+
+    def _driven(self, motor: int, now: Nanos) -> int:
+        """Where the shaft is without what a hand has turned, in pulses."""
+        if self._motion is not None:
+            return self._motion.count(now)
+        return motor - self._lost if self.coupling is Coupling.DRIVE else self._standing
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the counts cannot but tell what the drive does."""
+        counts, pulses = self._built
+        as_told = counts * self.mot_resol == pulses * self.enc_resol
+        return self.coupling is Coupling.DRIVE and self._motion is None and as_told
+
+    def counter(self, shaft: int) -> int:
+        """The counter register, a DINT that wraps."""
+        return wrapped_dint(shaft - self._zero)
+
+    def set_counter(self, value: int, shaft: int) -> None:
+        """Write the register: the shaft stays, the number changes."""
+        self._zero = shaft - value
+
+    def turn(self, counts: int) -> None:
+        """Turn the shaft by hand (or let it slip) by ``counts``."""
+        self._turned += counts
+
+    def couple(self, coupling: Coupling, motor: int, now: Nanos) -> None:
+        """Let the drive or nothing turn the shaft from here on; what happens in between is lost."""
+        if coupling is not self.coupling or self._motion is not None:
+            at = self._driven(motor, now)
+            self._motion = None
+            if coupling is Coupling.DRIVE:
+                self._lost = motor - at
+            else:
+                self._standing = at
+            self.coupling = coupling
+
+    def follow(self, motion: Motion | None) -> None:
+        """Let mechanics turn the shaft (play, a stop, steps lost, another axis); None is the drive, with not a pulse lost."""
+        self._motion = motion
+        self._lost = 0
+        self.coupling = Coupling.DRIVE
+
+    def gear(self, counts: int, pulses: int, motor: int, now: Nanos) -> None:
+        """The encoder gives ``counts`` (negative: backwards; not 0) per ``pulses`` (> 0) of the drive, whatever is configured."""
+        before = self.shaft(motor, now)
+        self._built = (counts, pulses)
+        self._turned += before - self.shaft(motor, now)
+
+    def pulses(self, counts: float) -> float:
+        """Drive pulses that correspond to ``counts``, as configured."""
+        return counts * self.mot_resol / self.enc_resol
+
+    def counts(self, pulses: float) -> float:
+        """Encoder counts that correspond to ``pulses``, as configured."""
+        return pulses * self.enc_resol / self.mot_resol

@@ -1,0 +1,182 @@
+"""Position control with an encoder: correction (ENCODER), following (ENCFOLLOW), and watching for a blocked drive.
+
+A control loop, re-planned every 10 ms while it is active; inactive it costs nothing. Drive and encoder are compared from a
+*reference* on, a pair of motor count and encoder shaft that are taken to agree.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.mic488.homing import Homing
+from steptwin.mic488.status import Status
+from steptwin.state import Stateful
+
+if TYPE_CHECKING:
+    from steptwin.mic488.axis import Axis
+
+PERIOD_NS: Nanos = 10 * MILLISECOND
+
+# MIC-19
+TOLERANCE_COUNTS = 4
+SETTLE_NS: Nanos = 100 * MILLISECOND
+ERR_TIME_NS: Nanos = 2000 * MILLISECOND
+
+STOP_LAG_REVOLUTIONS = 0.05
+"""HOME3: the mechanical stop is found when the encoder lags the drive by this much of a revolution, and the tolerance."""
+
+
+class PositionControl(Stateful):
+    """The control loop of one axis."""
+
+    OFF, ENCODER, ENCFOLLOW = range(3)
+    """``PosCtrlMode``."""
+
+    REACTION_NONE, REACTION_STOP, REACTION_PROGRAM, REACTION_OUT8 = range(4)
+    """``ErrCtrlMode``: NONE, ERRMODE0, ERRMODE1, ERRMODE2."""
+
+    __slots__ = ("_best_p", "_following", "_progress_ns", "_ref_motor", "_ref_shaft", "_shaft", "tick_ns")
+
+    def __init__(self) -> None:
+        self.tick_ns: Nanos | None = None
+        """When the loop runs next."""
+        self._ref_motor = 0
+        self._ref_shaft = 0
+        self._following = False
+        self._shaft = 0
+        self._progress_ns: Nanos = 0
+        """When the shaft stood at ``_shaft``, or the correction came as near as ``_best_p``."""
+        self._best_p = 0.0
+
+    def reference(self, axis: Axis, now: Nanos) -> None:
+        """From here drive and encoder are taken to agree."""
+        self._ref_motor = axis.profile.count(now)
+        self._ref_shaft = axis.shaft(now)
+
+    def true_p(self, axis: Axis, now: Nanos) -> float:
+        """Where the encoder says the drive is, as motor position."""
+        shaft = axis.shaft(now)
+        return self._ref_motor + axis.encoder.pulses(shaft - self._ref_shaft)
+
+    def stop(self) -> None:
+        """A command takes over."""
+        self.tick_ns = None
+        self._following = False
+
+    # ------------------------------------------------------------------ when the loop runs
+
+    def watch(self, axis: Axis, now: Nanos) -> None:
+        """Watch a motion that may lose steps. An encoder coupled to the drive without loss cannot disagree."""
+        wanted = axis.config.pos_ctrl_mode == self.ENCODER or axis.homing.leg == Homing.TO_STOP
+        if wanted and not axis.encoder.agrees and axis.profile.moving(now):
+            self._expect_progress(axis, now)
+            self.tick_ns = _next_tick(now)
+
+    def encoder_moved(self, axis: Axis, now: Nanos) -> None:
+        """The shaft was turned or its coupling changed from outside."""
+        if axis.config.pos_ctrl_mode != self.ENCFOLLOW or axis.homing.leg == Homing.TO_STOP:
+            if axis.status is not Status.CORRECTION:
+                self.watch(axis, now)
+        elif axis.enabled and (self._following or not axis.profile.moving(now)):
+            # What is turned during a commanded motion is not followed; see `rested`.
+            self._following = True
+            if self.tick_ns is None:
+                self.tick_ns = _next_tick(now)
+
+    def rested(self, axis: Axis, now: Nanos) -> None:
+        """The axis has come to rest by itself or by a command: ENCFOLLOW follows from here on."""
+        if axis.config.pos_ctrl_mode == self.ENCFOLLOW and not self._following:
+            self.reference(axis, now)
+
+    def arrived(self, axis: Axis, now: Nanos) -> None:
+        """A motion has ended as planned: after a position move, compare with the encoder."""
+        self.rested(axis, now)
+        if axis.config.pos_ctrl_mode != self.ENCODER:
+            return
+        self.tick_ns = None
+        missing_p = abs(axis.target_p - self.true_p(axis, now))
+        if axis.status is Status.REACHED and axis.encoder.counts(missing_p) > TOLERANCE_COUNTS:
+            axis.status = axis.arrival = Status.CORRECTION
+            self._best_p = missing_p
+            self._progress_ns = now
+            self.tick_ns = now + SETTLE_NS
+
+    def _expect_progress(self, axis: Axis, now: Nanos) -> None:
+        self._progress_ns = now
+        self._shaft = axis.shaft(now)
+
+    # ------------------------------------------------------------------ the loop
+
+    def tick(self, axis: Axis, now: Nanos) -> None:
+        self.tick_ns = None
+        if axis.homing.leg == Homing.TO_STOP:
+            self._seek_stop(axis, now)
+        elif self._following:
+            self._follow(axis, now)
+        elif axis.status is Status.CORRECTION:
+            self._correct(axis, now)
+        elif axis.profile.moving(now):
+            self._supervise(axis, now)
+
+    def _seek_stop(self, axis: Axis, now: Nanos) -> None:
+        lag = axis.encoder.counts(abs(axis.profile.count(now) - self.true_p(axis, now)))
+        if lag > max(STOP_LAG_REVOLUTIONS * axis.encoder.enc_resol, TOLERANCE_COUNTS):
+            axis.homing.stop_reached(axis, now)
+        else:
+            self.tick_ns = now + PERIOD_NS
+
+    def _follow(self, axis: Axis, now: Nanos) -> None:
+        shaft = axis.shaft(now)
+        if shaft != self._shaft:
+            self._shaft = shaft
+            self.tick_ns = now + PERIOD_NS
+        target = round(self.true_p(axis, now))
+        if target != axis.profile.count(now) or axis.profile.moving(now):
+            axis.follow(target, now)
+
+    def _correct(self, axis: Axis, now: Nanos) -> None:
+        # Steps that did not reach the shaft are not counted: the coordinate becomes the true one again. Less than a count is
+        # no loss: the shaft counts whole ones.
+        true_p = self.true_p(axis, now)
+        away_p = abs(axis.target_p - true_p)
+        lost = axis.profile.count(now) - round(true_p)
+        if axis.encoder.counts(abs(lost)) >= 1.0:
+            axis.offset_p -= lost
+            axis.target_p += lost
+            self._ref_motor += lost
+        missing = axis.target_p - axis.profile.count(now)
+        within = axis.encoder.counts(abs(missing)) <= TOLERANCE_COUNTS
+        if within and not axis.profile.moving(now):
+            axis.status = axis.arrival = Status.REACHED
+            return
+        if away_p < self._best_p:
+            self._best_p = away_p
+            self._progress_ns = now
+        elif not within and self._given_up(axis, now):
+            axis.position_lost(now)
+            return
+        self.tick_ns = now + PERIOD_NS
+        axis.creep(missing if within else _part(missing, axis.config.kp), now)
+
+    def _supervise(self, axis: Axis, now: Nanos) -> None:
+        """A drive blocked for ERR_TIME is an error [1.74]."""
+        if axis.shaft(now) != self._shaft:
+            self._expect_progress(axis, now)
+        elif self._given_up(axis, now):
+            axis.position_lost(now)
+            return
+        self.tick_ns = now + PERIOD_NS
+
+    def _given_up(self, axis: Axis, now: Nanos) -> bool:
+        return now - self._progress_ns >= ERR_TIME_NS and axis.config.err_ctrl_mode != self.REACTION_NONE
+
+
+def _part(missing_p: int, kp: float) -> int:
+    """The step of a correction: ``kp`` % of what is missing, at least a pulse and at most all of it."""
+    part = round(missing_p * min(kp, 100.0) / 100.0)
+    return part or (1 if missing_p > 0 else -1)
+
+
+def _next_tick(now: Nanos) -> Nanos:
+    return (now // PERIOD_NS + 1) * PERIOD_NS

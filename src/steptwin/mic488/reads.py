@@ -1,0 +1,201 @@
+"""What a read request shows: a request is compiled once into a short plan that computes only what it asks for.
+
+Values of a block are packed little-endian and then every 16-bit word is byte-swapped, which gives big-endian registers with
+the low word first (manual 3.2).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+from steptwin.machine import Nanos
+from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, saturated_dint, saturated_real, swap_bytes, wrapped_dint
+from steptwin.mic488.registermap import FUNCTION_SPACES, LAST_ADDRESS, DataType, Piece, Register, RegisterMap, Space, Type
+from steptwin.mic488.registers import AXES
+from steptwin.wire.pdu import ILLEGAL_DATA_ADDRESS, ModbusException, Read, pack_bits
+
+if TYPE_CHECKING:
+    from steptwin.mic488.axis import Axis
+    from steptwin.mic488.device import Mic488
+
+Getter: TypeAlias = "Callable[[Any, Nanos], float]"
+"""Of the controller or of an axis, and a moment: the number that travels."""
+
+
+class Source(NamedTuple):
+    """Where a value comes from: ``place`` 0–3 is an axis, `DEVICE` the controller."""
+
+    place: int
+    get: Getter
+
+
+DEVICE = AXES
+
+
+def compile_read(registers: RegisterMap, request: Read, data_type: DataType, *, lenient: bool) -> Callable[[Mic488], bytes]:
+    """The plan for functions 01, 02, 03, or exception 02 (MIC-3, MIC-5)."""
+    space = FUNCTION_SPACES[request.function]
+    pieces = list(registers.pieces(space, request.address, request.count))
+    for piece in pieces:
+        register = piece.register
+        if register is not None and request.function in register.reads and piece.whole:
+            continue
+        half = register is not None and not piece.whole
+        if not lenient or half or request.address + request.count > LAST_ADDRESS + 1:
+            raise ModbusException(request.function, ILLEGAL_DATA_ADDRESS)
+    if space is Space.HOLDING:
+        return _registers_plan(request, pieces, data_type)
+    return _bits_plan(request, pieces)
+
+
+# ---------------------------------------------------------------------- bits
+
+
+def _bits_plan(request: Read, pieces: list[Piece]) -> Callable[[Mic488], bytes]:
+    head = bytes((request.function, (request.count + 7) // 8))
+    getters: list[Callable[[Mic488], bool]] = []
+    for register, _, size in pieces:
+        getters += [_off] * size if register is None else [_bit(register)]
+    return lambda device: head + pack_bits([get(device) for get in getters])
+
+
+def _off(device: Mic488) -> bool:
+    return False
+
+
+def _bit(register: Register) -> Callable[[Mic488], bool]:
+    key, number = (register.key, register.index), (register.index or 1) - 1
+    if register.key == "OUT":
+        return lambda device: device.outputs[number]
+    if register.key == "IN":
+        return lambda device: device.inputs.filtered[number]
+    return lambda device: bool(device.written.get(key))
+
+
+# ---------------------------------------------------------------------- registers
+
+
+def _registers_plan(request: Read, pieces: list[Piece], data_type: DataType) -> Callable[[Mic488], bytes]:
+    head = bytes((request.function, 2 * request.count))
+    if len(pieces) == 1 and pieces[0].register is not None and pieces[0].register.type is Type.MEMORY:
+        return _memory_plan(head, request.address, request.count)
+    layout = "<"
+    sources: list[Source] = []
+    for register, address, size in pieces:
+        if register is None:
+            sources += [Source(DEVICE, lambda device, now: 0)] * size
+            layout += "H" * size
+        elif register.type is Type.MEMORY:
+            sources += [Source(DEVICE, _user_word(a)) for a in range(address, address + size)]
+            layout += "H" * size
+        else:
+            sources.append(_source(register, data_type))
+            layout += register.type.layout(data_type)
+    return _packing_plan(head, struct.Struct(layout), sources)
+
+
+def _packing_plan(head: bytes, layout: struct.Struct, sources: list[Source]) -> Callable[[Mic488], bytes]:
+    pack = layout.pack
+    formats = layout.format[1:]
+
+    of_axes_only = all(place < DEVICE for place, _ in sources)
+
+    def plan(device: Mic488) -> bytes:
+        now = device.now
+        places = device.axes if of_axes_only else (*device.axes, device)
+        values = [get(places[place], now) for place, get in sources]
+        try:
+            packed = pack(*values)
+        except (struct.error, OverflowError):
+            packed = pack(*map(_saturated, formats, values))
+        return head + swap_bytes(packed)
+
+    return plan
+
+
+def _saturated(layout: str, value: float) -> float:
+    """A quantity that has outgrown its register shows the limit; counters have wrapped already."""
+    return saturated_real(value) if layout == "f" else saturated_dint(value) if layout == "i" else value
+
+
+def _memory_plan(head: bytes, address: int, count: int) -> Callable[[Mic488], bytes]:
+    pack = struct.Struct(f">{count}H").pack
+    end = address + count
+    return lambda device: head + pack(*device.user[address:end])
+
+
+def _user_word(address: int) -> Getter:
+    return lambda device, now: device.user[address]
+
+
+def _source(register: Register, data_type: DataType) -> Source:
+    if 3 not in register.reads:
+        return Source(DEVICE, _last_written(register, data_type))
+    if register.axis is None:
+        return Source(DEVICE, _OF_DEVICE[register.key])
+    if register.type is not Type.VALUE:
+        return Source(register.axis - 1, _OF_AXIS[register.key])
+    return Source(register.axis - 1, (_IN_UNITS if data_type is DataType.REAL else _IN_PULSES)[register.key])
+
+
+def _last_written(register: Register, data_type: DataType) -> Getter:
+    """MIC-3, lenient: what was written last into a write-only register, converted as stored values are (MIC-17)."""
+    key, number = (register.key, register.index), (register.axis or 1) - 1
+    if register.type is not Type.VALUE:
+        return lambda device, now: device.written.get(key, 0)
+    if data_type is DataType.DINT:
+        return lambda device, now: round(device.written.get(key, 0))
+    return lambda device, now: device.written.get(key, 0) / device.axes[number].gear
+
+
+_OF_DEVICE: dict[str, Getter] = {
+    "DATA_TYPE": lambda device, now: device.data_type,
+    "PROG_BANK_SEL": lambda device, now: device.program.program_bank,
+    "POS_BANK_SEL": lambda device, now: device.program.position_bank,
+    "PROGRAM_CTRL": lambda device, now: device.program.state,
+    "AXIS_CTR_MODE": lambda device, now: device.trigger_mode,
+    "AXIS_VEL_ABS_TRIG": lambda device, now: device.triggered["VEL_ABS"],
+    "AXIS_VEL_REL_TRIG": lambda device, now: device.triggered["VEL_REL"],
+    "AXIS_POS_ABS_TRIG": lambda device, now: device.triggered["POS_ABS"],
+    "AXIS_POS_REL_TRIG": lambda device, now: device.triggered["POS_REL"],
+    "M_ALL_STATUS": lambda device, now: 0,
+    "M_STATUS": lambda device, now: device.status(),
+}
+
+_OF_AXIS: dict[str, Getter] = {
+    "STATUS": lambda axis, now: axis.status,
+    "ENC_IMP": lambda axis, now: axis.encoder_counts(now),
+}
+
+
+def _position_u(axis: Axis, now: Nanos) -> float:
+    # What masters poll most: `Axis.coordinate_p` written out.
+    coordinate = axis.profile.count(now) + axis.offset_p
+    if not DINT_MIN <= coordinate <= DINT_MAX:
+        coordinate = wrapped_dint(coordinate)
+    return coordinate / axis.gear
+
+
+# MIC-17: stored in pulses, shown as DATA_TYPE says.
+_IN_UNITS: dict[str, Getter] = {
+    "POS_ACT": _position_u,
+    "VEL_ACT": lambda axis, now: axis.profile.velocity(now) / axis.gear,
+    "ACC": lambda axis, now: axis.acc_p / axis.gear,
+    "DEC": lambda axis, now: axis.dec_p / axis.gear,
+    "VMAX": lambda axis, now: axis.vmax_p / axis.gear,
+    "ENC_XPOS": lambda axis, now: axis.encoder.pulses(axis.encoder_counts(now)) / axis.gear,
+    "POSLIM_L": lambda axis, now: axis.limit_l_p / axis.gear,
+    "POSLIM_R": lambda axis, now: axis.limit_r_p / axis.gear,
+}
+_IN_PULSES: dict[str, Getter] = {
+    "POS_ACT": lambda axis, now: axis.coordinate_p(now),
+    "VEL_ACT": lambda axis, now: round(axis.profile.velocity(now)),
+    "ACC": lambda axis, now: round(axis.acc_p),
+    "DEC": lambda axis, now: round(axis.dec_p),
+    "VMAX": lambda axis, now: round(axis.vmax_p),
+    "ENC_XPOS": lambda axis, now: round(axis.encoder.pulses(axis.encoder_counts(now))),
+    "POSLIM_L": lambda axis, now: axis.limit_l_p,
+    "POSLIM_R": lambda axis, now: axis.limit_r_p,
+}

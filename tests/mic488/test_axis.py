@@ -1,0 +1,564 @@
+"""What an axis does when it is told: drive and stop, velocity and position, direct and by trigger, jog.
+
+Default configuration: 1 pulse per unit, ACC = DEC = 1000 u/s², VMAX = 1000 u/s.
+"""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mic488_rig import EN, Rig, coil_pdu, controller, word_pdu
+
+from steptwin.machine import SECOND
+from steptwin.mic488.config import AxisConfig
+from steptwin.motion import Profile
+from steptwin.motion.pulses import pulse_runs
+
+
+@pytest.fixture
+def rig() -> Rig:
+    """A controller with M1 enabled."""
+    rig = Rig()
+    rig.enable(1)
+    return rig
+
+
+# ---------------------------------------------------------------------- drive on and off
+
+
+def test_enable_and_disable_by_coil_and_by_mask() -> None:
+    rig = Rig()
+    rig.coil(EN + 1, True)
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [0, 1, 0, 0]
+    rig.word("M_ENABLE", 0b1001)
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [1, 1, 0, 1]
+    rig.coil(EN + 1, False)
+    rig.word("M_DISABLE", 0b0001)
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [0, 0, 0, 1]
+    assert [(edge.pin, edge.value) for edge in rig.edges] == [
+        ("M2_EN", 1.0), ("M1_EN", 1.0), ("M4_EN", 1.0), ("M2_EN", 0.0), ("M1_EN", 0.0),
+    ]  # fmt: skip
+    assert rig.pins()["M4_EN"] == 1.0
+
+
+def test_enabling_what_is_enabled_changes_nothing(rig: Rig) -> None:
+    rig.set("VEL_ABS", 500.0)
+    rig.wait(1.0)
+    rig.coil(EN, True)
+    rig.enable(1)
+    assert rig.status() == 2
+    assert rig.velocity() == 500.0
+    assert len(rig.edges) == 1
+
+
+def test_mic_8_motion_commands_while_off_are_answered_recorded_and_do_nothing() -> None:
+    rig = Rig()
+    for key in ("VEL_ABS", "VEL_REL", "POS_ABS", "POS_REL", "HOME"):
+        rig.set(key, 100.0)
+    rig.jog(1, +1, True)
+    rig.jog(1, +1, False)
+    rig.wait(1.0)
+    assert rig.status() == 0
+    assert rig.position() == 0.0
+    assert len(rig.events("drive-off")) == 6
+    rig.enable(1)
+    rig.wait(1.0)
+    assert rig.status() == 1
+    assert rig.position() == 0.0
+
+
+def test_mic_9_en_off_during_motion_ends_pulses_at_once_and_keeps_the_position(rig: Rig) -> None:
+    rig.set("VEL_ABS", 1000.0)
+    rig.wait(1.5)
+    rig.coil(EN, False)
+    assert rig.status() == 0
+    assert rig.velocity() == 0.0
+    assert rig.position() == 1000.0
+    rig.wait(5.0)
+    assert rig.position() == 1000.0
+    rig.enable(1)
+    assert rig.status() == 1
+    assert rig.position() == 1000.0
+
+
+def test_mic_10_stop_has_no_ramp_and_leaves_status_1(rig: Rig) -> None:
+    rig.enable(1, 2, 3)
+    for axis in (1, 2, 3):
+        rig.set("POS_ABS", 10_000.0, axis)
+    rig.wait(1.5)
+    rig.stop(1)
+    rig.coil(2005, False)  # writing OFF is no stop
+    rig.word("M_STOP", 0b0100)
+    assert [rig.status(axis) for axis in (1, 2, 3)] == [1, 3, 1]
+    assert [rig.velocity(axis) for axis in (1, 2, 3)] == [0.0, 1000.0, 0.0]
+    assert [rig.position(axis) for axis in (1, 2, 3)] == [1000.0] * 3
+    rig.wait(20.0)
+    assert [rig.position(axis) for axis in (1, 2, 3)] == [1000.0, 10_000.0, 1000.0]
+
+
+def test_mic_10_stop_of_a_drive_at_rest_shows_status_1(rig: Rig) -> None:
+    rig.set("POS_ABS", 10.0)
+    rig.until(1, 4)
+    rig.stop()
+    assert rig.status() == 1
+    off = Rig()
+    off.stop()
+    assert off.status() == 0
+
+
+# ---------------------------------------------------------------------- position
+
+
+def test_absolute_position_runs_a_trapezoid(rig: Rig) -> None:
+    """1000 u/s² to 1000 u/s: one second and 500 u for each ramp."""
+    rig.set("POS_ABS", 2000.0)
+    seen = []
+    for _ in range(7):
+        seen.append((rig.status(), rig.position(), rig.velocity()))
+        rig.wait(0.5)
+    assert seen == [
+        (3, 0.0, 0.0), (3, 125.0, 500.0), (3, 500.0, 1000.0), (3, 1000.0, 1000.0), (3, 1500.0, 1000.0), (3, 1875.0, 500.0),
+        (4, 2000.0, 0.0),
+    ]  # fmt: skip
+
+
+def test_short_moves_are_triangles(rig: Rig) -> None:
+    rig.set("POS_ABS", -90.0)
+    rig.wait(0.3)
+    assert rig.position() == -45.0
+    assert rig.velocity() == pytest.approx(-300.0)
+    rig.wait_ns(3 * SECOND // 10 - 1)
+    assert rig.status() == 3
+    rig.wait_ns(1)
+    assert (rig.status(), rig.position()) == (4, -90.0)
+
+
+def test_relative_position_adds_to_the_present_position_also_in_motion(rig: Rig) -> None:
+    rig.set("POS_REL", 100.0)
+    rig.until(1, 4)
+    rig.set("POS_REL", -250.0)
+    rig.until(1, 4)
+    assert rig.position() == -150.0
+    rig.set("VEL_ABS", 1000.0)
+    rig.wait(2.0)
+    assert rig.position() == 1350.0
+    rig.set("POS_REL", 1000.0)
+    rig.until(1, 4)
+    assert rig.position() == 2350.0
+
+
+def test_a_move_to_where_the_axis_is_ends_at_once(rig: Rig) -> None:
+    rig.set("POS_ABS", 0.0)
+    assert rig.status() == 4
+    rig.set("POS_REL", 0.0)
+    assert rig.status() == 4
+
+
+def test_mic_29_acc_up_and_dec_down_in_position_mode_acc_both_ways_in_velocity_mode(rig: Rig) -> None:
+    rig.set("ACC", 500.0)
+    rig.set("DEC", 2000.0)
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    assert rig.velocity() == 500.0
+    rig.wait(1.0)
+    assert (rig.position(), rig.velocity()) == (1000.0, 1000.0)
+    rig.wait(0.75)  # 750 u of cruise, then 250 u of braking in 0.5 s
+    assert (rig.position(), rig.velocity()) == (1750.0, 1000.0)
+    rig.wait(0.25)
+    assert rig.velocity() == 500.0
+    rig.wait(0.25)
+    assert rig.status() == 4
+    rig.set("VEL_ABS", 1000.0)
+    rig.wait(1.0)
+    assert rig.velocity() == 500.0
+    rig.wait(1.0)
+    rig.set("VEL_ABS", 0.0)
+    rig.wait(1.0)
+    assert rig.velocity() == 500.0
+    rig.wait(1.0)
+    assert rig.status() == 1
+
+
+def test_vmax_and_ramps_count_from_the_next_command(rig: Rig) -> None:
+    rig.set("POS_ABS", 5000.0)
+    rig.wait(2.0)
+    rig.set("VMAX", 400.0)
+    rig.wait(0.5)
+    assert rig.velocity() == 1000.0
+    rig.set("POS_ABS", 5000.0)
+    rig.wait(0.6)
+    assert rig.velocity() == 400.0
+
+
+def test_vmax_does_not_limit_velocity_mode(rig: Rig) -> None:
+    rig.set("VEL_ABS", 3000.0)
+    rig.wait(3.0)
+    assert rig.velocity() == 3000.0
+
+
+def test_ramps_slower_than_can_be_planned_are_kept_as_written_and_count_right(rig: Rig) -> None:
+    rig.set("VEL_ABS", 1000.0)
+    rig.wait(1.0)
+    for key in ("ACC", "DEC"):
+        rig.set(key, 1e-30)
+        assert rig.get(key) == pytest.approx(1e-30)
+    rig.set("POS_ABS", 0.0)
+    for seconds in range(1, 5):
+        rig.wait(1.0)
+        assert rig.position() == 500.0 + 1000.0 * seconds - 1  # not yet slower by a pulse in all
+    assert rig.velocity() == pytest.approx(1000.0 - 0.01 * 4)
+
+
+# ---------------------------------------------------------------------- velocity
+
+
+def test_absolute_velocity_ramps_and_reverses_through_zero(rig: Rig) -> None:
+    rig.set("VEL_ABS", 800.0)
+    rig.wait(0.4)
+    assert (rig.status(), rig.velocity()) == (2, 400.0)
+    rig.wait(1.0)
+    assert rig.velocity() == 800.0
+    rig.set("VEL_ABS", -800.0)
+    rig.wait(0.8)
+    assert rig.velocity() == pytest.approx(0.0, abs=1e-4)
+    rig.wait(1.0)
+    assert (rig.status(), rig.velocity()) == (2, -800.0)
+    assert rig.position() == 320.0 + 480.0 + 320.0 - 320.0 - 160.0
+
+
+def test_relative_velocity_adds_to_the_present_velocity_not_to_the_one_asked_for(rig: Rig) -> None:
+    rig.set("VEL_ABS", 800.0)
+    rig.wait(0.4)
+    rig.set("VEL_REL", 100.0)
+    rig.wait(1.0)
+    assert rig.velocity() == 500.0
+    rig.set("VEL_REL", -600.0)
+    rig.wait(2.0)
+    assert rig.velocity() == -100.0
+
+
+def test_mic_11_velocity_ramped_to_zero_ends_with_status_1(rig: Rig) -> None:
+    rig.set("VEL_ABS", 500.0)
+    rig.wait(1.0)
+    rig.set("VEL_REL", -500.0)
+    assert rig.status() == 2
+    rig.wait_ns(SECOND // 2 - 1)
+    assert rig.status() == 2
+    rig.wait_ns(1)
+    assert rig.status() == 1
+    rig.set("VEL_ABS", 0.0)
+    assert rig.status() == 1
+
+
+# ---------------------------------------------------------------------- replacing commands in flight
+
+
+def test_a_farther_target_in_flight_keeps_the_velocity(rig: Rig) -> None:
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(2.25)
+    assert rig.velocity() == 750.0
+    rig.set("POS_ABS", 4000.0)
+    assert rig.velocity() == 750.0
+    assert rig.status() == 3
+    rig.wait(0.25)
+    assert rig.velocity() == 1000.0
+    rig.until(1, 4)
+    assert rig.position() == 4000.0
+
+
+def test_a_target_behind_reverses_through_zero(rig: Rig) -> None:
+    rig.set("POS_ABS", 5000.0)
+    rig.wait(2.0)
+    assert rig.position() == 1500.0
+    rig.set("POS_ABS", 0.0)
+    rig.wait(1.0)
+    assert (rig.position(), rig.velocity()) == (2000.0, 0.0)
+    rig.until(1, 4)
+    assert rig.position() == 0.0
+    assert rig.now == (2 + 1 + 3) * SECOND
+
+
+def test_a_target_too_near_to_brake_for_is_passed_and_met_from_behind(rig: Rig) -> None:
+    rig.set("POS_ABS", 5000.0)
+    rig.wait(2.0)
+    rig.set("POS_ABS", 1600.0)
+    rig.wait(1.0)
+    assert rig.position() == 2000.0
+    rig.until(1, 4)
+    assert rig.position() == 1600.0
+
+
+def test_velocity_and_position_commands_replace_each_other(rig: Rig) -> None:
+    rig.set("VEL_ABS", 1000.0)
+    rig.wait(1.5)
+    rig.set("POS_ABS", 3000.0)
+    assert (rig.status(), rig.velocity()) == (3, 1000.0)
+    rig.wait(1.0)
+    rig.set("VEL_ABS", 600.0)
+    assert (rig.status(), rig.velocity()) == (2, 1000.0)
+    rig.wait(0.4)
+    assert rig.velocity() == 600.0
+
+
+def test_a_velocity_above_vmax_slows_down_to_it(rig: Rig) -> None:
+    rig.set("VEL_ABS", 3000.0)
+    rig.wait(3.0)
+    rig.set("POS_ABS", 100_000.0)
+    rig.wait(2.0)
+    assert rig.velocity() == 1000.0
+
+
+# ---------------------------------------------------------------------- the outputs' highest frequency
+
+
+def test_more_than_64_khz_is_clamped_and_reported() -> None:
+    rig = Rig(controller(AxisConfig(gear=100.0, acc=10_000.0, dec=10_000.0, vel=1000.0)))
+    rig.enable(1)
+    rig.set("VEL_ABS", 640.0)
+    assert rig.events("speed-clamped") == []
+    rig.set("VEL_ABS", -700.0)
+    rig.wait(1.0)
+    assert rig.velocity() == -640.0
+    assert [event.axis for event in rig.events("speed-clamped")] == [1]
+    assert "70000" in rig.events("speed-clamped")[0].text
+    rig.set("VMAX", 2000.0)
+    assert rig.get("VMAX") == 2000.0
+    rig.set("POS_ABS", 10_000.0)
+    rig.wait(1.0)
+    assert rig.velocity() == 640.0
+    rig.set("VEL_REL", 0.01)
+    rig.wait(1.0)
+    assert rig.velocity() == 640.0
+    assert len(rig.events("speed-clamped")) == 3
+
+
+# ---------------------------------------------------------------------- trigger mode
+
+
+def test_trigger_example_of_the_manual() -> None:
+    """Three axes to 10, 15 and 20 together."""
+    rig = Rig()
+    rig.enable(1, 2, 3)
+    rig.word("AXIS_CTR_MODE", 1)
+    for axis, target in ((1, 10.0), (2, 15.0), (3, 20.0)):
+        rig.set("POS_ABS", target, axis)
+    rig.wait(1.0)
+    assert [rig.status(axis) for axis in (1, 2, 3)] == [1, 1, 1]
+    rig.word("AXIS_POS_ABS_TRIG", 7)
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [3, 3, 3, 0]
+    started = {axis.profile.start for axis in rig.device.axes[:3]}
+    assert started == {SECOND}
+    for axis in (1, 2, 3):
+        rig.until(axis, 4)
+    assert [rig.position(axis) for axis in (1, 2, 3)] == [10.0, 15.0, 20.0]
+
+
+def test_mic_16_a_trigger_consumes_values_of_its_axes_and_reads_back_its_mask(rig: Rig) -> None:
+    rig.enable(1, 2)
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.set("POS_REL", 10.0, 1)
+    rig.set("POS_REL", 20.0, 2)
+    rig.word("AXIS_POS_REL_TRIG", 1)
+    rig.until(1, 4)
+    assert rig.position(2) == 0.0
+    rig.word("AXIS_POS_REL_TRIG", 3)
+    rig.wait(5.0)
+    assert (rig.position(1), rig.position(2)) == (10.0, 20.0)
+    assert rig.word("AXIS_POS_REL_TRIG") == 3
+    assert rig.word("AXIS_POS_ABS_TRIG") == 0
+    rig.word("AXIS_POS_REL_TRIG", 3)
+    rig.wait(5.0)
+    assert (rig.position(1), rig.position(2)) == (10.0, 20.0)
+
+
+def test_mic_16_each_kind_has_its_own_stored_value_and_the_last_one_counts(rig: Rig) -> None:
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.set("VEL_ABS", 100.0)
+    rig.set("VEL_ABS", 200.0)
+    rig.set("VEL_REL", 50.0)
+    rig.set("POS_ABS", 5000.0)
+    rig.word("AXIS_VEL_ABS_TRIG", 1)
+    rig.wait(1.0)
+    assert rig.velocity() == 200.0
+    rig.word("AXIS_VEL_REL_TRIG", 1)
+    rig.wait(1.0)
+    assert rig.velocity() == 250.0
+    rig.word("AXIS_POS_ABS_TRIG", 1)
+    rig.until(1, 4)
+    assert rig.position() == 5000.0
+
+
+def test_triggers_mean_nothing_in_direct_mode(rig: Rig) -> None:
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.set("POS_ABS", 100.0)
+    rig.word("AXIS_CTR_MODE", 0)
+    rig.word("AXIS_POS_ABS_TRIG", 1)
+    rig.wait(1.0)
+    assert rig.status() == 1
+    rig.set("POS_ABS", 5.0)
+    assert rig.status() == 3
+
+
+def test_homing_does_not_wait_for_a_trigger(rig: Rig) -> None:
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.set("HOME", -100.0)
+    assert rig.status() == 6
+
+
+def test_jog_does_not_wait_for_a_trigger(rig: Rig) -> None:
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.jog(1, +1, True)
+    assert rig.status() == 2
+
+
+# ---------------------------------------------------------------------- position register
+
+
+def test_writing_the_position_at_rest_moves_nothing(rig: Rig) -> None:
+    rig.set("POS_ABS", 100.0)
+    rig.until(1, 4)
+    rig.set("POS_ACT", 0.0)
+    assert (rig.status(), rig.position()) == (4, 0.0)
+    rig.set("POS_ACT", -7.0)
+    rig.set("POS_ABS", 3.0)
+    rig.until(1, 4)
+    assert rig.position() == 3.0
+    assert rig.device.axes[0].profile.count(rig.now) == 110
+
+
+def test_mic_13_position_written_in_motion_shifts_the_coordinate_only(rig: Rig) -> None:
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.5)
+    before = rig.device.axes[0].profile
+    rig.set("POS_ACT", 0.0)
+    assert (rig.status(), rig.position(), rig.velocity()) == (3, 0.0, 1000.0)
+    assert rig.device.axes[0].profile is before
+    rig.until(1, 4)
+    assert rig.position() == 1000.0  # the same place
+    assert rig.now == 3 * SECOND
+
+
+def test_a_counter_wraps_as_32_bits_do_and_relative_moves_cross_the_border(rig: Rig) -> None:
+    rig.use_dint()
+    rig.set("POS_ACT", 2**31 - 10)
+    rig.set("POS_REL", 30)
+    rig.until(1, 4)
+    assert rig.position() == -(2**31) + 20
+    rig.set("POS_ABS", -(2**31))
+    rig.until(1, 4)
+    assert rig.position() == -(2**31)
+    assert rig.device.axes[0].profile.count(rig.now) == 10
+    rig.set("VEL_ABS", -1000)
+    rig.wait(1.0)
+    assert rig.position() == 2**31 - 500
+
+
+# ---------------------------------------------------------------------- jog
+
+
+def test_jog_runs_while_the_bit_is_on_and_ramps_down_with_acc(rig: Rig) -> None:
+    rig.set("ACC", 500.0)
+    rig.ask(word_pdu(rig.base + 17, 250))
+    rig.jog(1, -1, True)
+    rig.wait(1.0)
+    assert (rig.status(), rig.velocity()) == (2, -250.0)  # MIC-31: jogging shows status 2
+    rig.jog(1, -1, False)
+    rig.wait_ns(SECOND // 2 - 1)
+    assert rig.status() == 2
+    rig.wait_ns(1)
+    assert (rig.status(), rig.velocity()) == (1, 0.0)
+
+
+def test_jog_speed_is_the_configured_velocity_until_written(rig: Rig) -> None:
+    rig.jog(1, +1, True)
+    rig.wait(2.0)
+    assert rig.velocity() == 1000.0
+
+
+def test_mic_18_of_both_jog_bits_the_last_write_wins(rig: Rig) -> None:
+    rig.ask(word_pdu(rig.base + 17, 100))
+    rig.jog(1, +1, True)
+    rig.wait(1.0)
+    rig.jog(1, -1, True)
+    rig.wait(1.0)
+    assert rig.velocity() == -100.0
+    rig.jog(1, +1, False)  # the direction that bit started is over already
+    rig.wait(1.0)
+    assert rig.velocity() == -100.0
+    rig.jog(1, -1, False)
+    rig.wait(1.0)
+    assert rig.status() == 1
+
+
+def test_mic_18_clearing_a_bit_stops_no_motion_it_did_not_start(rig: Rig) -> None:
+    rig.jog(1, +1, True)
+    rig.set("VEL_ABS", 300.0)
+    rig.jog(1, +1, False)
+    rig.wait(2.0)
+    assert rig.velocity() == 300.0
+    rig.set("POS_ABS", 0.0)
+    rig.jog(1, +1, False)
+    rig.jog(1, -1, False)
+    assert rig.status() == 3
+
+
+def test_jog_bits_of_every_axis() -> None:
+    rig = Rig()
+    rig.enable(1, 2, 3, 4)
+    for address in (2008, 2011, 2012, 2015):
+        assert rig.ask(coil_pdu(address, True)) == coil_pdu(address, True)
+    rig.wait(1.0)
+    assert [rig.velocity(axis) for axis in (1, 2, 3, 4)] == [1000.0, -1000.0, 1000.0, -1000.0]
+
+
+# ---------------------------------------------------------------------- pulses are whole
+
+COMMANDS = st.one_of(
+    st.tuples(st.sampled_from(["POS_ABS", "POS_REL"]), st.floats(-3000.0, 3000.0, width=32)),
+    st.tuples(st.sampled_from(["VEL_ABS", "VEL_REL"]), st.floats(-70_000.0, 70_000.0, width=32)),
+    st.tuples(st.sampled_from(["ACC", "DEC", "VMAX"]), st.floats(1.0, 1e6, width=32)),
+    st.tuples(st.sampled_from(["POSLIM_L", "POSLIM_R", "POS_ACT"]), st.floats(-2000.0, 2000.0, width=32)),
+    st.tuples(st.just("STOP"), st.just(0.0)),
+    st.tuples(st.just("OFF"), st.just(0.0)),
+)
+
+
+def pulses_of(profile: Profile, after: int, until: int) -> int:
+    return sum(direction * len(times) for direction, times in pulse_runs(profile, after, until))
+
+
+@settings(max_examples=80)
+@given(st.lists(st.tuples(COMMANDS, st.integers(0, 3 * SECOND)), max_size=15))
+def test_the_count_is_the_sum_of_the_pulses_of_replaced_profiles(steps: list[tuple[tuple[str, float], int]]) -> None:
+    rig = Rig()
+    axis = rig.device.axes[0]
+    rig.enable(1)
+    given_p, profile, since, revision = 0, axis.profile, 0, axis.revision
+
+    def look() -> None:
+        """Count the pulses of each profile up to the moment it was replaced."""
+        nonlocal given_p, profile, since, revision
+        if axis.revision != revision:
+            at = axis.profile.start
+            given_p += pulses_of(profile, since, at)
+            profile, since, revision = axis.profile, at, axis.revision
+
+    for (key, value), pause in steps:
+        end = rig.now + pause
+        while (due := rig.kernel.deadline()) is not None and due <= end:
+            rig.wait_ns(due - rig.now)
+            look()
+        rig.wait_ns(end - rig.now)
+        if key == "STOP":
+            rig.stop()
+        elif key == "OFF":
+            rig.coil(EN, False)
+            rig.enable(1)
+        else:
+            rig.set(key, value)
+        look()
+    rig.wait(2.0)
+    look()
+    count = axis.profile.count(rig.now)
+    assert count == given_p + pulses_of(profile, since, rig.now)

@@ -1,0 +1,389 @@
+"""The vendor's configuration file: nothing is lost, everything is checked."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from steptwin.diagnostics import Severity, to_json
+from steptwin.errors import Misuse
+from steptwin.mic488.config import (
+    AxisConfig,
+    ConfigError,
+    ControllerConfig,
+    InputConfig,
+    ProgramConfig,
+    encoder_channel,
+    examine_config,
+    read_config,
+)
+from steptwin.mic488.inifile import IniFile
+
+VENDOR = (
+    "; zapisane programem, prędkości w mm/s\r\n"
+    "[Axis0]\r\n"
+    "Unit=3\r\n"
+    "Gear=320,5\r\n"
+    "Acc=100.25\r\n"
+    "Dec = 200   ; hamowanie\r\n"
+    "Vel=50\r\n"
+    "MotResol=6400\r\n"
+    "EncResol=2000\r\n"
+    "EncOffset=-17\r\n"
+    "HomeMode=1\r\n"
+    "LimitMode=3\r\n"
+    "InKL=0\r\n"
+    "InKR=7\r\n"
+    "PosCtrlMode=1\r\n"
+    "ErrCtrlMode=2\r\n"
+    "Kp=12,5\r\n"
+    "MotCurrent=1,8\r\n"
+    "\r\n"
+    "[axis1]\r\n"
+    "gear=12800\r\n"
+    "\r\n"
+    "[IN0]\r\n"
+    "Filter=4\r\n"
+    "Level=1\r\n"
+    "Int=3\r\n"
+    "[AIN0]\r\n"
+    "LoVal=-10\r\n"
+    "HiVal=10\r\n"
+    "Baud=115200\r\n"
+    "ID=17\r\n"
+    "[AIN1]\r\n"
+    "Baud=9600\r\n"
+    "ID=999\r\n"
+    "[WBC_PROGRAM]\r\n"
+    "Activate=1\r\n"
+    "ProgBankToRun=5\r\n"
+    "PosBankToRun=2\r\n"
+    "[Vision]\r\n"
+    "Camera=none\r\n"
+    "last line without end"
+).encode("cp1250")
+
+
+def parse(text: str) -> IniFile:
+    return IniFile.parse(text.encode(), "m.cfg")
+
+
+def findings(text: str, firmware: str = "1.70") -> list[tuple[str, str]]:
+    return [(found.code, found.message) for found in examine_config(parse(text), firmware)[1]]
+
+
+# ---------------------------------------------------------------------- the typed view
+
+
+def test_the_vendor_s_file() -> None:
+    config = read_config(IniFile.parse(VENDOR))
+    assert config.axes[0] == AxisConfig(
+        unit=3,
+        gear=320.5,
+        acc=100.25,
+        dec=200.0,
+        vel=50.0,
+        mot_resol=6400,
+        enc_resol=2000,
+        enc_offset=-17,
+        home_mode=1,
+        limit_mode=3,
+        in_kl=0,
+        in_kr=7,
+        pos_ctrl_mode=1,
+        err_ctrl_mode=2,
+        kp=12.5,
+    )
+    assert config.axes[0].unit_name == "mm"
+    assert config.axes[1] == AxisConfig(gear=12800.0)
+    assert config.inputs[0] == InputConfig(filter=4, level=1, interrupt=3)
+    assert (config.analog[0].lo_val, config.analog[0].hi_val) == (-10.0, 10.0)
+    assert [port.baud for port in config.ports] == [115200, 9600]
+    assert config.program == ProgramConfig(activate=1, prog_bank=5, pos_bank=2)
+
+
+def test_the_slave_address_is_that_of_com1_and_com2_s_is_ignored() -> None:
+    assert read_config(IniFile.parse(VENDOR)).address == 17
+    assert read_config(parse("[AIN1]\nID=5")).address == 1
+
+
+def test_mic_27_without_a_file_the_controller_is_as_delivered() -> None:
+    config = read_config(parse(""))
+    assert config == ControllerConfig()
+    assert len(config.axes) == 4
+    assert len(config.inputs) == 20
+    axis = config.axes[3]
+    assert (axis.unit_name, axis.gear, axis.acc, axis.dec, axis.vel) == ("imp", 1.0, 1000.0, 1000.0, 1000.0)
+    assert (axis.mot_resol, axis.enc_resol, axis.kp) == (3200, 400, 50.0)
+    assert (axis.in_kl, axis.in_kr, axis.limit_mode, axis.home_mode, axis.pos_ctrl_mode) == (20, 20, 0, 0, 0)
+    assert (config.address, config.ports[0].baud, config.program.activate) == (1, 38400, 0)
+
+
+@pytest.mark.parametrize("written", ["0,5", "0.5", ".5", ",5", "+0,50", "5e-1", "5E-01"])
+def test_decimal_point_and_comma(written: str) -> None:
+    assert read_config(parse(f"[Axis0]\nGear={written}")).axes[0].gear == 0.5
+
+
+def test_input_numbers_of_encoder_channels() -> None:
+    shown = [encoder_channel(number) for number in (0, 7, 8, 9, 10, 11, 19, 20)]
+    assert shown == [None, None, (0, "C"), (0, "B"), (0, "A"), (1, "C"), (3, "A"), None]
+
+
+# ---------------------------------------------------------------------- what is wrong with a file
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "message", "hint"),
+    [
+        ("[Axis0]\nGear=0", "C008", "[Axis0] Gear = 0 is not permitted", "permitted: a number > 0 in pulses per unit"),
+        ("[Axis1]\nAcc=-1", "C008", "[Axis1] Acc = -1 is not permitted", "permitted: a number > 0 in units/s²"),
+        ("[Axis1]\nDec=0,0", "C008", "[Axis1] Dec = 0,0 is not permitted", "permitted: a number > 0 in units/s²"),
+        ("[Axis1]\nVel=1e39", "C008", "[Axis1] Vel = 1e39 is not permitted", "permitted: a number > 0 in units/s"),
+        ("[Axis1]\nVel=fast", "C006", "[Axis1] Vel = fast is no number", "permitted: a number > 0 in units/s"),
+        ("[Axis1]\nVel=nan", "C006", "[Axis1] Vel = nan is no number", "permitted: a number > 0 in units/s"),
+        ("[Axis1]\nVel=1 000", "C006", "[Axis1] Vel = 1 000 is no number", "permitted: a number > 0 in units/s"),
+        ("[Axis1]\nVel=", "C006", "[Axis1] Vel =  has no value", "permitted: a number > 0 in units/s"),
+        (
+            "[Axis2]\nUnit=6",
+            "C008",
+            "[Axis2] Unit = 6 is not permitted",
+            "permitted: 0 = imp, 1 = rev, 2 = degree, 3 = mm, 4 = cm, 5 = m",
+        ),
+        (
+            "[Axis2]\nHomeMode=1,5",
+            "C007",
+            "[Axis2] HomeMode = 1,5 is no whole number",
+            "permitted: 0 = HOME0, 1 = HOME1, 2 = HOME2, 3 = HOME3, 4 = HOME4",
+        ),
+        (
+            "[Axis3]\nInKL=21",
+            "C008",
+            "[Axis3] InKL = 21 is not permitted",
+            "permitted: 0…7 (IN1…IN8), 8…19 (channels C, B, A of encoders 1…4), 20 (none)",
+        ),
+        (
+            "[Axis3]\nEncOffset=2147483648",
+            "C008",
+            "[Axis3] EncOffset = 2147483648 is not permitted",
+            "permitted: a whole number -2147483648…2147483647",
+        ),
+        (
+            "[IN19]\nFilter=5",
+            "C008",
+            "[IN19] Filter = 5 is not permitted",
+            "permitted: 0 = 10 ms, 1 = 50 ms, 2 = 100 ms, 3 = 250 ms, 4 = 500 ms",
+        ),
+        (
+            "[AIN0]\nBaud=4800",
+            "C008",
+            "[AIN0] Baud = 4800 is not permitted",
+            "permitted: 9600, 19200, 38400, 57600, 115200",
+        ),
+        ("[AIN0]\nID=0", "C008", "[AIN0] ID = 0 is not permitted", "permitted: a whole number 1…247"),
+        (
+            "[Axis0]\nInKR=11\nPosCtrlMode=2",
+            "C009",
+            "[Axis0] InKR = 11 is channel C of encoder 2, but the axis uses its encoder (PosCtrlMode 2, HomeMode 0)",
+            "permitted: 0…7 (IN1…IN8), 20 (none)",
+        ),
+        (
+            "[Axis0]\nHomeMode=4\nInKL=8",
+            "C009",
+            "[Axis0] InKL = 8 is channel C of encoder 1, but the axis uses its encoder (PosCtrlMode 0, HomeMode 4)",
+            "permitted: 0…7 (IN1…IN8), 20 (none)",
+        ),
+        ("[Axis0\nGear=2", "C002", "the section header [Axis0 is not closed", "permitted: [name]"),
+    ],
+)
+def test_one_error(text: str, code: str, message: str, hint: str) -> None:
+    config, found = examine_config(parse(text))
+    assert [(f.code, f.message, f.hint, f.severity) for f in found] == [(code, message, hint, Severity.ERROR)]
+    with pytest.raises(ConfigError, match=r"m\.cfg:"):
+        read_config(parse(text))
+    assert isinstance(config, ControllerConfig)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "message"),
+    [
+        ("[Axis0]\nGaer=100", "C005", "[Axis0] Gaer is not known; did you mean Gear?"),
+        ("[Axsi0]\nGear=100", "C005", "the section [Axsi0] is not known; did you mean [Axis0]?"),
+        ("[Axis0]\nsomething", "C001", "'something' has no effect"),
+        ("Gear=1\n[Axis0]", "C001", "'Gear=1' stands before the first [section] and has no effect"),
+        ("[Axis0]\nGear=1\ngear=2", "C003", "[Axis0] gear is repeated; the first one counts"),
+        ("[Axis0]\n[AXIS0]", "C003", "the section [AXIS0] is repeated"),
+        ("[Axis0]\nInKL=11\n[Axis1]\nPosCtrlMode=1", "C010", "[Axis0] InKL = 11 is channel C of encoder 2, which axis M2 uses"),
+    ],
+)
+def test_one_warning(text: str, code: str, message: str) -> None:
+    found = examine_config(parse(text))[1]
+    assert [(f.code, f.message, f.severity) for f in found] == [(code, message, Severity.WARNING)]
+    read_config(parse(text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[Axis0]\nMotCurrent=x\n[Vision]\nGaer=1",
+        "[Axis0]\nGear=2\nGears=3",  # Gear is there, so Gears is somebody else's key
+        "[Axis0]\nInKL=8",  # an encoder nobody uses as such
+        "; comment\n# comment\n// comment\n\n  \n[Axis0] ; comment",
+        "[AIN1]\nID=many",
+    ],
+)
+def test_nothing_to_say(text: str) -> None:
+    assert findings(text) == []
+
+
+@pytest.mark.parametrize(("firmware", "last"), [("1.23", 7), ("1.40", 7), ("1.70", 5)])
+def test_mic_28_banks_to_run_follow_the_firmware(firmware: str, last: int) -> None:
+    for key in ("ProgBankToRun", "PosBankToRun"):
+        assert findings(f"[WBC_PROGRAM]\n{key}={last}", firmware) == []
+        assert findings(f"[WBC_PROGRAM]\n{key}={last + 1}", firmware) == [
+            ("C008", f"[WBC_PROGRAM] {key} = {last + 1} is not permitted")
+        ]
+
+
+def test_unknown_firmware_is_the_caller_s_mistake() -> None:
+    with pytest.raises(Misuse, match=r"permitted: 1\.23, 1\.40, 1\.70"):
+        read_config(parse(""), "3")
+
+
+def test_all_errors_at_once_with_file_line_and_key() -> None:
+    text = "[Axis0]\r\nGear=0\r\nAcc=x\r\n\r\n[IN3]\r\nLevel=2\r\n"
+    with pytest.raises(ConfigError) as caught:
+        read_config(parse(text))
+    assert str(caught.value) == (
+        "m.cfg:2:6: error C008: [Axis0] Gear = 0 is not permitted\n"
+        "  2 | Gear=0\n"
+        "    |      ^\n"
+        "    = permitted: a number > 0 in pulses per unit\n"
+        "m.cfg:3:5: error C006: [Axis0] Acc = x is no number\n"
+        "  3 | Acc=x\n"
+        "    |     ^\n"
+        "    = permitted: a number > 0 in units/s²\n"
+        "m.cfg:6:7: error C008: [IN3] Level = 2 is not permitted\n"
+        "  6 | Level=2\n"
+        "    |       ^\n"
+        "    = permitted: 0 = active high, 1 = active low"
+    )
+    rows = to_json(caught.value.source, caught.value.findings)
+    assert [(row["line"], row["code"]) for row in rows] == [(2, "C008"), (3, "C006"), (6, "C008")]
+
+
+def test_a_wrong_value_leaves_its_default() -> None:
+    config, _ = examine_config(parse("[Axis0]\nGear=0\nAcc=7"))
+    assert (config.axes[0].gear, config.axes[0].acc) == (1.0, 7.0)
+
+
+def test_a_misspelt_key_comes_with_the_repair() -> None:
+    file = parse("[Axis0]\nGaer=100")
+    (found,) = examine_config(file)[1]
+    assert found.fix is not None
+    span = found.fix.span
+    repaired = file.source.text[: span.start] + found.fix.text + file.source.text[span.end :]
+    assert repaired == "[Axis0]\nGear=100"
+
+
+def test_utf_16_is_named() -> None:
+    data = "[Axis0]\r\nGear=1\r\n".encode("utf-16")
+    file = IniFile.parse(data)
+    assert "C004" in [f.code for f in file.findings]
+    assert file.to_bytes() == data
+
+
+# ---------------------------------------------------------------------- nothing is lost
+
+ENDS = st.sampled_from(["\n", "\r\n", "\r", ""])
+NAMES = st.sampled_from(["Axis0", "axis0", "AXIS1", "IN0", "AIN0", "WBC_PROGRAM", "Vision", "", " x "])
+KEYS = st.sampled_from(["Gear", "gear", "Acc", "InKL", "ID", "Foo", "", "a b"])
+VALUES = st.sampled_from(["1", "0,5", "", " 7 ", "x;y", "5 ; note", "100 # note", "ąę", "=", "[x]", "\x85", "\xa0"])
+LINES = st.one_of(
+    NAMES.map("[{}]".format),
+    NAMES.map("[{}".format),
+    st.tuples(KEYS, st.sampled_from(["=", " = ", "=\t", ""]), VALUES).map("".join),
+    st.sampled_from([";", "; comment", "# c", "// c", "", "   ", "rubbish", "\x0b", "\u2028"]),
+)
+TEXTS = st.lists(st.tuples(LINES, ENDS).map("".join)).map("".join)
+FILES = st.one_of(st.binary(max_size=200), TEXTS.map(lambda t: t.encode()), TEXTS.map(lambda t: t.encode("cp1250", "replace")))
+
+
+@given(FILES)
+@example(VENDOR)
+@example(b"\xef\xbb\xbf[Axis0]\r\nGear=2")
+@example(bytes(range(256)))
+@example(b"[Axis0]\rGear=2\r")
+def test_an_unmodified_file_is_written_byte_for_byte(data: bytes) -> None:
+    file = IniFile.parse(data)
+    assert file.to_bytes() == data
+    examine_config(file)
+
+
+@given(FILES, NAMES, KEYS, st.sampled_from(["1", "0,5", "", "x y", "a;b", "ü"]))
+@example(VENDOR, "Axis0", "Dec", "1")
+@example(b"[Axis0]\nGear=1", "Axis0", "Acc", "5")
+def test_setting_a_key_changes_that_value_only(data: bytes, section: str, key: str, value: str) -> None:
+    file = IniFile.parse(data)
+    try:
+        changed = file.with_value(section, key, value)
+    except Misuse:
+        return
+    assert changed.get(section, key) == value
+    names = {(e.section.lower(), e.key.lower()) for e in (*file.entries, *changed.entries)} - {(section.lower(), key.lower())}
+    assert all(changed.get(*name) == file.get(*name) for name in names)
+    entry = file.find(section, key)
+    old, new = file.source.text, changed.source.text
+    if entry is not None:
+        span = entry.value_span
+        assert new == old[: span.start] + value + old[span.end :]
+    else:
+        extra = len(new) - len(old)
+        assert any(new[:i] + new[i + extra :] == old for i in range(len(old) + 1))
+
+
+def test_setting_a_value_keeps_the_comment_behind_it() -> None:
+    changed = IniFile.parse(VENDOR).with_value("axis0", "DEC", "3,5")
+    assert changed.to_bytes() == VENDOR.replace(b"Dec = 200   ; ham", b"Dec = 3,5   ; ham")
+    assert read_config(changed).axes[0].dec == 3.5
+
+
+def test_a_new_key_joins_its_section_with_the_file_s_line_ends() -> None:
+    changed = IniFile.parse(VENDOR).with_value("Axis1", "Acc", "7")
+    assert changed.to_bytes() == VENDOR.replace(b"gear=12800\r\n", b"gear=12800\r\nAcc=7\r\n")
+
+
+def test_a_new_section_goes_to_the_end() -> None:
+    assert parse("[A]\nx=1").with_value("B", "y", "2").to_bytes() == b"[A]\nx=1\n[B]\ny=2\n"
+    assert parse("").with_value("B", "y", "2").to_bytes() == b"[B]\r\ny=2\r\n"
+    assert IniFile.parse(b"\xef\xbb\xbf").with_value("B", "y", "2").to_bytes() == b"\xef\xbb\xbf[B]\r\ny=2\r\n"
+    assert parse("[B]\n\n[C]\n").with_value("b", "y", "2").to_bytes() == b"[B]\ny=2\n\n[C]\n"
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("Axis0", "Gear", "1\n2"),
+        ("Axis0", "Gear", " 1"),
+        ("Axis0", "Gear", "1 ; x"),
+        ("Axis0", "a=b", "1"),
+        ("Axis0", ";a", "1"),
+        ("Axis0", "[a]", "1"),
+        ("Axis0", "", "1"),
+        ("A]B", "a", "1"),
+        ("New\n[Axis0]", "a", "1"),
+    ],
+)
+def test_what_would_not_read_back_is_refused(section: str, key: str, value: str) -> None:
+    with pytest.raises(Misuse, match="it would not read back"):
+        parse("[Axis0]\nGear=5\n").with_value(section, key, value)
+
+
+def test_characters_the_file_cannot_hold_are_refused() -> None:
+    with pytest.raises(Misuse, match="has characters that"):
+        IniFile.parse(VENDOR, "m.cfg").with_value("Vision", "Camera", "\N{SNOWMAN}")
+
+
+def test_a_long_line_is_read_in_no_time() -> None:
+    text = "[Axis0]\nGear=1" + " " * 200_000 + "x\n" + "a" * 200_000 + "\n" + "k " * 100_000 + "=1"
+    assert read_config(parse(text.replace("Gear=1", "Note=1"))) == ControllerConfig()

@@ -1,0 +1,466 @@
+"""Encoders: counters, the three position-control modes, and what happens when a drive does not arrive (MIC-19, MIC-26).
+
+Default: 3200 pulses and 400 counts per revolution, so 8 pulses a count; tolerance 4 counts, 32 pulses.
+"""
+
+from __future__ import annotations
+
+import pytest
+from mic488_rig import EN, Rig, controller
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND
+from steptwin.mic488.config import AxisConfig
+from steptwin.mic488.encoder import Coupling
+
+ON, VELOCITY, POSITION, REACHED, ERROR, HOMING, CORRECTION, LIMIT_R = 1, 2, 3, 4, 5, 6, 8, 10
+CONTROL_OFF, ENCODER, ENCFOLLOW = range(3)
+NONE, ERRMODE0, ERRMODE1, ERRMODE2 = range(4)
+
+
+def encoder_rig(mode: int = ENCODER, reaction: int = ERRMODE0, /, **config: float) -> Rig:
+    rig = Rig(controller(AxisConfig(pos_ctrl_mode=mode, err_ctrl_mode=reaction, **config)))  # type: ignore[arg-type]
+    rig.enable(1)
+    return rig
+
+
+def couple(rig: Rig, coupling: Coupling, axis: int = 1) -> None:
+    rig.kernel.advance(rig.now)
+    rig.device.couple_encoder(axis, coupling, rig.now)
+    rig.kernel.deadline()
+
+
+def turn(rig: Rig, counts: int, axis: int = 1) -> None:
+    rig.kernel.advance(rig.now)
+    rig.device.turn_encoder(axis, counts, rig.now)
+    rig.kernel.deadline()
+
+
+def motor(rig: Rig) -> int:
+    return rig.device.axes[0].profile.count(rig.now)
+
+
+# ---------------------------------------------------------------------- counters
+
+
+def test_the_encoder_counts_what_the_drive_turns() -> None:
+    rig = Rig(controller(AxisConfig(gear=3200.0, enc_offset=10)))
+    assert rig.get("ENC_IMP") == 10
+    rig.enable(1)
+    rig.set("VMAX", 5.0)
+    rig.set("ACC", 10.0)
+    rig.set("POS_ABS", -2.5)
+    rig.until(1, REACHED)
+    assert rig.get("ENC_IMP") == 10 - 1000
+    rig.set("ENC_IMP", 400)
+    assert rig.get("ENC_IMP") == 400
+    assert rig.get("ENC_XPOS") == 1.0  # 400 counts are a revolution, 3200 pulses, one unit
+    assert rig.position() == -2.5
+
+
+def test_xpos_is_the_counter_in_drive_position_read_and_written() -> None:
+    rig = Rig(controller(AxisConfig(gear=1600.0)))
+    rig.set("ENC_XPOS", 3.0)
+    assert rig.get("ENC_IMP") == 600
+    rig.use_dint()
+    assert rig.get("ENC_XPOS") == 4800
+    rig.set("ENC_XPOS", 803)  # 100.4 counts
+    assert rig.get("ENC_IMP") == 100
+    assert rig.get("ENC_XPOS") == 800
+
+
+def test_every_axis_has_its_encoder_and_its_resolution() -> None:
+    rig = Rig(controller(AxisConfig(), AxisConfig(enc_resol=4000), AxisConfig(), AxisConfig(mot_resol=400)))
+    rig.enable(1, 2, 3, 4)
+    for axis in (1, 2, 3, 4):
+        rig.set("POS_ABS", 400.0, axis)
+    rig.wait(5.0)
+    assert [rig.get("ENC_IMP", axis) for axis in (1, 2, 3, 4)] == [50, 500, 50, 400]
+
+
+def test_a_hand_turns_the_shaft_and_the_counter_wraps() -> None:
+    rig = Rig()
+    turn(rig, -7)
+    assert rig.get("ENC_IMP") == -7
+    rig.set("ENC_IMP", 2**31 - 3)
+    turn(rig, 5)
+    assert rig.get("ENC_IMP") == -(2**31) + 2
+
+
+def test_couplings() -> None:
+    rig = Rig()
+    rig.enable(1)
+    for coupling, counted in ((Coupling.DRIVE, 100), (Coupling.BLOCKED, 100), (Coupling.FREE, 100), (Coupling.DRIVE, 200)):
+        couple(rig, coupling)
+        rig.set("POS_REL", 800.0)
+        rig.until(1, REACHED)
+        assert rig.get("ENC_IMP") == counted
+
+
+def test_impossible_turns_and_axes_are_misuse() -> None:
+    rig = Rig()
+    with pytest.raises(Misuse, match=r"4294967296 encoder counts at once: permitted -2147483648…2147483647"):
+        rig.device.turn_encoder(1, 2**32, 0)
+    for axis in (0, 5):
+        with pytest.raises(Misuse, match=f"no axis M{axis}: axes are M1 to M4"):
+            rig.device.turn_encoder(axis, 1, 0)
+        with pytest.raises(Misuse, match="axes are M1 to M4"):
+            rig.device.couple_encoder(axis, Coupling.FREE, 0)
+
+
+# ---------------------------------------------------------------------- OFF
+
+
+def test_without_position_control_a_slip_goes_unnoticed() -> None:
+    rig = encoder_rig(CONTROL_OFF)
+    couple(rig, Coupling.BLOCKED)
+    rig.set("POS_ABS", 3000.0)
+    turn(rig, 50)
+    rig.wait(10.0)
+    assert (rig.status(), rig.position()) == (REACHED, 3000.0)
+
+
+# ---------------------------------------------------------------------- ENCODER: correction
+
+
+def test_a_slip_is_corrected_after_settling() -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    turn(rig, -50)  # 400 pulses lost
+    rig.wait(2.0)
+    assert rig.status() == CORRECTION
+    rig.wait_ns(100_000_000 - 1)
+    assert (rig.velocity(), rig.position()) == (0.0, 2000.0)
+    rig.wait_ns(1)
+    assert rig.position() == 1600.0  # what did not reach the shaft is not counted
+    rig.until(1, REACHED)
+    assert abs(rig.position() - 2000.0) <= 32
+    assert abs(rig.get("ENC_IMP") - 250) <= 4
+    assert rig.velocity() == 0.0
+    assert motor(rig) == rig.position() + 400
+    assert rig.kernel.deadline() is None
+
+
+@pytest.mark.parametrize(("counts", "status"), [(4, REACHED), (-4, REACHED), (5, CORRECTION), (-5, CORRECTION)])
+def test_mic_19_four_counts_are_tolerated(counts: int, status: int) -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 800.0)
+    rig.wait(0.5)
+    turn(rig, counts)
+    rig.wait(2.0 * 0.8**0.5 - 0.4)
+    assert rig.status() == status
+
+
+@pytest.mark.parametrize("kp", [0.0, 1.0, 50.0, 100.0, 1000.0, 1e38])
+def test_the_gain_changes_how_fast_not_whether(kp: float) -> None:
+    rig = encoder_rig(kp=kp)
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    turn(rig, 60)
+    rig.until(1, REACHED, ERROR)
+    rig.until(1, REACHED)
+    assert abs(rig.get("ENC_IMP") - 250) <= 4
+
+
+def test_a_new_command_ends_the_correction() -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    turn(rig, -50)
+    rig.until(1, CORRECTION)
+    rig.wait(0.15)
+    rig.set("POS_ABS", 0.0)
+    assert rig.status() == POSITION
+    rig.until(1, REACHED)
+    assert abs(rig.get("ENC_IMP")) <= 4
+
+
+def test_stop_ends_the_correction() -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    turn(rig, -50)
+    rig.until(1, CORRECTION)
+    rig.stop()
+    rig.wait(5.0)
+    assert rig.status() == ON
+    assert rig.kernel.deadline() is None
+
+
+def test_mic_13_position_written_during_a_correction_does_not_change_where_it_ends() -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    turn(rig, -50)
+    rig.until(1, CORRECTION)
+    rig.wait(0.15)
+    rig.set("POS_ACT", 0.0)
+    rig.until(1, REACHED)
+    assert abs(rig.get("ENC_IMP") - 250) <= 4
+
+
+def test_position_written_at_rest_takes_drive_and_encoder_to_agree() -> None:
+    rig = encoder_rig()
+    turn(rig, 100)
+    rig.set("POS_ACT", 0.0)
+    rig.set("POS_ABS", 80.0)
+    rig.until(1, REACHED, CORRECTION)
+    assert rig.status() == REACHED
+
+
+def test_writing_the_encoder_counter_moves_nothing() -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 2000.0)
+    rig.wait(1.0)
+    rig.set("ENC_IMP", 0)
+    rig.until(1, REACHED, CORRECTION)
+    assert rig.status() == REACHED
+
+
+def test_mic_30_the_reference_of_the_encoder_is_the_home_position() -> None:
+    rig = encoder_rig(in_kl=0)
+    turn(rig, 200)
+    rig.set("HOME", -100.0)
+    rig.wait(1.0)
+    rig.pin("IN1", 1)
+    rig.set("POS_ABS", 100.0)
+    rig.until(1, REACHED, CORRECTION)
+    assert rig.status() == REACHED
+
+
+# ---------------------------------------------------------------------- ENCODER: giving up
+
+
+@pytest.mark.parametrize(("key", "value"), [("POS_ABS", 100_000.0), ("VEL_ABS", 500.0), ("VEL_ABS", -0.25)])
+def test_a_drive_blocked_for_err_time_is_a_position_error(key: str, value: float) -> None:
+    rig = encoder_rig()
+    couple(rig, Coupling.BLOCKED)
+    rig.set(key, value)
+    rig.until(1, ERROR)
+    assert 2 * SECOND <= rig.now <= 2 * SECOND + 20_000_000
+    assert rig.velocity() == 0.0
+    assert rig.word("M_STATUS") == 1
+    assert rig.pins()["ERR"] == 1.0
+    assert [event.axis for event in rig.events("position-error")] == [1]
+
+
+def test_a_drive_blocked_in_flight_is_noticed_and_one_that_turns_again_is_not() -> None:
+    rig = encoder_rig()
+    rig.set("VEL_ABS", 800.0)
+    rig.wait(3.0)
+    couple(rig, Coupling.BLOCKED)
+    rig.wait(1.9)
+    couple(rig, Coupling.DRIVE)
+    rig.wait(10.0)
+    assert rig.status() == VELOCITY
+    couple(rig, Coupling.BLOCKED)
+    rig.until(1, ERROR)
+    assert 16.9 * SECOND <= rig.now <= 16.93 * SECOND
+
+
+def test_mic_19_a_correction_without_progress_gives_up_after_err_time() -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 500.0)
+    rig.wait(0.7)
+    couple(rig, Coupling.BLOCKED)
+    rig.until(1, CORRECTION)
+    began = rig.now
+    rig.until(1, ERROR)
+    assert 2 * SECOND <= rig.now - began <= 2.2 * SECOND
+    assert rig.position() < 400.0
+    rig.wait(10.0)
+    assert rig.status() == ERROR
+
+
+def test_reaction_none_never_gives_up() -> None:
+    rig = encoder_rig(ENCODER, NONE)
+    rig.set("POS_ABS", 500.0)
+    rig.wait(0.7)
+    couple(rig, Coupling.BLOCKED)
+    rig.wait(30.0)
+    assert rig.status() == CORRECTION
+    couple(rig, Coupling.DRIVE)
+    rig.until(1, REACHED)
+    assert abs(rig.position() - 500.0) <= 32
+
+
+@pytest.mark.parametrize(("reaction", "interrupts", "out8"), [(ERRMODE0, 0, 0.0), (ERRMODE1, 1, 0.0), (ERRMODE2, 1, 1.0)])
+def test_error_reactions(reaction: int, interrupts: int, out8: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = encoder_rig(ENCODER, reaction)
+    told: list[int] = []
+    monkeypatch.setattr(type(rig.device.program), "interrupt_by_position_error", lambda program, now: told.append(now))
+    couple(rig, Coupling.BLOCKED)
+    rig.set("VEL_ABS", 500.0)
+    rig.until(1, ERROR)
+    assert told == [rig.now] * interrupts
+    assert rig.pins()["OUT8"] == out8
+    assert ("OUT8" in [edge.pin for edge in rig.edges]) is (out8 == 1.0)
+
+
+def failed() -> Rig:
+    rig = encoder_rig(in_kl=0)
+    couple(rig, Coupling.BLOCKED)
+    rig.set("VEL_ABS", 500.0)
+    rig.until(1, ERROR)
+    couple(rig, Coupling.DRIVE)
+    return rig
+
+
+@pytest.mark.parametrize(
+    ("command", "status"), [(("POS_REL", 10.0), POSITION), (("VEL_ABS", 10.0), VELOCITY), (("HOME", -10.0), HOMING)]
+)
+def test_mic_26_a_position_error_is_cleared_by_motion_and_homing(command: tuple[str, float], status: int) -> None:
+    rig = failed()
+    rig.set(*command)
+    assert rig.status() == status
+    assert rig.word("M_STATUS") == 0
+    assert rig.pins()["ERR"] == 0.0
+    assert [edge.value for edge in rig.edges if edge.pin == "ERR"] == [1.0, 0.0]
+
+
+def test_mic_26_a_position_error_is_cleared_by_disabling_and_by_nothing_less() -> None:
+    rig = failed()
+    rig.stop()
+    rig.coil(EN, True)
+    rig.set("POS_ACT", 0.0)
+    rig.set("ACC", 5.0)
+    rig.jog(1, +1, False)
+    assert rig.status() == ERROR
+    assert rig.word("M_STATUS") == 1
+    rig.coil(EN, False)
+    assert (rig.status(), rig.word("M_STATUS"), rig.pins()["ERR"]) == (0, 0, 0.0)
+
+
+# ---------------------------------------------------------------------- ENCFOLLOW
+
+
+def follower(**config: float) -> Rig:
+    return encoder_rig(ENCFOLLOW, ERRMODE0, **config)
+
+
+def test_the_axis_follows_the_handwheel() -> None:
+    rig = follower()
+    turn(rig, 100)
+    assert rig.status() == ON
+    rig.wait(0.01)
+    assert rig.status() == POSITION
+    rig.until(1, REACHED)
+    assert rig.position() == 800.0
+    turn(rig, -25)
+    rig.until(1, POSITION)
+    rig.until(1, REACHED)
+    assert rig.position() == 600.0
+    assert rig.kernel.deadline() is None
+
+
+def test_following_is_planned_anew_every_10_ms_while_the_wheel_turns() -> None:
+    rig = follower()
+    for _ in range(100):
+        turn(rig, 1)
+        rig.wait(0.013)
+    assert rig.velocity() > 0.0
+    rig.wait(3.0)
+    assert rig.position() == 800.0
+
+
+def test_following_keeps_to_vmax_ramps_and_64_khz() -> None:
+    rig = follower(acc=1e6, dec=1e6, vel=1e6)
+    turn(rig, 100_000)
+    rig.wait(2.0)
+    assert rig.velocity() == 64_000.0
+    slow = follower()
+    turn(slow, 100_000)
+    slow.wait(2.0)
+    assert slow.velocity() == 1000.0
+
+
+def test_following_stops_at_limits_and_comes_back() -> None:
+    rig = follower()
+    rig.set("POSLIM_R", 500.0)
+    turn(rig, 100)
+    rig.wait(5.0)
+    assert (rig.status(), rig.position()) == (LIMIT_R, 500.0)
+    turn(rig, -60)
+    rig.wait(5.0)
+    assert rig.position() == 320.0
+
+
+def test_following_stops_at_a_switch_and_turns_back_from_there() -> None:
+    rig = follower(limit_mode=2, in_kr=0)
+    rig.switch(1, 500, None, "IN1")
+    turn(rig, 100)
+    rig.wait(5.0)
+    assert (rig.status(), rig.position()) == (LIMIT_R, 500.0)
+    turn(rig, 10)
+    rig.wait(1.0)
+    assert (rig.status(), rig.position()) == (LIMIT_R, 500.0)
+    turn(rig, -20)
+    rig.wait(5.0)
+    assert rig.position() == 340.0
+
+
+def test_a_disabled_axis_does_not_follow_and_catches_up_with_nothing() -> None:
+    rig = Rig(controller(AxisConfig(pos_ctrl_mode=ENCFOLLOW)))
+    turn(rig, 100)
+    rig.wait(1.0)
+    rig.enable(1)
+    rig.wait(1.0)
+    assert rig.position() == 0.0
+    turn(rig, 1)
+    rig.wait(1.0)
+    assert rig.position() == 8.0
+
+
+@pytest.mark.parametrize("command", [("POS_ABS", 5000.0), ("VEL_ABS", 100.0), ("HOME", -100.0)])
+def test_a_command_goes_before_the_handwheel(command: tuple[str, float]) -> None:
+    rig = follower(in_kl=0)
+    rig.set(*command)
+    status = rig.status()
+    rig.wait(0.5)
+    turn(rig, 1000)
+    rig.wait(0.5)
+    assert rig.status() == status
+    rig.stop()
+    stopped = rig.position()
+    rig.wait(1.0)
+    assert rig.position() == stopped
+    turn(rig, 10)
+    rig.wait(2.0)
+    assert rig.position() == stopped + 80.0
+
+
+def test_writing_registers_does_not_move_a_following_axis() -> None:
+    rig = follower()
+    turn(rig, 10)
+    rig.wait(2.0)
+    rig.set("ENC_IMP", 12345)
+    rig.set("POS_ACT", 7.0)
+    rig.wait(1.0)
+    assert rig.position() == 7.0
+    turn(rig, 1)
+    rig.set("POS_ACT", 0.0)
+    rig.wait(1.0)
+    assert rig.position() == 8.0
+
+
+def test_whatever_a_wheel_asks_for_can_be_planned() -> None:
+    rig = follower(mot_resol=2**31 - 1, enc_resol=1)
+    for counts in (2**31 - 1, -(2**31), 2**31 - 1):
+        turn(rig, counts)
+        rig.wait(0.05)
+    assert rig.status() == POSITION
+    encoder = encoder_rig(mot_resol=2**31 - 1, enc_resol=1)
+    encoder.set("POS_ABS", 100.0)
+    turn(encoder, 2**31 - 1)
+    encoder.wait(3.0)
+    assert encoder.status() in (CORRECTION, ERROR)
+
+
+def test_an_axis_that_nobody_disturbs_needs_no_control_loop() -> None:
+    """An idle machine costs nothing, in any mode."""
+    for mode in (CONTROL_OFF, ENCODER, ENCFOLLOW):
+        rig = encoder_rig(mode)
+        assert rig.kernel.deadline() is None
+        rig.set("VEL_ABS", 100.0)
+        assert rig.kernel.deadline() is None

@@ -1,0 +1,493 @@
+"""The table against the manuals: a transcription of tables 3.1 and 3.2, typed from each manual, in the manual's own columns."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.mic488.registermap import (
+    DataType,
+    Effect,
+    Firmware,
+    Kind,
+    Per,
+    Piece,
+    Register,
+    RegisterMap,
+    RegisterMapError,
+    Row,
+    Space,
+    Type,
+    UnknownRegister,
+)
+from steptwin.mic488.registers import DEFAULT_FIRMWARE, FIRMWARES, ROWS, axes_of_mask, firmware, register_map
+
+BITS = """
+6000 6001 6002 6003 6004 6005 6006 6007 | OUT1 OUT2 OUT3 OUT4 OUT5 OUT6 OUT7 OUT8 | 01 | 05
+5000 5001 5002 5003 5004 5005 5006 5007 5008 5009 | IN1 IN2 IN3 IN4 IN5 IN6 IN7 IN8 IN9 IN10 | 02 |
+5010 5011 5012 5013 5014 5015 5016 5017 5018 5019 | IN11 IN12 IN13 IN14 IN15 IN16 IN17 IN18 IN19 IN20 | 02 |
+2000 2001 2002 2003 | M1_EN M2_EN M3_EN M4_EN | | 05
+2004 2005 2006 2007 | M1_STOP M2_STOP M3_STOP M4_STOP | | 05
+2008 2009 | M1_JOG_PLUS M1_JOG_MINUS | | 05
+2010 2011 | M2_JOG_PLUS M2_JOG_MINUS | | 05
+2012 2013 | M3_JOG_PLUS M3_JOG_MINUS | | 05
+2014 2015 | M4_JOG_PLUS M4_JOG_MINUS | | 05
+"""
+BITS_OF_1_70_ONLY = """
+2100 2101 2102 | USER_REG_READ USER_REG_SAVE USER_REG_ZERO | | 05
+"""
+
+# Manual 1.23 in English. The first address of POSLIM_L is printed 1114, which is ENC4_XPOS; 1120 is meant.
+REGISTERS_1_23 = """
+1000 | DATA_TYPE | WORD | 03 | 06
+1001 | PROG_BANK_SEL | WORD | 03 | 06
+1002 | POS_BANK_SEL | WORD | 03 | 06
+1003 | PROGRAM_CTRL | WORD | 03 | 06
+1004 | AXIS_CTR_MODE | WORD | 03 | 06
+1005 | AXIS_VEL_ABS_TRIG | WORD | 03 | 06
+1006 | AXIS_VEL_REL_TRIG | WORD | 03 | 06
+1007 | AXIS_POS_ABS_TRIG | WORD | 03 | 06
+1008 | AXIS_POS_REL_TRIG | WORD | 03 | 06
+1009 | M_ALL_STATUS | WORD | 03 |
+1010 1011 1012 1013 | M1_STATUS M2_STATUS M3_STATUS M4_STATUS | WORD | 03 |
+1014 | M_ENABLE | WORD | | 06
+1015 | M_DISABLE | WORD | | 06
+1016 | M_STOP | WORD | | 06
+1017 | JOG_SPEED | REAL | | 06
+1020 1022 1024 1026 | M1_POS_ACT M2_POS_ACT M3_POS_ACT M4_POS_ACT | REAL/DINT | 03 | 10
+1028 1030 1032 1034 | M1_VEL_ACT M2_VEL_ACT M3_VEL_ACT M4_VEL_ACT | REAL/DINT | 03 |
+1036 1038 1040 1042 | M1_ACC M2_ACC M3_ACC M4_ACC | REAL/DINT | 03 | 10
+1044 1046 1048 1050 | M1_DEC M2_DEC M3_DEC M4_DEC | REAL/DINT | 03 | 10
+1052 1054 1056 1058 | M1_VMAX M2_VMAX M3_VMAX M4_VMAX | REAL/DINT | 03 | 10
+1060 1062 1064 1066 | M1_HOME M2_HOME M3_HOME M4_HOME | REAL/DINT | | 10
+1068 1070 1072 1074 | M1_VEL_ABS M2_VEL_ABS M3_VEL_ABS M4_VEL_ABS | REAL/DINT | | 10
+1076 1078 1080 1082 | M1_VEL_REL M2_VEL_REL M3_VEL_REL M4_VEL_REL | REAL/DINT | | 10
+1084 1086 1088 1090 | M1_POS_ABS M2_POS_ABS M3_POS_ABS M4_POS_ABS | REAL/DINT | | 10
+1092 1094 1096 1098 | M1_POS_REL M2_POS_REL M3_POS_REL M4_POS_REL | REAL/DINT | | 10
+1100 1102 1104 1106 | ENC1_IMP ENC2_IMP ENC3_IMP ENC4_IMP | DINT | 03 | 10
+1108 1110 1112 1114 | ENC1_XPOS ENC2_XPOS ENC3_XPOS ENC4_XPOS | REAL/DINT | 03 | 10
+1120 1122 1124 1126 | M1_POSLIM_L M2_POSLIM_L M3_POSLIM_L M4_POSLIM_L | REAL/DINT | 03 | 10
+1128 1130 1132 1134 | M1_POSLIM_R M2_POSLIM_R M3_POSLIM_R M4_POSLIM_R | REAL/DINT | 03 | 10
+"""
+
+# Manual 1.70 in Polish. Its table still lists 10009 as M_ALL_STATUS, its section 4.7 describes M_STATUS there.
+REGISTERS_1_70 = """
+10000 | DATA_TYPE | WORD | 03 | 06
+10001 | PROG_BANK_SEL | WORD | 03 | 06
+10002 | POS_BANK_SEL | WORD | 03 | 06
+10003 | PROGRAM_CTRL | WORD | 03 | 06
+10004 | AXIS_CTR_MODE | WORD | 03 | 06
+10005 | AXIS_VEL_ABS_TRIG | WORD | 03 | 06
+10006 | AXIS_VEL_REL_TRIG | WORD | 03 | 06
+10007 | AXIS_POS_ABS_TRIG | WORD | 03 | 06
+10008 | AXIS_POS_REL_TRIG | WORD | 03 | 06
+10009 | M_STATUS | WORD | 03 |
+10010 10011 10012 10013 | M1_STATUS M2_STATUS M3_STATUS M4_STATUS | WORD | 03 |
+10014 | M_ENABLE | WORD | | 06
+10015 | M_DISABLE | WORD | | 06
+10016 | M_STOP | WORD | | 06
+10017 | JOG_SPEED | REAL | | 06
+10020 10022 10024 10026 | M1_POS_ACT M2_POS_ACT M3_POS_ACT M4_POS_ACT | REAL/DINT | 03 | 10
+10028 10030 10032 10034 | M1_VEL_ACT M2_VEL_ACT M3_VEL_ACT M4_VEL_ACT | REAL/DINT | 03 |
+10036 10038 10040 10042 | M1_ACC M2_ACC M3_ACC M4_ACC | REAL/DINT | 03 | 10
+10044 10046 10048 10050 | M1_DEC M2_DEC M3_DEC M4_DEC | REAL/DINT | 03 | 10
+10052 10054 10056 10058 | M1_VMAX M2_VMAX M3_VMAX M4_VMAX | REAL/DINT | 03 | 10
+10060 10062 10064 10066 | M1_HOME M2_HOME M3_HOME M4_HOME | REAL/DINT | | 10
+10068 10070 10072 10074 | M1_VEL_ABS M2_VEL_ABS M3_VEL_ABS M4_VEL_ABS | REAL/DINT | | 10
+10076 10078 10080 10082 | M1_VEL_REL M2_VEL_REL M3_VEL_REL M4_VEL_REL | REAL/DINT | | 10
+10084 10086 10088 10090 | M1_POS_ABS M2_POS_ABS M3_POS_ABS M4_POS_ABS | REAL/DINT | | 10
+10092 10094 10096 10098 | M1_POS_REL M2_POS_REL M3_POS_REL M4_POS_REL | REAL/DINT | | 10
+10100 10102 10104 10106 | ENC1_IMP ENC2_IMP ENC3_IMP ENC4_IMP | DINT | 03 | 10
+10108 10110 10112 10114 | ENC1_XPOS ENC2_XPOS ENC3_XPOS ENC4_XPOS | REAL/DINT | 03 | 10
+10120 10122 10124 10126 | M1_POSLIM_L M2_POSLIM_L M3_POSLIM_L M4_POSLIM_L | REAL/DINT | 03 | 10
+10128 10130 10132 10134 | M1_POSLIM_R M2_POSLIM_R M3_POSLIM_R M4_POSLIM_R | REAL/DINT | 03 | 10
+"""
+# Revision history: 1.40 brings the addresses and the memory, 1.70 M_STATUS and the USER_REG_ bits.
+REGISTERS_1_40 = REGISTERS_1_70.replace("M_STATUS |", "M_ALL_STATUS |", 1)
+
+TABLES = {
+    "1.23": (BITS, REGISTERS_1_23, 500),
+    "1.40": (BITS, REGISTERS_1_40, 2000),
+    "1.70": (BITS + BITS_OF_1_70_ONLY, REGISTERS_1_70, 2000),
+}
+Listed = tuple[int, str, str, tuple[int, ...], tuple[int, ...]]
+
+
+def _codes(cell: str) -> tuple[int, ...]:
+    return (int(cell, 16),) if cell else ()
+
+
+def _rows(table: str) -> Iterator[list[str]]:
+    for line in table.split("\n"):
+        if line:
+            yield [cell.strip() for cell in line.split("|")]
+
+
+def _listed(name: str) -> list[Listed]:
+    bits, registers, _ = TABLES[name]
+    listed: list[Listed] = []
+    for addresses, names, reads, writes in _rows(bits):
+        pairs = zip(addresses.split(), names.split(), strict=True)
+        listed += [(int(address), bit, "BIT", _codes(reads), _codes(writes)) for address, bit in pairs]
+    for addresses, names, kind, reads, writes in _rows(registers):
+        pairs = zip(addresses.split(), names.split(), strict=True)
+        listed += [(int(address), register, kind, _codes(reads), _codes(writes)) for address, register in pairs]
+    return [*listed, (0, "USER_REGISTER", "WORD/DINT/REAL", (3,), (6, 16))]
+
+
+@pytest.mark.parametrize("name", FIRMWARES)
+def test_the_map_is_what_the_manual_lists_and_nothing_else(name: str) -> None:
+    shown = [(r.address, r.name, r.type.value, r.reads, r.writes) for r in register_map(name)]
+    assert sorted(shown) == sorted(_listed(name))
+
+
+@pytest.mark.parametrize("name", FIRMWARES)
+def test_the_user_registers_are_one_range(name: str) -> None:
+    user = register_map(name).named("USER_REGISTER")
+    count = TABLES[name][2]
+    assert (user.address, user.cells, user.span, user.last) == (0, count, count, count - 1)
+    assert register_map(name).find(Space.HOLDING, count) is None
+
+
+def test_spaces_follow_from_the_functions() -> None:
+    spaces = {r.name: r.space for r in register_map()}
+    assert (spaces["OUT1"], spaces["IN1"], spaces["M1_EN"], spaces["M1_ACC"]) == (
+        Space.COIL,
+        Space.INPUT,
+        Space.COIL,
+        Space.HOLDING,
+    )
+
+
+def test_the_longest_readable_block_of_control_registers() -> None:
+    control = [r for r in register_map() if r.space is Space.HOLDING and r.address >= 10000]
+    readable = {address - 10000 for r in control if r.reads for address in range(r.address, r.last + 1)}
+    starts = [first for first in readable if first - 1 not in readable]
+    lengths = {first: next(n for n in range(1, 200) if first + n not in readable) for first in starts}
+    assert lengths == {0: 14, 20: 40, 100: 16, 120: 16}
+
+
+# ---------------------------------------------------------------------- facts behind the interpretations
+
+
+def test_mic_4_function_16_writes_words_too() -> None:
+    words = [r for r in register_map() if r.type is Type.WORD and r.writes]
+    assert words
+    assert {r.accepts for r in words} == {(6, 16)}
+    assert register_map().named("USER_REGISTER").accepts == (6, 16)
+
+
+def test_mic_5_only_whole_values_of_32_bit_control_registers() -> None:
+    chart = register_map()
+    wide = [r for r in chart if r.type.size == 2 and r.writes and r.name != "JOG_SPEED"]
+    assert {r.accepts for r in wide} == {(16,)}
+    whole, half = chart.pieces(Space.HOLDING, 10020, 3)
+    assert (whole.whole, whole.register) == (True, chart.named("M1_POS_ACT"))
+    assert (half.whole, half.register, half.address, half.size) == (False, chart.named("M2_POS_ACT"), 10022, 1)
+    (odd,) = chart.pieces(Space.HOLDING, 10021, 1)
+    assert not odd.whole
+    (memory,) = chart.pieces(Space.HOLDING, 1, 1)
+    assert memory.whole
+
+
+def test_mic_6_jog_speed_is_the_one_exception() -> None:
+    jog = register_map().named("JOG_SPEED")
+    assert [r.name for r in register_map() if r.word_write] == ["JOG_SPEED"]
+    assert (jog.address, jog.last, jog.accepts) == (10017, 10018, (6, 16))
+    assert jog.unit(DataType.DINT, "mm") == "mm/s"
+
+
+@pytest.mark.parametrize("axis", [1, 2, 3, 4])
+@pytest.mark.parametrize("key", ["ACC", "DEC", "VMAX"])
+def test_mic_7_ramps_are_positive(key: str, axis: int) -> None:
+    register = register_map().of(key, axis)
+    assert [register.permits(v) for v in (0.0, -1.0, 1e-30, 1.0, float("inf"), float("nan"))] == [
+        False,
+        False,
+        True,
+        True,
+        False,
+        False,
+    ]
+    assert str(register.permitted) == "> 0"
+
+
+def test_mic_7_no_register_takes_what_is_not_a_number() -> None:
+    for register in register_map():
+        assert not any(register.permits(v) for v in (float("nan"), float("inf"), float("-inf"))), register.name
+
+
+def test_mic_7_enumerations_take_their_values_only() -> None:
+    chart = register_map()
+    assert [v for v in range(-1, 5) if chart.named("DATA_TYPE").permits(v)] == [0, 1]
+    assert [v for v in range(-1, 5) if chart.named("AXIS_CTR_MODE").permits(v)] == [0, 1]
+    assert [v for v in range(-1, 5) if chart.named("PROGRAM_CTRL").permits(v)] == [0, 1, 2]
+    assert dict(chart.named("PROGRAM_CTRL").values) == {0: "STOP", 1: "START", 2: "PAUSE"}
+
+
+def test_mic_24_what_cannot_be_written_accepts_no_function() -> None:
+    names = {r.name for r in register_map() if not r.accepts}
+    axes = range(1, 5)
+    assert names == {f"IN{n}" for n in range(1, 21)} | {"M_STATUS"} | {f"M{n}_STATUS" for n in axes} | {
+        f"M{n}_VEL_ACT" for n in axes
+    }
+    assert all((r.effect is Effect.NONE) == (not r.accepts) for r in register_map())
+
+
+def test_mic_25_upper_bits_of_masks_are_accepted_and_ignored() -> None:
+    masks = [r for r in register_map() if r.kind is Kind.MASK]
+    assert [r.name for r in masks] == [
+        "AXIS_VEL_ABS_TRIG",
+        "AXIS_VEL_REL_TRIG",
+        "AXIS_POS_ABS_TRIG",
+        "AXIS_POS_REL_TRIG",
+        "M_ENABLE",
+        "M_DISABLE",
+        "M_STOP",
+    ]
+    assert all(r.permits(0xFFFF) for r in masks)
+    assert axes_of_mask(0xFFF7) == axes_of_mask(7) == (1, 2, 3)
+    # Manual 4.2: the table of all combinations, and the text's "bit 4 - M4" is a misprint.
+    assert [axes_of_mask(m) for m in (0, 1, 2, 4, 8, 10, 15, 16)] == [(), (1,), (2,), (3,), (4,), (2, 4), (1, 2, 3, 4), ()]
+
+
+@pytest.mark.parametrize(("name", "last"), [("1.23", 7), ("1.40", 7), ("1.70", 5)])
+@pytest.mark.parametrize("register", ["PROG_BANK_SEL", "POS_BANK_SEL"])
+def test_mic_28_banks_of_the_generation(name: str, last: int, register: str) -> None:
+    bank = register_map(name).named(register)
+    assert [v for v in range(-1, 10) if bank.permits(v)] == list(range(last + 1))
+    assert str(bank.permitted) == f"0…{last}"
+
+
+def test_status_texts_follow_the_manual() -> None:
+    values = register_map().of("STATUS", 1).values
+    assert list(values) == [0, 1, 2, 3, 4, 5, 6, 8, 9, 10]
+    assert values[4] == "position reached"
+    assert list(register_map().named("M_STATUS").values) == [0, 1, 2, 3]
+
+
+# ---------------------------------------------------------------------- units, keys, sections
+
+
+@pytest.mark.parametrize(
+    ("name", "real", "dint"),
+    [
+        ("M1_POS_ACT", "mm", "imp"),
+        ("M2_VEL_ACT", "mm/s", "imp/s"),
+        ("M3_ACC", "mm/s²", "imp/s²"),
+        ("M4_VMAX", "mm/s", "imp/s"),
+        ("M1_HOME", "mm/s", "imp/s"),
+        ("ENC1_XPOS", "mm", "imp"),
+        ("ENC1_IMP", "imp", "imp"),
+        ("JOG_SPEED", "mm/s", "mm/s"),
+        ("M1_STATUS", "", ""),
+        ("M_STOP", "", ""),
+        ("USER_REGISTER", "", ""),
+        ("OUT1", "", ""),
+    ],
+)
+def test_the_unit_follows_from_quantity_and_data_type(name: str, real: str, dint: str) -> None:
+    register = register_map().named(name)
+    assert register.unit(DataType.REAL, "mm") == real
+    assert register.unit(DataType.DINT, "mm") == dint
+
+
+def test_keys_are_the_same_in_all_generations() -> None:
+    for key, index in [("POS_ACT", 1), ("POSLIM_R", 4), ("ENC_IMP", 2), ("OUT", 8), ("JOG_SPEED", None), ("DATA_TYPE", None)]:
+        names = {register_map(name).of(key, index).name for name in FIRMWARES}
+        assert len(names) == 1
+    assert register_map("1.23").of("POS_ACT", 3).address == 1024
+    assert register_map("1.70").of("POS_ACT", 3).address == 10024
+
+
+def test_axes_and_channels() -> None:
+    chart = register_map()
+    assert chart.named("ENC3_IMP").axis == 3
+    assert chart.named("M4_JOG_MINUS").axis == 4
+    assert (chart.named("OUT5").axis, chart.named("OUT5").index) == (None, 5)
+    assert (chart.named("M_STOP").axis, chart.named("M_STOP").index) == (None, None)
+
+
+def test_sections_are_those_of_the_generation_s_manual() -> None:
+    assert register_map("1.23").of("STATUS", 1).section == "3.2, 4.7"
+    assert register_map("1.70").of("STATUS", 1).section == "3.2, 4.8"
+    assert register_map("1.70").named("M_STATUS").section == "3.2, 4.7"
+    assert register_map("1.70").named("USER_REG_SAVE").section == "3.1, 4.11"
+
+
+def test_every_meaning_is_one_sentence() -> None:
+    for name in FIRMWARES:
+        for register in register_map(name):
+            assert register.meaning.endswith("."), register.name
+            assert ". " not in register.meaning, register.name
+            assert "{" not in register.meaning, register.name
+
+
+# ---------------------------------------------------------------------- looking up
+
+
+def test_names_in_either_case_and_aliases() -> None:
+    chart = register_map()
+    assert chart.named("m1_pos_act") is chart.named("M1_POS_ACT")
+    assert chart.named("user_reg_reset").address == 2102
+
+
+def test_a_wrong_name_gets_near_misses() -> None:
+    with pytest.raises(UnknownRegister, match=r"no register named 'M1_POSACT'; did you mean M1_POS_ACT,"):
+        register_map().named("M1_POSACT")
+    with pytest.raises(UnknownRegister, match=r"firmware 1\.70 has no register named 'qqq'$"):
+        register_map().named("qqq")
+    with pytest.raises(UnknownRegister, match=r"firmware 1\.23 has no register named 'M_STATUS'; did you mean M1_STATUS,"):
+        register_map("1.23").named("M_STATUS")
+
+
+def test_every_address_of_a_register_finds_it() -> None:
+    for name in FIRMWARES:
+        chart = register_map(name)
+        for register in chart:
+            assert chart.at(register.space, register.address) is register
+            assert chart.at(register.space, register.last) is register
+
+
+def test_a_hole_names_its_neighbours_in_decimal_and_hex() -> None:
+    chart = register_map()
+    assert chart.find(Space.HOLDING, 10019) is None
+    with pytest.raises(UnknownRegister) as caught:
+        chart.at(Space.HOLDING, 10019)
+    assert str(caught.value) == (
+        "firmware 1.70 has no holding register at 10019 (0x2723); "
+        "nearest: JOG_SPEED at 10017 (0x2721)…10018 (0x2722), M1_POS_ACT at 10020 (0x2724)…10021 (0x2725)"
+    )
+    with pytest.raises(UnknownRegister, match="no input at 4999"):
+        chart.at(Space.INPUT, 4999)
+    assert chart.find(Space.COIL, 0) is None
+
+
+def test_unknown_keys_raise() -> None:
+    with pytest.raises(UnknownRegister, match="key 'POS_ACT' with number 5"):
+        register_map().of("POS_ACT", 5)
+    with pytest.raises(UnknownRegister, match="key 'M_STATUS'"):
+        register_map("1.40").of("M_STATUS")
+
+
+def test_pieces_cut_a_request_at_register_borders() -> None:
+    chart = register_map()
+    assert list(chart.pieces(Space.HOLDING, 10017, 4)) == [
+        Piece(chart.named("JOG_SPEED"), 10017, 2),
+        Piece(None, 10019, 1),
+        Piece(chart.named("M1_POS_ACT"), 10020, 1),
+    ]
+    assert list(chart.pieces(Space.HOLDING, 1990, 20)) == [Piece(chart.named("USER_REGISTER"), 1990, 10), Piece(None, 2000, 10)]
+    assert list(chart.pieces(Space.COIL, 6007, 9)) == [Piece(chart.named("OUT8"), 6007, 1), Piece(None, 6008, 8)]
+
+
+def test_unknown_firmware() -> None:
+    with pytest.raises(Misuse, match=r"unknown firmware '2.0'; permitted: 1.23, 1.40, 1.70"):
+        register_map("2.0")
+    assert DEFAULT_FIRMWARE == "1.70"
+    assert firmware("1.70").stored_user_registers == range(1000, 2000)
+    assert firmware("1.40").stored_user_registers is None
+
+
+# ---------------------------------------------------------------------- the map checks itself and is frozen
+
+SMALL = Firmware("9.9", "1.70", control_base=10000, user_registers=2000, stored_user_registers=None, banks=6)
+GOOD = Row(
+    key="GOOD",
+    name="GOOD",
+    space=Space.HOLDING,
+    address=40,
+    control=True,
+    type=Type.VALUE,
+    reads=(3,),
+    writes=(16,),
+    kind=Kind.POSITION,
+    effect=Effect.STORE,
+    meaning="Good.",
+    sections={"1.70": "3.2"},
+)
+
+
+def _with(**changes: Any) -> Row:
+    return dataclasses.replace(GOOD, **changes)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (
+            [GOOD, _with(key="NEXT", name="NEXT", address=41)],
+            "NEXT at 10041 (0x2739)…10042 (0x273A) overlaps GOOD at 10040 (0x2738)…10041 (0x2739) among the holding registers",
+        ),
+        (
+            [GOOD, _with(key="NEXT", address=60)],
+            "the name GOOD is given to 10040 (0x2738)…10041 (0x2739) and to 10060 (0x274C)…10061 (0x274D)",
+        ),
+        (
+            [GOOD, _with(key="NEXT", name="NEXT", aliases=("good",), address=60)],
+            "the name good is given to 10040 (0x2738)…10041 (0x2739) and to 10060 (0x274C)…10061 (0x274D)",
+        ),
+        (
+            [GOOD, _with(name="NEXT", address=60)],
+            "the key GOOD is given to GOOD at 10040 (0x2738)…10041 (0x2739) and to NEXT at 10060 (0x274C)…10061 (0x274D)",
+        ),
+        (
+            [_with(address=65535, control=False)],
+            "firmware 9.9: GOOD at 65535 (0xFFFF)…65536 (0x10000) is outside 0…65535 (0xFFFF)",
+        ),
+        ([_with(address=-1, control=False)], "firmware 9.9: GOOD at -1 (-0x0001)…0 (0x0000) is outside 0…65535 (0xFFFF)"),
+        ([_with(writes=(5,))], "firmware 9.9: GOOD is a holding register, function 05 does not reach it"),
+        ([_with(reads=(16,))], "firmware 9.9: GOOD lists function 16 on the wrong side of read and write"),
+        ([_with(writes=())], "firmware 9.9: GOOD has the effect 'stores' but write functions ()"),
+        ([_with(type=Type.BIT)], "firmware 9.9: GOOD is a holding register of type BIT"),
+        ([_with(copies=2)], "firmware 9.9: GOOD has 2 copies per device"),
+        (
+            [_with(name="M{n}_X", copies=4, step=1, per=Per.AXIS)],
+            "M2_X at 10041 (0x2739)…10042 (0x273A) overlaps M1_X at 10040 (0x2738)…10041 (0x2739) among the holding registers",
+        ),
+    ],
+)
+def test_a_table_that_contradicts_itself_names_the_culprit(rows: list[Row], message: str) -> None:
+    with pytest.raises(RegisterMapError) as caught:
+        RegisterMap(SMALL, rows)
+    assert str(caught.value) == message
+
+
+def test_a_good_row_passes() -> None:
+    chart = RegisterMap(SMALL, [GOOD, _with(key="NEXT", name="NEXT", address=42)])
+    assert [r.name for r in chart] == ["GOOD", "NEXT"]
+
+
+def test_a_row_of_other_firmware_is_left_out() -> None:
+    assert len(RegisterMap(SMALL, [_with(firmwares=("1.23",))])) == 0
+
+
+def test_the_map_is_frozen() -> None:
+    chart = register_map()
+    with pytest.raises(AttributeError, match=r"firmware 1\.70 is frozen"):
+        chart.firmware = SMALL
+    with pytest.raises(AttributeError, match=r"firmware 1\.70 is frozen"):
+        del chart.registers
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        chart.named("OUT1").address = 1  # pyrefly: ignore[read-only]
+    values: Any = chart.named("DATA_TYPE").values
+    with pytest.raises(TypeError):
+        values[2] = "more"
+    assert register_map() is chart
+
+
+def test_a_deep_copy_of_what_refers_to_the_map_shares_it() -> None:
+    chart = register_map()
+    assert copy.deepcopy({"map": chart, "register": chart.named("OUT1")}) == {"map": chart, "register": chart.named("OUT1")}
+    assert copy.deepcopy([chart])[0] is chart
+
+
+def test_every_row_is_in_some_generation() -> None:
+    keys = {r.key for name in FIRMWARES for r in register_map(name)}
+    assert keys == {row.key for row in ROWS}
+    assert isinstance(register_map().registers[0], Register)

@@ -1,0 +1,545 @@
+"""Requests and responses byte for byte: what may be read and written, and what is refused with which exception."""
+
+from __future__ import annotations
+
+import struct
+from contextlib import suppress
+from dataclasses import replace
+from math import inf, nan
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mic488_rig import OFFSETS, OUT, Rig, coil_pdu, controller, dint_words, read_pdu, real_words, word_pdu, words_pdu
+
+from steptwin.mic488.config import AxisConfig, ControllerConfig
+from steptwin.mic488.slave import PLANS_KEPT, slave
+from steptwin.wire import pdu as modbus
+
+FIRMWARES = tuple(OFFSETS)
+USER_REGISTERS = {"1.23": 500, "1.40": 2000, "1.70": 2000}
+BANKS = {"1.23": 8, "1.40": 8, "1.70": 6}
+
+ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
+
+
+def hexes(response: bytes) -> str:
+    return response.hex(" ").upper()
+
+
+@pytest.fixture(params=FIRMWARES)
+def any_rig(request: pytest.FixtureRequest) -> Rig:
+    return Rig(firmware=request.param)
+
+
+# ---------------------------------------------------------------------- the manual's examples
+
+
+def test_example_of_the_manual_read_inputs() -> None:
+    rig = Rig()
+    rig.pin("IN1", 1)
+    rig.pin("IN8", 1)
+    rig.wait(0.010)
+    assert hexes(rig.ask(bytes.fromhex("02 1388 0008"))) == "02 01 81"
+
+
+def test_example_of_the_manual_out2_off() -> None:
+    rig = Rig()
+    rig.coil(OUT + 1, True)
+    assert hexes(rig.ask(bytes.fromhex("05 1771 0000"))) == "05 17 71 00 00"
+    assert rig.pins()["OUT2"] == 0.0
+
+
+@pytest.mark.parametrize(("firmware", "request_"), [("1.23", "03 03FC 0002"), ("1.40", "03 2724 0002"), ("1.70", "03 2724 0002")])
+def test_example_of_the_manual_read_position(firmware: str, request_: str) -> None:
+    rig = Rig(controller(AxisConfig(gear=12800.0)), firmware)
+    rig.set("POS_ACT", 4.5)
+    assert hexes(rig.ask(bytes.fromhex(request_))) == "03 04 00 00 40 90"  # 4.5 = 40 90 00 00, low word first
+    rig.use_dint()
+    assert hexes(rig.ask(bytes.fromhex(request_))) == "03 04 E1 00 00 00"  # 57600 = 00 00 E1 00
+
+
+@pytest.mark.parametrize(("firmware", "head"), [("1.23", "10 042C 0002 04"), ("1.70", "10 2754 0002 04")])
+def test_example_of_the_manual_velocity_of_12800_pulses_per_revolution(firmware: str, head: str) -> None:
+    """2.5 rev/s = 32000 imp/s."""
+    rig = Rig(controller(AxisConfig(gear=12800.0, acc=10.0)), firmware)
+    rig.enable(1)
+    assert rig.ask(bytes.fromhex(head + "0000 4020"))[:5] == bytes.fromhex(head)[:5]
+    rig.wait(1.0)
+    assert rig.velocity() == 2.5
+    rig.use_dint()
+    assert rig.velocity() == 32000
+    assert rig.ask(bytes.fromhex(head + "3E80 0000")) == bytes.fromhex(head)[:5]  # 16000 = 3E 80
+    rig.wait(1.0)
+    assert rig.velocity() == 16000
+
+
+# ---------------------------------------------------------------------- which addresses exist
+
+
+def readable_words(firmware: str) -> set[int]:
+    base = OFFSETS[firmware]
+    return {*range(USER_REGISTERS[firmware]), *range(base, base + 14)}
+
+
+def readable_pairs(firmware: str) -> set[int]:
+    base = OFFSETS[firmware]
+    return {base + n for first, last in ((20, 58), (100, 114), (120, 134)) for n in range(first, last + 1, 2)}
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_mic_3_strict_single_registers_are_readable_where_the_manual_says_so_and_nowhere_else(firmware: str) -> None:
+    rig, words = Rig(firmware=firmware), readable_words(firmware)
+    for address in [*range(2200), *range(9900, 10300), 0x7FFF, 0xFFFE, 0xFFFF]:
+        expected = 0 if address in words else ILLEGAL_ADDRESS
+        assert rig.exception(read_pdu(3, address, 1)) == expected, address
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_mic_5_pairs_are_readable_whole_and_from_their_first_address(firmware: str) -> None:
+    rig, pairs = Rig(firmware=firmware), readable_pairs(firmware)
+    base = OFFSETS[firmware]
+    for address in range(base + 14, base + 140):
+        expected = 0 if address in pairs else ILLEGAL_ADDRESS
+        assert rig.exception(read_pdu(3, address, 2)) == expected, address
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_bits_are_readable_where_the_manual_says_so(firmware: str) -> None:
+    rig = Rig(firmware=firmware)
+    for address in [*range(1990, 2110), *range(4990, 5030), *range(5990, 6020), 0, 0xFFFF]:
+        assert rig.exception(read_pdu(1, address, 1)) == (0 if 6000 <= address < 6008 else ILLEGAL_ADDRESS), address
+        assert rig.exception(read_pdu(2, address, 1)) == (0 if 5000 <= address < 5020 else ILLEGAL_ADDRESS), address
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_coils_are_writable_where_the_manual_says_so(firmware: str) -> None:
+    rig = Rig(firmware=firmware)
+    writable = {*range(2000, 2016), *range(6000, 6008)}
+    if firmware == "1.70":
+        writable |= {2100, 2101, 2102}
+    for address in [*range(1990, 2110), *range(4990, 5030), *range(5990, 6020), 0, 0xFFFF]:
+        assert rig.exception(coil_pdu(address, True)) == (0 if address in writable else ILLEGAL_ADDRESS), address
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_mic_24_words_are_writable_where_the_manual_says_so(firmware: str) -> None:
+    rig, base = Rig(firmware=firmware), OFFSETS[firmware]
+    single = {*range(USER_REGISTERS[firmware]), *range(base, base + 9), *range(base + 14, base + 18)}
+    several = single - {base + 17}  # JOG_SPEED alone is a pair that takes function 06 (MIC-6)
+    for address in [*range(2100), *range(9990, 10140)]:
+        assert rig.exception(word_pdu(address, 0)) == (0 if address in single else ILLEGAL_ADDRESS), address
+        assert rig.exception(words_pdu(address, 0)) == (0 if address in several else ILLEGAL_ADDRESS), address
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_mic_24_pairs_are_writable_where_the_manual_says_so(firmware: str) -> None:
+    rig, base = Rig(firmware=firmware), OFFSETS[firmware]
+    ranges = ((17, 17), (20, 26), (36, 58), (60, 98), (100, 114), (120, 134))
+    writable = {base + n for first, last in ranges for n in range(first, last + 1, 2)}
+    for address in range(base + 17, base + 140):
+        expected = 0 if address in writable else ILLEGAL_ADDRESS
+        assert rig.exception(words_pdu(address, *real_words(1.0))) == expected, address
+
+
+def test_a_request_may_not_leave_the_address_space() -> None:
+    for lenient in (False, True):
+        rig = Rig(lenient=lenient)
+        assert rig.exception(read_pdu(3, 0xFFFF, 2)) == ILLEGAL_ADDRESS
+        assert rig.exception(read_pdu(1, 0xFFF0, 17)) == ILLEGAL_ADDRESS
+        assert rig.exception(words_pdu(0xFFFF, 1, 2)) == ILLEGAL_ADDRESS
+
+
+# ---------------------------------------------------------------------- what is refused
+
+
+def test_mic_1_exceptions_01_02_03(any_rig: Rig) -> None:
+    for function in {*range(1, 128)} - {1, 2, 3, 5, 6, 16}:
+        assert any_rig.exception(bytes((function, 0, 0, 0, 1))) == ILLEGAL_FUNCTION
+    assert any_rig.exception(read_pdu(3, 30000, 1)) == ILLEGAL_ADDRESS
+    assert any_rig.exception(word_pdu(any_rig.base, 2)) == ILLEGAL_VALUE
+
+
+def test_mic_3_one_unreadable_address_refuses_the_whole_request(any_rig: Rig) -> None:
+    base = any_rig.base
+    assert any_rig.exception(read_pdu(3, base, 14)) == 0
+    assert any_rig.exception(read_pdu(3, base, 15)) == ILLEGAL_ADDRESS  # M_ENABLE is write-only
+    assert any_rig.exception(read_pdu(3, base + 20, 40)) == 0
+    assert any_rig.exception(read_pdu(3, base + 20, 42)) == ILLEGAL_ADDRESS  # M1_HOME is write-only
+    assert any_rig.exception(read_pdu(3, base + 100, 16)) == 0
+    assert any_rig.exception(read_pdu(3, base + 100, 22)) == ILLEGAL_ADDRESS  # hole at 116…119
+
+
+def test_mic_5_half_of_a_control_pair_is_refused_but_user_registers_are_plain_memory(any_rig: Rig) -> None:
+    base = any_rig.base
+    assert any_rig.exception(read_pdu(3, base + 20, 1)) == ILLEGAL_ADDRESS
+    assert any_rig.exception(read_pdu(3, base + 21, 2)) == ILLEGAL_ADDRESS
+    assert any_rig.exception(word_pdu(base + 52, 5)) == ILLEGAL_ADDRESS
+    assert any_rig.exception(words_pdu(base + 52, 5)) == ILLEGAL_ADDRESS
+    assert any_rig.exception(words_pdu(base + 53, 5, 5)) == ILLEGAL_ADDRESS
+    any_rig.write_words(0, *dint_words(0x12345678))
+    assert any_rig.read_words(1, 1) == [0x1234]
+    any_rig.write_words(1, 0xABCD)
+    assert any_rig.read_words(0, 2) == [0x5678, 0xABCD]
+
+
+@pytest.mark.parametrize("bad", [nan, inf, -inf])
+@pytest.mark.parametrize(
+    "key", ["POS_ACT", "ACC", "VMAX", "HOME", "VEL_ABS", "VEL_REL", "POS_ABS", "POS_REL", "ENC_XPOS", "POSLIM_L"]
+)
+def test_mic_7_nan_and_infinity_are_refused(key: str, bad: float) -> None:
+    rig = Rig()
+    rig.enable(1)
+    before = rig.read_words(rig.base + 20, 40)
+    assert rig.exception(rig.set_pdu(key, bad)) == ILLEGAL_VALUE
+    assert rig.read_words(rig.base + 20, 40) == before
+    assert rig.status() == 1
+
+
+@pytest.mark.parametrize("key", ["ACC", "DEC", "VMAX"])
+@pytest.mark.parametrize("bad", [0.0, -0.0, -1.0])
+@pytest.mark.parametrize("dint", [False, True])
+def test_mic_7_ramps_and_vmax_must_be_above_zero(key: str, bad: float, dint: bool) -> None:
+    rig = Rig()
+    if dint:
+        rig.use_dint()
+    assert rig.exception(rig.set_pdu(key, bad, 3)) == ILLEGAL_VALUE
+    assert rig.get(key, 3) == 1000
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("DATA_TYPE", 2), ("AXIS_CTR_MODE", 2), ("PROGRAM_CTRL", 3), ("DATA_TYPE", 0xFFFF), ("PROGRAM_CTRL", 0xFFFF)],
+)
+def test_mic_7_enumerations_refuse_other_values(any_rig: Rig, key: str, value: int) -> None:
+    for pdu in (word_pdu(any_rig.address(key), value), words_pdu(any_rig.address(key), value)):
+        assert any_rig.exception(pdu) == ILLEGAL_VALUE
+    assert any_rig.word(key) == 0
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("key", ["PROG_BANK_SEL", "POS_BANK_SEL"])
+def test_mic_28_banks_of_each_firmware(firmware: str, key: str) -> None:
+    rig, last = Rig(firmware=firmware), BANKS[firmware] - 1
+    rig.word(key, last)
+    assert rig.exception(word_pdu(rig.address(key), last + 1)) == ILLEGAL_VALUE
+    assert rig.word(key) == last
+
+
+@pytest.mark.parametrize("value", [0x0001, 0x00FF, 0xFF01, 0xFFFF, 0x0100])
+def test_mic_7_coil_values_other_than_on_and_off_are_refused(value: int) -> None:
+    rig = Rig()
+    assert rig.exception(struct.pack(">BHH", 5, OUT, value)) == ILLEGAL_VALUE
+    assert rig.exception(struct.pack(">BHH", 5, 2000, value)) == ILLEGAL_VALUE
+    assert rig.bits(1, OUT, 8) == [0] * 8
+    assert rig.status() == 0
+
+
+@pytest.mark.parametrize(
+    "pdu",
+    [
+        read_pdu(3, 0, 0),
+        read_pdu(3, 0, 126),
+        read_pdu(1, 6000, 0),
+        read_pdu(2, 5000, 2001),
+        struct.pack(">BHHB", 16, 0, 0, 0),
+        words_pdu(0, *range(124)),
+        struct.pack(">BHHBHH", 16, 0, 2, 3, 1, 2),
+        struct.pack(">BHHBHH", 16, 0, 2, 6, 1, 2),
+        words_pdu(0, 1, 2)[:-1],
+        words_pdu(0, 1, 2) + b"\0",
+        read_pdu(3, 0, 1)[:-1],
+        word_pdu(0, 1) + b"\0",
+        coil_pdu(6000, True)[:-1],
+    ],
+)
+def test_mic_24_impossible_quantities_and_lengths_are_refused(pdu: bytes) -> None:
+    rig = Rig()
+    rig.write_words(0, 7, 7)  # so that the beginning of the request is known already
+    assert rig.exception(pdu) == ILLEGAL_VALUE
+    assert rig.read_words(0, 2) == [7, 7]
+
+
+def test_mic_24_the_longest_requests_are_served() -> None:
+    rig = Rig()
+    rig.write_words(100, *range(123))
+    assert rig.read_words(100, 125) == [*range(123), 0, 0]
+    assert rig.bits(2, 5000, 20) == [0] * 20
+
+
+def test_mic_24_writing_what_is_read_only_is_an_address_error(any_rig: Rig) -> None:
+    base = any_rig.base
+    for address in (base + 9, base + 10, base + 13):
+        assert any_rig.exception(word_pdu(address, 0)) == ILLEGAL_ADDRESS
+    assert any_rig.exception(words_pdu(base + 28, *real_words(1.0))) == ILLEGAL_ADDRESS
+
+
+# ---------------------------------------------------------------------- several registers in one request
+
+
+def test_mic_4_one_request_spans_several_registers_and_types() -> None:
+    rig = Rig()
+    rig.write_words(rig.base + 14, 0b0011, 0b0010, 0, *real_words(250.0))  # M_ENABLE, M_DISABLE, M_STOP, JOG_SPEED
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [1, 0, 0, 0]
+    rig.jog(1, +1, True)
+    rig.wait(1.0)
+    assert rig.velocity() == 250.0
+
+
+def test_mic_4_parameters_commands_and_counters_in_one_request_take_effect_in_order() -> None:
+    rig = Rig()
+    rig.enable(1, 2, 3, 4)
+    values: list[int] = []
+    for key in ("ACC", "DEC", "VMAX"):
+        for axis in range(4):
+            values += real_words({"ACC": 100.0, "DEC": 200.0, "VMAX": 300.0}[key] + axis)
+    rig.write_words(rig.base + 36, *values)
+    assert [rig.get(key, axis) for key in ("ACC", "DEC", "VMAX") for axis in (1, 2, 3, 4)] == [
+        n + axis for n in (100, 200, 300) for axis in range(4)
+    ]
+    # POS_REL of four axes, ENCx_IMP (always DINT) and ENCx_XPOS in one request
+    rig.write_words(rig.base + 92, *real_words(10.0) * 4, *dint_words(-70000) * 4, *real_words(0.0) * 4)
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [3, 3, 3, 3]
+    assert rig.get("ENC_IMP") == 0  # XPOS, the same counter, came after it
+
+
+def test_mic_4_one_bad_value_and_nothing_is_written() -> None:
+    rig = Rig()
+    rig.enable(1)
+    before = rig.read_words(rig.base + 20, 40)
+    words = [*real_words(5.0) * 11, *real_words(-5.0)]  # ACC, DEC, VMAX of four axes, the last one bad
+    assert rig.exception(words_pdu(rig.base + 36, *words)) == ILLEGAL_VALUE
+    assert rig.read_words(rig.base + 20, 40) == before
+    assert rig.exception(words_pdu(rig.base, 1, 0, 99)) == ILLEGAL_VALUE
+    assert rig.word("DATA_TYPE") == 0
+
+
+def test_mic_4_a_bad_address_comes_before_a_bad_value() -> None:
+    rig = Rig()
+    assert rig.exception(words_pdu(rig.base, 99, 99, 99, 99, 99, 0, 0, 0, 0, 0)) == ILLEGAL_ADDRESS
+
+
+def test_mic_4_function_16_writes_words() -> None:
+    rig = Rig()
+    rig.write_words(rig.address("AXIS_CTR_MODE"), 1)
+    assert rig.word("AXIS_CTR_MODE") == 1
+
+
+# ---------------------------------------------------------------------- values
+
+
+def test_mic_6_jog_speed_takes_a_real_with_16_and_a_signed_word_with_06() -> None:
+    rig = Rig(controller(AxisConfig(gear=10.0)))
+    rig.use_dint()  # it stays REAL in units/s
+    rig.enable(1)
+    for write, units in ((words_pdu(rig.base + 17, *real_words(12.5)), 12.5), (word_pdu(rig.base + 17, 30), 30.0)):
+        assert rig.exception(write) == 0
+        rig.jog(1, +1, True)
+        rig.wait(1.0)
+        assert rig.velocity() == units * 10
+    assert rig.exception(word_pdu(rig.base + 18, 1)) == ILLEGAL_ADDRESS
+    assert rig.exception(words_pdu(rig.base + 17, 1)) == ILLEGAL_ADDRESS
+    assert rig.exception(words_pdu(rig.base + 17, *real_words(nan))) == ILLEGAL_VALUE
+    assert rig.exception(read_pdu(3, rig.base + 17, 2)) == ILLEGAL_ADDRESS
+
+
+def test_mic_6_a_signed_word_is_signed() -> None:
+    rig = Rig(lenient=True)
+    rig.ask(word_pdu(rig.base + 17, -30))
+    assert rig.read_words(rig.base + 17, 2) == list(real_words(-30.0))
+
+
+def test_mic_17_data_type_changes_the_representation_only() -> None:
+    rig = Rig(controller(AxisConfig(gear=12800.0), AxisConfig(gear=0.5)))
+    for key, units in (("POS_ACT", 4.5), ("ACC", 3.0), ("DEC", 2.0), ("VMAX", 2.5), ("POSLIM_L", -100.0), ("POSLIM_R", 100.0)):
+        rig.set(key, units)
+    rig.set("VMAX", 3000.0, 2)
+    rig.use_dint()
+    shown = {key: rig.get(key) for key in ("POS_ACT", "ACC", "DEC", "VMAX", "POSLIM_L", "POSLIM_R")}
+    assert shown == {"POS_ACT": 57600, "ACC": 38400, "DEC": 25600, "VMAX": 32000, "POSLIM_L": -1280000, "POSLIM_R": 1280000}
+    assert rig.get("VMAX", 2) == 1500
+    rig.set("ACC", 12800)
+    rig.word("DATA_TYPE", 0)
+    rig.dint = False
+    assert rig.get("ACC") == 1.0
+    assert rig.get("POS_ACT") == 4.5
+
+
+def test_mic_17_a_stored_trigger_value_keeps_its_meaning() -> None:
+    rig = Rig(controller(AxisConfig(gear=100.0)))
+    rig.enable(1)
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.set("POS_ABS", 2.0)
+    rig.use_dint()
+    rig.word("AXIS_POS_ABS_TRIG", 1)
+    rig.until(1, 4)
+    assert rig.position() == 200
+
+
+def test_mic_14_targets_are_rounded_to_the_nearest_pulse() -> None:
+    rig = Rig(controller(AxisConfig(gear=10.0)))
+    rig.enable(1)
+    rig.set("POS_ABS", 1.26)
+    rig.until(1, 4)
+    assert rig.position() == pytest.approx(1.3, rel=1e-7)
+    rig.use_dint()
+    assert rig.position() == 13
+
+
+@pytest.mark.parametrize("value", [2147483648.0, 1e38, -2147483904.0])
+def test_a_position_beyond_the_counter_is_refused(value: float) -> None:
+    rig = Rig()
+    for key in ("POS_ACT", "POS_ABS", "POS_REL", "POSLIM_R", "ENC_XPOS"):
+        assert rig.exception(rig.set_pdu(key, value)) == ILLEGAL_VALUE, key
+    assert rig.exception(rig.set_pdu("POS_ACT", -2147483648.0)) == 0
+
+
+def test_quantities_that_outgrow_their_register_show_its_limit() -> None:
+    rig = Rig(controller(AxisConfig(gear=1e-6, acc=1e9)))
+    rig.use_dint()
+    rig.set("POSLIM_R", 2147483647)
+    rig.word("DATA_TYPE", 0)
+    rig.dint = False
+    assert rig.get("POSLIM_R") == pytest.approx(2.147483647e15, rel=1e-6)
+    big = Rig(controller(AxisConfig(gear=1e6)))
+    big.set("VMAX", 1e30)
+    assert big.get("VMAX") == pytest.approx(1e30)
+    big.use_dint()
+    assert big.get("VMAX") == 2**31 - 1
+    tiny = Rig(controller(AxisConfig(gear=1e-37)))
+    tiny.use_dint()
+    tiny.set("POS_ACT", -1000)
+    tiny.word("DATA_TYPE", 0)
+    tiny.dint = False
+    assert tiny.get("POS_ACT") == -struct.unpack(">f", bytes.fromhex("7F7FFFFF"))[0]
+
+
+def test_mic_25_mask_bits_above_the_fourth_axis_are_ignored() -> None:
+    rig = Rig()
+    rig.word("M_ENABLE", 0xFFF5)
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [1, 0, 1, 0]
+    rig.word("M_DISABLE", 0xFFF4)
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [1, 0, 0, 0]
+    rig.word("M_ENABLE", 8)
+    assert rig.status(4) == 1
+
+
+def test_m_all_status_reads_0_before_1_70() -> None:
+    for firmware in ("1.23", "1.40"):
+        rig = Rig(firmware=firmware)
+        rig.word("PROGRAM_CTRL", 1)
+        assert rig.word("M_STATUS") == 0
+
+
+def test_user_registers_keep_words_and_both_32_bit_types(any_rig: Rig) -> None:
+    last = {1000: 499, 10000: 1999}[any_rig.base]
+    any_rig.write_words(last - 1, *dint_words(-5))
+    any_rig.write_words(0, *real_words(-0.125))
+    any_rig.ask(word_pdu(2, 65535))
+    assert any_rig.read_words(last - 1, 2) == [0xFFFB, 0xFFFF]
+    assert any_rig.read_words(0, 3) == [*real_words(-0.125), 65535]
+    assert any_rig.exception(words_pdu(last, 1, 2)) == ILLEGAL_ADDRESS
+    assert any_rig.read_words(last, 1) == [0xFFFF]
+
+
+# ---------------------------------------------------------------------- lenient
+
+
+def test_mic_3_lenient_holes_read_0_and_write_only_registers_their_last_value() -> None:
+    rig = Rig(lenient=True)
+    assert rig.read_words(30000, 125) == [0] * 125
+    rig.write_words(1998, 8, 9)
+    assert rig.read_words(1997, 5) == [0, 8, 9, 0, 0]
+    rig.word("M_ENABLE", 5)
+    rig.set("HOME", -12.5, 2)
+    rig.coil(OUT, True)
+    rig.coil(2009, True)
+    assert rig.read_words(rig.base + 14, 6) == [5, 0, 0, 0, 0, 0]
+    assert rig.read_words(rig.base + 62, 2) == list(real_words(-12.5))
+    assert rig.bits(1, 2008, 3) == [0, 1, 0]
+    assert rig.bits(1, 5999, 3) == [0, 1, 0]
+    assert rig.bits(2, 5019, 2) == [0, 0]
+    assert rig.exception(read_pdu(3, rig.base + 63, 2)) == ILLEGAL_ADDRESS  # MIC-5 holds all the same
+    assert rig.exception(word_pdu(30000, 1)) == ILLEGAL_ADDRESS
+
+
+def test_mic_3_lenient_last_values_follow_data_type_and_end_with_the_power() -> None:
+    rig = Rig(controller(AxisConfig(gear=100.0)), lenient=True)
+    rig.set("POS_ABS", 2.5)
+    rig.use_dint()
+    assert rig.get("POS_ABS") == 250
+    rig.device.power_cycle(rig.now)
+    rig.dint = False
+    assert rig.get("POS_ABS") == 0
+
+
+def test_mic_3_a_refused_write_is_not_remembered() -> None:
+    rig = Rig(lenient=True)
+    rig.set("POS_ABS", 7.0)
+    assert rig.exception(rig.set_pdu("POS_ABS", nan)) == ILLEGAL_VALUE
+    assert rig.get("POS_ABS") == 7.0
+
+
+# ---------------------------------------------------------------------- plans
+
+
+def test_a_master_that_tries_everything_fills_no_memory() -> None:
+    asked = slave("1.40", lenient=True)
+    rig = Rig(firmware="1.40", lenient=True)
+    for address in range(4 * PLANS_KEPT + 10):
+        rig.ask(read_pdu(3, address, 2))
+    assert 0 < len(asked) <= 4 * PLANS_KEPT
+    assert rig.read_words(10020, 2) == [0, 0]
+
+
+def test_controllers_share_plans_but_no_values() -> None:
+    one, other = Rig(controller(AxisConfig(gear=10.0))), Rig(controller(AxisConfig(gear=4.0)))
+    one.set("POS_ACT", 5.0)
+    other.set("POS_ACT", 7.0)
+    other.use_dint()
+    assert (one.get("POS_ACT"), other.get("POS_ACT")) == (5.0, 28)
+    one.write_words(3, 1)
+    assert other.read_words(3, 1) == [0]
+
+
+# ---------------------------------------------------------------------- whatever comes
+
+ANY_PDU = st.binary(min_size=0, max_size=40) | st.builds(
+    lambda function, address, rest: struct.pack(">BH", function, address) + rest,
+    st.sampled_from([1, 2, 3, 5, 6, 16, 16, 7, 0x83]),
+    st.one_of(st.integers(0, 0xFFFF), st.integers(9990, 10140), st.integers(1990, 2110), st.integers(5990, 6010)),
+    st.binary(max_size=20),
+)
+VALUE_PDU = st.builds(
+    lambda offset, values: words_pdu(10000 + offset, *values),
+    st.integers(0, 135),
+    st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=8),
+)
+
+
+@settings(max_examples=150)
+@given(
+    pdus=st.lists(st.tuples(ANY_PDU | VALUE_PDU, st.integers(0, 10**10)), max_size=25),
+    lenient=st.booleans(),
+    gear=st.sampled_from([100.0, 1.0, 0.3, 1e-30, 1e30]),
+)
+def test_whatever_bytes_arrive_the_response_belongs_to_the_request(
+    pdus: list[tuple[bytes, int]], lenient: bool, gear: float
+) -> None:
+    axis = AxisConfig(gear=gear, limit_mode=3, in_kl=0, in_kr=1, home_mode=1)
+    config = replace(ControllerConfig(), axes=(axis,) * 4)
+    rig = Rig(config, lenient=lenient)
+    rig.enable(1, 2, 3, 4)
+    for pdu, pause in pdus:
+        rig.wait_ns(pause)
+        response = rig.ask(pdu)
+        try:
+            request = modbus.decode_request(pdu)
+        except modbus.ModbusException as refusal:
+            expected = refusal.pdu
+        else:
+            expected = bytes((pdu[0] | 0x80, response[1])) if response[0] & 0x80 else response
+            with suppress(modbus.ModbusException):  # anything but a response or an exception to this request raises
+                modbus.answer(request, response)
+        assert response == expected
+        assert not response[0] & 0x80 or response[1] in (ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE)

@@ -1,0 +1,202 @@
+"""A master in virtual time for tests of the MIC488: it speaks PDUs it makes itself and knows addresses from the manuals.
+
+Nothing here uses the product's register table or encoding, so that a mistake there cannot hide itself.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import replace
+
+from steptwin.machine import SECOND, Edge
+from steptwin.mic488.config import AxisConfig, ControllerConfig
+from steptwin.mic488.device import Event, Mic488
+from steptwin.world.kernel import Kernel, PinName, PositionSwitch
+
+OFFSETS = {"1.23": 1000, "1.40": 10000, "1.70": 10000}
+
+WORDS = {
+    "DATA_TYPE": 0, "PROG_BANK_SEL": 1, "POS_BANK_SEL": 2, "PROGRAM_CTRL": 3, "AXIS_CTR_MODE": 4, "AXIS_VEL_ABS_TRIG": 5,
+    "AXIS_VEL_REL_TRIG": 6, "AXIS_POS_ABS_TRIG": 7, "AXIS_POS_REL_TRIG": 8, "M_STATUS": 9, "M_ENABLE": 14, "M_DISABLE": 15,
+    "M_STOP": 16,
+}  # fmt: skip
+VALUES = {
+    "POS_ACT": 20, "VEL_ACT": 28, "ACC": 36, "DEC": 44, "VMAX": 52, "HOME": 60, "VEL_ABS": 68, "VEL_REL": 76, "POS_ABS": 84,
+    "POS_REL": 92, "ENC_IMP": 100, "ENC_XPOS": 108, "POSLIM_L": 120, "POSLIM_R": 128,
+}  # fmt: skip
+EN, STOP, JOG, USER_REG_READ, USER_REG_SAVE, USER_REG_ZERO, IN, OUT = 2000, 2004, 2008, 2100, 2101, 2102, 5000, 6000
+
+
+def real_words(value: float) -> tuple[int, int]:
+    high, low = struct.unpack(">HH", struct.pack(">f", value))
+    return low, high
+
+
+def dint_words(value: int) -> tuple[int, int]:
+    return value & 0xFFFF, value >> 16 & 0xFFFF
+
+
+def read_pdu(function: int, address: int, count: int) -> bytes:
+    return struct.pack(">BHH", function, address, count)
+
+
+def coil_pdu(address: int, on: bool) -> bytes:
+    return struct.pack(">BHH", 5, address, 0xFF00 if on else 0)
+
+
+def word_pdu(address: int, value: int) -> bytes:
+    return struct.pack(">BHH", 6, address, value & 0xFFFF)
+
+
+def words_pdu(address: int, *words: int) -> bytes:
+    return struct.pack(f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *words)
+
+
+def controller(*axes: AxisConfig, **others: object) -> ControllerConfig:
+    """A configuration whose first axes are given; the rest is default."""
+    given = axes + (AxisConfig(),) * (4 - len(axes))
+    return replace(ControllerConfig(), axes=given, **others)  # type: ignore[arg-type]
+
+
+class Refused(AssertionError):
+    """A request the test expected to succeed was answered with an exception."""
+
+
+class Rig:
+    """A controller in a kernel, its present moment, and everything that came out of it."""
+
+    def __init__(self, config: ControllerConfig | None = None, firmware: str = "1.70", **options: object) -> None:
+        self.device = Mic488(config or ControllerConfig(), firmware, **options)  # type: ignore[arg-type]
+        self.base = OFFSETS[firmware]
+        self.kernel = Kernel()
+        self.kernel.add("m", self.device)
+        self.edges: list[Edge] = []
+        self.kernel.observers.append(lambda name, edge: self.edges.append(edge))
+        self.now = 0
+        self.dint = False
+
+    # -------------------------------------------------------------- time and the world
+
+    def wait(self, seconds: float) -> None:
+        self.wait_ns(round(seconds * SECOND))
+
+    def wait_ns(self, nanoseconds: int) -> None:
+        self.now += nanoseconds
+        self.kernel.advance(self.now)
+        self.device.advance(self.now)
+
+    def until(self, axis: int, *statuses: int, within: float = 100.0) -> None:
+        """Wait from event to event until ``axis`` has one of ``statuses``."""
+        end = self.now + round(within * SECOND)
+        while self.status(axis) not in statuses:
+            due = self.kernel.deadline()
+            assert due is not None, f"nothing will happen; status of M{axis} is {self.status(axis)}"
+            assert due <= end, f"M{axis} has status {self.status(axis)} after {within} s"
+            self.wait_ns(due - self.now)
+
+    def pin(self, pin: str, value: float) -> None:
+        self.kernel.advance(self.now)
+        self.device.set_pin(pin, value, self.now)
+        self.kernel.deadline()
+
+    def pins(self) -> Mapping[str, float]:
+        return self.device.pins()
+
+    def switch(self, axis: int, low: int | None, high: int | None, pin: str, *, normally_closed: bool = False) -> None:
+        self.kernel.advance(self.now)
+        self.kernel.place(PositionSwitch("m", axis, low, high, PinName("m", pin), normally_closed))
+        self.kernel.deadline()
+
+    def events(self, code: str) -> list[Event]:
+        return [event for event in self.device.events if event.code == code]
+
+    # -------------------------------------------------------------- requests
+
+    def ask(self, pdu: bytes) -> bytes:
+        self.kernel.advance(self.now)
+        response = self.device.execute(pdu, self.now)
+        self.kernel.deadline()
+        return response
+
+    def _ask(self, pdu: bytes) -> bytes:
+        response = self.ask(pdu)
+        if response[0] & 0x80:
+            raise Refused(f"{pdu.hex(' ')} was answered with exception {response[1]}")
+        return response
+
+    def exception(self, pdu: bytes) -> int:
+        """Code of the exception ``pdu`` is answered with, 0 when it is served."""
+        response = self.ask(pdu)
+        if response[0] & 0x80:
+            assert len(response) == 2
+            assert response[0] == pdu[0] | 0x80
+            return response[1]
+        return 0
+
+    def coil(self, address: int, on: bool) -> None:
+        pdu = coil_pdu(address, on)
+        assert self._ask(pdu) == pdu
+
+    def read_words(self, address: int, count: int) -> list[int]:
+        response = self._ask(read_pdu(3, address, count))
+        assert response[:2] == bytes((3, 2 * count))
+        return list(struct.unpack(f">{count}H", response[2:]))
+
+    def write_words(self, address: int, *words: int) -> None:
+        pdu = words_pdu(address, *words)
+        assert self._ask(pdu) == pdu[:5]
+
+    def bits(self, function: int, address: int, count: int) -> list[int]:
+        response = self._ask(read_pdu(function, address, count))
+        assert response[:2] == bytes((function, (count + 7) // 8))
+        return [response[2 + i // 8] >> i % 8 & 1 for i in range(count)]
+
+    # -------------------------------------------------------------- registers by name
+
+    def address(self, key: str, axis: int = 1) -> int:
+        return self.base + (WORDS[key] if key in WORDS else VALUES[key] + 2 * (axis - 1))
+
+    def word(self, key: str, value: int | None = None) -> int:
+        """Read a WORD register; with ``value`` write it first (function 06)."""
+        if value is not None:
+            pdu = word_pdu(self.address(key), value)
+            assert self._ask(pdu) == pdu
+            return value
+        return self.read_words(self.address(key), 1)[0]
+
+    def encoded(self, key: str, value: float) -> tuple[int, int]:
+        return dint_words(int(value)) if self.dint or key == "ENC_IMP" else real_words(value)
+
+    def set(self, key: str, value: float, axis: int = 1) -> None:
+        self.write_words(self.address(key, axis), *self.encoded(key, value))
+
+    def set_pdu(self, key: str, value: float, axis: int = 1) -> bytes:
+        return words_pdu(self.address(key, axis), *self.encoded(key, value))
+
+    def get(self, key: str, axis: int = 1) -> float:
+        low, high = self.read_words(self.address(key, axis), 2)
+        raw = struct.pack(">HH", high, low)
+        return struct.unpack(">i" if self.dint or key == "ENC_IMP" else ">f", raw)[0]
+
+    def status(self, axis: int = 1) -> int:
+        return self.read_words(self.base + 9 + axis, 1)[0]
+
+    def position(self, axis: int = 1) -> float:
+        return self.get("POS_ACT", axis)
+
+    def velocity(self, axis: int = 1) -> float:
+        return self.get("VEL_ACT", axis)
+
+    def enable(self, *axes: int) -> None:
+        self.word("M_ENABLE", sum(1 << axis - 1 for axis in axes or (1,)))
+
+    def stop(self, axis: int = 1) -> None:
+        self.coil(STOP + axis - 1, True)
+
+    def jog(self, axis: int, direction: int, on: bool) -> None:
+        self.coil(JOG + 2 * (axis - 1) + (direction < 0), on)
+
+    def use_dint(self) -> None:
+        self.word("DATA_TYPE", 1)
+        self.dint = True
