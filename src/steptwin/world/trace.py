@@ -1,0 +1,192 @@
+"""What happened in a world, exactly and compactly: profiles instead of pulses, edges instead of samples.
+
+Each machine's records come in the order in which they happened to it; machines that share no wire are advanced apart from each
+other, so the records of several machines are merged by (time, order of the machines, sequence) when somebody reads them.
+
+Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
+a pulse for every unit of position; ``edge`` the new level of a pin, input or output (0.0, 1.0 or volts); ``frame`` the bytes of
+a frame (subject link and direction, ``"tcp-1/in"``); ``statement`` the number of the line a program executes (subject: program);
+``event`` a text (subject: its code); ``input`` what came from outside (subject: what was done); ``fault`` a text (subject: its
+name).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from hashlib import blake2b
+from heapq import merge
+from itertools import islice
+from operator import itemgetter
+from typing import NamedTuple, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.motion import Profile
+from steptwin.motion.divisions import StepTrain
+
+KINDS = ("plan", "edge", "frame", "statement", "event", "input", "fault")
+DIGEST_BYTES = 16
+
+
+class Record(NamedTuple):
+    """Something that happened."""
+
+    time: Nanos
+    machine: str
+    kind: str
+    subject: str
+    value: object
+
+
+Recorder: TypeAlias = Callable[[Record], None]
+"""Takes each record as it happens: a `Trace`'s `add`, or anything else that wants to know."""
+
+
+class Trace:
+    """The records of a world. ``machines`` fixes their order; a machine not named there comes after those seen before it.
+
+    With ``keep=False`` only the digest and the number of records grow: for runs too long to be kept.
+    """
+
+    def __init__(self, machines: Iterable[str] = (), *, keep: bool = True) -> None:
+        self._keep = keep
+        self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
+
+    @property
+    def machines(self) -> list[str]:
+        return list(self._streams)
+
+    def add(self, record: Record) -> None:
+        """Take what happened to a machine after everything taken of it before. `Misuse` where its time goes back.
+
+        ``value`` is immutable; one of a kind that `encode` does not know makes `digest` raise.
+        """
+        stream = self._streams.get(record.machine)
+        if stream is None:
+            stream = self._streams[record.machine] = _Stream()
+        if record.time < stream.latest:
+            raise Misuse(f"{record.machine}: a record of {record.time} ns after one of {stream.latest} ns")
+        stream.latest = record.time
+        stream.count += 1
+        if self._keep:
+            stream.records.append(record)
+        else:
+            stream.hash.update(encode(record))
+
+    def __len__(self) -> int:
+        """How many records were taken, kept or not."""
+        return sum(stream.count for stream in self._streams.values())
+
+    def __iter__(self) -> Iterator[Record]:
+        """All kept records by (time, machine, sequence)."""
+        return merge(*(stream.records for stream in self._streams.values()), key=itemgetter(0))
+
+    def of(self, *kinds: str, machine: str | None = None) -> Iterator[Record]:
+        """The records of these kinds, of one machine where it is named, in order. `Misuse` for an unknown kind."""
+        for kind in kinds:
+            if kind not in KINDS:
+                raise Misuse(f"no kind of record {kind!r}: kinds are {', '.join(KINDS)}")
+        if machine is None:
+            chosen: Iterator[Record] = iter(self)
+        else:
+            chosen = iter(self._streams[machine].records if machine in self._streams else ())
+        return (record for record in chosen if record.kind in kinds)
+
+    def plans(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("plan", machine=machine)
+
+    def edges(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("edge", machine=machine)
+
+    def frames(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("frame", machine=machine)
+
+    def statements(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("statement", machine=machine)
+
+    def events(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("event", machine=machine)
+
+    def inputs(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("input", machine=machine)
+
+    def faults(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("fault", machine=machine)
+
+    def digest(self) -> str:
+        """What two runs of the same world share, on any machine and Python version: 32 hexadecimal digits.
+
+        A digest of the machines' digests: their merged order follows from their times.
+        """
+        whole = blake2b(digest_size=DIGEST_BYTES)
+        for name, stream in self._streams.items():
+            if stream.count:
+                whole.update(_value(name) + stream.digest())
+        return whole.hexdigest()
+
+
+class _Stream:
+    """The records of one machine."""
+
+    __slots__ = ("_hashed", "count", "hash", "latest", "records")
+
+    def __init__(self) -> None:
+        self.records: list[Record] = []
+        self.count = 0
+        self.latest: Nanos = 0
+        self.hash = blake2b(digest_size=DIGEST_BYTES)
+        self._hashed = 0
+
+    def digest(self) -> bytes:
+        """Kept records are hashed when somebody asks: taking them has to be cheap."""
+        for record in islice(self.records, self._hashed, None):
+            self.hash.update(encode(record))
+        self._hashed = len(self.records)
+        return self.hash.digest()
+
+
+# ---------------------------------------------------------------------- canonical bytes
+
+_HEAD = struct.Struct("<qI")
+_LENGTH = struct.Struct("<cI")
+_FLOAT = struct.Struct("<cd")
+_SEGMENT = struct.Struct("<6db")
+
+
+def encode(record: Record) -> bytes:
+    """The same bytes for the same record everywhere: floats by their IEEE bytes, integers exactly."""
+    body = _value(record.kind) + _value(record.subject) + _value(record.value)
+    return _HEAD.pack(record.time, len(body)) + body
+
+
+def _value(value: object) -> bytes:
+    if isinstance(value, float):
+        return _FLOAT.pack(b"f", value)
+    if isinstance(value, Profile):
+        return _profile(value)
+    if isinstance(value, StepTrain):
+        return _framed(b"t", _profile(value.profile) + _value(tuple(value.divisions)))
+    if isinstance(value, str):
+        return _framed(b"s", value.encode())
+    if isinstance(value, bool) or value is None:
+        return b"?" + str(value)[:1].encode()
+    if isinstance(value, int):
+        return _framed(b"i", str(value).encode())
+    if isinstance(value, bytes):
+        return _framed(b"b", value)
+    if isinstance(value, tuple):
+        return _framed(b"l", b"".join([_value(item) for item in value]))
+    raise Misuse(
+        f"{value!r} cannot be in a trace: permitted are numbers, text, bytes, profiles, trains of pulses and tuples of them"
+    )
+
+
+def _framed(tag: bytes, data: bytes) -> bytes:
+    return _LENGTH.pack(tag, len(data)) + data
+
+
+def _profile(profile: Profile) -> bytes:
+    parts = [_FLOAT.pack(b"f", profile.final_p)]
+    parts += [_SEGMENT.pack(s.end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction) for s in profile.segments]
+    return _framed(b"p", f"{profile.start} {profile.base} ".encode() + b"".join(parts))
