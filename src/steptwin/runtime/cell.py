@@ -1,0 +1,74 @@
+"""A kernel in real time: whoever has an input for its machines asks `Cell.enter` for the moment and says `Cell.leave`."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.runtime.clock import Clock
+from steptwin.world.kernel import Kernel
+
+LONGEST_WAIT_S = 3600.0
+"""Event loops take no arbitrarily distant timer; a longer wait is waited in parts."""
+
+LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
+"""Something due that is done later than this has not jittered: the process was stopped or cannot keep up."""
+
+
+class Cell:
+    """Machines that are advanced together, when somebody looks or something happens.
+
+    When the process is held up, virtual time is held up with it, so that nothing has to be caught up with; ``on_lag`` is told
+    by how much.
+    """
+
+    __slots__ = ("_armed_for", "_loop", "_timer", "clock", "kernel", "on_lag")
+
+    def __init__(self, kernel: Kernel, clock: Clock) -> None:
+        self.kernel = kernel
+        self.clock = clock
+        self.on_lag: Callable[[Nanos], None] | None = None
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+        self._armed_for: Nanos | None = None
+
+    def enter(self) -> Nanos:
+        """Bring the machines to the present; inputs may be applied at the moment returned, then call `leave`."""
+        now = self.clock.now()
+        due = self._armed_for
+        if due is not None and now - due > LONGEST_DELAY_NS:
+            now = self._held_up(due, now)
+        self.kernel.advance(now)
+        return now
+
+    def leave(self) -> None:
+        """Let signals settle after an input and wake up for what it leads to."""
+        if self.kernel.stale:
+            self._arm(self.kernel.deadline())
+
+    def _held_up(self, due: Nanos, now: Nanos) -> Nanos:
+        """Go on where the delay began."""
+        resumed = max(due, self.kernel.now)
+        self.clock.lag(now - resumed)
+        if self.on_lag is not None:
+            self.on_lag(now - resumed)
+        return resumed
+
+    def _arm(self, due: Nanos | None) -> None:
+        if due is None or (self._armed_for is not None and self._armed_for <= due):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._armed_for = due
+        self._timer = self._loop.call_later(min(self.clock.wait_s(due), LONGEST_WAIT_S), self._wake)
+
+    def _wake(self) -> None:
+        self.enter()
+        self._timer = self._armed_for = None
+        self._arm(self.kernel.deadline())
+
+    def close(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = self._armed_for = None

@@ -1,0 +1,84 @@
+"""Byte streams and the ports behind them: what every kind of link has in common."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Protocol
+
+from steptwin.machine import Nanos
+from steptwin.runtime.cell import Cell
+
+SLICE_BYTES = 2048
+"""A client that sends more at once is served this much at a time, so that it cannot keep others waiting."""
+
+
+class Port(Protocol):
+    """What a link needs of a wire port."""
+
+    @property
+    def broken(self) -> str | None:
+        """Why the connection has to be closed, or None."""
+        ...
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes: ...
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
+    def deadline(self) -> Nanos | None: ...
+
+
+class Writer(Protocol):
+    def write(self, data: bytes) -> None: ...
+
+
+class Feed:
+    """Between a stream of bytes and a port: bytes in, answers out, timers for what is due later."""
+
+    __slots__ = ("_cell", "_loop", "_port", "_timer", "_writer")
+
+    def __init__(self, cell: Cell, port: Port, writer: Writer) -> None:
+        self._cell = cell
+        self._port = port
+        self._writer = writer
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.TimerHandle | None = None
+
+    def take(self, data: bytes) -> None:
+        cell = self._cell
+        answer = self._port.exchange(data, cell.enter())
+        if answer:
+            self._writer.write(answer)
+        if cell.kernel.stale:
+            cell.leave()
+        due = self._port.deadline()
+        if due is not None:
+            self._arm(due)
+
+    def _arm(self, due: Nanos) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.call_later(self._cell.clock.wait_s(due), self._wake)
+
+    def _wake(self) -> None:
+        self._timer = None
+        now = self._cell.enter()
+        for _, data in self._port.to_send(now):
+            self._writer.write(data)
+        self._cell.leave()
+        due = self._port.deadline()
+        if due is not None:
+            self._arm(due)
+
+    def close(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+
+class Link(Protocol):
+    """Something that connects a port with the outside."""
+
+    async def close(self) -> None: ...
+
+
+def where(error: OSError) -> str:
+    """The reason of a system error in words."""
+    return (error.strerror or str(error)).lower()

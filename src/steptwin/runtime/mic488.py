@@ -1,0 +1,220 @@
+"""MIC488 controllers on a line: what `steptwin serve mic488` puts together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.device import Event, Mic488, check_pin
+from steptwin.mic488.encoder import Coupling
+from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.demo import place_switches
+from steptwin.runtime.frames import FrameLog, WatchedRtuPort
+from steptwin.runtime.links import Port
+from steptwin.runtime.memory import StateDirectory
+from steptwin.wire.line import SerialLine
+from steptwin.wire.rtu import BURSTY_GAP_NS
+from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.world.kernel import Kernel
+
+
+@dataclass(frozen=True, slots=True)
+class LineOptions:
+    """How requests are served. ``baud`` matters to real line timing only."""
+
+    baud: int = 38400
+    timing: bool = False
+    frames: bool = False
+    """Whether frames are put into words."""
+
+
+class Mic488Line:
+    """Controllers with different units on one line, their memories, and what a person can ask of them."""
+
+    def __init__(
+        self,
+        config: ControllerConfig,
+        units: Sequence[int],
+        firmware: str,
+        *,
+        lenient: bool = False,
+        state: StateDirectory | None = None,
+        demo: bool = False,
+        options: LineOptions | None = None,
+    ) -> None:
+        self.options = options or LineOptions()
+        self.kernel = Kernel()
+        self.devices: dict[int, Mic488] = {}
+        for unit in units:
+            memory = state.load(memory_name(unit)) if state is not None else None
+            device = Mic488(config, firmware, lenient=lenient, memory=memory)
+            if state is not None:
+                device.store = partial(state.save, memory_name(unit))
+            self.devices[unit] = device
+            self.kernel.add(str(unit), device)
+            if demo:
+                place_switches(self.kernel, str(unit))
+        self.frames = FrameLog(self.devices)
+        numbers = ", ".join(map(str, units))
+        self.title = f"MIC488 firmware {firmware}, unit{'s' if len(units) > 1 else ''} {numbers}"
+        self._connections = count(1)
+
+    # ------------------------------------------------------------------ ports
+
+    def tcp_port(self) -> TcpSlavePort:
+        """A port for one more client."""
+        link = f"tcp-{next(self._connections)}"
+        return TcpSlavePort(self.devices, on_frame=self.frames.observer(link, tcp=True) if self.options.frames else None)
+
+    def rtu_port(self, link: str, gap_ns: Nanos = BURSTY_GAP_NS) -> Port:
+        """A port for one more program on the line, or client of it."""
+        observer = self.frames.observer(link, tcp=False) if self.options.frames else None
+        port: RtuSlavePort | TimedRtuSlavePort
+        if self.options.timing:
+            timing = LineTiming(SerialLine(self.options.baud))
+            port = TimedRtuSlavePort(self.devices, timing, gap_ns=gap_ns, on_frame=observer)
+        else:
+            port = RtuSlavePort(self.devices, gap_ns=gap_ns, on_frame=observer)
+        return WatchedRtuPort(port, self.frames, link) if self.options.frames else port
+
+    def rtu_client_port(self, gap_ns: Nanos = BURSTY_GAP_NS) -> Port:
+        """A port for one more client of RTU over TCP."""
+        return self.rtu_port(f"rtu-{next(self._connections)}", gap_ns)
+
+    # ------------------------------------------------------------------ what a hand at the machine does
+
+    def handlers(self, cell: Cell) -> dict[str, Callable[[Mapping[str, Any]], object]]:
+        """Requests of the control endpoint; ``unit`` chooses the controller where there are several."""
+
+        def acting(action: Callable[[Mic488, Mapping[str, Any], Nanos], object]) -> Callable[[Mapping[str, Any]], object]:
+            def handle(request: Mapping[str, Any]) -> object:
+                device = self._chosen(request.get("unit"))
+                now = cell.enter()
+                try:
+                    return action(device, request, now)
+                finally:
+                    cell.leave()
+
+            return handle
+
+        return {
+            "pin": acting(_pin),
+            "power-cycle": acting(lambda device, request, now: device.power_cycle(now)),
+            "encoder": acting(_encoder),
+            "state": acting(lambda device, request, now: state_of(device, now)),
+        }
+
+    def _chosen(self, unit: object) -> Mic488:
+        if unit is None and len(self.devices) == 1:
+            return next(iter(self.devices.values()))
+        served = ", ".join(map(str, self.devices))
+        if unit is None:
+            raise Misuse(f"several units are served: choose one with --unit: {served}")
+        if not isinstance(unit, int) or unit not in self.devices:
+            raise Misuse(f"no unit {unit}: served are {served}")
+        return self.devices[unit]
+
+    def watch_events(self, sink: Callable[[int, Event], None]) -> None:
+        """Tell ``sink`` (unit, event) what no register shows."""
+        for unit, device in self.devices.items():
+            device.on_event = partial(sink, unit)
+
+    def told(self, unit: int, event: Event) -> str:
+        """An event in words; the unit is named where there are several."""
+        return f"unit {unit}: {event.text}" if len(self.devices) > 1 else event.text
+
+
+def memory_name(unit: int) -> str:
+    return f"mic488-{unit}-user-registers"
+
+
+def open_state(stack: ExitStack, path: Path | None) -> StateDirectory | None:
+    return stack.enter_context(StateDirectory(path)) if path is not None else None
+
+
+def _changes(request: Mapping[str, Any]) -> Mapping[str, Any]:
+    changes = request.get("set") or {}
+    if not isinstance(changes, dict):
+        raise Misuse(f'"set" = {changes!r}: expected {{NAME: VALUE, ...}}')
+    return changes
+
+
+def _pin(device: Mic488, request: Mapping[str, Any], now: Nanos) -> object:
+    """All changes or none, then every pin."""
+    changes = _changes(request)
+    for pin, value in changes.items():
+        if not isinstance(value, int | float):
+            raise Misuse(f"{pin} = {value!r}: a pin takes a number")
+        check_pin(pin, float(value))
+    for pin, value in changes.items():
+        device.set_pin(pin, float(value), now)
+    return dict(device.pins())
+
+
+def _encoder(device: Mic488, request: Mapping[str, Any], now: Nanos) -> object:
+    """Turn or couple shafts, then all of them. A whole number turns by counts, a word says what turns the shaft."""
+    changes: list[tuple[int, int | Coupling]] = []
+    for number, change in _changes(request).items():
+        axis = int(number) if number.isdecimal() else 0
+        if not 1 <= axis <= AXES:
+            raise Misuse(f"no axis M{number}: axes are M1 to M{AXES}")
+        changes.append((axis, change if isinstance(change, int) else _coupling(axis, change)))
+    for axis, change in changes:
+        if isinstance(change, int):
+            device.turn_encoder(axis, change, now)
+        else:
+            device.couple_encoder(axis, change, now)
+    return [
+        {"axis": axis.number, "counts": axis.encoder_counts(now), "turned_by": axis.encoder.coupling.value}
+        for axis in device.axes
+    ]
+
+
+def _coupling(axis: int, word: object) -> Coupling:
+    try:
+        return Coupling(word)
+    except ValueError:
+        permitted = ", ".join(coupling.value for coupling in Coupling)
+        raise Misuse(f"M{axis} = {word!r}: an encoder is turned by {permitted}, or by +N or -N counts") from None
+
+
+def state_of(device: Mic488, now: Nanos) -> dict[str, object]:
+    """Everything a person asks for, as plain data; positions in configured units."""
+    return {
+        "time_s": now / SECOND,
+        "firmware": device.firmware.name,
+        "status": int(device.status()),
+        "program": {
+            "state": device.program.state.name.lower(),
+            "program_bank": device.program.program_bank,
+            "position_bank": device.program.position_bank,
+        },
+        "data_type": "DINT" if device.data_type else "REAL",
+        "axis_control_mode": "TRIGGER" if device.trigger_mode else "DIRECT",
+        "axes": [
+            {
+                "axis": axis.number,
+                "enabled": axis.enabled,
+                "status": int(axis.status),
+                "status_text": AXIS_STATUS_TEXTS[axis.status],
+                "unit": axis.config.unit_name,
+                "position": axis.coordinate_p(now) / axis.gear,
+                "velocity": axis.profile.velocity(now) / axis.gear,
+                "position_pulses": axis.coordinate_p(now),
+                "encoder_counts": axis.encoder_counts(now),
+            }
+            for axis in device.axes
+        ],
+        "pins": dict(device.pins()),
+        "user_registers": {str(n): word for n, word in enumerate(device.user) if word},
+    }

@@ -1,0 +1,82 @@
+"""Text for whoever watches a served twin.
+
+A pager that is not scrolled, a terminal held by Ctrl-S: who reads our text may stop for a while, and a write to him then blocks.
+So a thread writes, and the twin goes on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import select
+import threading
+from typing import TextIO
+
+MOST_WAITING = 10_000
+"""Pieces kept for a reader that has stopped; later ones are left out."""
+PATIENCE_S = 1.0
+"""How long the end waits for him."""
+
+
+class Output:
+    """Writes to ``stream``'s descriptor, in order, from a thread of its own. Also a file that rich can draw on.
+
+    Whoever closes his end is not written to any more; that is no error.
+    """
+
+    def __init__(self, stream: TextIO | None) -> None:
+        self.encoding = "utf-8" if stream is None else stream.encoding
+        self._stream = stream
+        self._waiting: queue.Queue[bytes | None] = queue.Queue(MOST_WAITING)
+        self._left_out = 0
+        self._thread: threading.Thread | None = None
+        if stream is not None:
+            stream.flush()
+            self._thread = threading.Thread(target=self._run, args=(stream.fileno(),), name="output", daemon=True)
+            self._thread.start()
+
+    def line(self, text: str) -> None:
+        self.write(text + "\n")
+
+    def write(self, text: str) -> int:
+        if self._thread is not None:
+            try:
+                self._waiting.put_nowait(text.encode(self.encoding, "replace"))
+            except queue.Full:
+                self._left_out += 1
+        return len(text)
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def isatty(self) -> bool:
+        return self._stream is not None and self._stream.isatty()
+
+    def _run(self, descriptor: int) -> None:
+        with contextlib.suppress(OSError):
+            while (data := self._waiting.get()) is not None:
+                _write_all(descriptor, data)
+                if self._left_out and self._waiting.empty():
+                    count, self._left_out = self._left_out, 0
+                    _write_all(descriptor, f"({count} lines left out: nobody read them)\n".encode())
+        self._thread = None
+
+    def close(self) -> None:
+        """Write what waits, as long as somebody reads it."""
+        thread = self._thread
+        if thread is not None:
+            with contextlib.suppress(queue.Full):
+                self._waiting.put(None, timeout=PATIENCE_S)
+            thread.join(PATIENCE_S)
+            self._thread = None
+
+
+def _write_all(descriptor: int, data: bytes) -> None:
+    while data:
+        try:
+            data = data[os.write(descriptor, data) :]
+        except BlockingIOError:  # somebody who shares it made it so
+            writable = select.poll()
+            writable.register(descriptor, select.POLLOUT)
+            writable.poll()

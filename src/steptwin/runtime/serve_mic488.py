@@ -1,0 +1,171 @@
+"""`steptwin serve mic488` behind its options."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from steptwin.errors import LineFailure, Misuse
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.mic488.config import ControllerConfig, read_config
+from steptwin.mic488.inifile import IniFile
+from steptwin.mic488.registers import firmware as known_firmware
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.clock import Clock
+from steptwin.runtime.demo import demo_config
+from steptwin.runtime.lines import Face, Lines
+from steptwin.runtime.links import where
+from steptwin.runtime.mic488 import LineOptions, Mic488Line, open_state
+from steptwin.runtime.output import Output
+from steptwin.runtime.server import Server, clear_ready_file
+from steptwin.runtime.tcp import parse_address
+from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
+
+LONGEST_NAME = 40
+"""Paths of sockets are short: about 100 characters in all."""
+
+RTU = "Modbus RTU"
+TCP = "Modbus TCP"
+RTU_TCP = "RTU over TCP"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mic488Options:
+    """The command's options as given; see ``steptwin serve mic488 --help``."""
+
+    firmware: str = "1.70"
+    units: str | None = None
+    pty: Path | None = None
+    serial: str | None = None
+    baud: int | None = None
+    tcp: str | None = None
+    rtu_tcp: str | None = None
+    config: Path | None = None
+    state: Path | None = None
+    lenient: bool = False
+    line_timing: str = "off"
+    gap_ms: float | None = None
+    ready_file: Path | None = None
+    log_frames: bool = False
+    name: str = "mic488"
+    listen_any: bool = False
+    demo: bool = False
+
+
+def serve(options: Mic488Options) -> None:
+    """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
+    if options.line_timing not in ("real", "off"):
+        raise Misuse(f"--line-timing {options.line_timing}: permitted are 'real' and 'off'")
+    if options.baud is not None and not 300 <= options.baud <= 1_000_000:
+        raise Misuse(f"--baud {options.baud}: permitted are 300 to 1000000 bit/s")
+    if options.gap_ms is not None and not 0.0 < options.gap_ms <= 10_000.0:
+        raise Misuse(f"--gap {options.gap_ms:g}: permitted are more than 0 and at most 10000 ms")
+    if not LONGEST_NAME >= len(options.name) > 0 or not options.name.replace("-", "").replace("_", "").isalnum():
+        raise Misuse(f"--name {options.name!r}: permitted are 1 to {LONGEST_NAME} letters, digits, '-' and '_'")
+    known_firmware(options.firmware)
+    for address in (options.tcp, options.rtu_tcp):
+        if address is not None:
+            parse_address(address, listen_any=options.listen_any)
+    if options.config is not None:
+        config = load_config(options.config, options.firmware)
+    else:
+        config = demo_config() if options.demo else ControllerConfig()
+    units = parse_units(options.units) if options.units is not None else [config.address]
+    if options.ready_file is not None:
+        clear_ready_file(options.ready_file)
+    with asyncio.Runner(loop_factory=_fastest_loop()) as runner:
+        runner.run(_serve(options, config, units))
+
+
+def _fastest_loop() -> Callable[[], asyncio.AbstractEventLoop] | None:
+    try:
+        import uvloop
+    except ImportError:
+        return None
+    return uvloop.new_event_loop
+
+
+def load_config(path: Path, firmware: str) -> ControllerConfig:
+    """The configuration in a ``.cfg`` file. Raises `Misuse` with every problem of it, `LineFailure` if it cannot be read."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise LineFailure(f"cannot read the configuration {path}: {where(error)}") from error
+    return read_config(IniFile.parse(data, str(path)), firmware)
+
+
+def parse_units(text: str) -> list[int]:
+    """``1,2,5`` → slave addresses. Raises `Misuse`."""
+    units: list[int] = []
+    for part in text.split(","):
+        if not part.strip().isdecimal() or not 1 <= int(part) <= 247:
+            raise Misuse(f"--units {text}: {part.strip()!r} is no slave address; permitted are 1 to 247, separated by commas")
+        if int(part) in units:
+            raise Misuse(f"--units {text}: {int(part)} is given twice")
+        units.append(int(part))
+    return units
+
+
+async def _serve(options: Mic488Options, config: ControllerConfig, units: list[int]) -> None:
+    with ExitStack() as stack:
+        output = Output(sys.stdout)
+        stack.callback(output.close)
+        live = output.isatty() and not options.log_frames and os.environ.get("TERM", "dumb") not in ("dumb", "unknown")
+        baud = options.baud or config.ports[0].baud
+        line = Mic488Line(
+            config,
+            units,
+            options.firmware,
+            lenient=options.lenient,
+            state=open_state(stack, options.state),
+            demo=options.demo,
+            options=LineOptions(baud=baud, timing=options.line_timing == "real", frames=live or options.log_frames),
+        )
+        cell = Cell(line.kernel, Clock())
+        face = _live_view(line, cell, output) if live else Lines(line, output, frames=options.log_frames)
+        server = Server(cell, face.notice)
+        try:
+            await _open(server, line, options, baud)
+            await face.show(server, _remarks(options))
+        finally:
+            await server.close()
+
+
+def _live_view(line: Mic488Line, cell: Cell, output: Output) -> Face:
+    from steptwin.runtime.view import LiveView
+
+    return LiveView(line, cell, output)
+
+
+async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: int) -> None:
+    gap: Nanos | None = None if options.gap_ms is None else round(options.gap_ms * MILLISECOND)
+    bursty = BURSTY_GAP_NS if gap is None else gap
+    # First, for it tells who else has this name, and with it the pty of that name.
+    await server.open_control(options.name, line.handlers(server.cell))
+    if options.pty is not None:
+        await server.open_pty(options.pty, RTU, lambda: line.rtu_port("pty", bursty))
+    if options.serial is not None:
+        uart = UART_GAP_NS if gap is None else gap
+        await server.open_serial(options.serial, baud, RTU, lambda: line.rtu_port("serial", uart))
+    if options.tcp is not None:
+        await server.open_tcp("tcp", parse_address(options.tcp, listen_any=options.listen_any), TCP, line.tcp_port)
+    if options.rtu_tcp is not None:
+        address = parse_address(options.rtu_tcp, listen_any=options.listen_any)
+        await server.open_tcp("rtu-tcp", address, RTU_TCP, lambda: line.rtu_client_port(bursty))
+    if options.ready_file is not None:
+        server.write_ready_file(options.ready_file, options.name)
+
+
+def _remarks(options: Mic488Options) -> list[str]:
+    """What the person who started this should know."""
+    remarks = []
+    if options.listen_any:
+        remarks.append("Modbus has no authentication: whoever reaches these addresses moves the axes")
+    if options.state is None:
+        remarks.append("non-volatile memory ends with this process (--state DIR keeps it)")
+    return remarks

@@ -1,0 +1,55 @@
+"""Files the user names: their bytes, and texts as people's editors leave them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from steptwin.diagnostics import Source
+from steptwin.errors import Misuse
+
+# Polish Windows before Unicode; Latin-1 takes whatever bytes that page leaves undefined, so that every file can be written back.
+_ENCODINGS = ("utf-8", "cp1250", "latin-1")
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True, slots=True)
+class TextFile:
+    """A text and how its bytes say it."""
+
+    source: Source
+    encoding: str
+    has_mark: bool
+
+    def to_bytes(self, text: str) -> bytes:
+        """A text in the manner of this file; its own text gives its own bytes."""
+        return (_BYTE_ORDER_MARK if self.has_mark else b"") + text.encode(self.encoding)
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a file the user named. Raises `Misuse` when it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise Misuse(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Raises `Misuse` when the file cannot be written."""
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise Misuse(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def read_text(path: Path) -> TextFile:
+    """A text file in UTF-8, with or without byte order mark, or else in the code page of Polish Windows."""
+    data = read_bytes(path)
+    has_mark = data.startswith(_BYTE_ORDER_MARK)
+    content = data.removeprefix(_BYTE_ORDER_MARK)
+    for encoding in _ENCODINGS[:-1]:
+        try:
+            return TextFile(Source(str(path), content.decode(encoding)), encoding, has_mark)
+        except UnicodeDecodeError:
+            continue
+    return TextFile(Source(str(path), content.decode(_ENCODINGS[-1])), _ENCODINGS[-1], has_mark)

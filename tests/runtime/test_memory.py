@@ -1,0 +1,288 @@
+"""What was saved is there: after kill -9, after power loss, with one owner."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+import pytest
+
+import steptwin
+from steptwin.errors import Misuse
+from steptwin.runtime.memory import StateDirectory, StateFailure, StateInUse
+
+SIZE = 2000
+"""User registers 1000–1999."""
+
+
+def image(number: int) -> bytes:
+    """Content that differs in every part from one save to the next."""
+    return number.to_bytes(4, "big") * (SIZE // 4)
+
+
+# ---------------------------------------------------------------------- saving and loading
+
+
+def test_what_was_never_saved_is_none(tmp_path: Path) -> None:
+    with StateDirectory(tmp_path) as state:
+        assert state.load("unit1") is None
+
+
+def test_the_last_save_counts(tmp_path: Path) -> None:
+    with StateDirectory(tmp_path / "new" / "state") as state:
+        for number in range(5):
+            state.save("unit1", image(number))
+            assert state.load("unit1") == image(number)
+        state.save("unit2", b"")
+    with StateDirectory(tmp_path / "new" / "state") as state:
+        assert state.load("unit1") == image(4)
+        assert state.load("unit2") == b""
+
+
+@pytest.mark.parametrize("name", ["", "../x", "a/b", ".x", "a.b", "x" * 65, "ä"])
+def test_a_name_is_a_name(tmp_path: Path, name: str) -> None:
+    with StateDirectory(tmp_path) as state, pytest.raises(Misuse, match="permitted are up to 64 letters"):
+        state.save(name, b"")
+
+
+def test_a_directory_that_is_not_open_keeps_nothing(tmp_path: Path) -> None:
+    with pytest.raises(Misuse, match="is not open"):
+        StateDirectory(tmp_path).save("unit1", b"")
+
+
+def test_a_file_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("")
+    with pytest.raises(StateFailure, match="cannot be used: it is no directory"), StateDirectory(tmp_path / "state"):
+        pass
+
+
+# ---------------------------------------------------------------------- one owner
+
+
+def test_the_second_owner_is_told_who_the_first_is(tmp_path: Path) -> None:
+    with StateDirectory(tmp_path), pytest.raises(StateInUse, match=f"in use by process {os.getpid()}"), StateDirectory(tmp_path):
+        pass
+    with StateDirectory(tmp_path) as again:
+        assert again.load("unit1") is None
+
+
+def test_another_process_owns_it_until_it_is_killed(tmp_path: Path) -> None:
+    with _saver(tmp_path) as (child, says):
+        says.readline()
+        with pytest.raises(StateInUse, match=f"in use by process {child.pid}$"), StateDirectory(tmp_path):
+            pass
+        child.kill()
+        child.wait()
+        with StateDirectory(tmp_path) as state:
+            assert state.load("unit1") is not None
+
+
+# ---------------------------------------------------------------------- damage
+
+
+def _slots(path: Path, name: str = "unit1") -> list[Path]:
+    return [path / f"{name}.0", path / f"{name}.1"]
+
+
+def _saved_twice(path: Path) -> Path:
+    """The slot that holds the newer of two generations."""
+    with StateDirectory(path) as state:
+        state.save("unit1", image(1))
+        before = {slot: slot.stat().st_ino for slot in _slots(path) if slot.exists()}
+        state.save("unit1", image(2))
+    (newer,) = [slot for slot in _slots(path) if slot not in before]
+    return newer
+
+
+def test_a_slot_torn_at_any_length_gives_the_generation_before(tmp_path: Path) -> None:
+    newer = _saved_twice(tmp_path)
+    whole = newer.read_bytes()
+    with StateDirectory(tmp_path) as state:
+        for length in [*range(40), *range(40, len(whole), 97), len(whole) - 1]:
+            newer.write_bytes(whole[:length])
+            assert state.load("unit1") == image(1), length
+        newer.write_bytes(whole + b"\0")
+        assert state.load("unit1") == image(1)
+        newer.write_bytes(whole)
+        assert state.load("unit1") == image(2)
+
+
+def test_any_flipped_bit_gives_the_generation_before(tmp_path: Path) -> None:
+    newer = _saved_twice(tmp_path)
+    whole = newer.read_bytes()
+    with StateDirectory(tmp_path) as state:
+        for place in [*range(24), *range(24, len(whole), 61)]:
+            newer.write_bytes(whole[:place] + bytes([whole[place] ^ 0x10]) + whole[place + 1 :])
+            assert state.load("unit1") == image(1), place
+
+
+def test_a_save_after_damage_does_not_touch_the_good_generation(tmp_path: Path) -> None:
+    newer = _saved_twice(tmp_path)
+    (older,) = [slot for slot in _slots(tmp_path) if slot != newer]
+    newer.write_bytes(b"torn")
+    kept = older.read_bytes()
+    with StateDirectory(tmp_path) as state:
+        state.save("unit1", image(3))
+        assert state.load("unit1") == image(3)
+    assert older.read_bytes() == kept
+
+
+def test_a_first_save_that_was_torn_is_no_save(tmp_path: Path) -> None:
+    (tmp_path / "unit1.0").write_bytes(b"STW1")
+    with StateDirectory(tmp_path) as state:
+        assert state.load("unit1") is None
+
+
+def test_two_damaged_generations_are_said_and_can_be_overwritten(tmp_path: Path) -> None:
+    _saved_twice(tmp_path)
+    for slot in _slots(tmp_path):
+        slot.write_bytes(b"x" * 30)
+    with StateDirectory(tmp_path) as state:
+        with pytest.raises(StateFailure, match=r"both generations of unit1 .* \(unit1\.0 is damaged, unit1\.1 is damaged\)"):
+            state.load("unit1")
+        state.save("unit1", image(9))
+        assert state.load("unit1") == image(9)
+
+
+# ---------------------------------------------------------------------- power loss: the calls that reach the disk fail one by one
+
+
+class PowerLoss(BaseException):
+    """Nothing happens after this."""
+
+
+@pytest.mark.parametrize("saves", [1, 2, 3])
+@pytest.mark.parametrize("stop", range(6))
+def test_power_lost_between_any_two_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, saves: int, stop: int) -> None:
+    """Every step of a save that reaches the disk, stopped before it; what was not synced is lost."""
+    with StateDirectory(tmp_path) as state:
+        for number in range(1, saves):
+            state.save("unit1", image(number))
+        steps = 0
+
+        def breaking(real: Callable[..., object]) -> Callable[..., object]:
+            def step(*arguments: object, **named: object) -> object:
+                nonlocal steps
+                if steps == stop:
+                    raise PowerLoss
+                steps += 1
+                return real(*arguments, **named)
+
+            return step
+
+        monkeypatch.setattr(os, "fsync", breaking(os.fsync))
+        monkeypatch.setattr(Path, "replace", breaking(Path.replace))
+        with suppress(PowerLoss):
+            state.save("unit1", image(saves))
+        monkeypatch.undo()
+        if stop == 0:
+            (tmp_path / "unit1.tmp").write_bytes(image(saves)[:100])  # before fsync any part may be missing
+    with StateDirectory(tmp_path) as state:
+        old = image(saves - 1) if saves > 1 else None
+        wanted = {0: [old], 1: [old], 2: [image(saves)]}.get(stop, [image(saves)])
+        assert state.load("unit1") in wanted
+        assert steps == min(stop, 3)
+        state.save("unit1", image(77))
+        assert state.load("unit1") == image(77)
+
+
+def test_the_file_reaches_the_disk_before_its_name_and_the_name_before_save_returns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order: list[str] = []
+    real_sync, real_replace = os.fsync, Path.replace
+
+    def sync(handle: int) -> None:
+        order.append("fsync " + Path(os.readlink(f"/proc/self/fd/{handle}")).name)
+        real_sync(handle)
+
+    def replace(path: Path, target: Path) -> Path:
+        order.append(f"rename {path.name} {target.name}")
+        return real_replace(path, target)
+
+    with StateDirectory(tmp_path / "state") as state:
+        monkeypatch.setattr(os, "fsync", sync)
+        monkeypatch.setattr(Path, "replace", replace)
+        state.save("unit1", b"1")
+        state.save("unit1", b"2")
+        state.save("unit1", b"3")
+    one = ["fsync unit1.tmp", "rename unit1.tmp unit1.0", "fsync state"]
+    assert order == [*one, *[step.replace("unit1.0", "unit1.1") for step in one], *one]
+
+
+def test_a_full_disk_is_said_and_keeps_the_old_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(handle: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with StateDirectory(tmp_path) as state:
+        state.save("unit1", image(1))
+        monkeypatch.setattr(os, "fsync", full)
+        with pytest.raises(StateFailure, match=r"unit1 cannot be saved in .*: No space left on device"):
+            state.save("unit1", image(2))
+        assert state.load("unit1") == image(1)
+
+
+# ---------------------------------------------------------------------- kill -9
+
+SAVER = """
+import sys
+from steptwin.runtime.memory import StateDirectory
+with StateDirectory(sys.argv[1]) as state:
+    last = state.load("unit1")
+    number = int.from_bytes(last[:4], "big") if last else 0
+    while True:
+        number += 1
+        state.save("unit1", number.to_bytes(4, "big") * 500)
+        print(number, flush=True)
+"""
+
+
+@contextmanager
+def _saver(path: Path) -> Generator[tuple[subprocess.Popen[str], IO[str]], None, None]:
+    """A process that saves 1, 2, 3, … and says so after each; with what it says."""
+    source = Path(steptwin.__file__).parents[1]
+    child = subprocess.Popen(
+        [sys.executable, "-S", "-c", SAVER, str(path)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(source)},
+    )
+    with child:
+        try:
+            assert child.stdout is not None
+            yield child, child.stdout
+        finally:
+            child.kill()
+
+
+def test_a_saving_process_killed_again_and_again_loses_nothing(tmp_path: Path) -> None:
+    """The content found is one that was saved, whole, and not older than the last save that returned."""
+    chance = random.Random(488)
+    kills = 0
+    found = 0
+    end = time.monotonic() + 4.0
+    while kills < 50 and time.monotonic() < end:
+        with _saver(tmp_path) as (child, says):
+            first = int(says.readline())
+            assert first == found + 1
+            time.sleep(chance.uniform(0.0, 0.02))
+            child.send_signal(signal.SIGKILL)
+            told = [first, *map(int, says.read().split("\n")[:-1])]
+        kills += 1
+        with StateDirectory(tmp_path) as state:
+            content = state.load("unit1")
+        assert content is not None
+        found = int.from_bytes(content[:4], "big")
+        assert content == image(found)
+        assert told[-1] <= found <= told[-1] + 1
+    assert kills >= 10
+    assert found > kills

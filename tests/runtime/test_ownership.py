@@ -1,0 +1,81 @@
+"""One owner at a time, found out without asking him."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from steptwin.runtime.ownership import InUse, Ownership
+
+HOLD = """
+import sys
+from pathlib import Path
+from steptwin.runtime.ownership import Ownership
+owned = Ownership(Path(sys.argv[1]))
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_the_second_is_told_who_the_first_is(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    first = Ownership(path)
+    with pytest.raises(InUse) as refusal:
+        Ownership(path)
+    assert str(refusal.value) == f"{path} is in use by process {os.getpid()}"
+    first.release()
+    Ownership(path).release()
+
+
+def test_release_removes_the_file_unless_told_not_to(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    owned = Ownership(path)
+    owned.release(remove=False)
+    owned.release()
+    assert path.exists()
+    Ownership(path).release()
+    assert not path.exists()
+
+
+def test_a_killed_owner_has_left_it_behind(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    command = [sys.executable, "-c", HOLD, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as owner:
+        assert owner.stdout is not None
+        assert owner.stdout.readline() == "held\n"
+        with pytest.raises(InUse, match=f"process {owner.pid}"):
+            Ownership(path)
+        owner.kill()
+    owned = Ownership(path)
+    assert owned.left_behind
+    owned.release()
+
+
+def test_a_new_file_was_not_left_behind(tmp_path: Path) -> None:
+    owned = Ownership(tmp_path / "lock")
+    assert not owned.left_behind
+    owned.release()
+
+
+def test_a_lock_on_a_file_that_was_removed_meanwhile_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The owner removes the file between our opening and our locking it; a third one may have made it anew."""
+    path = tmp_path / "lock"
+    opened = os.open
+    replaced: list[int] = []
+
+    def open_then_replace(*arguments: object, **options: object) -> int:
+        file = opened(*arguments, **options)  # type: ignore[arg-type]
+        if not replaced:
+            path.unlink()
+            path.write_text("")
+            replaced.append(file)
+        return file
+
+    monkeypatch.setattr(os, "open", open_then_replace)
+    owned = Ownership(path)
+    assert path.read_text() == f"{os.getpid()}\n"
+    owned.release()

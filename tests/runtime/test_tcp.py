@@ -1,0 +1,335 @@
+"""TCP links: many clients, clients that vanish, flood, never read or make no sense."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import socket
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+
+from steptwin.errors import LineFailure, Misuse
+from steptwin.mic488.device import Mic488
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.tcp import READ_BYTES, Address, BufferedConnection, Clients, Connection, TcpLink, parse_address
+from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
+
+Run = Callable[..., Any]
+Make = Callable[[], tuple[Cell, Mic488]]
+
+# Read user register 0, and 125 of them.
+READ_ONE = bytes.fromhex("000100000006010300000001")
+ONE = bytes.fromhex("0001000000050103020000")
+READ_MANY = bytes.fromhex("00020000000601030000007D")
+
+
+# ---------------------------------------------------------------------- addresses
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("127.0.0.1:5020", Address("127.0.0.1", 5020)),
+        (":0", Address("127.0.0.1", 0)),
+        ("localhost:502", Address("127.0.0.1", 502)),
+        ("127.1.2.3:65535", Address("127.1.2.3", 65535)),
+        ("[::1]:5020", Address("::1", 5020)),
+    ],
+)
+def test_loopback_addresses(text: str, address: Address) -> None:
+    assert parse_address(text, listen_any=False) == address
+
+
+@pytest.mark.parametrize("text", ["5020", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:http", ""])
+def test_no_addresses(text: str) -> None:
+    with pytest.raises(Misuse, match=re.escape(f"{text!r} is no address: expected HOST:PORT with a port from 0 to 65535")):
+        parse_address(text, listen_any=True)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "[::]", "example"])
+def test_other_addresses_need_permission(host: str) -> None:
+    with pytest.raises(Misuse, match=r"not a loopback address.*no authentication.*--listen-any"):
+        parse_address(f"{host}:5020", listen_any=False)
+    assert parse_address(f"{host}:5020", listen_any=True) == Address(host.strip("[]"), 5020)
+
+
+def test_an_address_is_written_as_it_is_read() -> None:
+    assert [str(Address("127.0.0.1", 1)), str(Address("::1", 2))] == ["127.0.0.1:1", "[::1]:2"]
+
+
+# ---------------------------------------------------------------------- over real sockets
+
+
+Client = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+
+class Scene:
+    """A Modbus TCP link on a free port and clients of it."""
+
+    def __init__(self, make_cell: Make, most: int = 100) -> None:
+        self.cell, self.device = make_cell()
+        self.notices: list[str] = []
+        self.clients = Clients(most, self.notices.append)
+        self.link = TcpLink(self.cell, Address("127.0.0.1", 0), lambda: TcpSlavePort({1: self.device}), self.clients)
+        self._writers: list[asyncio.StreamWriter] = []
+
+    async def __aenter__(self) -> Scene:
+        self.address = await self.link.open()
+        return self
+
+    async def __aexit__(self, *exc: object) -> None:
+        await self.link.close()
+        self.cell.close()
+        for writer in self._writers:
+            writer.close()
+
+    async def fallen_to(self, count: int) -> int:
+        """How many clients there are, as soon as it is ``count``."""
+        for _ in range(1000):
+            if len(self.clients.present) == count:
+                break
+            await asyncio.sleep(0)
+        return len(self.clients.present)
+
+    async def client(self) -> Client:
+        reader, writer = await asyncio.open_connection(*self.address)
+        self._writers.append(writer)
+        return reader, writer
+
+
+async def ask(client: Client) -> bytes:
+    client[1].write(READ_ONE)
+    return await client[0].readexactly(len(ONE))
+
+
+def in_scene(run: Run, make_cell: Make, play: Callable[[Scene], Awaitable[Any]], most: int = 100) -> Any:
+    async def scene() -> Any:
+        async with Scene(make_cell, most) as made:
+            return await play(made)
+
+    return run(scene())
+
+
+def test_many_clients_are_answered(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> list[bytes]:
+        clients = [await scene.client() for _ in range(50)]
+        return [await ask(client) for client in clients * 3]
+
+    assert in_scene(run, make_cell, play) == [ONE] * 150
+
+
+def test_more_than_one_request_at_once(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> bytes:
+        reader, writer = await scene.client()
+        writer.write(READ_ONE * 3 + READ_ONE[:5])
+        writer.write(READ_ONE[5:])
+        return await reader.readexactly(4 * len(ONE))
+
+    assert in_scene(run, make_cell, play) == ONE * 4
+
+
+def test_a_client_that_vanishes_within_a_frame_harms_nobody(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[bytes, int]:
+        other = await scene.client()
+        _, writer = await scene.client()
+        await ask(other)
+        writer.write(READ_ONE[:7])
+        await writer.drain()
+        writer.transport.abort()
+        answer = await ask(other)
+        return answer, await scene.fallen_to(1)
+
+    assert in_scene(run, make_cell, play) == (ONE, 1)
+
+
+def test_a_wrong_header_ends_the_connection_and_is_told(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[bytes, list[str], bytes]:
+        other = await scene.client()
+        reader, writer = await scene.client()
+        writer.write(READ_ONE + b"\0\0\0\7\0\6" + READ_ONE[6:])
+        answered = await reader.read(100)
+        assert await reader.read() == b""
+        return answered, scene.notices, await ask(other)
+
+    answered, (notice,), other = in_scene(run, make_cell, play)
+    assert answered == ONE
+    assert re.fullmatch(r"client 127\.0\.0\.1:\d+: MBAP protocol 7 is not 0; its connection is closed", notice)
+    assert other == ONE
+
+
+def test_clients_beyond_the_limit_are_turned_away_and_places_become_free(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[list[bytes], list[str]]:
+        first = [await scene.client() for _ in range(2)]
+        answers = [await ask(client) for client in first]
+        with pytest.raises((asyncio.IncompleteReadError, ConnectionError)):
+            await ask(await scene.client())
+        first[0][1].transport.abort()
+        await scene.fallen_to(1)
+        return [*answers, await ask(await scene.client()), await ask(first[1])], scene.notices
+
+    assert in_scene(run, make_cell, play, most=2) == ([ONE] * 4, ["more than 2 clients at once are turned away"])
+
+
+def test_a_client_that_never_reads_costs_bounded_memory_and_hinders_nobody(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[list[bytes], int]:
+        other = await scene.client()
+        deaf = socket.create_connection(scene.address)
+        deaf.setblocking(False)
+        answers, waiting = [], 0
+        for _ in range(300):
+            try:
+                while True:
+                    deaf.send(READ_MANY * 1000)
+            except BlockingIOError:
+                pass
+            answers.append(await ask(other))
+            connections = [c for c in scene.clients.present if isinstance(c, Connection)]
+            waiting = max(waiting, *(c._transport.get_write_buffer_size() for c in connections))
+        deaf.close()
+        return answers, waiting
+
+    answers, waiting = in_scene(run, make_cell, play)
+    assert answers == [ONE] * 300
+    assert 0 < waiting < 200_000
+
+
+def test_a_flood_is_served_in_slices_between_the_requests_of_others(run: Run, make_cell: Make) -> None:
+    """65 536 bytes at once are some 5000 requests; another client's single one is answered among the first of them."""
+
+    async def play(scene: Scene) -> list[str]:
+        order: list[str] = []
+        flood, other = await scene.client(), await scene.client()
+        await ask(flood)
+        await ask(other)
+
+        async def flooding() -> None:
+            for _ in range(5000):
+                await flood[0].readexactly(len(ONE))
+                order.append("flood")
+
+        async def asking() -> None:
+            await ask(other)
+            order.append("other")
+
+        flood[1].write(READ_ONE * 5000)
+        await asyncio.gather(flooding(), asking())
+        return order
+
+    order = in_scene(run, make_cell, play)
+    assert len(order) == 5001
+    assert order.index("other") < 2000
+
+
+def test_closing_the_link_ends_its_connections_and_no_others(run: Run, make_cell: Make) -> None:
+    async def scene() -> tuple[bytes, bytes]:
+        async with Scene(make_cell) as one:
+            line = TcpLink(one.cell, Address("127.0.0.1", 0), lambda: RtuSlavePort({1: one.device}), one.clients)
+            rtu_reader, rtu_writer = await asyncio.open_connection(*await line.open())
+            client = await one.client()
+            await ask(client)
+            await line.close()
+            try:
+                ended = await rtu_reader.read()
+            except ConnectionResetError:
+                ended = b""
+            rtu_writer.close()
+            return ended, await ask(client)
+
+    assert run(scene()) == (b"", ONE)
+
+
+def test_a_port_that_is_taken(run: Run, make_cell: Make) -> None:
+    async def scene() -> None:
+        async with Scene(make_cell) as one:
+            second = TcpLink(one.cell, one.address, lambda: TcpSlavePort({1: one.device}), one.clients)
+            with pytest.raises(LineFailure, match=rf"cannot listen on 127\.0\.0\.1:{one.address.port}: .*in use"):
+                await second.open()
+
+    run(scene())
+
+
+# ---------------------------------------------------------------------- without sockets: what a transport tells a connection
+
+
+class Transport:
+    """Records what a connection does."""
+
+    def __init__(self) -> None:
+        self.written = b""
+        self.reading = True
+        self.closing = False
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+
+    def pause_reading(self) -> None:
+        self.reading = False
+
+    def resume_reading(self) -> None:
+        self.reading = True
+
+    def close(self) -> None:
+        self.closing = True
+
+    def is_closing(self) -> bool:
+        return self.closing
+
+    def get_extra_info(self, name: str) -> None:
+        return None
+
+
+def connected(make_cell: Make, kind: type[Connection] = Connection) -> tuple[Connection, Transport]:
+    cell, device = make_cell()
+    transport: Any = Transport()
+    connection = kind(cell, lambda: TcpSlavePort({1: device}), Clients())
+    connection.connection_made(transport)
+    return connection, transport
+
+
+def test_while_answers_wait_nothing_is_executed(run: Run, make_cell: Make) -> None:
+    async def scene() -> tuple[int, bool, int, bool, int, bool]:
+        connection, transport = connected(make_cell)
+        connection.data_received(READ_ONE * 1000)
+        first = len(transport.written)
+        connection.pause_writing()
+        await asyncio.sleep(1.0)
+        paused = len(transport.written)
+        reading = transport.reading
+        connection.resume_writing()
+        await asyncio.sleep(1.0)
+        return first, reading, paused, transport.reading, len(transport.written), transport.closing
+
+    first, reading_while_paused, paused, reading_again, total, closing = run(scene())
+    assert first == paused == 2048 // len(READ_ONE) * len(ONE)
+    assert not reading_while_paused
+    assert (reading_again, total, closing) == (True, 1000 * len(ONE), False)
+
+
+def test_after_a_wrong_header_the_rest_of_a_flood_is_not_executed(run: Run, make_cell: Make) -> None:
+    async def scene() -> tuple[bytes, bool]:
+        cell, device = make_cell()
+        transport: Any = Transport()
+        transport.get_extra_info = lambda name: ("127.0.0.1", 1) if name == "peername" else None
+        connection = Connection(cell, lambda: TcpSlavePort({1: device}), Clients())
+        connection.connection_made(transport)
+        connection.data_received(READ_ONE + b"\xff" * 12 + READ_ONE * 1000)
+        await asyncio.sleep(1.0)
+        return transport.written, transport.closing
+
+    assert run(scene()) == (ONE, True)
+
+
+def test_the_kept_receive_buffer(run: Run, make_cell: Make) -> None:
+    async def scene() -> bytes:
+        connection, transport = connected(make_cell, BufferedConnection)
+        assert isinstance(connection, BufferedConnection)
+        for part in (READ_ONE[:4], READ_ONE[4:] + READ_ONE):
+            buffer = connection.get_buffer(-1)
+            assert len(buffer) == READ_BYTES
+            buffer[: len(part)] = part
+            connection.buffer_updated(len(part))
+        return transport.written
+
+    assert run(scene()) == ONE * 2
