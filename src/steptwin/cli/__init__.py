@@ -1,0 +1,51 @@
+"""The command line. Each command lives in a module of its own and imports what it needs when it runs.
+
+Exit codes: 0 done, 1 not done (a check found something, a peer refused, a line failed), 2 wrong use.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from steptwin import __version__
+from steptwin.cli import build, check, commands, decompile, fmt, registers, serve, twin
+from steptwin.errors import Misuse, SteptwinError
+
+app = typer.Typer(
+    name="steptwin", no_args_is_help=True, add_completion=True, pretty_exceptions_enable=False, rich_markup_mode=None
+)
+app.add_typer(serve.app, name="serve")
+app.command()(registers.registers)
+app.command()(commands.commands)
+app.command()(check.check)
+app.command()(fmt.fmt)
+app.command()(build.build)
+app.command()(decompile.decompile)
+app.command()(twin.pin)
+app.command()(twin.encoder)
+app.command("power-cycle")(twin.power_cycle)
+app.command()(twin.state)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def _steptwin(
+    version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")] = False,
+) -> None:
+    """The WObit MIC488 and Microcon M1486 motion controllers as software."""
+
+
+def main() -> None:
+    try:
+        app()
+    except SteptwinError as error:
+        print(f"steptwin: {error}", file=sys.stderr)  # noqa: T201
+        sys.exit(2 if isinstance(error, Misuse) else 1)

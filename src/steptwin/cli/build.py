@@ -1,0 +1,46 @@
+"""``steptwin build``: the vendor's compiled image of a WBC program.
+
+From Python: `steptwin.wbc.image.build`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.errors import Misuse
+
+
+def build(
+    file: Annotated[Path, typer.Argument(help="WBC program (.prg).")],
+    positions: Annotated[Path | None, typer.Option(help="Position table (.csv); default: an empty one.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Image to write; default: FILE.wbc.")] = None,
+    firmware: Annotated[str, typer.Option(help="Firmware the program is checked for.")] = "1.70",
+) -> None:
+    """Compile a WBC program to the image of firmware 1.25. Exit code 1 if it has errors or something without a known form."""
+    from steptwin.diagnostics import Severity, render
+    from steptwin.runtime.programfiles import read_program
+    from steptwin.runtime.textfiles import write_bytes
+    from steptwin.wbc.dialect import dialect_for
+    from steptwin.wbc.image import build as build_image
+    from steptwin.wbc.positions import PositionTable
+
+    read = read_program(file, positions, dialect=dialect_for(firmware))
+    for source, diagnostics in read.findings:
+        if diagnostics:
+            typer.echo(render(source, diagnostics), err=True)
+    if read.count(Severity.ERROR):
+        raise typer.Exit(1)
+    executable = read.checked.executable
+    if executable is None:
+        raise Misuse(f"{file} names positions: give the table with --positions")
+    table = read.positions or PositionTable()
+    data, refused = build_image(executable, table)
+    if data is None:
+        typer.echo(render(read.findings[0][0], refused), err=True)
+        raise typer.Exit(1)
+    target = output or file.with_suffix(".wbc")
+    write_bytes(target, data)
+    typer.echo(f"{target}: {len(executable.steps)} commands, {len(table.rows)} positions")

@@ -1,0 +1,99 @@
+"""The tables of WBC, the program language of the MIC488, for ``steptwin commands mic488``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.cli.commands import Section
+
+if TYPE_CHECKING:
+    from steptwin.wbc.dialect import Dialect
+    from steptwin.wbc.registers import RegisterRow
+
+
+def sections_of(dialect: Dialect) -> list[Section]:
+    """The tables of the language, each with its columns, as far as a firmware has them."""
+    return [
+        _statements(dialect),
+        _functions(),
+        _operators(),
+        _registers(dialect),
+        _names(),
+        _interrupts(dialect),
+        _limits(dialect),
+        _findings(),
+    ]
+
+
+def _statements(dialect: Dialect) -> Section:
+    from steptwin.wbc.statements import ASSIGNMENTS, STATEMENTS
+
+    rows = [*ASSIGNMENTS, *((row.usage, row.meaning) for row in STATEMENTS.values() if dialect.has(row.since))]
+    return Section("Statements", ("statement", "meaning"), rows)
+
+
+def _functions() -> Section:
+    from steptwin.wbc.statements import FUNCTIONS
+
+    rows = [(f"{row.name}({', '.join('XY'[: row.arguments])})", row.meaning) for row in FUNCTIONS.values()]
+    return Section("Functions", ("function", "meaning"), rows)
+
+
+def _operators() -> Section:
+    from steptwin.wbc.statements import COMPARISONS, OPERATORS
+
+    rows = [*((sign, "SET", meaning) for sign, meaning in OPERATORS.items())]
+    rows += [(sign, "conditions", meaning) for sign, meaning in COMPARISONS.items()]
+    return Section("Operators", ("operator", "in", "meaning"), rows)
+
+
+def _registers(dialect: Dialect) -> Section:
+    from steptwin.wbc.registers import REGISTERS
+
+    rows = [
+        (row.spelling(dialect), row.access, row.unit, str(row.reads), _written(row), row.meaning)
+        for row in REGISTERS
+        if dialect.has(row.since)
+    ]
+    return Section("Registers", ("register", "access", "unit", "reads", "takes", "meaning"), rows)
+
+
+def _written(row: RegisterRow) -> str:
+    if row.writes is None:
+        return ""
+    return f"{row.writes}, else the nearest" if row.saturates else str(row.writes)
+
+
+def _names() -> Section:
+    from steptwin.wbc.registers import PREDEFINED
+
+    return Section("Predefined names", ("name", "value"), [(name, f"{value:g}") for name, value in PREDEFINED.items()])
+
+
+def _interrupts(dialect: Dialect) -> Section:
+    from steptwin.wbc.events import EVENTS, HARD_PREFIX, HARD_SINCE, INPUTS, PREFIX
+
+    rows = []
+    for event in EVENTS:
+        if not dialect.has(event.since) or event.input > INPUTS:
+            continue
+        hard = HARD_PREFIX + event.name if dialect.has(HARD_SINCE) else ""
+        rows.append((PREFIX + event.name, hard, event.register or "configuration only (Int)"))
+    return Section("Interrupts", ("label", "label that waits for the statement's end", "enabled by"), rows)
+
+
+def _limits(dialect: Dialect) -> Section:
+    rows = [
+        ("executable lines", str(dialect.max_steps)),
+        ("variables", str(dialect.max_variables)),
+        ("rows of the position table", str(dialect.max_positions)),
+        ("user registers", str(dialect.user_registers)),
+    ]
+    return Section("Limits", ("what", "at most"), rows)
+
+
+def _findings() -> Section:
+    from steptwin.wbc.findings import FINDINGS
+
+    rows = [(row.code, row.severity.value, row.title) for row in FINDINGS.values()]
+    return Section("What the checker finds", ("code", "severity", "finding"), rows)

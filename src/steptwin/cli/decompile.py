@@ -1,0 +1,40 @@
+"""``steptwin decompile``: the source of a compiled image.
+
+From Python: `steptwin.wbc.decompile.decompile`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.errors import Misuse
+
+
+def decompile(
+    file: Annotated[Path, typer.Argument(help="Compiled image (.wbc).")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Program to write (.prg); default: print it.")] = None,
+    positions: Annotated[Path | None, typer.Option(help="Position table to write; default: beside the program, as .csv.")] = None,
+) -> None:
+    """Turn a compiled image into a program and a position table that build to the same bytes."""
+    from steptwin.runtime.textfiles import read_bytes, write_bytes
+    from steptwin.wbc.decompile import decompile as decompile_image
+
+    found = decompile_image(read_bytes(file))
+    rows = len(found.positions.rows)
+    table = positions
+    if table is None and output is not None and rows:
+        table = output.with_suffix(".csv")
+        if table.exists():
+            raise Misuse(f"{table} exists already: name the position table with --positions")
+    if output is None:
+        typer.echo(found.text, nl=False)
+    else:
+        write_bytes(output, found.text.encode("utf-8"))
+        typer.echo(f"{output}: {found.unknown} unknown records" if found.unknown else f"{output}: everything known")
+    if table is not None:
+        write_bytes(table, found.positions.text.encode("utf-8"))
+    elif rows:
+        typer.echo(f"{file} has {rows} positions: write them with --positions", err=True)

@@ -1,0 +1,187 @@
+"""``steptwin registers``: the register table of a controller, for people and for programs.
+
+From Python: `steptwin.mic488.registers.register_map`.
+"""
+
+from __future__ import annotations
+
+import csv
+import enum
+import io
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from steptwin.mic488.registermap import Register, RegisterMap, Row
+
+_COLUMNS = ("address", "name", "type", "read", "write", "unit", "permitted", "meaning")
+
+
+class Device(enum.StrEnum):
+    MIC488 = "mic488"
+
+
+class Format(enum.StrEnum):
+    TABLE = "table"
+    CSV = "csv"
+    JSON = "json"
+    MD = "md"
+
+
+def registers(
+    device: Annotated[Device, typer.Argument(help="Controller.")],
+    firmware: Annotated[str, typer.Option(help="Firmware generation: 1.23, 1.40 or 1.70.")] = "1.70",
+    form: Annotated[Format, typer.Option("--format", help="How to print it.")] = Format.TABLE,
+) -> None:
+    """Show the coils, inputs and holding registers of a controller."""
+    from steptwin.mic488.registers import register_map
+
+    chosen = register_map(firmware)
+    if form is Format.CSV:
+        typer.echo(as_csv(chosen), nl=False)
+    elif form is Format.JSON:
+        typer.echo(json.dumps(as_data(chosen), ensure_ascii=False, indent=2))
+    elif form is Format.MD:
+        typer.echo(as_markdown(chosen), nl=False)
+    elif sys.stdout.isatty():
+        _show(chosen)
+    else:
+        typer.echo(as_text(chosen), nl=False)
+
+
+# ---------------------------------------------------------------------- for programs
+
+
+def as_data(register_map: RegisterMap) -> list[dict[str, Any]]:
+    """One record for each register; a range under one name (USER_REGISTER) is one record with its ``count``."""
+    return [
+        {
+            "firmware": register_map.firmware.name,
+            "space": register.space.value,
+            "address": register.address,
+            "count": register.cells,
+            "name": register.name,
+            "aliases": list(register.aliases),
+            "key": register.key,
+            "index": register.index,
+            "axis": register.axis,
+            "type": register.type.value,
+            "read_functions": list(register.reads),
+            "write_functions": list(register.accepts),
+            "manual_write_functions": list(register.writes),
+            "quantity": register.kind.value,
+            "unit": register.unit(),
+            "effect": register.effect.value,
+            "minimum": register.permitted.low,
+            "minimum_excluded": register.permitted.above,
+            "maximum": register.permitted.high,
+            "values": {str(value): text for value, text in register.values.items()},
+            "meaning": register.meaning,
+            "manual": register_map.firmware.manual,
+            "section": register.section,
+        }
+        for register in register_map
+    ]
+
+
+def as_csv(register_map: RegisterMap) -> str:
+    """The records of `as_data`, lists separated by blanks and values as ``0=REAL 1=DINT``."""
+    records = as_data(register_map)
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(records[0]), lineterminator="\n")
+    writer.writeheader()
+    for record in records:
+        flat = {name: " ".join(map(str, value)) if isinstance(value, list) else value for name, value in record.items()}
+        writer.writerow(flat | {"values": "; ".join(f"{value}={meaning}" for value, meaning in record["values"].items())})
+    return text.getvalue()
+
+
+# ---------------------------------------------------------------------- for people
+
+
+def _functions(codes: Iterable[int]) -> str:
+    return ", ".join(f"{code:02d}" for code in codes)
+
+
+def _permitted(register: Register) -> str:
+    from steptwin.mic488.registermap import Kind
+
+    if not register.accepts:
+        return ""
+    return {Kind.SWITCH: "ON, OFF", Kind.MASK: "bit 0 M1 … bit 3 M4"}.get(register.kind, str(register.permitted))
+
+
+def _meaning(sentence: str, values: Mapping[int, str]) -> str:
+    listed = ", ".join(f"{value} {text}" for value, text in values.items())
+    return f"{sentence.removesuffix('.')}: {listed}." if listed else sentence
+
+
+def _line(register: Register) -> tuple[str, ...]:
+    address = str(register.address) if register.cells == 1 else f"{register.address}…{register.last}"
+    return (
+        address,
+        register.name,
+        register.type.value,
+        _functions(register.reads),
+        _functions(register.accepts),
+        register.unit(),
+        _permitted(register),
+        _meaning(register.meaning, register.values),
+    )
+
+
+def as_text(register_map: RegisterMap) -> str:
+    """Aligned columns, one register a line."""
+    lines = [_COLUMNS, *(_line(register) for register in register_map)]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(_COLUMNS))]
+    return "".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() + "\n" for line in lines
+    )
+
+
+def _show(register_map: RegisterMap) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from steptwin.mic488.registermap import Space
+
+    console = Console(highlight=False)
+    for space in Space:
+        table = Table(title=f"MIC488 firmware {register_map.firmware.name}: {space.value}s", title_justify="left")
+        for column in _COLUMNS:
+            table.add_column(column, justify="right" if column == "address" else "left", no_wrap=column in ("address", "name"))
+        for register in register_map:
+            if register.space is space:
+                table.add_row(*_line(register))
+        console.print(table)
+
+
+def as_markdown(register_map: RegisterMap) -> str:
+    """Tables for a page, the copies of a register for axes and channels in one line, ``x`` standing for their number."""
+    from steptwin.mic488.registermap import Space
+
+    parts = []
+    for space in Space:
+        lines = [_family(register_map, row) for row in register_map.rows if row.space is space]
+        table = [_COLUMNS, ["---"] * len(_COLUMNS), *lines]
+        parts.append(f"### {space.value.capitalize()}s\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in table))
+    return "\n".join(parts)
+
+
+def _family(register_map: RegisterMap, row: Row) -> tuple[str, ...]:
+    members = [register for register in register_map if register.key == row.key]
+    first, last = members[0], members[-1]
+    cells = _line(first)
+    if len(members) == 1:
+        addresses = cells[0]
+    elif row.step == first.span == 1:
+        addresses = f"{first.address}…{last.address}"
+    else:
+        addresses = ", ".join(str(member.address) for member in members)
+    name = f"`{row.name.format(n='x')}`"
+    aliases = "".join(f" (also `{alias.format(n='x')}`)" for alias in row.aliases)
+    return (addresses, name + aliases, *cells[2:-1], _meaning(row.meaning.format(n="x"), row.values))

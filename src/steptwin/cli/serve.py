@@ -1,0 +1,77 @@
+"""``steptwin serve``: twins that listen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Serve a twin until Ctrl-C.", no_args_is_help=True)
+
+DEFAULT_TCP = "127.0.0.1:5020"
+DEFAULT_RTU_TCP = "127.0.0.1:5021"
+
+
+@app.command()
+def mic488(
+    firmware: Annotated[str, typer.Option(help="Register map: 1.23, 1.40 or 1.70.")] = "1.70",
+    units: Annotated[
+        str | None, typer.Option(help="Slave addresses, such as 1,2,5. Default: that of the configuration, or 1.")
+    ] = None,
+    pty: Annotated[Path | None, typer.Option(help="Modbus RTU on a pseudo terminal; PATH becomes a link to it.")] = None,
+    serial: Annotated[str | None, typer.Option(help="Modbus RTU on a real serial port, 8N1.")] = None,
+    baud: Annotated[int | None, typer.Option(help="Baud rate. Default: that of the configuration, or 38400.")] = None,
+    tcp: Annotated[str | None, typer.Option(help="Modbus TCP on HOST:PORT; port 0 takes a free one.")] = None,
+    rtu_tcp: Annotated[str | None, typer.Option(help="RTU frames over TCP on HOST:PORT.")] = None,
+    config: Annotated[Path | None, typer.Option(help="The vendor tool's .cfg file.")] = None,
+    state: Annotated[
+        Path | None, typer.Option(help="Directory of the non-volatile memory. Without it, memory ends with the twin.")
+    ] = None,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Holes of the register map read as 0 instead of being refused.")
+    ] = False,
+    line_timing: Annotated[str, typer.Option(help="'real': RTU takes the time a wire would; 'off'.")] = "off",
+    gap: Annotated[
+        float | None, typer.Option(help="Silence in ms after which rubbish is given up. Default: 0.75 on a serial port, else 20.")
+    ] = None,
+    ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
+    log_frames: Annotated[
+        bool, typer.Option("--log-frames", help="Print every frame with time, direction, bytes and meaning.")
+    ] = False,
+    name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "mic488",
+    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    demo: Annotated[bool, typer.Option("--demo", help="Four spindles in mm with a switch at each end.")] = False,
+) -> None:
+    """Serve virtual MIC488 controllers.
+
+    Without any of --pty, --serial, --tcp and --rtu-tcp it listens on a pty, on 127.0.0.1:5020 (Modbus TCP) and on
+    127.0.0.1:5021 (RTU over TCP).
+    """
+    from steptwin.runtime.serve_mic488 import Mic488Options, serve
+
+    if not (pty or serial or tcp or rtu_tcp):
+        from steptwin.runtime.control import runtime_directory
+
+        pty, tcp, rtu_tcp = runtime_directory() / name, DEFAULT_TCP, DEFAULT_RTU_TCP
+    serve(
+        Mic488Options(
+            firmware=firmware,
+            units=units,
+            pty=pty,
+            serial=serial,
+            baud=baud,
+            tcp=tcp,
+            rtu_tcp=rtu_tcp,
+            config=config,
+            state=state,
+            lenient=lenient,
+            line_timing=line_timing,
+            gap_ms=gap,
+            ready_file=ready_file,
+            log_frames=log_frames,
+            name=name,
+            listen_any=listen_any,
+            demo=demo,
+        )
+    )

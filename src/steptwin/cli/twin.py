@@ -1,0 +1,94 @@
+"""``steptwin pin``, ``encoder``, ``power-cycle``, ``state``: a hand at a served twin."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+import typer
+
+from steptwin.errors import Misuse
+
+Twin = Annotated[str | None, typer.Option(help="Name of the twin; default: the only one running.")]
+Unit = Annotated[int | None, typer.Option(help="Unit, where the twin serves several.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+def pin(
+    changes: Annotated[list[str] | None, typer.Argument(help="IN3=1 AIN1=4.2 ...; without any, all pins are shown.")] = None,
+    twin: Twin = None,
+    unit: Unit = None,
+    json: Json = False,
+) -> None:
+    """Set inputs of a running twin, or show all pins."""
+    wanted: dict[str, float] = {}
+    for change in changes or []:
+        name, equals, value = change.partition("=")
+        if not equals:
+            raise Misuse(f"{change!r}: expected PIN=VALUE, such as IN3=1 or AIN1=4.2")
+        try:
+            wanted[name.strip().upper()] = float(value.replace(",", "."))
+        except ValueError:
+            raise Misuse(f"{change!r}: {value!r} is no number") from None
+    pins = _ask(twin, {"do": "pin", "unit": unit, "set": wanted})
+    if json:
+        _print_json(pins)
+    elif not wanted:
+        typer.echo("\n".join(f"{name:<6} {value:g}" for name, value in pins.items()))
+
+
+def encoder(
+    changes: Annotated[
+        list[str] | None,
+        typer.Argument(help="M1+40 or M1-40 turns the shaft by counts; M1=drive, M1=free, M1=blocked says what turns it."),
+    ] = None,
+    twin: Twin = None,
+    unit: Unit = None,
+    json: Json = False,
+) -> None:
+    """Turn, couple or block the encoder shafts of a running twin, or show them."""
+    wanted: dict[str, int | str] = {}
+    for change in changes or []:
+        match = re.fullmatch(r"(?i)M([1-9]\d*)(?:([+-]\d+)|=(\w+))", change.strip())
+        if match is None:
+            raise Misuse(f"{change!r}: expected M1+40, M1-40, M1=drive, M1=free or M1=blocked")
+        wanted[match[1]] = int(match[2]) if match[2] else match[3].lower()
+    shafts = _ask(twin, {"do": "encoder", "unit": unit, "set": wanted})
+    if json:
+        _print_json(shafts)
+    else:
+        typer.echo("\n".join(f"M{s['axis']}  {s['counts']:>10} counts, turned by: {s['turned_by']}" for s in shafts))
+
+
+def power_cycle(twin: Twin = None, unit: Unit = None) -> None:
+    """Switch a running twin off and on again."""
+    _ask(twin, {"do": "power-cycle", "unit": unit})
+
+
+def state(twin: Twin = None, unit: Unit = None, json: Json = False) -> None:
+    """Show the state of a running twin."""
+    shown = _ask(twin, {"do": "state", "unit": unit})
+    if json:
+        _print_json(shown)
+        return
+    typer.echo(f"firmware {shown['firmware']}, {shown['time_s']:.1f} s after power-on, program {shown['program']['state']}")
+    for axis in shown["axes"]:
+        unit_name = axis["unit"]
+        typer.echo(
+            f"M{axis['axis']}  {axis['position']:>12.4f} {unit_name}  {axis['velocity']:>10.3f} {unit_name}/s  "
+            f"{axis['status']} {axis['status_text']}"
+        )
+    on = [name for name, value in shown["pins"].items() if value and not name.startswith("AIN")]
+    typer.echo(f"on: {', '.join(on) or 'nothing'}")
+
+
+def _ask(twin: str | None, request: dict[str, object]) -> Any:
+    from steptwin.runtime.control import ask
+
+    return ask(twin, request)
+
+
+def _print_json(value: object) -> None:
+    import json
+
+    typer.echo(json.dumps(value, indent=2))

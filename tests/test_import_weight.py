@@ -1,0 +1,40 @@
+"""What an import brings along: pure packages nothing heavy, the command line nothing that keeps `--help` waiting."""
+
+from __future__ import annotations
+
+import pkgutil
+import subprocess
+import sys
+
+import steptwin
+
+PURE = ("world", "mic488", "m1486", "wbc", "wire", "motion", "machine", "diagnostics", "errors")
+PROJECTIONS = {"steptwin.motion.pulses"}
+HEAVY = {"anyio", "asyncio", "fastapi", "matplotlib", "numpy", "pydantic", "rich", "serialx", "uvloop"}
+
+
+def modules_of(*packages: str) -> list[str]:
+    names = (module.name for module in pkgutil.walk_packages(steptwin.__path__, "steptwin."))
+    return [name for name in names if name.split(".")[1] in packages and name not in PROJECTIONS]
+
+
+def brought_by(modules: list[str]) -> set[str]:
+    """The top-level modules that a fresh interpreter has loaded after importing ``modules``."""
+    code = f"import sys, importlib\nfor name in {modules!r}: importlib.import_module(name)\nprint(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    return {name.partition(".")[0] for name in run.stdout.split()}
+
+
+def test_pure_packages_bring_nothing_heavy() -> None:
+    modules = modules_of(*PURE)
+    assert {"steptwin.machine", "steptwin.motion.planner"} <= set(modules)
+    assert brought_by(modules) & HEAVY == set()
+
+
+def test_the_command_line_brings_nothing_heavy() -> None:
+    assert brought_by(["steptwin.cli"]) & HEAVY == set()
+
+
+def test_the_probe_sees_what_an_import_brings() -> None:
+    assert "numpy" in brought_by(sorted(PROJECTIONS))
