@@ -1,0 +1,98 @@
+"""Rules on one command by itself: is its number permitted, reserved, a line that is free?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from steptwin.diagnostics import Diagnostic, Fix
+from steptwin.m1486 import findings
+from steptwin.m1486.commands import CommandSpec, Kind, find, grouped, permitted_text, range_text, rows
+from steptwin.m1486.functions import CARRY, is_reserved
+from steptwin.m1486.lines import LINES, Interface, line_group
+from steptwin.m1486.registers import UPLOADS
+from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.variants import VARIANTS, Variant
+
+_WRITES_LINES = frozenset("CT!")
+#: Zero is no distance and no position; other commands do what is meant.
+_INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
+
+
+def argument_rules(command: Command, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
+    """What is wrong or doubtful about the number written in the command."""
+    number = command.number
+    if number is None:
+        return
+    problem = number_problem(command, number, variant, interface)
+    if problem is not None:
+        yield problem
+    if isinstance(command.argument, Condition):
+        yield from _label_of_condition(command.argument, variant)
+
+
+def number_problem(command: Command, number: int, variant: Variant, interface: Interface) -> Diagnostic | None:
+    """What is wrong with ``number`` as the argument of the command, wherever the number comes from."""
+    spec = find(command.key, number, variant)
+    if spec is None:
+        return _out_of_range(command, number, variant)
+    return _reserved(command, spec, number) or _occupied(command, spec, number, interface)
+
+
+def lines_of(spec: CommandSpec, number: int) -> range:
+    """The I/O lines a command with this number reads or writes."""
+    if spec.kind is Kind.LINE or (spec.kind is Kind.CONDITION and number in LINES):
+        return range(number, number + 1)
+    group = line_group(number) if spec.kind is Kind.LINES else None
+    return group or range(0)
+
+
+def lines_text(lines: range | list[int]) -> str:
+    return ", ".join(f"B{line}" for line in lines)
+
+
+def _out_of_range(command: Command, number: int, variant: Variant) -> Diagnostic:
+    key = command.key
+    hint = permitted_text(key, variant)
+    fix = None
+    subject = f"{key} {grouped(number)}"
+    kind = rows(key)[0].kind
+    if kind in (Kind.LABEL, Kind.ADDRESS):
+        subject = f"label {grouped(number)}" if kind is Kind.LABEL else f"address {number:X}"
+        hint += f" on {variant.title}{_others_that_take(key, number, variant)}"
+    elif key in "TC" and number == CARRY:
+        hint = f"flag {CARRY}, the carry, is set and cleared by + and - only; {hint}"
+    elif number == 0 and key in _INSTEAD_OF_ZERO:
+        fix = Fix(command.span, _INSTEAD_OF_ZERO[key])
+    return findings.OUT_OF_RANGE(command.argument_span, f"{subject} is out of range", hint, fix)
+
+
+def _others_that_take(key: str, number: int, variant: Variant) -> str:
+    others = [v.title for v in VARIANTS if v.clock == variant.clock and find(key, number, v)]
+    return f"; {', '.join(others)} would take it" if others else ""
+
+
+def _label_of_condition(condition: Condition, variant: Variant) -> Iterator[Diagnostic]:
+    if find("J", condition.label, variant) is None:
+        hint = f"{range_text(rows('J')[0], variant)} on {variant.title}{_others_that_take('J', condition.label, variant)}"
+        yield findings.OUT_OF_RANGE(condition.label_span, f"label {grouped(condition.label)} is out of range", hint)
+
+
+def _reserved(command: Command, spec: CommandSpec, number: int) -> Diagnostic | None:
+    if spec.kind is Kind.FUNCTION and is_reserved(number):
+        return findings.RESERVED(command.argument_span, f"function {number} is reserved", "the manual gives it no meaning")
+    if spec.kind is Kind.UPLOAD and number not in UPLOADS:
+        known = ", ".join(map(str, UPLOADS))
+        return findings.RESERVED(command.argument_span, f"byte {number} is reserved", f"bytes with a meaning are {known}")
+    return None
+
+
+def _occupied(command: Command, spec: CommandSpec, number: int, interface: Interface) -> Diagnostic | None:
+    taken = [line for line in lines_of(spec, number) if line in interface.occupied]
+    if not taken:
+        return None
+    # M-21: commands that write such a line are refused; reading it is possible and of no use.
+    finding = findings.LINE_OCCUPIED if command.key in _WRITES_LINES else findings.LINE_READ_OCCUPIED
+    free = lines_text([line for line in LINES if line not in interface.occupied])
+    verb = "belongs" if len(taken) == 1 else "belong"
+    message = f"{lines_text(taken)} {verb} to the {interface.title} interface"
+    return finding(command.argument_span, message, f"free lines are {free}")

@@ -1,0 +1,74 @@
+"""Check an M1486 program: everything that is wrong or doubtful at once, and the command memory it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from steptwin.diagnostics import Diagnostic, Severity, in_order
+from steptwin.m1486.argument_rules import argument_rules
+from steptwin.m1486.flow_rules import flow_rules
+from steptwin.m1486.lines import STEP_DIRECTION, Interface
+from steptwin.m1486.structure import Stream, stored_bits, streams
+from steptwin.m1486.structure_rules import structure_rules
+from steptwin.m1486.syntax import Command, Program, parse
+from steptwin.m1486.variants import DEFAULT, Variant
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """The result: the program as far as it could be read, the findings in text order, the memory of each chip."""
+
+    program: Program
+    diagnostics: list[Diagnostic]
+    memory: list[ChipMemory]
+
+    @property
+    def is_sound(self) -> bool:
+        """True if there is no error; there may be warnings."""
+        return not any(d.severity is Severity.ERROR for d in self.diagnostics)
+
+
+@dataclass(frozen=True, slots=True)
+class ChipMemory:
+    """Command memory, in bits, that one chip's commands take.
+
+    A file in ``[ ]`` must fit ``limit`` as a whole; commands outside pass through the ring and never fill it.
+    """
+
+    #: None for a program without ``X``.
+    address: int | None
+    limit: int
+    total: int
+    #: Bits of each file in ``[ ]``, in order.
+    files: tuple[int, ...]
+    commands: tuple[CommandMemory, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CommandMemory:
+    command: Command
+    bits: int
+    in_file: bool
+
+
+def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIRECTION) -> Checked:
+    """Check the text of a program for one variant and driver interface, as if started after power-up. Never raises."""
+    program, found = parse(text)
+    diagnostics = list(found)
+    for command in program.all_commands:
+        diagnostics += argument_rules(command, variant, interface)
+    chips = streams(program)
+    for stream in chips:
+        diagnostics += structure_rules(stream, variant)
+        diagnostics += flow_rules(stream, variant, interface)
+    # Commands that several chips receive are judged for each of them.
+    return Checked(program, in_order(dict.fromkeys(diagnostics)), [memory_of(s, variant) for s in chips])
+
+
+def memory_of(stream: Stream, variant: Variant) -> ChipMemory:
+    commands = tuple(
+        CommandMemory(command, stored_bits(command), stream.in_file[index] is not None)
+        for index, command in enumerate(stream.commands)
+    )
+    files = tuple(file.bits for file in stream.files)
+    return ChipMemory(stream.address, variant.memory_bits, stream.bits, files, commands)

@@ -1,0 +1,292 @@
+"""The M1486 command table: one row per command of the manual. Parser, checker, memory accounting, help and reference pages
+are projections of it.
+
+A row is found by its ``key`` (the letter, or ``G+``, ``G-``, ``XG`` where a sign or letter follows) and the number that
+follows; several rows may share a key when their numbers differ (``C7`` clears a line, ``C43`` a function).
+Distances are minimum microsteps (full step / 64), speeds full steps/s, times milliseconds.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
+from steptwin.m1486.lines import LINES, line_group
+from steptwin.m1486.microsteps import MICROSTEPS, QUALIFICATIONS
+from steptwin.m1486.registers import REGISTERS, UPLOAD_RANGE
+from steptwin.m1486.variants import Variant
+
+
+class Kind(enum.Enum):
+    """What the argument of a command is."""
+
+    NONE = "none"
+    NUMBER = "number"
+    LABEL = "label"
+    ADDRESS = "address, hexadecimal"
+    CONDITION = "line or flag, H or L, label"
+    LINE = "line"
+    LINES = "first line and count"
+    FUNCTION = "function"
+    FLAG = "flag"
+    REGISTER = "register"
+    UPLOAD = "byte"
+
+
+class When(enum.Enum):
+    """When a command acts."""
+
+    #: As soon as it has been received, ahead of everything that waits (M-27).
+    RECEIVED = "when received"
+    #: When it leaves the input buffer; it is not stored.
+    COMPRESSED = "when compressed"
+    #: In program order, from the command memory.
+    QUEUED = "in program order"
+
+
+@dataclass(frozen=True, slots=True)
+class CommandSpec:
+    """One command. ``values``, in rising order, is what it takes on every variant; None where the variant decides or nothing
+    is taken.
+    """
+
+    key: str
+    name: str
+    kind: Kind
+    values: range | tuple[int, ...] | None
+    effect: str
+    section: str
+    unit: str = ""
+    when: When = When.QUEUED
+
+    @property
+    def letter(self) -> str:
+        return self.key[0]
+
+    def permitted(self, variant: Variant) -> range | tuple[int, ...]:
+        """The numbers this command takes on ``variant``; empty for a command without a number."""
+        if self.kind is Kind.LABEL:
+            return range(1, variant.labels + 1)
+        if self.kind is Kind.ADDRESS:
+            return variant.addresses
+        return () if self.values is None else self.values
+
+
+_24_BIT = range(2**24)
+_DISTANCE = range(1, 16_000_001)
+_BYTE = range(1, 256)
+#: Larger values of P than the range of parabolic acceleration switch it off; two bytes hold no more.
+PROFILE_RANGE = range(20, 7_001)
+_PROFILE = range(PROFILE_RANGE.start, 2**16)
+_LINE_GROUPS = tuple(n for n in _BYTE if line_group(n) is not None)
+#: What ``I`` can ask: a line or a flag.
+CONDITIONS = (*LINES, *USER_FLAGS, CARRY)
+CLEAR_KILL = 75
+CLEAR_POSITION = 100
+#: Largest internal variable that may be divided, except by these numbers (chapter VII.7, Divide).
+DIVIDEND_LIMIT = 65_000
+FREE_DIVISORS = frozenset((2, 4, 8, 16, 32, 64))
+
+_PROGRAM, _MOTION, _IO, _SEQUENCER = "VII.1", "VII.2", "VII.3", "VII.4"
+_CONFIGURATION, _AUXILIARY, _NUMERIC = "VII.5", "VII.6", "VII.7"
+_C = CommandSpec
+
+_ROWS: tuple[CommandSpec, ...] = (
+    # Program control
+    _C("@", "Address", Kind.LABEL, None, "Gives the next command a label.", _PROGRAM, when=When.COMPRESSED),
+    _C("L", "Loop", Kind.NUMBER, _BYTE, "Runs the commands up to the matching E this many times.", _PROGRAM, "times"),
+    _C("E", "End of loop", Kind.NONE, None, "Goes back to the matching L until its count is done.", _PROGRAM),
+    _C("I", "If", Kind.CONDITION, CONDITIONS, "Jumps to the label when the line or flag has the level named.", _PROGRAM),
+    _C("J", "Jump", Kind.LABEL, None, "Goes on at the label.", _PROGRAM),
+    _C("K", "Kill", Kind.NONE, None, "Stops the motion with its ramp, and the program too while function 51 is OFF.",
+       _PROGRAM, when=When.RECEIVED),
+    _C("C", "Clear kill", Kind.NUMBER, (CLEAR_KILL,), "Lets a program go on that Kill has stopped.",
+       _PROGRAM, when=When.RECEIVED),
+    _C("U", "Upload", Kind.UPLOAD, UPLOAD_RANGE, "Sends one byte to the host.", _PROGRAM),
+    _C("W", "Wait", Kind.NUMBER, _DISTANCE, "Waits.", _PROGRAM, "ms"),
+    _C("[", "Disable", Kind.NONE, None, "From here on commands are stored, not run.", _PROGRAM, when=When.COMPRESSED),
+    _C("]", "Enable", Kind.NONE, None, "Runs the commands stored since [.", _PROGRAM, when=When.COMPRESSED),
+    _C("'", "Subroutine", Kind.LABEL, None, "Goes on at the label and comes back at the next dot.", _PROGRAM),
+    _C(".", "End of subroutine", Kind.NONE, None, "Goes back to the command after the call.", _PROGRAM),
+    # Motion control
+    _C("B", "Backward", Kind.NUMBER, _DISTANCE, "Sets distance and negative direction of the next move.",
+       _MOTION, "min. microsteps"),
+    _C("D", "Direction", Kind.NONE, None, "Reverses the direction of the next move.", _MOTION),
+    _C("F", "Forward", Kind.NUMBER, _DISTANCE, "Sets distance and positive direction of the next move.",
+       _MOTION, "min. microsteps"),
+    _C("G", "Go absolute", Kind.NUMBER, _DISTANCE, "Sets distance and direction from the present position to this one.",
+       _MOTION, "min. microsteps"),
+    _C("G+", "Go positive", Kind.NONE, None, "The next move runs in positive direction until Kill or LIMIT.", _MOTION),
+    _C("G-", "Go negative", Kind.NONE, None, "The next move runs in negative direction until Kill or LIMIT.", _MOTION),
+    _C("H", "Home", Kind.NONE, None, "Sets distance and direction from the present position to 0.", _MOTION),
+    _C("=", "Equal", Kind.NUMBER, _DISTANCE, "Gives the position counter a value.", _MOTION, "min. microsteps"),
+    _C("C", "Clear position counter", Kind.NUMBER, (CLEAR_POSITION,), "Sets the position counter to 0.", _MOTION),
+    _C("A", "Acceleration", Kind.NUMBER, range(1, 65_001), "Sets acceleration and deceleration.", _MOTION, "step/s²"),
+    _C("S", "Start/stop", Kind.NUMBER, range(16, 1_951), "Sets the speed at which a move starts and ends.",
+       _MOTION, "step/s"),
+    _C("P", "Profile", Kind.NUMBER, _PROFILE,
+       "Sets the speed from which the acceleration is parabolic; above 7000 and V there is no such part.",
+       _MOTION, "step/s"),
+    _C("V", "Velocity", Kind.NUMBER, range(16, 20_001), "Sets the highest speed of a move.", _MOTION, "step/s"),
+    _C("R", "Run", Kind.NONE, None, "Makes the move specified last.", _MOTION),
+    _C(")", "Seek positive", Kind.LINE, LINES,
+       "Moves at start/stop speed in positive direction until the line has its end level.", _MOTION),
+    _C("(", "Seek negative", Kind.LINE, LINES,
+       "Moves at start/stop speed in negative direction until the line has its end level.", _MOTION),
+    # User I/O
+    _C("C", "Clear", Kind.LINE, LINES, "Sets an output low.", _IO),
+    _C("O", "One", Kind.LINE, LINES, "Waits until the line is high.", _IO),
+    _C("T", "Turn on", Kind.LINE, LINES, "Sets an output high.", _IO),
+    _C("Z", "Zero", Kind.LINE, LINES, "Waits until the line is low.", _IO),
+    # Sequencer
+    _C("M", "Microstep", Kind.NUMBER, MICROSTEPS, "Sets the microsteps per full step at low speed.", _SEQUENCER),
+    _C("Q", "Qualification", Kind.NUMBER, QUALIFICATIONS, "Sets the microsteps per full step at high speed.", _SEQUENCER),
+    _C("N", "Number of characteristic", Kind.NUMBER, range(1, 8), "Chooses the waveform of the phase currents.", _SEQUENCER),
+    # Configuration
+    _C("\\", "Reset", Kind.NONE, None, "Sets everything to its defaults; E types erase the EEPROM too.",
+       _CONFIGURATION, when=When.COMPRESSED),
+    _C("X", "indeX", Kind.ADDRESS, None, "Lets only the chip with this address listen.", _CONFIGURATION, when=When.RECEIVED),
+    _C("XG", "indeX all", Kind.NONE, None, "Lets all chips listen.", _CONFIGURATION, when=When.RECEIVED),
+    # Auxiliary functions and flags
+    _C("T", "Function on", Kind.FUNCTION, FUNCTIONS, "Switches a function on.", _AUXILIARY),
+    _C("C", "Function off", Kind.FUNCTION, FUNCTIONS, "Switches a function off.", _AUXILIARY),
+    _C("T", "Flag on", Kind.FLAG, USER_FLAGS, "Sets a user flag.", _AUXILIARY),
+    _C("C", "Flag off", Kind.FLAG, USER_FLAGS, "Clears a user flag.", _AUXILIARY),
+    # Numeric unit
+    _C(":", "Load", Kind.NUMBER, _24_BIT, "Gives the internal variable a value.", _NUMERIC),
+    _C("?", "Query", Kind.LINES, _LINE_GROUPS, "Reads lines into the internal variable, lowest line = lowest bit.", _NUMERIC),
+    _C("!", "Order", Kind.LINES, _LINE_GROUPS, "Puts the internal variable out on lines, lowest line = lowest bit.", _NUMERIC),
+    _C(">", "Move to register", Kind.REGISTER, range(1, len(REGISTERS) + 1),
+       "Copies the internal variable to a register.", _NUMERIC),
+    _C("<", "Move from register", Kind.REGISTER, range(1, len(REGISTERS) + 1),
+       "Copies a register to the internal variable.", _NUMERIC),
+    _C("+", "Add", Kind.NUMBER, _BYTE, "Adds to the internal variable; sets flag 87 on overflow.", _NUMERIC),
+    _C("-", "Subtract", Kind.NUMBER, _BYTE, "Subtracts from the internal variable; sets flag 87 when that is too small.",
+       _NUMERIC),
+    _C("*", "Multiply", Kind.NUMBER, _BYTE, "Multiplies the internal variable.", _NUMERIC),
+    _C("/", "Divide", Kind.NUMBER, _BYTE, "Divides the internal variable; the remainder goes to register 10.", _NUMERIC),
+)  # fmt: skip
+
+#: Sizes the manual states by themselves (chapter II, Memory): four commands take no memory; ``I`` holds line, level and label.
+_STATED_BITS = {"@": 0, "[": 0, "]": 0, "\\": 0, "I": 32}
+#: Keys whose number may not be left out: it is no number of the numeric kind, or nothing could be known without it.
+_NEEDS_ARGUMENT = frozenset("@IX")
+
+#: Of all variants; it decides the size of a label in the memory of each.
+LARGEST_LABEL = 80
+_LARGEST_ADDRESS = 15
+
+
+def argument_bits(largest: int) -> int:
+    """The least multiple of 8 bits that holds ``largest``: the chip's rule for the size of an argument."""
+    return -(-largest.bit_length() // 8) * 8
+
+
+def _largest(spec: CommandSpec) -> int:
+    if spec.kind is Kind.LABEL:
+        return LARGEST_LABEL
+    if spec.kind is Kind.ADDRESS:
+        return _LARGEST_ADDRESS
+    return spec.values[-1] if spec.values else 0
+
+
+def _letter_bits(letter: str) -> int:
+    if letter in _STATED_BITS:
+        return _STATED_BITS[letter]
+    # M-24: the letter decides, so G+ and G- take what G takes.
+    return 8 + max(argument_bits(_largest(s)) for s in _ROWS if s.letter == letter)
+
+
+def _index() -> dict[str, tuple[CommandSpec, ...]]:
+    index: dict[str, tuple[CommandSpec, ...]] = {}
+    for spec in _ROWS:
+        for other in index.get(spec.key, ()):
+            taken = set(other.values or ()) & set(spec.values or ())
+            if taken or other.values is None or spec.values is None:
+                raise ValueError(f"command table: {spec.name} and {other.name} both claim {spec.key} {sorted(taken)}")
+        index[spec.key] = (*index.get(spec.key, ()), spec)
+    return index
+
+
+TABLE: tuple[CommandSpec, ...] = _ROWS
+_BY_KEY = _index()
+_BITS = {letter: _letter_bits(letter) for letter in dict.fromkeys(s.letter for s in _ROWS)}
+
+#: Every character that can begin a command; letters stand here as capitals.
+LETTERS: frozenset[str] = frozenset(_BITS)
+
+
+def rows(key: str) -> tuple[CommandSpec, ...]:
+    """The rows with this key, none if there is no such command."""
+    return _BY_KEY.get(key, ())
+
+
+def find(key: str, argument: int | None, variant: Variant) -> CommandSpec | None:
+    """The row that ``key`` and a number mean on ``variant``, or None where the number is not permitted.
+
+    For a command without a number, and for ``I`` with the line or flag it asks, the same.
+    """
+    for spec in rows(key):
+        if spec.kind is Kind.NONE:
+            return spec if argument is None else None
+        if argument is not None and argument in spec.permitted(variant):
+            return spec
+    return None
+
+
+def takes_number(key: str) -> bool:
+    return any(spec.kind is not Kind.NONE for spec in rows(key))
+
+
+def takes_variable(key: str) -> bool:
+    """True where the number may be left out and the internal variable stands for it."""
+    return takes_number(key) and key not in _NEEDS_ARGUMENT
+
+
+def memory_bits(key: str) -> int:
+    """Command memory one command takes, in bits: 8 for the letter and the size of the largest argument it may have."""
+    return _BITS[key[0]]
+
+
+def when(key: str, argument: int | None) -> When:
+    """When the command acts; of the commands that share the letter C one does not wait its turn."""
+    specs = rows(key)
+    for spec in specs:
+        if argument is not None and spec.values is not None and argument in spec.values:
+            return spec.when
+    return When.QUEUED if len(specs) != 1 else specs[0].when
+
+
+def grouped(number: int) -> str:
+    """A number for people: ``16 000 000``."""
+    return f"{number:,}".replace(",", " ") if number >= 10_000 else str(number)
+
+
+def permitted_text(key: str, variant: Variant) -> str:
+    """What may follow ``key``, for people: ``1 to 21 (line), 40 to 63 (function), 75 (Clear kill)``."""
+    specs = [s for s in rows(key) if s.kind is not Kind.NONE]
+    if not specs:
+        return "nothing"
+    several = len(specs) > 1
+    texts = sorted((s.permitted(variant)[0], range_text(s, variant, named=several)) for s in specs)
+    return ", ".join(text for _, text in texts)
+
+
+def range_text(spec: CommandSpec, variant: Variant, *, named: bool = False) -> str:
+    """The permitted numbers of one row with their unit, followed by what they stand for if ``named``."""
+    values = spec.permitted(variant)
+    if spec.kind is Kind.NONE:
+        return "nothing"
+    if spec.kind is Kind.ADDRESS:
+        return f"{values[0]:X} to {values[-1]:X}"
+    if spec.kind is Kind.LINES:
+        return "first line 1 to 21 and count 1 to 9 as one number, such as 14 for lines 1 to 4, up to line 21"
+    if spec.kind is Kind.CONDITION:
+        return f"line {LINES[0]} to {LINES[-1]} or flag {USER_FLAGS[0]} to {CARRY}, then H or L and a label"
+    text = f"{grouped(values[0])} to {grouped(values[-1])}" if isinstance(values, range) else ", ".join(map(str, values))
+    if spec.unit:
+        text += f" {spec.unit}"
+    if named:
+        text += f" ({spec.name if spec.kind is Kind.NUMBER else spec.kind.value})"
+    return text

@@ -1,0 +1,279 @@
+"""Where a program can go, and with which settings: every path is followed with the values the program itself sets.
+
+A command reached with several settings keeps each of them up to `MOST_STATES`; beyond that they are merged, and a value that
+differs becomes None, unknown. What the program cannot know (lines, registers, flags) is unknown or branches.
+Distances in minimum microsteps, speeds in full steps/s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import NamedTuple
+
+from steptwin.m1486.commands import find
+from steptwin.m1486.functions import INPUT, REGISTER, RUNSIGN
+from steptwin.m1486.lines import Interface, line_group
+from steptwin.m1486.microsteps import microstep_size
+from steptwin.m1486.structure import Stream
+from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.variants import Variant
+
+#: Enough for a line group of five lines; more settings at one place are merged.
+MOST_STATES = 32
+#: The call a command runs under when it runs under none.
+_MAIN = -1
+_DEFAULT_DISTANCE = 64_000
+_DEFAULT_VELOCITY = 1_000
+_DEFAULT_PROFILE = 25_000
+
+
+class Settings(NamedTuple):
+    """What the chip is set to; None is unknown. Field names are those of the commands."""
+
+    microstep: int | None
+    qualification: int | None
+    start_stop: int | None
+    velocity: int | None
+    profile: int | None
+    acceleration: int | None
+    #: Of the next move; None also for a move to a position.
+    distance: int | None
+    variable: int | None
+    #: Functions 40, 46 and 58: 1 is ON, 0 is OFF.
+    runsign: int | None
+    lines_operand: int | None
+    register_operand: int | None
+
+
+_SETTING = {
+    "M": "microstep",
+    "Q": "qualification",
+    "S": "start_stop",
+    "V": "velocity",
+    "P": "profile",
+    "A": "acceleration",
+    "F": "distance",
+    "B": "distance",
+    ":": "variable",
+}
+_FUNCTION_SETTING = {RUNSIGN: "runsign", INPUT: "lines_operand", REGISTER: "register_operand"}
+
+
+def defaults(variant: Variant, interface: Interface) -> Settings:
+    """The settings after power-up and after a reset."""
+    return Settings(
+        microstep=interface.microstep,
+        qualification=1,
+        start_stop=variant.start_stop,
+        velocity=_DEFAULT_VELOCITY,
+        profile=_DEFAULT_PROFILE,
+        acceleration=variant.acceleration,
+        distance=_DEFAULT_DISTANCE,
+        variable=None,
+        runsign=0,
+        lines_operand=0,
+        register_operand=0,
+    )
+
+
+@dataclass(slots=True)
+class Flow:
+    """The result: for each command that can be reached the settings it can be reached with, and where jumps lead."""
+
+    states: dict[int, set[Settings]] = field(default_factory=dict)
+    targets: dict[int, set[int]] = field(default_factory=dict)
+    #: Calls inside a subroutine, dots outside one, calls that no dot ends.
+    nested_calls: set[int] = field(default_factory=set)
+    lone_returns: set[int] = field(default_factory=set)
+    endless_calls: list[int] = field(default_factory=list)
+
+
+def value(command: Command, state: Settings) -> int | None:
+    """The number a command works with: its own or the internal variable; None where it is unknown or none is taken."""
+    return state.variable if command.from_variable else command.number
+
+
+def follow(stream: Stream, variant: Variant, interface: Interface) -> Flow:
+    """Follow every path of the stream from its beginning and from each reset."""
+    return _Walk(stream, variant, interface).run()
+
+
+class _Point:
+    """The settings one place has been reached with."""
+
+    def __init__(self) -> None:
+        self.states: set[Settings] = set()
+        self.merged: Settings | None = None
+
+    def add(self, state: Settings) -> Settings | None:
+        """What to go on with from here because of ``state``; None if nothing is new."""
+        if self.merged is None:
+            if state in self.states:
+                return None
+            self.states.add(state)
+            if len(self.states) <= MOST_STATES:
+                return state
+            self.merged = reduce(_join, self.states)
+        else:
+            joined = _join(self.merged, state)
+            if joined == self.merged:
+                return None
+            self.merged = joined
+        self.states = {self.merged}
+        return self.merged
+
+
+def _join(a: Settings, b: Settings) -> Settings:
+    return Settings._make(x if x == y else None for x, y in zip(a, b, strict=True))
+
+
+class _Walk:
+    def __init__(self, stream: Stream, variant: Variant, interface: Interface) -> None:
+        self.stream = stream
+        self.variant = variant
+        self.start = defaults(variant, interface)
+        self.flow = Flow()
+        self.points: dict[tuple[int, int], _Point] = {}
+        self.open: list[tuple[int, int, Settings]] = []
+        self.returned: set[int] = set()
+
+    def run(self) -> Flow:
+        self.arrive(0, _MAIN, self.start)
+        for index, command in enumerate(self.stream.commands):
+            # A reset ends whatever was running, also what would run for ever.
+            if command.key == "\\" and self.stream.in_file[index] is None:
+                self.arrive(index, _MAIN, self.start)
+        while self.open or self.leave_endless_calls():
+            index, call, state = self.open.pop()
+            self.step(index, call, state)
+        for (index, _), point in self.points.items():
+            self.flow.states.setdefault(index, set()).update(point.states)
+        return self.flow
+
+    def arrive(self, index: int, call: int, state: Settings) -> None:
+        if index >= len(self.stream.commands):
+            return
+        point = self.points.setdefault((index, call), _Point())
+        news = point.add(state)
+        if news is not None:
+            self.open.append((index, call, news))
+
+    def leave_endless_calls(self) -> bool:
+        """Go on after calls that never come back, so that what follows them is looked at all the same."""
+        calls = {call for _, call in self.points if call != _MAIN} - self.returned
+        for call in calls:
+            self.returned.add(call)
+            self.flow.endless_calls.append(call)
+            for state in tuple(self.points[call, _MAIN].states):
+                self.arrive(call + 1, _MAIN, state)
+        return bool(self.open)
+
+    def step(self, index: int, call: int, state: Settings) -> None:
+        command = self.stream.commands[index]
+        match command.key:
+            case "J":
+                self.jump(index, call, state, value(command, state))
+            case "I":
+                if isinstance(command.argument, Condition):
+                    self.jump(index, call, state, command.argument.label)
+                self.arrive(index + 1, call, state)
+            case "'" if call != _MAIN:
+                self.flow.nested_calls.add(index)
+                self.arrive(index + 1, call, state)
+            case "'":
+                self.jump(index, index, state, value(command, state))
+            case ".":
+                self.come_back(index, call, state)
+            case "E" if index in self.stream.loops:
+                self.arrive(self.stream.loops[index] + 1, call, state)
+                self.arrive(index + 1, call, state)
+            case "\\" if self.stream.in_file[index] is None:
+                self.arrive(index + 1, _MAIN, self.start)
+            case _:
+                for after in _after(command, state, self.variant):
+                    self.arrive(index + 1, call, after)
+
+    def jump(self, index: int, call: int, state: Settings, label: int | None) -> None:
+        """Go to ``label``, to every label there is where it is unknown, and straight on where there is none."""
+        if label is None:
+            targets = list(self.stream.visible_labels(index).values())
+        else:
+            target = self.stream.resolve(index, label)
+            targets = [] if target is None else [target]
+        self.flow.targets.setdefault(index, set()).update(targets)
+        for target in targets:
+            self.arrive(target, call, state)
+        if not targets:
+            self.arrive(index + 1, _MAIN if call == index else call, state)
+
+    def come_back(self, index: int, call: int, state: Settings) -> None:
+        if call == _MAIN:
+            self.flow.lone_returns.add(index)
+            self.arrive(index + 1, call, state)
+        else:
+            self.returned.add(call)
+            self.arrive(call + 1, _MAIN, state)
+
+
+def _after(command: Command, state: Settings, variant: Variant) -> Iterable[Settings]:
+    """The settings after a command that goes on to the next one."""
+    key = command.key
+    number = value(command, state)
+    if key in "+-*/":
+        return (state._replace(variable=_arithmetic(key, state, number)),)
+    if key == "<":
+        return (state._replace(variable=None),)
+    if key in ("G", "G+", "G-", "H"):
+        return (state._replace(distance=None),)
+    if number is None:
+        return (_after_unknown(command, state),)
+    if find(key, number, variant) is None or _is_wrong_multiple(key, number, state):
+        return (state,)
+    if key == "?":
+        return _readings(state, number)
+    if key in _SETTING:
+        return (state._replace(**{_SETTING[key]: number}),)
+    if key in "TC" and number in _FUNCTION_SETTING:
+        return (state._replace(**{_FUNCTION_SETTING[number]: int(key == "T")}),)
+    return (state,)
+
+
+def _is_wrong_multiple(key: str, number: int, state: Settings) -> bool:
+    return key in "FB" and state.microstep is not None and number % microstep_size(state.microstep) != 0
+
+
+def _after_unknown(command: Command, state: Settings) -> Settings:
+    if not command.from_variable:
+        return state
+    if command.key in "TC":
+        return state._replace(runsign=None, lines_operand=None, register_operand=None)
+    if command.key == "?":
+        return state._replace(variable=None)
+    return state._replace(**{_SETTING[command.key]: None}) if command.key in _SETTING else state
+
+
+def _readings(state: Settings, group: int) -> Iterable[Settings]:
+    lines = line_group(group)
+    if lines is None or 2 ** len(lines) > MOST_STATES:
+        return (state._replace(variable=None),)
+    return (state._replace(variable=reading) for reading in range(2 ** len(lines)))
+
+
+def _arithmetic(key: str, state: Settings, operand: int | None) -> int | None:
+    """The internal variable after + - * /, modulo 2^24 (M-13); None where operand or variable are unknown."""
+    if state.lines_operand != 0 or state.register_operand != 0:
+        return None
+    if state.variable is None or operand is None:
+        return None
+    match key:
+        case "+":
+            result = state.variable + operand
+        case "-":
+            result = state.variable - operand
+        case "*":
+            result = state.variable * operand
+        case _:
+            result = state.variable // operand if operand else state.variable
+    return result % 2**24

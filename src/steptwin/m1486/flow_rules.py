@@ -1,0 +1,261 @@
+"""Rules on what happens along the paths of a program: moves that cannot start, numbers from the internal variable, dead code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
+from steptwin.m1486 import findings
+from steptwin.m1486.argument_rules import lines_of, lines_text, number_problem
+from steptwin.m1486.commands import DIVIDEND_LIMIT, FREE_DIVISORS, PROFILE_RANGE, When, find, grouped, when
+from steptwin.m1486.findings import Finding
+from steptwin.m1486.flow import Flow, Settings, follow, value
+from steptwin.m1486.lines import LINES, RUNSIGN_LINE, Interface, line_group
+from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, microstep_size
+from steptwin.m1486.registers import GENERAL
+from steptwin.m1486.structure import Stream
+from steptwin.m1486.structure_rules import label_problem, written_label
+from steptwin.m1486.syntax import Command
+from steptwin.m1486.variants import Variant
+
+#: Acceleration per start/stop speed above which the lost table would have to be asked (M-4).
+ACCELERATION_PER_START_STOP = 65
+
+_MOVES = frozenset("R)(")
+_DISTANCES = frozenset("FBG=")
+_ARITHMETIC = frozenset("+-*/")
+#: What a setting makes wrong: the finding, the message, the hint.
+_Fault = tuple[Finding, str, str | None]
+_Rule = Callable[[Command, Settings], _Fault | None]
+
+
+def flow_rules(stream: Stream, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
+    flow = follow(stream, variant, interface)
+    for index, states in sorted(flow.states.items()):
+        command = stream.commands[index]
+        for rule in _RULES:
+            yield from _judge(command, states, rule)
+        if command.key in _ARITHMETIC:
+            yield from _judge(command, states, lambda c, s: _operand(c, s, interface))
+        if command.from_variable:
+            yield from _from_variable(stream, index, states, variant, interface)
+        if command.key in "CT!":
+            yield from _runsign(command, states, variant)
+    yield from _calls(stream, flow)
+    yield from _unused_labels(stream, flow)
+    yield from _never_reached(stream, flow)
+    yield from _shared_registers(stream, flow, variant)
+
+
+def _judge(command: Command, states: set[Settings], rule: _Rule) -> Iterator[Diagnostic]:
+    """An error where it is one with every setting, otherwise a warning that it may be; a warning where it can happen at all."""
+    faults = [rule(command, state) for state in states]
+    found = sorted({fault for fault in faults if fault is not None}, key=lambda fault: fault[1])
+    if not found:
+        return
+    finding, message, hint = found[0]
+    if finding.severity is Severity.ERROR and None in faults:
+        finding, message = findings.MAY_FAIL, f"on some paths {message}"
+    span = command.span if command.number is None else command.argument_span
+    fix = _nearest_multiple(command, states) if finding is findings.NOT_A_MULTIPLE and command.number is not None else None
+    yield finding(span, message, hint, fix)
+
+
+def _distance(command: Command, state: Settings) -> _Fault | None:
+    distance = value(command, state) if command.key in _DISTANCES else state.distance if command.key == "R" else None
+    if not distance or state.microstep is None:
+        return None
+    size = microstep_size(state.microstep)
+    if distance % size == 0:
+        return None
+    what = "the distance" if command.key == "R" else command.key
+    hint = f"with M{state.microstep} a microstep is {size} minimum microsteps"
+    return findings.NOT_A_MULTIPLE, f"{what} {grouped(distance)} is not a multiple of {size}", hint
+
+
+def _nearest_multiple(command: Command, states: set[Settings]) -> Fix | None:
+    """The nearest distance that is right with every setting."""
+    sizes = [microstep_size(state.microstep) for state in states if state.microstep is not None]
+    if command.number is None or not sizes:
+        return None
+    size = max(sizes)
+    return Fix(command.argument_span, str(max(size, (command.number + size // 2) // size * size)))
+
+
+def _pair(command: Command, state: Settings) -> _Fault | None:
+    if command.key not in _MOVES or state.microstep is None or state.qualification is None:
+        return None
+    allowed = PAIRS[state.microstep]
+    if state.qualification in allowed:
+        return None
+    hint = f"with M{state.microstep} go {', '.join(f'Q{q}' for q in allowed)}"
+    return findings.FORBIDDEN_PAIR, f"M{state.microstep} and Q{state.qualification} do not go together", hint
+
+
+def _no_ramp(command: Command, state: Settings) -> _Fault | None:
+    if command.key != "R" or state.velocity is None or state.start_stop is None or state.velocity > state.start_stop:
+        return None
+    message = f"V {state.velocity} is not above S {state.start_stop}"
+    return findings.NO_RAMP, message, "the move runs at V without a ramp"
+
+
+def _too_fast(command: Command, state: Settings) -> _Fault | None:
+    if command.key != "R" or state.velocity is None or state.qualification is None or state.microstep is None:
+        return None
+    highest = HIGHEST_SPEED[state.qualification]
+    if state.velocity <= highest or state.velocity <= low_range_limit(state.microstep):
+        return None
+    message = f"V {state.velocity} is above {highest} step/s, the highest speed with Q{state.qualification}"
+    return findings.SPEED_ABOVE_Q, message, "Q1 goes as far as V"
+
+
+def _profile(command: Command, state: Settings) -> _Fault | None:
+    if command.key != "R" or state.profile is None or state.velocity is None:
+        return None
+    if state.profile in PROFILE_RANGE or state.profile > state.velocity:
+        return None
+    message = f"P {state.profile} is above {PROFILE_RANGE[-1]} and not above V {state.velocity}"
+    hint = f"{PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]} step/s, or above V for no parabolic part"
+    return findings.PROFILE_OUT_OF_RANGE, message, hint
+
+
+def _acceleration(command: Command, state: Settings) -> _Fault | None:
+    # M-4: nothing is enforced; the table that would tell is missing.
+    if command.key != "R" or state.acceleration is None or state.start_stop is None:
+        return None
+    if state.acceleration <= ACCELERATION_PER_START_STOP * state.start_stop:
+        return None
+    message = f"A {state.acceleration} is large for S {state.start_stop}; the table of permitted pairs is not available"
+    hint = f"up to {ACCELERATION_PER_START_STOP} times S is taken to be safe"
+    return findings.NO_ACCELERATION_TABLE, message, hint
+
+
+_RULES: tuple[_Rule, ...] = (_distance, _pair, _no_ramp, _too_fast, _profile, _acceleration)
+
+
+def _operand(command: Command, state: Settings, interface: Interface) -> _Fault | None:
+    """The number after + - * / where functions 46 and 58 make it lines or a register, and the dividend."""
+    number = value(command, state)
+    if number is None:
+        return None
+    if state.lines_operand and state.register_operand:
+        return findings.BOTH_OPERANDS, "functions 46 and 58 are both ON", "the operand comes from the lines"
+    if state.lines_operand:
+        lines = line_group(number)
+        if lines is None:
+            hint = "first line and count, such as 14 for lines 1 to 4, up to line 21"
+            return findings.OUT_OF_RANGE, f"{number} names no lines, and function 46 is ON", hint
+        taken = [line for line in lines if line in interface.occupied]
+        if taken:
+            message = f"{lines_text(taken)} belong to the {interface.title} interface"
+            free = lines_text([line for line in LINES if line not in interface.occupied])
+            return findings.LINE_READ_OCCUPIED, message, f"free lines are {free}"
+        return None
+    if state.lines_operand is None or state.register_operand is None:
+        return None
+    if state.register_operand and number not in GENERAL:
+        return findings.OUT_OF_RANGE, f"{number} is no operand register, and function 58 is ON", "1 to 8"
+    if command.key == "/" and not state.register_operand:
+        return _dividend(number, state)
+    return None
+
+
+def _dividend(divisor: int, state: Settings) -> _Fault | None:
+    if state.variable is None or state.variable <= DIVIDEND_LIMIT or divisor in FREE_DIVISORS:
+        return None
+    hint = f"at most {grouped(DIVIDEND_LIMIT)}, except for {', '.join(map(str, sorted(FREE_DIVISORS)))}"
+    return findings.DIVIDEND_TOO_LARGE, f"the internal variable is {grouped(state.variable)}", hint
+
+
+def _from_variable(
+    stream: Stream, index: int, states: set[Settings], variant: Variant, interface: Interface
+) -> Iterator[Diagnostic]:
+    """A command whose number is the internal variable: the numbers it can be."""
+    command = stream.commands[index]
+    numbers = [state.variable for state in states]
+    problems = [None if n is None else _variable_problem(stream, index, n, variant, interface) for n in numbers]
+    found = [p for p in problems if p is not None]
+    if not found:
+        return
+    first = min(found, key=lambda p: p.message)
+    if len(found) == len(problems):
+        yield replace(first, span=command.span, message=f"the internal variable gives: {first.message}", fix=None)
+    else:
+        yield findings.MAY_FAIL(command.span, f"the internal variable can give: {first.message}", first.hint)
+
+
+def _variable_problem(stream: Stream, index: int, number: int, variant: Variant, interface: Interface) -> Diagnostic | None:
+    command = stream.commands[index]
+    problem = number_problem(command, number, variant, interface)
+    if problem is None and command.key in ("J", "'"):
+        problem = next(label_problem(stream, index, number, variant), None)
+    return problem if problem is not None and problem.severity is Severity.ERROR else None
+
+
+def _runsign(command: Command, states: set[Settings], variant: Variant) -> Iterator[Diagnostic]:
+    for state in states:
+        number = value(command, state)
+        spec = None if number is None else find(command.key, number, variant)
+        if number is None or spec is None or not state.runsign or RUNSIGN_LINE not in lines_of(spec, number):
+            continue
+        message = f"{command} writes B{RUNSIGN_LINE} while function 40 (Runsign) is ON"
+        yield findings.RUNSIGN_LINE_USED(command.span, message, "C40 gives the line back")
+        return
+
+
+def _calls(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+    for index in flow.nested_calls:
+        command = stream.commands[index]
+        yield findings.NESTED_CALL(command.span, f"{command} inside a subroutine", "one level only")
+    for index in flow.lone_returns:
+        yield findings.RETURN_ALONE(stream.commands[index].span, "this dot is reached without a call", "jump over the subroutine")
+    for index in flow.endless_calls:
+        command = stream.commands[index]
+        yield findings.NEVER_RETURNS(command.span, f"{command} does not come back", "a subroutine ends with a dot")
+
+
+def _unused_labels(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+    used = set().union(*flow.targets.values())
+    for index, command in enumerate(stream.commands):
+        label = written_label(command)
+        target = None if label is None else stream.resolve(index, label)
+        used |= set() if target is None else {target}
+    for label, places in stream.labels.items():
+        for at in places:
+            if at not in used:
+                yield findings.LABEL_UNUSED(stream.commands[at].span, f"nothing jumps to label {label}")
+
+
+def _never_reached(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+    """One warning for each run of commands that no path leads to."""
+    run: list[int] = []
+    for index in range(len(stream.commands) + 1):
+        if index < len(stream.commands):
+            command = stream.commands[index]
+            if when(command.key, command.number) is not When.QUEUED:
+                continue
+            if index not in flow.states:
+                run.append(index)
+                continue
+        if run:
+            first, last = stream.commands[run[0]], stream.commands[run[-1]]
+            count = "this command is" if len(run) == 1 else f"these {len(run)} commands are"
+            yield findings.NEVER_REACHED(Span(first.span.start, last.span.end), f"{count} never reached")
+            run = []
+
+
+def _shared_registers(stream: Stream, flow: Flow, variant: Variant) -> Iterator[Diagnostic]:
+    """Registers 1 to 8 where they lie in the command memory: safe after a reset and with a short file only (chapter VII.7)."""
+    limit = variant.memory_bits - variant.shared_bits
+    if not variant.shared_bits or (stream.commands and stream.commands[0].key == "\\" and stream.bits <= limit):
+        return
+    for index, states in sorted(flow.states.items()):
+        command = stream.commands[index]
+        moves = command.key in "<>" and any((value(command, s) or 0) in GENERAL for s in states)
+        operates = command.key in _ARITHMETIC and any(s.register_operand for s in states)
+        if moves or operates:
+            message = f"on {variant.title} the registers lie in the last {variant.shared_bits} bits of the command memory"
+            hint = f"safe with \\ as the first command and at most {limit} bits; these are {stream.bits} bits"
+            yield findings.REGISTERS_SHARED(command.span, message, hint)
+            return

@@ -1,0 +1,37 @@
+"""Microsteps: which divisions go together and how fast each may run (manual chapter VII.4).
+
+Distances in minimum microsteps (full step / 64), speeds in full steps/s as the arguments of ``V`` give them: at 24 MHz the
+motor turns twice as fast with the same argument, and the limits double with it.
+"""
+
+from __future__ import annotations
+
+#: Minimum microsteps in a full step.
+FULL_STEP = 64
+
+#: Values of Q that may stand with each M. M1 Q1 is missing in the manual's list and is its default for Step & Direction.
+PAIRS: dict[int, tuple[int, ...]] = {
+    1: (1,),
+    2: (2,),
+    4: (1, 4),
+    8: (1, 2),
+    16: (4,),
+    32: (1, 2, 4),
+    64: (1, 2, 4),
+}
+
+#: Highest speed with each Q; with Q1 it is what V permits.
+HIGHEST_SPEED = {1: 20_000, 2: 6_000, 4: 3_000}
+
+MICROSTEPS = tuple(PAIRS)
+QUALIFICATIONS = tuple(HIGHEST_SPEED)
+
+
+def microstep_size(microstep: int) -> int:
+    """Minimum microsteps in one microstep of division ``microstep``: what every distance must be a multiple of."""
+    return FULL_STEP // microstep
+
+
+def low_range_limit(microstep: int) -> float:
+    """Speed up to which division ``microstep`` is in force; above it the division is Q."""
+    return 12_000 / microstep

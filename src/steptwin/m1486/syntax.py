@@ -1,0 +1,331 @@
+"""M1486 programs as text: commands with their places, and back to text.
+
+A line holds one command, blanks mean nothing (M-2), a semicolon begins a comment (M-1), letters are equal in either case.
+In files CR, LF and CR LF all end a line; the chip itself knows CR only. Nothing here depends on the variant: whether a number
+is permitted is for `steptwin.m1486.commands.find`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import NamedTuple, NoReturn
+
+from steptwin.diagnostics import Diagnostic, Fix, Span
+from steptwin.m1486 import findings
+from steptwin.m1486.commands import CONDITIONS, LARGEST_LABEL, LETTERS, rows, takes_number, takes_variable
+from steptwin.m1486.findings import Finding
+
+_NOWHERE = Span(0, 0)
+_LINE_END = re.compile(r"\r\n|\r|\n")
+_DIGITS = frozenset("0123456789")
+_HEX = frozenset("0123456789ABCDEF")
+_BLANKS = frozenset(" \t")
+_LEVELS = frozenset("HL")
+#: More digits than any number of the language has; longer ones are no numbers.
+_MOST_DIGITS = 18
+#: Characters that word processors, scanners and eyes put for others.
+_MEANT = {"’": "'", "‘": "'", "`": "'", "–": "-", "−": "-", "×": "*", "÷": "/", "1": "L", "|": "L", "0": "O"}
+_MEANT_DIGIT = {"l": "1", "I": "1", "|": "1", "O": "0", "o": "0"}
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """The argument of ``I``: jump to ``label`` when line or flag ``line`` is ``high``."""
+
+    line: int
+    high: bool
+    label: int
+    label_span: Span = field(default=_NOWHERE, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command. ``key`` leads to the command table; ``argument`` is None where no number stands.
+
+    ``argument_span`` is the place of the number, in a condition of the line or flag. Two commands are equal if they say the
+    same, wherever they stand.
+    """
+
+    key: str
+    argument: int | Condition | None = None
+    span: Span = field(default=_NOWHERE, compare=False)
+    argument_span: Span = field(default=_NOWHERE, compare=False)
+
+    @property
+    def number(self) -> int | None:
+        """The number given: for ``I`` the line or flag, None where the internal variable stands for it or nothing is taken."""
+        return self.argument.line if isinstance(self.argument, Condition) else self.argument
+
+    @property
+    def from_variable(self) -> bool:
+        """True if the internal variable is the argument."""
+        return self.argument is None and takes_variable(self.key)
+
+    def __str__(self) -> str:
+        if isinstance(self.argument, Condition):
+            return f"I{self.argument.line}{'H' if self.argument.high else 'L'}{self.argument.label}"
+        if self.argument is None:
+            return self.key
+        return f"{self.key}{self.argument:X}" if self.key == "X" else f"{self.key}{self.argument}"
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line: a command, a comment, both or nothing; or ``broken``, its whole text, where there is no sound command.
+
+    ``salvaged`` holds what of a broken line could be understood, for checks that would otherwise miss a label or a bracket.
+    """
+
+    command: Command | None = None
+    comment: str | None = None
+    broken: str | None = None
+    salvaged: tuple[Command, ...] = ()
+
+    def __str__(self) -> str:
+        if self.broken is not None:
+            return self.broken
+        comment = None if self.comment is None else f"; {self.comment}".rstrip()
+        if self.command is None:
+            return comment or ""
+        return str(self.command) if comment is None else f"{self.command!s:<11} {comment}"
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    lines: tuple[Line, ...]
+
+    @property
+    def commands(self) -> list[Command]:
+        """The sound commands in order."""
+        return [line.command for line in self.lines if line.command is not None]
+
+    @property
+    def all_commands(self) -> list[Command]:
+        """The sound commands and those salvaged from broken lines, in order."""
+        return [c for line in self.lines for c in (line.salvaged if line.command is None else (line.command,))]
+
+
+class Parsed(NamedTuple):
+    program: Program
+    diagnostics: list[Diagnostic]
+
+
+class ParsedLine(NamedTuple):
+    line: Line
+    diagnostics: list[Diagnostic]
+
+
+def parse(text: str) -> Parsed:
+    """Read a whole program. Never raises: a broken line is reported, kept as it is, and does not hide the next one."""
+    lines: list[Line] = []
+    diagnostics: list[Diagnostic] = []
+    start = 0
+    for end in (*_LINE_END.finditer(text), None):
+        stop = len(text) if end is None else end.start()
+        if end is not None or stop > start:
+            line, found = parse_line(text[start:stop], start)
+            lines.append(line)
+            diagnostics += found
+        if end is not None:
+            start = end.end()
+    return Parsed(Program(tuple(lines)), diagnostics)
+
+
+def parse_line(text: str, offset: int = 0) -> ParsedLine:
+    """Read one line without its end. ``offset`` is where it begins in the text that spans point into."""
+    body, semicolon, rest = text.partition(";")
+    reader = _Reader(body, offset)
+    commands: list[Command] = []
+    try:
+        while reader.left:
+            commands.append(_command(reader))
+            _end_of_command(reader, commands[-1])
+    except _BrokenLine:
+        pass
+    if reader.is_broken:
+        return ParsedLine(Line(broken=text, salvaged=tuple(commands)), reader.diagnostics)
+    return ParsedLine(Line(commands[0] if commands else None, rest.strip() if semicolon else None), reader.diagnostics)
+
+
+def format_program(program: Program, end: str = "\n") -> str:
+    """The program as text in one form: capitals, no blanks, comments in a column, each line followed by ``end``."""
+    return "".join(f"{line}{end}" for line in program.lines)
+
+
+class _BrokenLine(Exception):
+    """The rest of the line cannot be read; what is wrong has been reported."""
+
+
+class _Reader:
+    """The characters of a line that are no blanks, each with its place."""
+
+    def __init__(self, body: str, offset: int) -> None:
+        kept = [(place, char) for place, char in enumerate(body, offset) if char not in _BLANKS]
+        self.chars = "".join(char for _, char in kept)
+        # Only ASCII letters have two cases for the chip; "ı".upper() would be an I.
+        self.capitals = "".join(char.upper() if char.isascii() else char for _, char in kept)
+        self.places = [place for place, _ in kept]
+        self.at = 0
+        self.diagnostics: list[Diagnostic] = []
+        self.is_broken = False
+
+    @property
+    def left(self) -> str:
+        return self.chars[self.at :]
+
+    @property
+    def next(self) -> str:
+        """The next character as a capital, empty at the end."""
+        return self.capitals[self.at : self.at + 1]
+
+    @property
+    def found(self) -> str:
+        """The next character for messages."""
+        return f"found {self.chars[self.at]!r}" if self.left else "found the end of the line"
+
+    def take(self) -> str:
+        char = self.next
+        self.at += 1
+        return char
+
+    def span(self, start: int, end: int | None = None) -> Span:
+        """From character ``start`` to before character ``end``, by default the one to be read next."""
+        end = self.at if end is None else end
+        if end > start:
+            return Span(self.places[start], self.places[end - 1] + 1)
+        place = self.places[start] if start < len(self.places) else self.places[-1] + 1
+        return Span(place, place)
+
+    def rest_span(self) -> Span:
+        return self.span(self.at, len(self.chars))
+
+    def error(self, finding: Finding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
+        self.diagnostics.append(finding(span, message, hint, fix))
+        self.is_broken = True
+
+    def give_up(self, finding: Finding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> NoReturn:
+        self.error(finding, span, message, hint, fix)
+        raise _BrokenLine
+
+
+def _command(reader: _Reader) -> Command:
+    start = reader.at
+    if reader.next not in LETTERS:
+        _unknown(reader)
+    key = reader.take()
+    if key + reader.next in ("G+", "G-", "XG"):
+        key += reader.take()
+    argument_start = reader.at
+    argument: int | Condition | None = None
+    argument_end: int | None = None
+    if key == "I":
+        argument, argument_end = _condition(reader)
+    elif key == "X":
+        if reader.next not in _HEX:
+            hint = "0 to 9, A to F, or G for all chips"
+            reader.give_up(findings.ARGUMENT_MISSING, reader.span(reader.at), f"address expected, {reader.found}", hint)
+        argument = int(reader.take(), 16)
+    elif takes_number(key):
+        argument = _number(reader)
+        _no_other_notation(reader, key, argument_start)
+        if argument is None and not takes_variable(key):
+            hint = "the internal variable cannot stand for it"
+            reader.give_up(findings.ARGUMENT_MISSING, reader.span(reader.at), f"number expected, {reader.found}", hint)
+    return Command(key, argument, reader.span(start), reader.span(argument_start, argument_end))
+
+
+def _number(reader: _Reader) -> int | None:
+    """The digits that come next as a number, None if there are none."""
+    start = reader.at
+    while reader.next in _DIGITS:
+        reader.at += 1
+    digits = reader.chars[start : reader.at]
+    if not digits:
+        return None
+    span = reader.span(start)
+    if len(digits) > _MOST_DIGITS:
+        reader.give_up(findings.BAD_ARGUMENT, span, f"a number of {len(digits)} digits", "no number has more than 8")
+    if span.end - span.start > len(digits):
+        message = f"blank inside a number, read as {digits}"
+        reader.diagnostics.append(findings.BLANK_IN_NUMBER(span, message, None, Fix(span, digits)))
+    return int(digits)
+
+
+def _no_other_notation(reader: _Reader, key: str, start: int) -> None:
+    """After the digits of a number: refuse a letter meant as a digit, a sign and a fraction, each with what would be right."""
+    rest, has_digits = reader.left, reader.at > start
+    if not rest:
+        return
+    span = reader.rest_span()
+    digits = "".join(_MEANT_DIGIT.get(char, char) for char in rest)
+    apart = reader.places[reader.at] > reader.places[reader.at - 1] + 1
+    whole = reader.chars[start : reader.at] + digits
+    if rest[0] in _MEANT_DIGIT and set(digits) <= _DIGITS and not _DIGITS.isdisjoint(reader.chars[start:]) and not apart:
+        fix = Fix(Span(reader.places[start], span.end), whole)
+        reader.give_up(findings.BAD_ARGUMENT, span, f"{rest[0]!r} is a letter, not a digit", None, fix)
+    if rest[1:2] not in _DIGITS:
+        return
+    if not has_digits and rest[0] in "+-":
+        hint = "F moves in positive, B in negative direction" if key in "FB" else "numbers have no sign"
+        reader.give_up(findings.BAD_ARGUMENT, span, f"{rest} has a sign", hint)
+    if has_digits and rest[0] in ".,":
+        number = reader.chars[start:]
+        reader.give_up(findings.BAD_ARGUMENT, reader.span(start, len(reader.chars)), f"{number} is not a whole number")
+
+
+def _condition(reader: _Reader) -> tuple[Condition, int]:
+    """The condition and where its first number ends."""
+    start = reader.at
+    line = _number(reader)
+    line_end = reader.at
+    if line is None:
+        _bad_condition(reader, "line or flag")
+    if reader.next not in _LEVELS:
+        _bad_condition(reader, "H or L", _level_read_as_one(reader.span(start), str(line)) if not reader.left else None)
+    high = reader.take() == "H"
+    label_start = reader.at
+    label = _number(reader)
+    if label is None:
+        _bad_condition(reader, "label")
+    return Condition(line, high, label, reader.span(label_start)), line_end
+
+
+def _bad_condition(reader: _Reader, expected: str, fix: Fix | None = None) -> NoReturn:
+    hint = "such as I2H5: if line 2 is high, go to label 5"
+    span = reader.span(reader.at) if fix is None else fix.span
+    reader.give_up(findings.BAD_CONDITION, span, f"{expected} expected, {reader.found}", hint, fix)
+
+
+def _level_read_as_one(span: Span, digits: str) -> Fix | None:
+    """``i116`` is ``i1l6`` on paper: a letter l read as the digit 1. The replacement that makes the condition whole."""
+    for i in range(1, len(digits) - 1):
+        line, label = int(digits[:i]), int(digits[i + 1 :])
+        if digits[i] == "1" and line in CONDITIONS and 1 <= label <= LARGEST_LABEL:
+            return Fix(span, f"{line}L{label}")
+    return None
+
+
+def _unknown(reader: _Reader) -> NoReturn:
+    char = reader.chars[reader.at]
+    span = reader.span(reader.at, reader.at + 1)
+    meant = _MEANT.get(char)
+    # A digit alone is worth a suggestion only where a number follows, as in 120 for l20.
+    fix = Fix(span, meant) if meant and (char not in _DIGITS or len(reader.left) > 1) else None
+    reader.give_up(findings.UNKNOWN_COMMAND, span, f"no command begins with {char!r}", None, fix)
+
+
+def _end_of_command(reader: _Reader, command: Command) -> None:
+    """Nothing may follow a command on its line. A second command is reported and may be read; anything else ends the line."""
+    rest = reader.left
+    if not rest:
+        return
+    span = reader.rest_span()
+    if reader.next in LETTERS:
+        message = f"{rest[0]!r} begins a second command ({rows(reader.next)[0].name}) on this line"
+        reader.error(findings.SECOND_COMMAND, span, message, "one command a line", Fix(Span(span.start, span.start), "\n"))
+    elif rest[0] in _DIGITS and not takes_number(command.key):
+        reader.give_up(findings.NO_ARGUMENT_TAKEN, span, f"{command.key} takes no number", None, Fix(span, ""))
+    else:
+        what = "number" if command.from_variable else "end of the line"
+        reader.give_up(findings.BAD_ARGUMENT, span, f"{what} expected after {command}, {reader.found}")

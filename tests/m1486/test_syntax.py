@@ -1,0 +1,264 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from steptwin.diagnostics import Fix, Span
+from steptwin.m1486.syntax import Command, Condition, Line, Program, format_program, parse, parse_line
+from steptwin.m1486.variants import Variant, variant
+
+
+def commands(text: str) -> list[Command]:
+    """The commands of a text that is sound."""
+    program, diagnostics = parse(text)
+    assert diagnostics == []
+    return program.commands
+
+
+def problems(text: str) -> list[tuple[str, str]]:
+    return [(d.code, text[d.span.start : d.span.end]) for d in parse(text).diagnostics]
+
+
+# Every command example of the manual's chapter VII, and what it means.
+MANUAL = {
+    "@2": Command("@", 2),
+    "J6": Command("J", 6),
+    "U3": Command("U", 3),
+    "W3000": Command("W", 3000),
+    "B640": Command("B", 640),
+    "R": Command("R"),
+    "D": Command("D"),
+    "F640": Command("F", 640),
+    "G10000": Command("G", 10_000),
+    "G+": Command("G+"),
+    "G-": Command("G-"),
+    "H": Command("H"),
+    "=1200": Command("=", 1200),
+    "C100": Command("C", 100),
+    "C75": Command("C", 75),
+    "P2500": Command("P", 2500),
+    "V12500": Command("V", 12_500),
+    ")7": Command(")", 7),
+    "(2": Command("(", 2),
+    "C7": Command("C", 7),
+    "O2": Command("O", 2),
+    "T1": Command("T", 1),
+    "Z3": Command("Z", 3),
+    "\\": Command("\\"),
+    "X3": Command("X", 3),
+    "XG": Command("XG"),
+    "T51": Command("T", 51),
+    "C43": Command("C", 43),
+    "T85": Command("T", 85),
+    "C85": Command("C", 85),
+    "?14": Command("?", 14),
+    "-10": Command("-", 10),
+    "i87H5": Command("I", Condition(87, True, 5)),
+    "i7h3": Command("I", Condition(7, True, 3)),
+    "i1l6": Command("I", Condition(1, False, 6)),
+    "<3": Command("<", 3),
+    "+5": Command("+", 5),
+    "*2": Command("*", 2),
+    "F": Command("F"),
+    "a": Command("A"),
+    "J": Command("J"),
+    "+184": Command("+", 184),
+    "'3": Command("'", 3),
+    ".": Command("."),
+    "[": Command("["),
+    "]": Command("]"),
+    ":0": Command(":", 0),
+    "L5": Command("L", 5),
+    "e": Command("E"),
+    "M64": Command("M", 64),
+    "Q4": Command("Q", 4),
+    "N2": Command("N", 2),
+    "!184": Command("!", 184),
+    ">10": Command(">", 10),
+    "/64": Command("/", 64),
+    "S70": Command("S", 70),
+    "K": Command("K"),
+}
+
+
+@pytest.mark.parametrize("text", MANUAL)
+@pytest.mark.parametrize("form", [str.upper, str.lower], ids=["upper", "lower"])
+def test_command_examples_of_the_manual(text: str, form: Callable[[str], str]) -> None:
+    assert commands(form(text)) == [MANUAL[text]]
+
+
+def test_addresses_are_hexadecimal() -> None:
+    assert commands("xA\nXf") == [Command("X", 10), Command("X", 15)]
+    assert str(Command("X", 10)) == "XA"
+
+
+def test_m_1_comments_and_line_feeds_are_ignored() -> None:
+    assert commands("F640 ; ten steps; forward\r\n;\r\n; R\r\nR") == [Command("F", 640), Command("R")]
+
+
+def test_m_2_blanks_are_ignored() -> None:
+    assert commands("  F\t640 \n i 2 H 3\nG +\nX G") == [
+        Command("F", 640),
+        Command("I", Condition(2, True, 3)),
+        Command("G+"),
+        Command("XG"),
+    ]
+
+
+def test_m_2_a_blank_between_digits_is_ignored_too_and_reported() -> None:
+    program, diagnostics = parse("F 12 800")
+    assert program.commands == [Command("F", 12_800)]
+    assert [(d.code, d.fix) for d in diagnostics] == [("M202", Fix(Span(2, 8), "12800"))]
+
+
+@pytest.mark.parametrize("end", ["\r", "\n", "\r\n"])
+def test_cr_lf_and_both_end_a_line(end: str) -> None:
+    text = end.join(["F640", "R", "", "D", ""])
+    assert commands(text) == [Command("F", 640), Command("R"), Command("D")]
+    assert len(parse(text).program.lines) == 4
+
+
+def test_spans_point_into_the_text() -> None:
+    text = "; go\n F 640 ;x\nI2H13\n"
+    forward, condition = parse(text).program.commands
+    assert text[forward.span.start : forward.span.end] == "F 640"
+    assert text[forward.argument_span.start : forward.argument_span.end] == "640"
+    assert isinstance(condition.argument, Condition)
+    assert text[condition.argument.label_span.start : condition.argument.label_span.end] == "13"
+
+
+def test_a_line_by_itself_has_spans_of_the_text_it_is_part_of() -> None:
+    line, diagnostics = parse_line("F640", 100)
+    assert diagnostics == []
+    assert line.command is not None
+    assert line.command.span == Span(100, 104)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("Y5", [("M101", "Y")]),
+        ("é", [("M101", "é")]),
+        ("ı2H3", [("M101", "ı")]),  # its capital is an ASCII I
+        ("F12y", [("M102", "y")]),
+        ("W2.5", [("M102", "2.5")]),
+        ("W2,5", [("M102", "2,5")]),
+        ("F-640", [("M102", "-640")]),
+        ("Fl2800", [("M102", "l2800")]),
+        ("f1O", [("M102", "O")]),
+        ("F" + "1" * 5000, [("M102", "1" * 5000)]),
+        ("F640 R", [("M103", "R")]),
+        ("[ ]", [("M103", "]")]),
+        ("R5", [("M104", "5")]),
+        ("G+5", [("M104", "5")]),
+        ("@", [("M105", "")]),
+        ("X", [("M105", "")]),
+        ("XH", [("M105", "")]),
+        ("I", [("M106", "")]),
+        ("I2", [("M106", "")]),
+        ("I2X5", [("M106", "")]),
+        ("I2H", [("M106", "")]),
+        ("i116", [("M106", "116")]),
+        ("X55", [("M102", "5")]),
+    ],
+)
+def test_what_cannot_be_read_is_pointed_at(text: str, found: list[tuple[str, str]]) -> None:
+    assert problems(text) == found
+    assert parse(text).program.commands == []
+
+
+@pytest.mark.parametrize(
+    ("text", "mended"),
+    [
+        ("i116", "i1L6"),  # printed so in the manual's example of Subroutine
+        ("Fl28O0", "F12800"),
+        ("120", "L20"),
+        ("’3", "'3"),
+        ("×2", "*2"),
+        ("R5", "R"),
+        ("F640R", "F640\nR"),
+    ],
+)
+def test_suggestions_mend_the_line(text: str, mended: str) -> None:
+    (diagnostic,) = parse(text).diagnostics
+    fix = diagnostic.fix
+    assert fix is not None
+    assert text[: fix.span.start] + fix.text + text[fix.span.end :] == mended
+    assert parse(mended).diagnostics == []
+
+
+def test_no_suggestion_where_nothing_sensible_is_near() -> None:
+    assert [d.fix for d in parse("1\nI199\nfoo").diagnostics[:2]] == [None, None]
+
+
+def test_a_broken_line_does_not_hide_the_next() -> None:
+    text = "F640\n%%\nI2\nR\nR5\nD"
+    program, diagnostics = parse(text)
+    assert program.commands == [Command("F", 640), Command("R"), Command("D")]
+    assert [d.code for d in diagnostics] == ["M101", "M106", "M104"]
+
+
+def test_what_can_be_understood_of_a_broken_line_is_kept() -> None:
+    program, _ = parse("@1 F640\nR5")
+    assert program.commands == []
+    assert program.all_commands == [Command("@", 1), Command("F", 640), Command("R")]
+
+
+def test_one_form_in_print() -> None:
+    text = " f 12800;go\n;\nr\n\n i2h3 ; if\nzz zz\n"
+    assert format_program(parse(text).program) == "F12800      ; go\n;\nR\n\nI2H3        ; if\nzz zz\n"
+    assert format_program(parse("f1\nr").program, end="\r") == "F1\rR\r"
+
+
+@pytest.mark.parametrize("number", range(1, 7))
+def test_examples_of_the_manual_survive_print(manual_examples: dict[int, str], number: int) -> None:
+    program, diagnostics = parse(manual_examples[number])
+    assert diagnostics == []
+    assert program.commands
+    assert parse(format_program(program)).program == program
+
+
+@pytest.mark.parametrize("v", [variant("A"), variant("E1")], ids=lambda v: v.name)
+@given(data=st.data())
+def test_permitted_programs_survive_print(
+    v: Variant, permitted_programs: Callable[[Variant], st.SearchStrategy[Program]], data: st.DataObject
+) -> None:
+    program = data.draw(permitted_programs(v))
+    again, diagnostics = parse(format_program(program))
+    assert diagnostics == []
+    assert again == program
+
+
+@given(data=st.data())
+def test_commands_are_read_however_they_are_written(
+    permitted_programs: Callable[[Variant], st.SearchStrategy[Program]], data: st.DataObject
+) -> None:
+    program = data.draw(permitted_programs(variant("B")))
+    texts = []
+    for command in program.commands:
+        cased = "".join(data.draw(st.sampled_from([c.lower(), c.upper()])) for c in str(command))
+        blanks = [data.draw(st.sampled_from(["", "", " ", "\t "])) for _ in cased]
+        tail = data.draw(st.sampled_from(["", ";", " ; R", ";F640;"]))
+        end = data.draw(st.sampled_from(["\r", "\n", "\r\n"]))
+        texts.append("".join(b + c for b, c in zip(blanks, cased, strict=True)) + tail + end)
+    found, diagnostics = parse("".join(texts))
+    assert {d.code for d in diagnostics} <= {"M202"}
+    assert found.commands == program.commands
+
+
+@given(st.text(st.characters(codec="utf-8"), max_size=80) | st.text("@FGIJXRhl12;:-+. \t\r\n'", max_size=80))
+@example("I" + "1" * 20 + "H3")
+@example("\x85F1\u2028R")
+def test_any_text_is_read_and_survives_print(text: str) -> None:
+    program, diagnostics = parse(text)
+    assert all(0 <= d.span.start <= d.span.end <= len(text) for d in diagnostics)
+    assert any(line.broken is not None for line in program.lines) == any(d.code.startswith("M1") for d in diagnostics)
+    assert parse(format_program(program)).program == program
+
+
+def test_equality_is_about_meaning_not_place() -> None:
+    assert parse("F640").program == parse("  f 640").program == Program((Line(Command("F", 640)),))
+    assert parse("I2H3").program != parse("I2L3").program
