@@ -1,0 +1,82 @@
+"""Which IF, ELSE, ENDIF, WHILE and ENDWHILE belong together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from steptwin.diagnostics import Diagnostic
+from steptwin.wbc import findings as f
+from steptwin.wbc.findings import Finding, Spanned
+
+
+@dataclass(slots=True)
+class Blocks:
+    """Step numbers: ``close`` of IF, ELSE and WHILE, ``middle`` (the ELSE) of IF, ``open`` (the WHILE) of ENDWHILE.
+
+    A step without its counterpart is in none of them.
+    """
+
+    close: dict[int, int] = field(default_factory=dict)
+    middle: dict[int, int] = field(default_factory=dict)
+    open: dict[int, int] = field(default_factory=dict)
+
+
+_NOT_CLOSED: dict[str, tuple[Finding, str]] = {"IF": (f.IF_NOT_CLOSED, "ENDIF"), "WHILE": (f.WHILE_NOT_CLOSED, "ENDWHILE")}
+_NOT_OPENED: dict[str, tuple[Finding, str]] = {
+    "ELSE": (f.ELSE_WITHOUT_IF, "IF"),
+    "ENDIF": (f.ENDIF_WITHOUT_IF, "IF"),
+    "ENDWHILE": (f.ENDWHILE_WITHOUT_WHILE, "WHILE"),
+}
+
+
+class BlockMatcher:
+    """Takes the block keywords in order. A forgotten end is reported once, at its beginning, and leaves outer blocks alone."""
+
+    def __init__(self, diagnostics: list[Diagnostic]) -> None:
+        self.blocks = Blocks()
+        self._diagnostics = diagnostics
+        self._stack: list[tuple[str, int, Spanned]] = []
+        self._open = {"IF": 0, "WHILE": 0}
+
+    def take(self, keyword: str, step: int, place: Spanned) -> None:
+        if keyword in _NOT_CLOSED:
+            self._stack.append((keyword, step, place))
+            self._open[keyword] += 1
+        elif keyword in _NOT_OPENED:
+            self._continue(keyword, step, place)
+
+    def finish(self) -> Blocks:
+        while self._stack:
+            self._abandon()
+        return self.blocks
+
+    def _continue(self, keyword: str, step: int, place: Spanned) -> None:
+        finding, opening = _NOT_OPENED[keyword]
+        if not self._open[opening]:
+            self._diagnostics.append(finding.at(place, f"{keyword} without {opening}", f"no {opening} is open here"))
+            return
+        while self._stack[-1][0] != opening:
+            self._abandon()
+        _, start, _ = self._stack[-1]
+        blocks = self.blocks
+        if keyword == "ELSE":
+            if start in blocks.middle:
+                self._diagnostics.append(
+                    f.SECOND_ELSE.at(place, "a second ELSE in one IF", "close the inner IF with ENDIF first")
+                )
+            else:
+                blocks.middle[start] = step
+            return
+        self._stack.pop()
+        self._open[opening] -= 1
+        blocks.close[start] = step
+        if keyword == "ENDWHILE":
+            blocks.open[step] = start
+        elif start in blocks.middle:
+            blocks.close[blocks.middle[start]] = step
+
+    def _abandon(self) -> None:
+        keyword, _, place = self._stack.pop()
+        self._open[keyword] -= 1
+        finding, closing = _NOT_CLOSED[keyword]
+        self._diagnostics.append(finding.at(place, f"{keyword} is not closed", f"{closing} is missing"))

@@ -1,0 +1,59 @@
+"""The checker: everything that can be said of a program before it runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from steptwin.diagnostics import Diagnostic, Severity, in_order
+from steptwin.wbc import flow, usage
+from steptwin.wbc.dialect import DEFAULT, Dialect
+from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.resolve import resolve
+from steptwin.wbc.steps import Executable, Illegal
+from steptwin.wbc.syntax import parse
+from steptwin.wbc.tree import Program
+from steptwin.wbc.usage import Setup
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """``executable`` is None when there are errors, or positions without a table. ``lines`` counts the executable lines, wrong
+    ones included. ``diagnostics`` are in text order."""
+
+    text: str
+    program: Program
+    executable: Executable | None
+    lines: int
+    diagnostics: list[Diagnostic]
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        return [d for d in self.diagnostics if d.severity is Severity.ERROR]
+
+
+def check(text: str, positions: PositionTable | None = None, setup: Setup | None = None, dialect: Dialect = DEFAULT) -> Checked:
+    """Everything wrong or doubtful in a program. Never raises.
+
+    Without ``positions`` the names after @ are not checked (one warning says so); without ``setup`` nothing is said of
+    gears, ramps and input interrupts. What depends on the whole program is said once every line it depends on is understood.
+    """
+    program, diagnostics = parse(text)
+    resolution = resolve(program, positions, dialect)
+    executable = resolution.executable
+    diagnostics += resolution.diagnostics
+    diagnostics += usage.endless_waits(executable)
+    wrong = [step for step in executable.steps if isinstance(step, Illegal)]
+    if not any(step.opaque for step in wrong):
+        paths = flow.flow_of(executable)
+        diagnostics += flow.interrupt_ends(paths, executable)
+        diagnostics += flow.unreached(paths, executable)
+        diagnostics += flow.stray_returns(paths)
+    if not wrong:
+        diagnostics += usage.unused_variables(executable, resolution.scope)
+        diagnostics += usage.axes_never_enabled(executable, positions)
+        diagnostics += usage.interrupts(executable, setup)
+        if setup is not None:
+            diagnostics += usage.unequal_axes(executable, setup)
+    wrong_somewhere = any(d.severity is Severity.ERROR for d in diagnostics)
+    runs = resolution.complete and not wrong_somewhere
+    return Checked(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics))

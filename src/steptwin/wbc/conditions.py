@@ -1,0 +1,40 @@
+"""Conditions whose outcome is known before the program runs."""
+
+from __future__ import annotations
+
+from steptwin.wbc.registers import Domain
+from steptwin.wbc.steps import Comparison, Literal, Register, Source
+
+_MIRRORED = {"=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
+
+
+def compare(left: float, sign: str, right: float) -> bool:
+    """The comparison WBC writes with ``sign``."""
+    if sign == "=":
+        return left == right
+    if sign == "<":
+        return left < right
+    if sign == ">":
+        return left > right
+    return left <= right if sign == "<=" else left >= right
+
+
+def outcome(condition: Comparison) -> bool | None:
+    """True or False when the condition always is, from its numbers or from the values its register can have; else None."""
+    left, sign, right = condition.left, condition.sign, condition.right
+    if isinstance(left, Literal):
+        if isinstance(right, Literal):
+            return compare(left.value, sign, right.value)
+        left, sign, right = right, _MIRRORED[sign], left
+    domain = _domain(left)
+    if domain is None or not isinstance(right, Literal):
+        return None
+    value = right.value
+    if sign == "=":
+        return None if domain.has(value) and not (domain.whole and value != int(value)) else False
+    at_low, at_high = compare(domain.low, sign, value), compare(domain.high, sign, value)
+    return at_low if at_low == at_high else None
+
+
+def _domain(source: Source) -> Domain | None:
+    return source.row.reads if isinstance(source, Register) else None

@@ -1,0 +1,269 @@
+"""From a compiled image back to source. Labels and names of positions are invented: the image has none.
+
+Building what comes out gives the same bytes again. What is not known, or known but written in a form the builder would not
+write, becomes a ``//!record`` line (a comment to the vendor's tool, raw data to the builder); a row no position table can
+express becomes a ``//!position`` line.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from itertools import pairwise
+
+from steptwin.diagnostics import Source
+from steptwin.errors import Misuse
+from steptwin.wbc import image as im
+from steptwin.wbc.check import check
+from steptwin.wbc.events import INPUT_LABELS
+from steptwin.wbc.positions import PARAMETERS, PositionTable, number_text, table_of
+from steptwin.wbc.printer import format_text
+from steptwin.wbc.registers import REAL_MAX, ROWS
+from steptwin.wbc.syntax import POSITION_MARK, RECORD_MARK
+from steptwin.wire.crc import crc16
+
+_REAL = struct.Struct("<f")
+_TITLE = "// Decompiled from a compiled image: labels and names of positions are invented."
+_CLASSES = {code: ROWS[key] for key, code in im.REGISTER_CLASSES.items()}
+_ALONE = {im.RETURN: "RETURN", im.WAITPOS: "WAITPOS"}
+
+
+class ImageError(Misuse):
+    """Not a compiled image, or a damaged one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """The used records (16 bytes each) and the used rows (18 bytes each)."""
+
+    records: tuple[bytes, ...]
+    rows: tuple[bytes, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Decompiled:
+    """``unknown`` counts the records that stayed raw data."""
+
+    text: str
+    positions: PositionTable
+    unknown: int
+
+
+def read_image(data: bytes) -> Image:
+    """The used part of an image. Raises `ImageError` when size, counts, CRCs or unused bytes are not those of an image."""
+    if len(data) != im.SIZE:
+        raise ImageError(f"not a compiled image: {len(data)} bytes instead of {im.SIZE}")
+    commands = _used(data, 0, im.COMMANDS_AT, im.SLOT_BYTES, "commands")
+    rows = _used(data, im.ROWS_AT, im.POSITIONS_AT, im.ROW_BYTES, "positions")
+    return Image(commands, rows)
+
+
+def _used(data: bytes, start: int, end: int, size: int, what: str) -> tuple[bytes, ...]:
+    count = int.from_bytes(data[end : end + 2], "little")
+    most = (end - start) // size
+    if count > most:
+        raise ImageError(f"damaged image: {count} {what}, permitted are 0…{most}")
+    used = data[start : start + count * size]
+    told, found = int.from_bytes(data[end + 2 : end + 4], "big"), crc16(used)
+    if told != found:
+        raise ImageError(f"damaged image: the CRC of the {what} is {told:04X}, their bytes give {found:04X}")
+    if any(data[start + count * size : end]):
+        raise ImageError(f"damaged image: bytes after the {count} {what} are not 0")
+    return tuple(used[n : n + size] for n in range(0, len(used), size))
+
+
+def decompile(data: bytes) -> Decompiled:
+    """Source and position table of an image. Raises `ImageError` for bytes that are none."""
+    image = read_image(data)
+    table, raw_rows = _table(image.rows)
+    raw: set[int] = set()
+    while True:
+        attempt = _Attempt(image.records, len(image.rows), raw, raw_rows)
+        text = attempt.text()
+        wrong = _differing(text, attempt, table, image)
+        if not wrong:
+            return Decompiled(text, table, len(attempt.raw))
+        if wrong <= attempt.raw:
+            raise ImageError(f"slots {sorted(wrong)} of this image cannot be written as source")
+        raw = attempt.raw | wrong
+
+
+def _differing(text: str, attempt: _Attempt, table: PositionTable, image: Image) -> set[int]:
+    """The slots whose line is refused by the checker, or would be built into other bytes."""
+    checked = check(text, table)
+    if checked.executable is None:
+        lines = Source("", text)
+        return {attempt.slot_of_line(lines.position(d.span.start)[0]) for d in checked.errors}
+    built, refused = im.build(checked.executable, table)
+    if built is None:
+        raise ImageError(f"the source of this image cannot be built: {refused[0].message}")
+    records = read_image(built).records
+    return {slot for slot, record in enumerate(image.records) if records[slot] != record}
+
+
+# ---------------------------------------------------------------------- rows
+
+
+def _table(rows: tuple[bytes, ...]) -> tuple[PositionTable, dict[int, bytes]]:
+    """The table of the rows, and those it cannot express."""
+    named = [(f"P{index}", _row_values(row)) for index, row in enumerate(rows)]
+    table = table_of(named)
+    raw = {
+        index: row for index, row in enumerate(rows) if im.row_bytes(table.rows[index], rows[index - 1] if index else None) != row
+    }
+    return table, raw
+
+
+def _row_values(row: bytes) -> list[float | None]:
+    mask = int.from_bytes(row[:2], "big")
+    values = struct.unpack("<4f", row[2:])
+    return [_shortest(values[n]) if mask & 1 << n and math.isfinite(values[n]) else None for n in range(PARAMETERS)]
+
+
+def _shortest(value: float) -> float:
+    """The number with the fewest digits that is this REAL."""
+    for digits in range(1, 9):
+        candidate = float(f"{value:.{digits}g}")
+        if abs(candidate) <= REAL_MAX and _REAL.pack(candidate) == _REAL.pack(value):
+            return candidate
+    return value
+
+
+# ---------------------------------------------------------------------- records
+
+
+class _Attempt:
+    """One way to write the records: slots in ``raw`` are written as data, and so is what cannot be read."""
+
+    def __init__(self, records: tuple[bytes, ...], rows: int, raw: set[int], raw_rows: dict[int, bytes]) -> None:
+        self.raw = set(raw)
+        self._records = records
+        self._rows = rows
+        self._raw_rows = raw_rows
+        self._labels: dict[int, str] = {}
+        self._line_slots: list[int] = []
+
+    def text(self) -> str:
+        records = self._records
+        self.raw |= _stray_blocks(records, self.raw)
+        entries = {
+            slot: record[1] + 1
+            for slot, record in enumerate(records)
+            if slot not in self.raw and record[0] == im.ENTRY and record[1] < INPUT_LABELS
+        }
+        for slot, record in enumerate(records):
+            target = int.from_bytes(record[1:3], "little")
+            if record[0] == im.JUMP and slot not in self.raw:
+                self._labels[target] = f"INT_IN{entries[target]}" if target in entries else f"L{target}"
+        lines = [_TITLE, *(f"{POSITION_MARK} {index} {row.hex()}" for index, row in self._raw_rows.items())]
+        self._line_slots = [0] * len(lines)
+        for slot, record in enumerate(records):
+            if slot in self._labels and slot not in entries:
+                lines.append(f"{self._labels[slot]}:")
+                self._line_slots.append(slot)
+            statement = None if slot in self.raw else self._statement(record)
+            if statement is None:
+                self.raw.add(slot)
+                statement = f"{RECORD_MARK} {record.hex()}"
+            lines.append(statement)
+            self._line_slots.append(slot)
+        return format_text("".join(line + "\n" for line in lines))
+
+    def slot_of_line(self, line: int) -> int:
+        """The slot a line (from 1) of the text stands for, for a label the slot it names; lines above count as slot 0."""
+        return self._line_slots[line - 1]
+
+    def _statement(self, record: bytes) -> str | None:
+        op = record[0]
+        if op == im.SET:
+            target, value = _register(record[1], record[2]), self._value(record[5:10])
+            return None if target is None or value is None else f"SET {target} = {value}"
+        if op in (im.IF, im.WHILE, im.WAIT):
+            condition = self._condition(record)
+            keyword = {im.IF: "IF", im.WHILE: "WHILE", im.WAIT: "WAIT"}[op]
+            return None if condition is None else f"{keyword} {condition}"
+        if op in _BLOCK_ENDS:
+            return _BLOCK_ENDS[op]
+        if op == im.DELAY:
+            seconds = self._value(record[1:6])
+            return None if seconds is None else f"DELAY {seconds}"
+        if op == im.JUMP:
+            target = int.from_bytes(record[1:3], "little")
+            return f"JUMP {self._labels[target]}" if target < len(self._records) else None
+        if op == im.ENTRY:
+            return f"INT_IN{record[1] + 1}:" if record[1] < INPUT_LABELS else None
+        if op == im.HOME:
+            velocity = self._value(record[3:8])
+            return None if velocity is None else f"HOME M{record[2]} {velocity}"
+        if op == im.MOVEPTP:
+            row = self._value(record[1:6])
+            return None if row is None else f"MOVEPTP {self._row(row)}"
+        return _ALONE.get(op)
+
+    def _row(self, index: str) -> str:
+        return f"@P{index}" if index.isdigit() and int(index) < self._rows else index
+
+    def _condition(self, record: bytes) -> str | None:
+        left, right, sign = self._value(record[1:6]), self._value(record[7:12]), chr(record[6])
+        return None if left is None or right is None or sign not in im.CONDITION_SIGNS else f"{left} {sign} {right}"
+
+    def _value(self, data: bytes) -> str | None:
+        if data[0] in (im.WHOLE, im.FRACTION):
+            (value,) = _REAL.unpack(data[1:])
+            return number_text(_shortest(value)) if math.isfinite(value) else None
+        return _register(data[0], data[1])
+
+
+_BLOCK_ENDS = {im.ENDIF: "ENDIF", im.ELSE: "ELSE", im.ENDWHILE: "ENDWHILE"}
+_BLOCKS = frozenset({im.IF, im.WHILE, *_BLOCK_ENDS})
+
+
+def _register(code: int, number: int) -> str | None:
+    row = _CLASSES.get(code)
+    return None if row is None else f"{row.name}{number}"
+
+
+def _stray_blocks(records: tuple[bytes, ...], raw: set[int]) -> set[int]:
+    """Block records that do not belong to a block whose parts name each other and which nests in the others."""
+    claims: dict[int, tuple[int, ...]] = {}
+    for slot, record in enumerate(records):
+        if record[0] in (im.IF, im.WHILE) and slot not in raw:
+            parts = _block(records, slot)
+            if parts and not raw.intersection(parts):
+                claims[slot] = parts
+    kept: set[int] = set()
+    open_blocks: list[tuple[int, ...]] = []
+    for slot in range(len(records)):
+        while open_blocks and open_blocks[-1][-1] < slot:
+            open_blocks.pop()
+        parts = claims.get(slot)
+        if parts is None or (open_blocks and not _nests(parts, open_blocks[-1])) or kept.intersection(parts):
+            continue
+        kept.update(parts)
+        open_blocks.append(parts)
+    return {slot for slot, record in enumerate(records) if record[0] in _BLOCKS and slot not in kept}
+
+
+def _block(records: tuple[bytes, ...], slot: int) -> tuple[int, ...] | None:
+    """The slots of the block that begins here, in order, when its records name each other."""
+    record, count = records[slot], len(records)
+    close = int.from_bytes(record[12:14], "little")
+    if not slot < close < count:
+        return None
+    if record[0] == im.WHILE:
+        back = int.from_bytes(records[close][12:14], "little")
+        return (slot, close) if records[close][0] == im.ENDWHILE and back == slot else None
+    if records[close][0] != im.ENDIF:
+        return None
+    middle = int.from_bytes(record[14:16], "little")
+    if middle == 0:
+        return slot, close
+    if not slot < middle < close or records[middle][0] != im.ELSE:
+        return None
+    return (slot, middle, close) if int.from_bytes(records[middle][12:14], "little") == close else None
+
+
+def _nests(inner: tuple[int, ...], outer: tuple[int, ...]) -> bool:
+    """Whether a block lies between two neighbouring parts of another."""
+    return any(before < inner[0] and inner[-1] < after for before, after in pairwise(outer))

@@ -1,0 +1,123 @@
+"""Every message about a WBC program, a position table or an image has a row here: code, severity, title.
+
+``W1…`` are errors, ``W2…`` warnings. Codes are stable: a code is never given a new meaning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
+
+
+class Spanned(Protocol):
+    """Anything with a place in the source: a tree node, a step, a token."""
+
+    @property
+    def start(self) -> int: ...
+    @property
+    def end(self) -> int: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One kind of message. ``title`` says in general what ``at`` says of one place."""
+
+    code: str
+    title: str
+
+    @property
+    def severity(self) -> Severity:
+        return Severity.ERROR if self.code.startswith("W1") else Severity.WARNING
+
+    def at(self, place: Spanned, message: str, hint: str | None = None, fix: str | None = None) -> Diagnostic:
+        """The message for one place; ``fix`` is the text that should stand there instead."""
+        span = Span(place.start, place.end)
+        return Diagnostic(self.code, self.severity, span, message, hint, None if fix is None else Fix(span, fix))
+
+
+FINDINGS: dict[str, Finding] = {}
+
+
+def _row(code: str, title: str) -> Finding:
+    if code in FINDINGS:
+        raise ValueError(f"code {code} is given twice")
+    return FINDINGS.setdefault(code, Finding(code, title))
+
+
+TRAILING = _row("W101", "characters after the end of a command")
+ILLEGAL_CHARACTER = _row("W102", "illegal character in a name")
+RESERVED = _row("W103", "the name is reserved (register, keyword, predefined name, existing position)")
+UNKNOWN_VARIABLE = _row("W104", "the name is used as a value but never given one")
+BAD_LABEL = _row("W105", "a label is malformed")
+NUMERIC_LABEL = _row("W106", "a label is a number")
+RESERVED_LABEL = _row("W107", "a label has a reserved name")
+DUPLICATE_LABEL = _row("W108", "a label is defined twice")
+MISSING_LABEL = _row("W109", "JUMP without a label")
+UNKNOWN_LABEL = _row("W110", "JUMP to a label that is not defined")
+LABEL_AT_END = _row("W111", "nothing follows the label")
+NO_RETURN = _row("W112", "an interrupt label without RETURN")
+MISSING_WAIT = _row("W113", "WAIT or another condition lacks an argument")
+WRONG_WAIT = _row("W114", "WAIT or another condition has a wrong argument")
+MISSING_EQUALS = _row("W115", "= is missing")
+WRONG_OPERATOR = _row("W116", "wrong operator")
+UNKNOWN_FUNCTION = _row("W117", "unknown function")
+MISSING_VALUE = _row("W118", "a number or a name is missing")
+WRONG_NUMBER = _row("W119", "not a number")
+TOO_FEW = _row("W120", "too few arguments")
+TOO_MANY = _row("W121", "too many arguments")
+OUT_OF_RANGE = _row("W122", "number out of range")
+TOO_MANY_VARIABLES = _row("W123", "too many variables")
+USER_ADDRESS = _row("W124", "user register address out of range")
+ODD_ADDRESS = _row("W125", "odd address of a two-word user register")
+UNKNOWN_POSITION = _row("W126", "the position is not in the table")
+MOTION_WITHOUT_DRIVE = _row("W127", "a motion command without drive")
+HALT_WITHOUT_DRIVE = _row("W128", "BRAKE or STOP without drive")
+READ_ONLY = _row("W129", "write to a read-only register")
+ELSE_WITHOUT_IF = _row("W130", "ELSE without IF")
+ENDIF_WITHOUT_IF = _row("W131", "ENDIF without IF")
+IF_NOT_CLOSED = _row("W132", "IF is not closed by ENDIF")
+SECOND_ELSE = _row("W133", "a second ELSE in one IF")
+ENDWHILE_WITHOUT_WHILE = _row("W134", "ENDWHILE without WHILE")
+WHILE_NOT_CLOSED = _row("W135", "WHILE is not closed by ENDWHILE")
+TOO_MANY_LINES = _row("W136", "too many executable lines")
+UNKNOWN_STATEMENT = _row("W137", "unknown statement")
+NOT_SUPPORTED = _row("W138", "a statement of later firmware whose syntax is not documented")
+NOT_IN_FIRMWARE = _row("W139", "not available in this firmware")
+NO_SUCH_REGISTER = _row("W140", "no register with this number")
+BAD_CONSTANT = _row("W141", "a constant is malformed")
+DUPLICATE_CONSTANT = _row("W142", "a constant is defined twice")
+NOT_ASSIGNABLE = _row("W143", "a constant cannot be assigned")
+WRONG_ARGUMENT = _row("W144", "wrong argument")
+BAD_RECORD = _row("W145", "malformed //!record or //!position")
+ROW_PARAMETERS = _row("W146", "a row lacks a parameter of the path, or the path does not exist")
+
+TABLE_COLUMNS = _row("W150", "a row of the position table has too few or too many columns")
+TABLE_NUMBER = _row("W151", "a cell of the position table is neither a number nor x")
+TABLE_DUPLICATE = _row("W152", "two rows of the position table have one name")
+TABLE_TOO_LONG = _row("W153", "too many rows in the position table")
+TABLE_BLANK = _row("W154", "an empty line inside the position table")
+
+NOT_ENCODABLE = _row("W160", "the compiled image of firmware 1.25 has no documented form for this")
+IMAGE_FULL = _row("W161", "the program is too long for the image")
+
+LEFT_BY_JUMP = _row("W201", "an interrupt label whose every path leaves without RETURN")
+GEARS_DIFFER = _row("W202", "GEAR of M1 and M2 differ, and a circle is drawn")
+RAMPS_DIFFER = _row("W203", "the ramps of M1 and M2 differ, and a line is drawn")
+NEVER_REACHED = _row("W204", "code is never reached")
+NEVER_ENDS = _row("W205", "a WAIT that can never end")
+NEVER_USED = _row("W206", "a variable is assigned but never used")
+NEVER_ENABLED = _row("W207", "motion of an axis that the program never enables")
+NO_HANDLER = _row("W208", "an interrupt is enabled without a label")
+NO_AXIS = _row("W209", "the row names no axis")
+INTERRUPT_OFF = _row("W210", "an interrupt label whose interrupt is never enabled")
+SATURATES = _row("W211", "the register cannot hold the number and takes the nearest one")
+SHORT_DELAY = _row("W212", "DELAY is rounded up")
+STATUS_IS_ZERO = _row("W213", "STATUS reads 0 in this firmware")
+AMBIGUOUS_COMMA = _row("W214", "a comma read as separator could be a decimal comma")
+POSITIONS_UNCHECKED = _row("W215", "positions are not checked without a position table")
+NOT_EXECUTABLE = _row("W216", "an unknown record of an image cannot be executed")
+STRAY_RETURN = _row("W217", "RETURN can be reached although no JUMP was taken")
+ALWAYS_FAILS = _row("W218", "a calculation that always stops the program with an error")
+TABLE_NAME = _row("W250", "a name of the position table cannot be written after @")

@@ -1,0 +1,151 @@
+"""Where a program can go: unreachable code, interrupt labels without RETURN, RETURN without JUMP.
+
+JUMP remembers the next line, so that line is reached when the code at the label can RETURN. "Can return" means: a RETURN is
+reached that takes back the JUMP which led here, every JUMP on the way having been taken back itself. Every question is answered
+in time linear in the number of steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from steptwin.diagnostics import Diagnostic
+from steptwin.wbc import findings as f
+from steptwin.wbc import steps as s
+from steptwin.wbc.conditions import outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """Per step: where it goes on within its level (``after``, past the end is ``len(steps)``) and whether it can return."""
+
+    steps: tuple[s.Step, ...]
+    after: list[tuple[int, ...]]
+    returns: list[bool]
+
+
+def flow_of(executable: s.Executable) -> Flow:
+    steps = executable.steps
+    after = [_after(number, step) for number, step in enumerate(steps)]
+    return Flow(steps, after, _returns(steps, after))
+
+
+def _after(number: int, step: s.Step) -> tuple[int, ...]:
+    """Where a step goes on. For JUMP: the next line, which it reaches only when its target can return."""
+    match step:
+        case s.If() | s.While():
+            failed = step.otherwise if isinstance(step, s.If) else step.close + 1
+            known = outcome(step.condition)
+            if known is None:
+                return number + 1, failed
+            return (number + 1,) if known else (failed,)
+        case s.Else(close=close):
+            return (close,)
+        case s.EndWhile(open=opened):
+            return (opened,)
+        case s.Return() | s.End() | s.ProgReset():
+            return ()
+        case _:
+            return (number + 1,)
+
+
+def _returns(steps: tuple[s.Step, ...], after: list[tuple[int, ...]]) -> list[bool]:
+    """Found backwards from every RETURN. A JUMP can return when both its target and the line after it can."""
+    count = len(steps)
+    before: list[list[int]] = [[] for _ in range(count + 1)]
+    callers: list[list[int]] = [[] for _ in range(count + 1)]
+    for number, step in enumerate(steps):
+        if isinstance(step, s.Jump):
+            callers[step.target].append(number)
+        else:
+            for following in after[number]:
+                before[following].append(number)
+    can = [False] * (count + 1)
+    work = [number for number, step in enumerate(steps) if isinstance(step, s.Return)]
+    while work:
+        number = work.pop()
+        if can[number]:
+            continue
+        can[number] = True
+        work += before[number]
+        work += [caller for caller in callers[number] if can[caller + 1]]
+        if number:
+            previous = steps[number - 1]
+            if isinstance(previous, s.Jump) and can[previous.target]:
+                work.append(number - 1)
+    return can
+
+
+def _level(flow: Flow, start: int, barriers: frozenset[int] = frozenset()) -> Iterator[int]:
+    """The steps reached from one without following JUMPs, past the end included, but not beyond other ``barriers``."""
+    seen: set[int] = set()
+    work = [start]
+    while work:
+        number = work.pop()
+        if number in seen:
+            continue
+        seen.add(number)
+        yield number
+        if number < len(flow.steps) and (number == start or number not in barriers):
+            step = flow.steps[number]
+            if not isinstance(step, s.Jump) or flow.returns[step.target]:
+                work += flow.after[number]
+
+
+def interrupt_ends(flow: Flow, executable: s.Executable) -> list[Diagnostic]:
+    """Interrupt labels that never come to a RETURN of their own."""
+    found: list[Diagnostic] = []
+    entries = frozenset(executable.entries.values())
+    for event, entry in executable.entries.items():
+        numbers = [number for number in _level(flow, entry, entries) if number != entry]
+        ends = [flow.steps[number] if number < len(flow.steps) else None for number in numbers]
+        if any(isinstance(step, s.Return) for step in ends):
+            continue
+        place = flow.steps[entry]
+        falls = any(step is None or isinstance(step, s.Entry) for step in ends)
+        if falls or not any(isinstance(step, s.Jump | s.End | s.ProgReset) for step in ends):
+            message = f"the interrupt label of {event.name} has no RETURN"
+            found.append(f.NO_RETURN.at(place, message, "end it with RETURN, or leave it by JUMP"))
+        else:
+            message = f"every path from the interrupt label of {event.name} leaves without RETURN"
+            found.append(f.LEFT_BY_JUMP.at(place, message, "the interrupted line is not continued"))
+    return found
+
+
+def unreached(flow: Flow, executable: s.Executable) -> list[Diagnostic]:
+    """The first line of every stretch of code that nothing leads to. A RETURN or END that only closes a stretch is no finding."""
+    steps, count = flow.steps, len(flow.steps)
+    seen = [False] * (count + 1)
+    work = [0, *executable.entries.values()]
+    while work:
+        number = work.pop()
+        if seen[number]:
+            continue
+        seen[number] = True
+        if number == count:
+            continue
+        step = steps[number]
+        if isinstance(step, s.Jump):
+            work.append(step.target)
+            if not flow.returns[step.target]:
+                continue
+        work += flow.after[number]
+    found: list[Diagnostic] = []
+    told = False
+    for number, step in enumerate(steps):
+        if seen[number]:
+            told = False
+        elif not told and not isinstance(step, s.Else | s.EndIf | s.EndWhile | s.Return | s.End):
+            told = True
+            found.append(f.NEVER_REACHED.at(step, "this line is never reached", "no label or interrupt leads here"))
+    return found
+
+
+def stray_returns(flow: Flow) -> list[Diagnostic]:
+    """RETURNs the program can come to with no JUMP to take back."""
+    if not flow.steps or not flow.returns[0]:
+        return []
+    hint = "end the program above with END or JUMP; a RETURN without JUMP is a program error"
+    strays = [flow.steps[number] for number in _level(flow, 0) if number < len(flow.steps)]
+    return [f.STRAY_RETURN.at(step, "RETURN without a JUMP", hint) for step in strays if isinstance(step, s.Return)]

@@ -1,0 +1,53 @@
+"""The words of one line of WBC. Every character belongs to a token or is blank; nothing is ever refused here."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+NUMBER = 1
+WRONG_NUMBER = 2
+WORD = 3
+COMPARISON = 4
+OPERATOR = 5
+MARK = 6
+"""One of ``( ) , : @ #``."""
+STRANGE = 7
+"""A character that means nothing in WBC."""
+
+
+class Token(NamedTuple):
+    kind: int
+    text: str
+    start: int
+    end: int
+
+
+# The order decides: a whole number before a part of one, long operators before short ones. A comma or point followed by a
+# digit is a decimal sign. A word takes in what nobody could have meant as something else (`a.b`, `a?`), so that the message
+# can speak of the name.
+_TOKEN = re.compile(
+    r"""
+      ( [0-9]+ (?: [.,][0-9]+ )? (?! [\w.] ) )
+    | ( \.?[0-9] [\w.]* )
+    | ( (?: \$ | [^\W\d] ) [\w.?!"'~\\`\[\]{};$]* (?<! ; ) )
+    | ( <= | >= | <> | != | == | =< | => | =(?!=) | <(?!<) | >(?!>) )
+    | ( && | \|\| | << | >> | [-+*/%&|^] )
+    | ( [(),:@#] )
+    | ( \S )
+    """,
+    re.VERBOSE,
+)
+
+
+def tokens(text: str, offset: int) -> list[Token]:
+    """Tokens of a line without its comment. ``offset`` is where the line begins in the source."""
+    return [
+        Token(match.lastindex or STRANGE, match[0], match.start() + offset, match.end() + offset)
+        for match in _TOKEN.finditer(text)
+    ]
+
+
+def is_name(text: str) -> bool:
+    """Whether a text is a name: letters without accents, digits, underscore, no digit first."""
+    return text.isascii() and text.isidentifier()

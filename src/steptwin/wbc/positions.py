@@ -1,0 +1,183 @@
+"""Position tables (`.csv`): one line per row, ``name;p1;p2;p3;p4``, ``x`` = leave this axis or parameter alone.
+
+Values are in configured units (positions), units per second (path velocity) or degrees (angle), as the statement that uses the
+row takes them. Rows count from 0. A table knows the text it was read from and gives it back unchanged.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from steptwin.diagnostics import Diagnostic, Span
+from steptwin.errors import Misuse
+from steptwin.wbc import findings as f
+from steptwin.wbc.dialect import MAX_POSITIONS
+from steptwin.wbc.lexer import is_name
+from steptwin.wbc.registers import REAL_MAX
+
+PARAMETERS = 4
+_NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?$")
+_LEFT_ALONE = "x"
+
+
+@dataclass(frozen=True, slots=True)
+class PositionRow:
+    """``values`` are p1…p4, None for ``x``. ``start`` and ``end`` are the place of the line in the text."""
+
+    name: str
+    values: tuple[float | None, ...]
+    start: int = field(default=0, compare=False)
+    end: int = field(default=0, compare=False)
+
+    @property
+    def mask(self) -> int:
+        """The axes the row names, bit 0 = M1."""
+        return sum(1 << n for n, value in enumerate(self.values) if value is not None)
+
+
+@dataclass(frozen=True)
+class PositionTable:
+    """Frozen rows and the text they stand in."""
+
+    rows: tuple[PositionRow, ...] = ()
+    text: str = ""
+    _index: dict[str, int] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        index: dict[str, int] = {}
+        for number, row in enumerate(self.rows):
+            if row.name:
+                index.setdefault(row.name.upper(), number)
+        object.__setattr__(self, "_index", index)
+
+    def index(self, name: str) -> int | None:
+        """Number of the row with this name (either case), from 0; None when there is none."""
+        return self._index.get(name.upper())
+
+    def names(self) -> list[str]:
+        return [row.name for row in self.rows if row.name]
+
+    def with_row(self, index: int, name: str, values: Sequence[float | None]) -> PositionTable:
+        """The table with one row changed, or appended when ``index`` is the number of rows; every other line stays as it was."""
+        if not 0 <= index <= len(self.rows) or index >= MAX_POSITIONS:
+            last = min(len(self.rows), MAX_POSITIONS - 1)
+            raise Misuse(f"row {index} cannot be written: permitted are 0…{last}")
+        if len(values) != PARAMETERS:
+            raise Misuse(f"row {index} needs {PARAMETERS} values, got {len(values)}")
+        if name and not is_name(name) and not (index < len(self.rows) and self.rows[index].name == name):
+            raise Misuse(f"{name!r} cannot be the name of row {index}: permitted are letters without accents, digits and _")
+        line = row_text(name, values)
+        if index < len(self.rows):
+            old = self.rows[index]
+            text = self.text[: old.start] + line + self.text[old.end :]
+        else:
+            line_end = "\r\n" if "\r\n" in self.text else "\n"
+            text = self.text.rstrip()
+            text = f"{text}{line_end if text else ''}{line}{line_end}"
+        return parse_positions(text)[0]
+
+
+def row_text(name: str, values: Sequence[float | None]) -> str:
+    """A line of the table; numbers are written so that reading them gives the same REAL."""
+    return ";".join([name, *(_LEFT_ALONE if value is None else number_text(value) for value in values)])
+
+
+def number_text(value: float) -> str:
+    """The shortest decimal number, without exponent, that gives this value when read."""
+    if not math.isfinite(value):
+        raise Misuse(f"{value} cannot be written as a number: permitted are finite numbers")
+    text = repr(value)
+    if "e" not in text:
+        return text.removesuffix(".0")
+    mantissa, _, exponent = text.lower().partition("e")
+    sign = "-" if mantissa.startswith("-") else ""
+    whole, _, fraction = mantissa.lstrip("-").partition(".")
+    digits, point = whole + fraction, len(whole) + int(exponent)
+    if point <= 0:
+        return f"{sign}0.{'0' * -point}{digits}"
+    return f"{sign}{digits[:point].ljust(point, '0')}{'.' + digits[point:] if digits[point:] else ''}"
+
+
+def table_of(rows: Sequence[tuple[str, Sequence[float | None]]]) -> PositionTable:
+    """A table of its own making, not from a file."""
+    table, diagnostics = parse_positions("".join(row_text(name, values) + "\n" for name, values in rows))
+    if diagnostics:
+        raise Misuse(diagnostics[0].message)
+    return table
+
+
+def parse_positions(text: str) -> tuple[PositionTable, list[Diagnostic]]:
+    """The table of a text and what is wrong with it. Never raises.
+
+    A wrong cell counts as ``x``, so that rows keep their numbers.
+    """
+    rows: list[PositionRow] = []
+    diagnostics: list[Diagnostic] = []
+    names: dict[str, int] = {}
+    blanks: list[Span] = []
+    start = 0
+    for whole in text.splitlines(keepends=True):
+        content = whole.rstrip()
+        span = Span(start, start + len(content))
+        start += len(whole)
+        if not content:
+            blanks.append(span)
+            continue
+        hint = "remove it: rows are counted by lines"
+        diagnostics += [f.TABLE_BLANK.at(blank, "an empty line", hint) for blank in blanks]
+        blanks.clear()
+        row = _row(content, span, diagnostics)
+        key = row.name.upper()
+        if key in names:
+            message = f"{row.name} is already the name of row {names[key]}"
+            diagnostics.append(f.TABLE_DUPLICATE.at(_cell(span.start, content), message, "names differ in more than case"))
+        elif key:
+            names[key] = len(rows)
+        if len(rows) == MAX_POSITIONS:
+            diagnostics.append(f.TABLE_TOO_LONG.at(span, f"more than {MAX_POSITIONS} rows", f"the table holds {MAX_POSITIONS}"))
+        rows.append(row)
+    return PositionTable(tuple(rows), text), diagnostics
+
+
+def _cell(start: int, text: str) -> Span:
+    return Span(start, start + len(text.split(";", 1)[0]))
+
+
+def _row(content: str, span: Span, diagnostics: list[Diagnostic]) -> PositionRow:
+    cells = content.split(";")
+    # A separator after the last value is a habit of spreadsheets.
+    if len(cells) == PARAMETERS + 2 and not cells[-1].strip():
+        cells.pop()
+    if len(cells) != PARAMETERS + 1:
+        message = f"{len(cells)} columns instead of {PARAMETERS + 1}"
+        diagnostics.append(f.TABLE_COLUMNS.at(span, message, "a row is name;p1;p2;p3;p4"))
+    name = cells[0].strip()
+    if name and not is_name(name):
+        hint = "names have letters without accents, digits and _, and do not begin with a digit"
+        diagnostics.append(f.TABLE_NAME.at(_cell(span.start, content), f"{name!r} cannot be written after @", hint))
+    values: list[float | None] = []
+    at = span.start + len(cells[0]) + 1
+    for number, cell in enumerate(cells[1 : PARAMETERS + 1], 1):
+        values.append(_value(cell, number, Span(at, at + len(cell)), diagnostics))
+        at += len(cell) + 1
+    values += [None] * (PARAMETERS - len(values))
+    return PositionRow(name, tuple(values), span.start, span.end)
+
+
+def _value(cell: str, number: int, span: Span, diagnostics: list[Diagnostic]) -> float | None:
+    text = cell.strip()
+    if text.lower() == _LEFT_ALONE:
+        return None
+    hint = "write a number like 20, -70, 20.5 or 20,5, or x to leave the axis alone"
+    if not _NUMBER.match(text):
+        found = repr(text) if text else "nothing"
+        diagnostics.append(f.TABLE_NUMBER.at(span, f"p{number} is {found}, neither a number nor x", hint))
+        return None
+    value = float(text.replace(",", "."))
+    if abs(value) > REAL_MAX:
+        diagnostics.append(f.TABLE_NUMBER.at(span, f"p{number} is beyond the range of REAL, ±{REAL_MAX:.3g}", hint))
+        return None
+    return value

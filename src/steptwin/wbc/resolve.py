@@ -1,0 +1,421 @@
+"""Tree to steps: names, labels, blocks, positions and number ranges. What is found wrong here keeps a program from running."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from steptwin.diagnostics import Diagnostic, Severity
+from steptwin.wbc import findings as f
+from steptwin.wbc import steps as s
+from steptwin.wbc.blocks import BlockMatcher, Blocks
+from steptwin.wbc.dialect import Dialect
+from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS, PREFIX, Event
+from steptwin.wbc.nearmiss import NearMiss
+from steptwin.wbc.paths import names_no_axis, row_problem
+from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.registers import PREDEFINED, parts
+from steptwin.wbc.scope import Scope
+from steptwin.wbc.statements import FUNCTIONS, HALTS, KEYWORDS, MOTIONS, ROW_MOTIONS, SET, STATEMENTS
+from steptwin.wbc.tree import (
+    Assign,
+    Binary,
+    Broken,
+    Call,
+    Command,
+    Condition,
+    Expression,
+    Label,
+    Name,
+    Number,
+    Operand,
+    Position,
+    PositionRecord,
+    Program,
+    Record,
+    Statement,
+)
+
+# WBC-7
+SHORTEST_DELAY_S = 0.01
+_ALONE = {"ENDIF": s.EndIf, "RETURN": s.Return, "END": s.End, "PROGRESET": s.ProgReset, "WAITPOS": s.WaitPos}
+_BRANCHING = frozenset({"IF", "ELSE", "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
+_ROW_0 = frozenset({"PTPM", "CIRCX", "CIRCY", "CIRCR", "CIRCA", "LINX", "LINY", "LINVEL"})
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """``complete`` tells whether the executable may be run: no errors, and every position known."""
+
+    executable: s.Executable
+    scope: Scope
+    complete: bool
+    diagnostics: list[Diagnostic]
+
+
+def resolve(program: Program, positions: PositionTable | None, dialect: Dialect) -> Resolution:
+    """The steps of a program and what is wrong with it beyond single lines. Without a table, positions are not checked."""
+    return _Resolver(program, positions, dialect).resolution()
+
+
+class _Resolver:
+    def __init__(self, program: Program, positions: PositionTable | None, dialect: Dialect) -> None:
+        self._program = program
+        self._positions = positions
+        self._dialect = dialect
+        self._diagnostics: list[Diagnostic] = []
+        self._scope = Scope(program, positions, dialect, self._diagnostics)
+        self._near = NearMiss()
+        self._labels: dict[str, int] = {}
+        self._broken_labels = False
+        self._entries: dict[Event, int] = {}
+        self._records: dict[int, bytes] = {}
+        self._lines: list[Statement] = []
+        self._unchecked = False
+        self._writes_row_0 = False
+
+    def resolution(self) -> Resolution:
+        blocks = self._outline()
+        steps = tuple(self._step(number, statement, blocks) for number, statement in enumerate(self._lines))
+        executable = s.Executable(
+            steps, tuple(name.text for name in self._scope.variables.values()), self._labels, self._entries, self._records
+        )
+        broken = any(isinstance(line.statement, Broken) for line in self._program.lines)
+        wrong = broken or any(d.severity is Severity.ERROR for d in self._diagnostics)
+        return Resolution(executable, self._scope, not wrong and not self._unchecked, self._diagnostics)
+
+    # -- first pass: which statements are steps, where labels are, which blocks belong together
+
+    def _outline(self) -> Blocks:
+        matcher = BlockMatcher(self._diagnostics)
+        lines = self._lines
+        defined: dict[str, Name] = {}
+        last: Label | None = None
+        for line in self._program.lines:
+            statement = line.statement
+            if isinstance(statement, Assign):
+                self._writes_row_0 = self._writes_row_0 or self._scope.family(statement.target) in _ROW_0
+                lines.append(statement)
+            elif isinstance(statement, Record):
+                lines.append(statement)
+            elif isinstance(statement, Command):
+                matcher.take(statement.keyword, len(lines), statement)
+                lines.append(statement)
+            elif isinstance(statement, Label):
+                self._define_label(statement, defined)
+                last = statement
+                continue
+            elif isinstance(statement, Broken):
+                if statement.keyword is not None:
+                    matcher.take(statement.keyword, len(lines), statement)
+                if ":" in statement.text:
+                    self._broken_labels = True
+                lines.append(statement)
+            elif isinstance(statement, PositionRecord):
+                self._records[statement.index] = statement.data
+                self._check_record(statement)
+                continue
+            else:
+                continue
+            last = None
+        if last is not None:
+            self._say(f.LABEL_AT_END.at(last.name, f"nothing follows the label {last.name.text}", "put an END after it"))
+        limit = self._dialect.max_steps
+        if len(lines) > limit:
+            hint = f"firmware {self._dialect.firmware} holds {limit} executable lines"
+            self._say(f.TOO_MANY_LINES.at(lines[limit], f"{len(lines)} executable lines", hint))
+        return matcher.finish()
+
+    def _define_label(self, label: Label, defined: dict[str, Name]) -> None:
+        name, key = label.name, label.name.key
+        found = BY_LABEL.get(key)
+        if key in defined:
+            self._say(f.DUPLICATE_LABEL.at(name, f"the label {name.text} is defined twice", "give one of them another name"))
+            return
+        defined[key] = name
+        if found is None:
+            reason = _reserved_label(key)
+            if key.startswith((PREFIX, HARD_PREFIX)) and key not in PREDEFINED:
+                known = f"INT_IN1…INT_IN{INPUT_LABELS}, INT_MODBUS, INT_TICK"
+                hint = f"{known}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
+                self._say(f.RESERVED_LABEL.at(name, f"{name.text} is no interrupt label, but begins like one", hint))
+            elif reason is not None:
+                self._say(f.RESERVED_LABEL.at(name, f"{name.text} cannot be a label: it is {reason}", "take another name"))
+            self._labels[key] = len(self._lines)
+            return
+        event, hard = found
+        since = HARD_SINCE if hard else event.since
+        if not self._dialect.has(since):
+            hint = f"checked for {self._dialect.firmware}"
+            self._say(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint))
+        if event in self._entries:
+            other = (PREFIX if hard else HARD_PREFIX) + event.name
+            hint = "an event has one label"
+            self._say(f.DUPLICATE_LABEL.at(name, f"{name.text} and {other} are labels of one event", hint))
+        else:
+            self._entries[event] = len(self._lines)
+        self._labels[key] = len(self._lines)
+        self._lines.append(label)
+
+    def _check_record(self, record: PositionRecord) -> None:
+        rows = self._dialect.max_positions if self._positions is None else len(self._positions.rows)
+        if record.index >= rows:
+            hint = f"the table has {_rows(rows)}, numbered from 0"
+            self._say(f.OUT_OF_RANGE.at(record, f"row {record.index} is outside the position table", hint))
+
+    # -- second pass: the steps
+
+    def _step(self, number: int, statement: Statement, blocks: Blocks) -> s.Step:
+        start, end = statement.start, statement.end
+        made: s.Step | None = None
+        keyword: str | None = None
+        if isinstance(statement, Assign):
+            made, keyword = self._assign(statement), SET
+        elif isinstance(statement, Command):
+            made, keyword = self._command(number, statement, blocks), statement.keyword
+        elif isinstance(statement, Label):
+            event, hard = BY_LABEL[statement.name.key]
+            made = s.Entry(start, end, event, hard)
+        elif isinstance(statement, Record):
+            hint = "the program stops with an error when it gets here"
+            self._say(f.NOT_EXECUTABLE.at(statement, "an unknown record cannot be executed", hint))
+            made = s.Illegal(start, end, statement.data, True)
+        elif isinstance(statement, Broken):
+            keyword = SET if statement.target is not None else statement.keyword
+        return made or s.Illegal(start, end, b"", keyword is None or keyword in _BRANCHING)
+
+    def _assign(self, statement: Assign) -> s.Step | None:
+        name = statement.target
+        target = self._scope.target(name)
+        value = self._expression(statement.value)
+        if isinstance(target, s.Register) and isinstance(value, s.Literal):
+            self._check_range(target, value.value, statement)
+        if target is None or value is None:
+            return None
+        return s.Set(statement.start, statement.end, target, value)
+
+    def _check_range(self, target: s.Register, value: float, statement: Assign) -> None:
+        domain = target.row.writes
+        if domain is None or domain.has(value):
+            return
+        place = statement.value
+        if target.row.saturates:
+            kept = domain.low if value < domain.low else domain.high
+            self._say(f.SATURATES.at(place, f"{target.name} becomes {kept:.10g}, not {value:.10g}", f"it holds {domain}"))
+        else:
+            self._say(f.OUT_OF_RANGE.at(place, f"{value:.10g} is out of range for {target.name}", f"permitted: {domain}"))
+
+    def _expression(self, node: Expression) -> s.Source | s.Operation | s.Function | None:
+        value = self._scope.value
+        if isinstance(node, Binary):
+            left, right = value(node.left), value(node.right)
+            if left is None or right is None:
+                return None
+            if node.operator in "/%" and isinstance(right, s.Literal) and right.value == 0:
+                self._say(f.ALWAYS_FAILS.at(node, "division by zero", "the program stops here with an error"))
+            return s.Operation(left, node.operator, right)
+        if isinstance(node, Call):
+            arguments = [value(argument) for argument in node.arguments]
+            found = [argument for argument in arguments if argument is not None]
+            if found and isinstance(found[0], s.Literal):
+                self._check_argument(node, found[0].value)
+            return s.Function(node.function.key, tuple(found)) if len(found) == len(arguments) else None
+        return value(node)
+
+    def _check_argument(self, node: Call, argument: float) -> None:
+        # WBC-5
+        impossible = argument < 0 if node.function.key == "SQRT" else node.function.key in ("ASIN", "ACOS") and abs(argument) > 1
+        if impossible:
+            message = f"{node.function.text}({argument:g}) does not exist"
+            self._say(f.ALWAYS_FAILS.at(node, message, "the program stops here with an error"))
+
+    def _comparison(self, node: Operand) -> s.Comparison | None:
+        if not isinstance(node, Condition):
+            return None
+        left, right = self._scope.value(node.left), self._scope.value(node.right)
+        if left is None or right is None:
+            return None
+        return s.Comparison(left, node.comparison, right)
+
+    def _command(self, number: int, statement: Command, blocks: Blocks) -> s.Step | None:
+        keyword = statement.keyword
+        row = STATEMENTS[keyword]
+        if not self._dialect.has(row.since):
+            hint = f"checked for {self._dialect.firmware}"
+            self._say(f.NOT_IN_FIRMWARE.at(statement, f"{keyword} needs firmware {row.since}", hint))
+        if keyword in _ALONE:
+            return _ALONE[keyword](statement.start, statement.end)
+        if keyword in MOTIONS:
+            return self._motion(statement)
+        if keyword in HALTS:
+            axis = self._axis(statement)
+            return None if axis is None else s.Halt(statement.start, statement.end, keyword, axis)
+        if keyword in ROW_MOTIONS:
+            return self._row_motion(statement)
+        match keyword:
+            case "WAIT":
+                condition = self._comparison(statement.operands[0])
+                return None if condition is None else s.Wait(statement.start, statement.end, condition)
+            case "DELAY":
+                return self._delay(statement)
+            case "JUMP":
+                return self._jump(statement)
+            case "PULSE":
+                return self._pulse(statement)
+            case _:
+                return self._block(number, statement, blocks)
+
+    def _block(self, number: int, statement: Command, blocks: Blocks) -> s.Step | None:
+        start, end = statement.start, statement.end
+        if statement.keyword == "ENDWHILE":
+            return self._end_while(number, statement, blocks)
+        close = blocks.close.get(number)
+        if statement.keyword == "ELSE":
+            return None if close is None else s.Else(start, end, close)
+        condition = self._comparison(statement.operands[0])
+        if condition is None or close is None:
+            return None
+        if statement.keyword == "WHILE":
+            return s.While(start, end, condition, close)
+        return s.If(start, end, condition, blocks.middle.get(number), close)
+
+    def _end_while(self, number: int, statement: Command, blocks: Blocks) -> s.Step | None:
+        opened = blocks.open.get(number)
+        opening = None if opened is None else self._lines[opened]
+        if opened is None or not isinstance(opening, Command):
+            return None
+        # The names of this condition were judged at the WHILE.
+        heard = len(self._diagnostics)
+        condition = self._comparison(opening.operands[0])
+        del self._diagnostics[heard:]
+        return None if condition is None else s.EndWhile(statement.start, statement.end, condition, opened)
+
+    def _delay(self, statement: Command) -> s.Step | None:
+        seconds = self._value(statement.operands[0])
+        if isinstance(seconds, s.Literal) and seconds.value < SHORTEST_DELAY_S:
+            message = f"DELAY {seconds.value:g} waits {SHORTEST_DELAY_S:g} s"
+            self._say(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {SHORTEST_DELAY_S:g} s"))
+        return None if seconds is None else s.Delay(statement.start, statement.end, seconds)
+
+    def _jump(self, statement: Command) -> s.Step | None:
+        name = statement.operands[0]
+        if not isinstance(name, Name):
+            return None
+        target = self._labels.get(name.key)
+        if target is not None:
+            return s.Jump(statement.start, statement.end, target)
+        if not self._broken_labels:
+            meant = self._near.of(name.text, self._labels)
+            hint = f"did you mean {meant}?" if meant else f"write {name.text}: on a line of its own where it should go on"
+            self._say(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
+        return None
+
+    def _motion(self, statement: Command) -> s.Step | None:
+        axis = self._axis(statement)
+        operand = statement.operands[1]
+        value = self._value(operand)
+        if axis is None or value is None:
+            return None
+        if statement.keyword == "HOME" and isinstance(value, s.Literal) and value.value == 0:
+            hint = "negative homes to KL, positive to KR"
+            self._say(f.OUT_OF_RANGE.at(operand, "HOME needs a velocity other than 0", hint))
+        return s.Motion(statement.start, statement.end, statement.keyword, axis, value)
+
+    def _axis(self, statement: Command) -> int | None:
+        """The drive a statement names, from 1."""
+        name = statement.operands[0]
+        if not isinstance(name, Name):
+            return None
+        register = self._scope.register(name)
+        if register is not None and register.row.key == "M":
+            return register.number
+        family = parts(name.key)
+        if register is not None or family is None or family[0].key != "M":
+            finding = f.HALT_WITHOUT_DRIVE if statement.keyword in HALTS else f.MOTION_WITHOUT_DRIVE
+            message = f"{statement.keyword} needs a drive, {name.text} is none"
+            self._say(finding.at(name, message, f"write {STATEMENTS[statement.keyword].usage}, M1…M4"))
+        return None
+
+    def _pulse(self, statement: Command) -> s.Step | None:
+        name, operand = statement.operands
+        seconds = self._value(operand)
+        register = self._scope.register(name) if isinstance(name, Name) else None
+        if register is None or register.row.key != "OUT":
+            if register is not None or (isinstance(name, Name) and parts(name.key) is None):
+                self._say(f.WRONG_ARGUMENT.at(name, "PULSE needs an output", f"write {STATEMENTS['PULSE'].usage}, OUT1…OUT8"))
+            return None
+        if isinstance(seconds, s.Literal) and seconds.value <= 0:
+            self._say(f.OUT_OF_RANGE.at(operand, f"PULSE cannot last {seconds.value:g} s", "permitted: greater than 0"))
+        return None if seconds is None else s.Pulse(statement.start, statement.end, register.number, seconds)
+
+    # -- rows of the position table
+
+    def _row_motion(self, statement: Command) -> s.Step | None:
+        operand = statement.operands[0]
+        row = self._position(operand) if isinstance(operand, Position) else self._value(operand)
+        if row is None:
+            return None
+        if isinstance(row, s.Literal) and self._positions is not None:
+            index = self._row_index(operand, row.value)
+            if index is None:
+                return None
+            self._check_row(statement, index)
+        return s.RowMotion(statement.start, statement.end, statement.keyword, row)
+
+    def _position(self, position: Position) -> s.Literal | None:
+        name = position.name
+        if self._positions is None:
+            if not self._unchecked:
+                hint = "give the position table to have names and rows checked"
+                self._say(f.POSITIONS_UNCHECKED.at(position, "positions are not checked", hint))
+            self._unchecked = True
+            return s.Literal(0.0)
+        index = self._positions.index(name.text)
+        if index is not None:
+            return s.Literal(float(index))
+        meant = self._near.of(name.text, self._positions.names())
+        hint = f"did you mean @{meant}?" if meant else f"the table has {_rows(len(self._positions.rows))}"
+        self._say(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, fix=meant and f"@{meant}"))
+        return None
+
+    def _row_index(self, place: Operand, value: float) -> int | None:
+        rows = 0 if self._positions is None else len(self._positions.rows)
+        if 0 <= value < rows and value == int(value):
+            return int(value)
+        hint = f"the table has {_rows(rows)}, numbered from 0"
+        self._say(f.UNKNOWN_POSITION.at(place, f"there is no row {value:g}", hint))
+        return None
+
+    def _check_row(self, statement: Command, index: int) -> None:
+        """Row 0 is left alone when the program writes it: its parameters are known when it runs."""
+        if self._positions is None or index in self._records or (index == 0 and self._writes_row_0):
+            return
+        values = self._positions.rows[index].values
+        name = self._positions.rows[index].name or f"row {index}"
+        problem = row_problem(statement.keyword, values)
+        if problem is not None:
+            hint = STATEMENTS[statement.keyword].meaning
+            self._say(f.ROW_PARAMETERS.at(statement.operands[0], f"{statement.keyword} cannot use {name}: {problem}", hint))
+        elif names_no_axis(statement.keyword, values):
+            self._say(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
+
+    def _value(self, operand: Operand) -> s.Source | None:
+        return self._scope.value(operand) if isinstance(operand, Name | Number) else None
+
+    def _say(self, diagnostic: Diagnostic) -> None:
+        self._diagnostics.append(diagnostic)
+
+
+def _rows(count: int) -> str:
+    return "1 row" if count == 1 else f"{count} rows"
+
+
+def _reserved_label(key: str) -> str | None:
+    if key in KEYWORDS:
+        return "a statement"
+    if parts(key) is not None:
+        return "a register"
+    if key in PREDEFINED:
+        return "a predefined name"
+    if key in FUNCTIONS:
+        return "a function"
+    return None

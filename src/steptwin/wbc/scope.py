@@ -1,0 +1,220 @@
+"""What the names of one program mean: constants, variables, registers, predefined names, positions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from steptwin.diagnostics import Diagnostic
+from steptwin.wbc import findings as f
+from steptwin.wbc.dialect import Dialect
+from steptwin.wbc.events import BY_LABEL
+from steptwin.wbc.nearmiss import NearMiss
+from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, RegisterRow, parts
+from steptwin.wbc.statements import FUNCTIONS, KEYWORDS, NOT_SUPPORTED
+from steptwin.wbc.steps import Literal, Register, Source, Target, Variable
+from steptwin.wbc.tree import Assign, Broken, Constant, Name, Number, Program, Value
+
+_STATUS_SINCE = "1.70"
+
+
+class Scope:
+    """Names of a program. Built from the whole text first, so that a name may be used above the line that defines it."""
+
+    def __init__(
+        self, program: Program, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
+    ) -> None:
+        self._dialect = dialect
+        self._positions = positions
+        self._diagnostics = diagnostics
+        self._near = NearMiss()
+        self._broken: set[str] = set()
+        self._status_told = False
+        self.known: dict[str, Source] = {}
+        self.constants: dict[str, Name] = {}
+        self.variables: dict[str, Name] = {}
+        """First assignment of every variable, in order."""
+        for line in program.lines:
+            statement = line.statement
+            if isinstance(statement, Constant):
+                self._define(statement)
+        for line in program.lines:
+            statement = line.statement
+            if isinstance(statement, Assign):
+                if statement.target.key not in self.known:
+                    self._assigned(statement.target)
+            elif isinstance(statement, Broken) and statement.target is not None:
+                self._broken.add(statement.target.key)
+
+    # -- defining
+
+    def _define(self, constant: Constant) -> None:
+        name, key = constant.name, constant.name.key
+        reason = self._reserved(key)
+        if reason is not None:
+            self._say(f.RESERVED.at(name, f"{name.text} cannot be a constant: it is {reason}", "take another name"))
+            return
+        if key in self.constants:
+            self._say(f.DUPLICATE_CONSTANT.at(name, f"the constant {name.text} is defined twice", "remove one definition"))
+            return
+        self.constants[key] = name
+        value = constant.value
+        if isinstance(value, Name) and parts(value.key) is None and value.key not in PREDEFINED:
+            hint = "the value of a constant is a number or a register, like #speed 60 or #pump OUT3"
+            self._say(f.BAD_CONSTANT.at(value, f"{value.text} is neither a number nor a register", hint))
+            self._broken.add(key)
+            return
+        resolved = self.value(value)
+        if resolved is None:
+            self._broken.add(key)
+        else:
+            self.known[key] = resolved
+
+    def _assigned(self, name: Name) -> None:
+        key = name.key
+        if key in self.constants or parts(key) is not None or key in PREDEFINED:
+            return
+        reason = self._reserved(key)
+        if reason is not None:
+            self._broken.add(key)
+            self._say(f.RESERVED.at(name, f"{name.text} cannot be a variable: it is {reason}", "take another name"))
+            return
+        index = len(self.variables)
+        if index == self._dialect.max_variables:
+            limit = self._dialect.max_variables
+            self._say(f.TOO_MANY_VARIABLES.at(name, f"{name.text} is one variable too many", f"a program has at most {limit}"))
+        self.variables[key] = name
+        self.known[key] = Variable(index, name.text)
+
+    def _reserved(self, key: str) -> str | None:
+        """Why a name cannot be given to a constant or variable."""
+        if parts(key) is not None:
+            return "a register"
+        if key in KEYWORDS or key in NOT_SUPPORTED:
+            return "a statement"
+        if key in PREDEFINED:
+            return f"predefined as {PREDEFINED[key]:g}"
+        if key in FUNCTIONS:
+            return "a function"
+        if key in BY_LABEL:
+            return "an interrupt label"
+        if self._positions is not None and self._positions.index(key) is not None:
+            return "a position"
+        return None
+
+    # -- using
+
+    def value(self, node: Value) -> Source | None:
+        """What a number or name stands for; None after saying why it stands for nothing."""
+        if isinstance(node, Number):
+            if not -REAL_MAX <= node.value <= REAL_MAX:
+                self._say(f.OUT_OF_RANGE.at(node, f"{node.text} is out of range", f"REAL reaches ±{REAL_MAX:.3g}"))
+                return None
+            return Literal(node.value)
+        known = self.known.get(node.key)
+        return known if known is not None else self._look_up(node)
+
+    def target(self, name: Name) -> Target | None:
+        """The variable or register an assignment goes to; None after saying why there is none."""
+        found = self.known.get(name.key)
+        if found is None:
+            if name.key in self._broken:
+                return None
+            found = self._look_up(name)
+            if found is None:
+                return None
+        if isinstance(found, Literal):
+            kind = "a constant" if name.key in self.constants else "predefined"
+            self._say(f.NOT_ASSIGNABLE.at(name, f"{name.text} is {kind} and cannot be set", "set a variable or a register"))
+            return None
+        if isinstance(found, Register) and found.row.writes is None:
+            alias = "" if name.text.upper() == found.name.upper() else f" ({found.name})"
+            self._say(f.READ_ONLY.at(name, f"{name.text}{alias} is read-only", f"{found.row.name}: {found.row.meaning}"))
+            return None
+        return found
+
+    def register(self, name: Name) -> Register | None:
+        """The register a name or alias means, None (silently) when it means something else."""
+        found = self.known.get(name.key)
+        if found is None and parts(name.key) is not None:
+            found = self._look_up(name)
+        return found if isinstance(found, Register) else None
+
+    def family(self, name: Name) -> str | None:
+        """Key of the register family a name or alias belongs to, existing number or not; None when it belongs to none."""
+        found = self.known.get(name.key)
+        if isinstance(found, Register):
+            return found.row.key
+        family = parts(name.key)
+        return family[0].key if family is not None else None
+
+    def _look_up(self, name: Name) -> Source | None:
+        """Registers and predefined names enter ``known`` when they are first used; anything else is a mistake."""
+        key = name.key
+        found = parts(key)
+        if found is not None:
+            register = self._register(name, *found)
+            if register is not None:
+                self.known[key] = register
+            return register
+        if key in PREDEFINED:
+            self.known[key] = Literal(float(PREDEFINED[key]))
+            return self.known[key]
+        if key not in self._broken:
+            self._unknown(name)
+        return None
+
+    def _register(self, name: Name, row: RegisterRow, number: int) -> Register | None:
+        dialect = self._dialect
+        if not dialect.has(row.since):
+            self._say(f.NOT_IN_FIRMWARE.at(name, f"{name.text} needs firmware {row.since}", f"checked for {dialect.firmware}"))
+            return None
+        numbers = row.numbers(dialect)
+        if numbers and number not in numbers:
+            if row.words and number <= numbers[-1]:
+                hint = f"{row.name} takes two registers and begins at an even one"
+                self._say(f.ODD_ADDRESS.at(name, f"{name.text} has an odd address", hint))
+            elif row.words:
+                hint = f"{row.spelling(dialect)} in firmware {dialect.firmware}"
+                self._say(f.USER_ADDRESS.at(name, f"there is no user register {name.text}", hint))
+            else:
+                self._say(f.NO_SUCH_REGISTER.at(name, f"there is no {name.text}", row.spelling(dialect)))
+            return None
+        if row.key == "STATUS" and not dialect.has(_STATUS_SINCE) and not self._status_told:
+            self._status_told = True
+            hint = f"it gives M_STATUS from firmware {_STATUS_SINCE} on"
+            self._say(f.STATUS_IS_ZERO.at(name, f"STATUS is always 0 in firmware {dialect.firmware}", hint))
+        return Register(row, number)
+
+    def _unknown(self, name: Name) -> None:
+        key = name.key
+        if self._positions is not None and self._positions.index(key) is not None:
+            hint = f"write @{name.text} after a motion statement"
+            self._say(f.RESERVED.at(name, f"{name.text} is a position, not a value", hint))
+            return
+        reason = self._reserved(key)
+        if reason is not None:
+            self._say(f.RESERVED.at(name, f"{name.text} is {reason}, not a value"))
+            return
+        meant = self.nearest(name.text)
+        hint = f"did you mean {meant}?" if meant else "a variable comes into being when it is first set"
+        self._say(f.UNKNOWN_VARIABLE.at(name, f"unknown variable {name.text}", hint, fix=meant))
+
+    def nearest(self, text: str) -> str | None:
+        return self._near.of(text, self._spellings())
+
+    def _spellings(self) -> Iterator[str]:
+        for names in (self.variables, self.constants):
+            for name in names.values():
+                yield name.text
+        yield from PREDEFINED
+        for row in REGISTERS:
+            numbers = row.numbers(self._dialect)[:20]
+            if numbers:
+                for number in numbers:
+                    yield f"{row.name}{number}"
+            else:
+                yield row.name
+
+    def _say(self, diagnostic: Diagnostic) -> None:
+        self._diagnostics.append(diagnostic)

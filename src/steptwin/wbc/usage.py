@@ -1,0 +1,170 @@
+"""Warnings about what a program uses: variables, drives, interrupts, conditions, settings of the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from steptwin.diagnostics import Diagnostic
+from steptwin.wbc import findings as f
+from steptwin.wbc import steps as s
+from steptwin.wbc.conditions import outcome
+from steptwin.wbc.events import BY_REGISTER, INPUTS, Event
+from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.scope import Scope
+from steptwin.wbc.statements import CIRCLES, LINES
+
+_RAMPS = frozenset({"ACCM", "DECM"})
+_PLANAR_AXES = (1, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What the checker needs of a configuration (`.cfg`): per axis GEAR in pulses per unit and the ramps in u/s², per input
+    the interrupt preset ``Int`` (0 off)."""
+
+    gears: tuple[float, ...]
+    accelerations: tuple[float, ...]
+    decelerations: tuple[float, ...]
+    input_interrupts: tuple[int, ...]
+
+
+def sources(step: s.Step) -> Iterator[s.Source]:
+    """Everything a step reads."""
+    match step:
+        case s.Set(value=value):
+            if isinstance(value, s.Operation):
+                yield value.left
+                yield value.right
+            elif isinstance(value, s.Function):
+                yield from value.arguments
+            else:
+                yield value
+        case s.If() | s.While() | s.Wait():
+            yield step.condition.left
+            yield step.condition.right
+        case s.Motion(value=value):
+            yield value
+        case s.Delay(seconds=seconds) | s.Pulse(seconds=seconds):
+            yield seconds
+        case s.RowMotion(row=row):
+            yield row
+
+
+def unused_variables(executable: s.Executable, scope: Scope) -> list[Diagnostic]:
+    read = {source.index for step in executable.steps for source in sources(step) if isinstance(source, s.Variable)}
+    hint = "remove it, or did you mean a register?"
+    return [
+        f.NEVER_USED.at(name, f"{name.text} is set but never used", hint)
+        for index, name in enumerate(scope.variables.values())
+        if index not in read
+    ]
+
+
+def endless_waits(executable: s.Executable) -> list[Diagnostic]:
+    return [
+        f.NEVER_ENDS.at(step, "this WAIT never ends: its condition is never true", _domain_hint(step.condition))
+        for step in executable.steps
+        if isinstance(step, s.Wait) and outcome(step.condition) is False
+    ]
+
+
+def _domain_hint(condition: s.Comparison) -> str | None:
+    for side in (condition.left, condition.right):
+        if isinstance(side, s.Register):
+            return f"{side.name} reads {side.row.reads}"
+    return None
+
+
+def axes_never_enabled(executable: s.Executable, positions: PositionTable | None) -> list[Diagnostic]:
+    """The first motion of every drive the program does not switch on; a master could do it over Modbus."""
+    switched_on = (register for register, step in _register_writes(executable) if not _is_zero(step.value))
+    enabled = {register.number for register in switched_on if register.row.key == "M"}
+    found: list[Diagnostic] = []
+    told: set[int] = set()
+    for step in executable.steps:
+        for axis in _moved(step, positions):
+            if axis not in enabled and axis not in told:
+                told.add(axis)
+                message = f"M{axis} is moved, but the program never enables it"
+                found.append(f.NEVER_ENABLED.at(step, message, f"write M{axis} = ON, unless a master enables the drive"))
+    return found
+
+
+def _register_writes(executable: s.Executable) -> Iterator[tuple[s.Register, s.Set]]:
+    for step in executable.steps:
+        if isinstance(step, s.Set) and isinstance(step.target, s.Register):
+            yield step.target, step
+
+
+def _is_zero(value: object) -> bool:
+    return isinstance(value, s.Literal) and value.value == 0
+
+
+def _moved(step: s.Step, positions: PositionTable | None) -> tuple[int, ...]:
+    """The drives a step moves, as far as they are known."""
+    match step:
+        case s.Motion(axis=axis):
+            return (axis,)
+        case s.RowMotion(keyword="MOVEPTP", row=s.Literal(value=index)):
+            if positions is None or not index < len(positions.rows):
+                return ()
+            mask = positions.rows[int(index)].mask
+            return tuple(axis for axis in range(1, 5) if mask & 1 << axis - 1)
+        case s.RowMotion(keyword=keyword) if keyword != "MOVEPTP":
+            return _PLANAR_AXES
+        case _:
+            return ()
+
+
+def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic]:
+    """Interrupts switched on that have no label, and labels whose interrupt nothing switches on."""
+    found: list[Diagnostic] = []
+    switched_on: set[Event] = set()
+    told: set[Event] = set()
+    for register, step in _register_writes(executable):
+        event = BY_REGISTER.get(register.name.upper())
+        if event is None or _is_zero(step.value):
+            continue
+        switched_on.add(event)
+        if event not in executable.entries and event not in told:
+            told.add(event)
+            message = f"the interrupt of {event.name} is enabled, but there is no label INT_{event.name}"
+            found.append(f.NO_HANDLER.at(step, message, f"write INT_{event.name}: and its lines up to RETURN"))
+    for event, entry in executable.entries.items():
+        if event not in switched_on and _stays_off(event, setup):
+            if event.input > INPUTS:
+                hint = f"the controller has the inputs IN1…IN{INPUTS}"
+            elif event.register is None:
+                hint = f"IN{event.input} interrupts only when the configuration says so (Int)"
+            else:
+                hint = f"set {event.register} to enable it"
+            message = f"the interrupt of {event.name} is never enabled"
+            found.append(f.INTERRUPT_OFF.at(executable.steps[entry], message, hint))
+    return found
+
+
+def _stays_off(event: Event, setup: Setup | None) -> bool:
+    """Whether an interrupt the program does not enable is off: inputs can be preset by the configuration."""
+    if event.input == 0 or event.input > INPUTS:
+        return True
+    return setup is not None and setup.input_interrupts[event.input - 1] == 0
+
+
+def unequal_axes(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
+    """The first circle when the gears of M1 and M2 differ, the first line when their ramps do."""
+    paths = [step for step in executable.steps if isinstance(step, s.RowMotion)]
+    circle = next((step for step in paths if step.keyword in CIRCLES), None)
+    line = next((step for step in paths if step.keyword in LINES), None)
+    written = (register for register, _ in _register_writes(executable))
+    ramps_set = any(register.row.key in _RAMPS and register.number in _PLANAR_AXES for register in written)
+    found: list[Diagnostic] = []
+    if circle is not None and setup.gears[0] != setup.gears[1]:
+        message = f"GEAR of M1 is {setup.gears[0]:g}, of M2 {setup.gears[1]:g} pulses per unit"
+        found.append(f.GEARS_DIFFER.at(circle, message, "a circle needs the same GEAR on both axes to be round"))
+    if line is not None and not ramps_set:
+        for name, ramps in (("Acc", setup.accelerations), ("Dec", setup.decelerations)):
+            if ramps[0] != ramps[1]:
+                message = f"{name} of M1 is {ramps[0]:g}, of M2 {ramps[1]:g} u/s²"
+                found.append(f.RAMPS_DIFFER.at(line, message, "give both axes of a line the same ramps"))
+    return found

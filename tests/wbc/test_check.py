@@ -1,0 +1,130 @@
+"""The checker beyond its messages: interpretations, time, what it gives to those who run the program."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from steptwin.wbc import steps as s
+from steptwin.wbc.check import check
+from steptwin.wbc.conditions import outcome
+from steptwin.wbc.dialect import DEFAULT, DIALECTS
+from steptwin.wbc.positions import parse_positions
+from steptwin.wbc.registers import ROWS
+
+
+def codes(text: str, firmware: str = "1.70") -> list[str]:
+    return [d.code for d in check(text, dialect=DIALECTS[firmware]).diagnostics]
+
+
+def executable(text: str, table: str = "") -> s.Executable:
+    checked = check(text, parse_positions(table)[0])
+    assert checked.executable is not None, checked.errors
+    return checked.executable
+
+
+def test_wbc_4_a_variable_read_above_its_assignment_is_known() -> None:
+    assert codes("OUT1 = x\nx = 1\n") == []
+    assert codes("OUT1 = x\n") == ["W104"]
+
+
+def test_wbc_7_short_delays_are_told() -> None:
+    assert codes("DELAY 0.009\n") == ["W212"]
+    assert codes("DELAY 0.01\n") == []
+
+
+def test_wbc_12_there_are_128_variables() -> None:
+    def program(count: int) -> str:
+        return "".join(f"v{n} = IN1\nOUT1 = v{n}\n" for n in range(count))
+
+    assert codes(program(128)) == []
+    assert codes(program(129)) == ["W123"]
+
+
+def test_wbc_13_modbus_master_statements_are_not_invented() -> None:
+    assert codes("MODBUS_READ 1 5\n") == ["W137"]
+
+
+def test_wbc_14_numbers_that_saturate_are_told() -> None:
+    assert codes("$I0 = 32767\n$I1 = 32767.5\nOUTPUTS = -1\n$D0 = 2147483648\n") == ["W211", "W211", "W211"]
+
+
+def test_steps_are_resolved() -> None:
+    text = (
+        "#pump OUT3\nx = 5\nL:\nIF x <= PosM1\n  pump = ON\nELSE\n  MOVEPTP @b\nENDIF\nJUMP l\nINT_TICK:\nRETURN\nm1 = on\nM2 = 1"
+    )
+    steps = executable(text, "a;x;x;x;x\nb;1;2;x;x\n")
+    x = s.Variable(0, "x")
+    assert steps.variables == ("x",)
+    assert steps.labels == {"L": 1, "INT_TICK": 7}
+    assert [(event.name, number) for event, number in steps.entries.items()] == [("TICK", 7)]
+    condition = s.Comparison(x, "<=", s.Register(ROWS["POSM"], 1))
+    assert steps.steps[:7] == (
+        s.Set(0, 0, x, s.Literal(5)),
+        s.If(0, 0, condition, 3, 5),
+        s.Set(0, 0, s.Register(ROWS["OUT"], 3), s.Literal(1)),
+        s.Else(0, 0, 5),
+        s.RowMotion(0, 0, "MOVEPTP", s.Literal(1)),
+        s.EndIf(0, 0),
+        s.Jump(0, 0, 1),
+    )
+    assert text[steps.steps[2].start : steps.steps[2].end] == "pump = ON"
+    assert isinstance(steps.steps[7], s.Entry)
+    assert s.If(0, 0, condition, 3, 5).otherwise == 4
+    assert s.If(0, 0, condition, None, 5).otherwise == 6
+
+
+def test_a_program_with_errors_or_unknown_positions_is_not_given_out() -> None:
+    assert check("WAIT\n").executable is None
+    assert check("M1 = ON\nMOVEPTP @a\n").executable is None
+    assert check("M1 = ON\nMOVEPTP @a\n", parse_positions("a;1;x;x;x\n")[0]).executable is not None
+
+
+@pytest.mark.parametrize(
+    ("sign", "value", "expected"),
+    [("=", 1, None), ("=", 2, False), ("=", 0.5, False), ("<", 0, False), ("<", 2, True), (">=", 0, True), (">", 0, None)],
+)
+def test_conditions_on_an_input(sign: str, value: float, expected: bool | None) -> None:
+    mirrored = {"=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
+    bit = s.Register(ROWS["IN"], 1)
+    assert outcome(s.Comparison(bit, sign, s.Literal(value))) is expected
+    assert outcome(s.Comparison(s.Literal(value), mirrored[sign], bit)) is expected
+
+
+def long_program(lines: int) -> str:
+    block = "L{n}:\nSET x{v} = x{w} + {n}\nIF IN1 = 1\nPABS M1 x3\nELSE\nDELAY 0,5\nENDIF\nJUMP L{m}  // and so on\n"
+    count = lines // 8
+    return "M1 = ON\n" + "".join(block.format(n=n, m=(n + 1) % count, v=n % 100, w=(n + 1) % 100) for n in range(count))
+
+
+def seconds(text: str) -> float:
+    """The best of some runs, in processor time: what else the machine does is not measured."""
+    best = float("inf")
+    for _ in range(5):
+        start = time.process_time()
+        check(text)
+        best = min(best, time.process_time() - start)
+    return best
+
+
+def test_4000_lines_are_checked_in_a_tenth_of_a_second() -> None:
+    text = long_program(4000)
+    assert check(text).diagnostics == []
+    assert seconds(text) < 0.1
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["wrong{n} line", "x = y{n}", "JUMP L{n}", "L{n}:", "ENDIF", "IF IN1 = 1", "WHILE IN1 = 1\nENDIF", "INT_IN{n}:", "@@ {n}"],
+)
+def test_time_grows_with_the_length_only(line: str) -> None:
+    short, long = ("".join(line.format(n=n) + "\n" for n in range(count)) for count in (1000, 8000))
+    assert seconds(long) < 8 * max(seconds(short), 0.005) * 2.5
+
+
+def test_the_line_limit_is_that_of_the_firmware() -> None:
+    text = "OUT1 = ON\n" * DEFAULT.max_steps
+    assert codes(text) == []
+    assert codes(text + "OUT1 = ON\n") == ["W136"]
+    assert codes("OUT1 = ON\n" * 1001, "1.40") == ["W136"]

@@ -1,0 +1,92 @@
+"""Messages are behaviour users rely on: every one of them stands in golden/, and a change of one deserves a review.
+
+Regenerate with ``python tests/wbc/test_check_golden.py`` and read the diff.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from steptwin.diagnostics import Source, render
+from steptwin.wbc.check import check
+from steptwin.wbc.dialect import dialect_for
+from steptwin.wbc.findings import FINDINGS
+from steptwin.wbc.positions import parse_positions
+from steptwin.wbc.usage import Setup
+
+GOLDEN = Path(__file__).parent / "golden" / "programs.txt"
+CASE, RESULT = "=== ", "---"
+NO_FINDING = "(no findings)"
+
+
+@dataclass(frozen=True)
+class Case:
+    name: str
+    text: str
+    expected: str
+
+    def settings(self, word: str) -> list[str]:
+        """The ``@ word …`` lines of a case."""
+        start = f"@ {word} "
+        return [line.removeprefix(start) for line in self.text.splitlines() if line.startswith(start)]
+
+    @property
+    def program(self) -> str:
+        return "".join(line for line in self.text.splitlines(keepends=True) if not line.startswith("@ "))
+
+    def found(self) -> str:
+        rows = self.settings("row")
+        table = parse_positions("".join(row + "\n" for row in rows))[0] if rows else None
+        dialect = dialect_for(*(self.settings("firmware") or ["1.70"]))
+        setup = None
+        if self.settings("setup"):
+            numbers = {key: float(value) for key, value in (pair.split("=") for pair in self.settings("setup")[0].split())}
+            setup = Setup(
+                gears=(100, numbers.get("gear2", 100), 1, 1),
+                accelerations=(10, numbers.get("acc2", 10), 1, 1),
+                decelerations=(10, numbers.get("dec2", 10), 1, 1),
+                input_interrupts=tuple(int(numbers.get(f"in{n}", 0)) for n in range(1, 21)),
+            )
+        checked = check(self.program, table, setup, dialect)
+        return render(Source(self.name, self.program), checked.diagnostics) or NO_FINDING
+
+
+def read_cases() -> tuple[str, list[Case]]:
+    head, *parts = GOLDEN.read_text(encoding="utf-8").split(CASE)
+    cases = []
+    for part in parts:
+        name, _, body = part.partition("\n")
+        text, _, expected = body.partition(f"{RESULT}\n")
+        cases.append(Case(name.strip(), text, expected.rstrip("\n")))
+    return head, cases
+
+
+HEAD, CASES = read_cases()
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_messages_are_the_reviewed_ones(case: Case) -> None:
+    assert case.found() == case.expected
+
+
+def test_every_message_about_a_program_has_a_case() -> None:
+    shown = "".join(case.expected for case in CASES)
+    about_programs = {code for code in FINDINGS if not code.startswith(("W15", "W16", "W25"))}
+    assert {code for code in about_programs if f" {code}: " not in shown} == set()
+
+
+def test_there_are_wrong_programs_enough() -> None:
+    assert sum(case.expected != NO_FINDING for case in CASES) >= 60
+    assert len({case.name for case in CASES}) == len(CASES)
+
+
+def regenerate() -> None:
+    written = "\n".join(f"{CASE}{case.name}\n{case.text}{RESULT}\n{case.found()}\n" for case in CASES)
+    GOLDEN.write_text(HEAD + written, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    regenerate()

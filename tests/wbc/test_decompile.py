@@ -1,0 +1,203 @@
+"""Decompiling and building again gives the same bytes, whatever the records are."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn
+
+from steptwin.wbc.check import check
+from steptwin.wbc.decompile import Decompiled, ImageError, decompile, read_image
+from steptwin.wbc.image import SIZE, build, image_of
+from steptwin.wbc.positions import parse_positions
+
+
+def again(decompiled: Decompiled) -> bytes | None:
+    """What building gives of the texts a user would have in files."""
+    positions, wrong = parse_positions(decompiled.positions.text)
+    assert wrong == []
+    checked = check(decompiled.text, positions)
+    assert checked.executable is not None, checked.errors
+    return build(checked.executable, positions)[0]
+
+
+def image(records: str, rows: str = "") -> bytes:
+    slots = [bytes.fromhex(line).ljust(16, b"\0") for line in records.splitlines() if line.strip()]
+    return image_of(slots, [bytes.fromhex(line) for line in rows.splitlines() if line.strip()])
+
+
+KNOWN = """
+    01 06 01 00 00 FE 00 00 80 3F F9 F9
+    02 02 03 00 00 00 3D FE 00 00 80 3F 05 00 03 00
+    01 00 03 00 00 FF CD CC CC 3D F9 F9
+    04 00 00 00 00 00 00 00 00 00 00 00 05 00
+    08 FE 00 00 A0 40
+    03
+    05 0C 01 00 00 00 3C FE 00 00 80 40 08 00
+    15
+    06 0C 01 00 00 00 3C FE 00 00 80 40 06 00
+    16 FE 00 00 80 3F
+    0E 06 02 FE 00 00 A0 C1
+    09 01 00
+    0B 01 0C 00
+    0A
+"""
+KNOWN_ROWS = """
+    00 03 00 00 80 3F 00 00 20 40 00 00 00 00 00 00 00 00
+    00 0A 00 00 80 3F 00 00 A0 C1 00 00 00 00 CD CC CC 3D
+"""
+KNOWN_TEXT = """\
+// Decompiled from a compiled image: labels and names of positions are invented.
+SET M1 = 1
+L1:
+IF IN3 = 1
+    SET OUT3 = 0.1
+ELSE
+    DELAY 5
+ENDIF
+WHILE StatM1 < 4
+    WAITPOS
+ENDWHILE
+MOVEPTP @P1
+HOME M2 -20
+JUMP L1
+INT_IN2:
+RETURN
+"""
+
+
+def test_known_records_become_statements() -> None:
+    found = decompile(image(KNOWN, KNOWN_ROWS))
+    assert found.text == KNOWN_TEXT
+    assert found.positions.text == "P0;1;2.5;x;x\nP1;x;-20;x;0.1\n"
+    assert found.unknown == 0
+    assert again(found) == image(KNOWN, KNOWN_ROWS)
+
+
+def unknown(records: str, rows: str = "") -> list[str]:
+    """The lines that stay data; the round trip is checked on the way."""
+    found = decompile(image(records, rows))
+    assert again(found) == image(records, rows)
+    return [line for line in found.text.splitlines() if line.startswith("//!")]
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        "12 01 02 03",  # unknown operation
+        "0A 00 00 01",  # RETURN with something behind it
+        "15 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01",
+        "01 03 01 00 00 FE 00 00 80 3F F9 F9",  # unknown register class
+        "01 00 09 00 00 FE 00 00 80 3F F9 F9",  # OUT9
+        "01 02 01 00 00 FE 00 00 80 3F F9 F9",  # an input as destination
+        "01 00 01 00 00 FE 00 00 00 3F F9 F9",  # a fraction marked as whole
+        "01 00 01 00 00 FF 00 00 80 3F F9 F9",  # a whole number marked as fraction
+        "01 00 01 00 00 FF 00 00 C0 7F F9 F9",  # not a number
+        "01 00 01 00 00 FE 00 00 80 3F F9 F8",  # something where no operator stands
+        "07 02 01 00 00 00 21 FE 00 00 80 3F",  # unknown condition
+        "02 02 01 00 00 00 3D FE 00 00 80 3F 00 00",  # IF without ENDIF
+        "03",  # ENDIF without IF
+        "05 02 01 00 00 00 3D FE 00 00 80 3F 09 00",  # WHILE beyond the program
+        "09 01 00",  # JUMP beyond the program
+        "0B 1F 00 00",  # there is no IN32
+        "0B 00 01 00",  # an entry that names another slot
+        "0E 06 05 FE 00 00 80 3F",  # M5
+        "0E 05 01 FE 00 00 80 3F",
+        "16 FE 00 00 80 3F",  # a row that does not exist
+    ],
+)
+def test_a_record_the_builder_would_not_write_stays_data(record: str) -> None:
+    assert unknown(record) == [f"//!record {bytes.fromhex(record).ljust(16, bytes(1)).hex().upper()}"]
+
+
+def test_blocks_that_do_not_nest_stay_data() -> None:
+    condition = "00 01 00 00 00 3D FE 00 00 80 3F"
+    records = f"""
+        02 {condition} 02 00 00 00
+        05 {condition} 03 00
+        03
+        06 {condition} 01 00
+    """
+    assert len(unknown(records)) == 2
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "00 10 00 00 80 3F 00 00 00 00 00 00 00 00 00 00 00 00",  # a fifth axis
+        "00 00 00 00 80 3F 00 00 00 00 00 00 00 00 00 00 00 00",  # a value that is neither given nor kept
+        "00 01 00 00 C0 7F 00 00 00 00 00 00 00 00 00 00 00 00",  # not a number
+    ],
+)
+def test_a_row_no_table_can_express_stays_data(row: str) -> None:
+    assert unknown("15", row) == [f"//!position 0 {row.replace(' ', '')}"]
+
+
+def test_damage_is_named() -> None:
+    good = image(KNOWN, KNOWN_ROWS)
+    with pytest.raises(ImageError, match="20093 bytes instead of 20094"):
+        read_image(good[:-1])
+    with pytest.raises(ImageError, match="CRC of the commands"):
+        read_image(b"\x09" + good[1:])
+    with pytest.raises(ImageError, match="CRC of the positions"):
+        read_image(good[:16_004] + b"\x01" + good[16_005:])
+    with pytest.raises(ImageError, match="1001 commands, permitted are 0…1000"):
+        read_image(good[:16_000] + b"\xe9\x03" + good[16_002:])
+    with pytest.raises(ImageError, match="after the 14 commands"):
+        read_image(good[:15_999] + b"\x01" + good[16_000:])
+
+
+@given(st.binary(max_size=64))
+def test_no_bytes_make_it_fail_otherwise(data: bytes) -> None:
+    for candidate in (data, data.ljust(SIZE, b"\0")):
+        with pytest.raises(ImageError):
+            decompile(candidate)
+
+
+def slot_number(limit: int) -> st.SearchStrategy[bytes]:
+    return st.integers(0, limit).map(lambda n: struct.pack("<H", n))
+
+
+reals = st.one_of(
+    st.integers(-300, 300).map(lambda n: b"\xfe" + struct.pack("<f", n)),
+    st.floats(width=32).map(lambda x: b"\xff" + struct.pack("<f", x)),
+)
+registers = st.tuples(st.sampled_from((0, 2, 6, 7, 8, 10, 12, 15, 16, 20, 3)), st.integers(0, 9)).map(bytes)
+values = st.one_of(reals, registers.map(lambda pair: pair + b"\0\0\0"))
+signs = st.sampled_from((b"=", b"<", b">", b"!"))
+conditions = st.tuples(values, signs, values).map(b"".join)
+
+
+@st.composite
+def images(draw: DrawFn) -> bytes:
+    """Images of records that are right, nearly right or anything."""
+    count = draw(st.integers(0, 12))
+    slots = slot_number(count)
+    record = st.one_of(
+        st.binary(min_size=16, max_size=16),
+        st.tuples(st.just(b"\1"), registers, st.just(b"\0\0"), values, st.just(b"\xf9\xf9")).map(b"".join),
+        st.tuples(st.just(b"\2"), conditions, slots, slots).map(b"".join),
+        st.sampled_from((b"\3", b"\x0a", b"\x15")),
+        slots.map(lambda slot: b"\4".ljust(12, b"\0") + slot),
+        st.tuples(st.sampled_from((b"\5", b"\6")), conditions, slots).map(b"".join),
+        conditions.map(lambda condition: b"\7" + condition),
+        st.tuples(st.sampled_from((b"\x08", b"\x16")), values).map(b"".join),
+        slots.map(lambda slot: b"\x09" + slot),
+        st.tuples(st.just(b"\x0b"), st.binary(min_size=1, max_size=1), slots).map(b"".join),
+        st.tuples(st.just(b"\x0e\x06"), st.binary(min_size=1, max_size=1), values).map(b"".join),
+    )
+    records = draw(st.lists(record, min_size=count, max_size=count))
+    row = st.one_of(
+        st.binary(min_size=18, max_size=18),
+        st.tuples(st.integers(0, 15).map(lambda mask: bytes((0, mask))), st.binary(min_size=16, max_size=16)).map(b"".join),
+    )
+    return image_of([record.ljust(16, b"\0") for record in records], draw(st.lists(row, max_size=4)))
+
+
+@settings(max_examples=200)
+@given(images())
+def test_round_trip(data: bytes) -> None:
+    assert again(decompile(data)) == data

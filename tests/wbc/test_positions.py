@@ -1,0 +1,115 @@
+"""Position tables: reading, complaining with row and column, writing back without a change."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.diagnostics import Source
+from steptwin.errors import Misuse
+from steptwin.wbc.dialect import MAX_POSITIONS
+from steptwin.wbc.positions import PositionTable, number_text, parse_positions, table_of
+
+TEXT = "home;0;0;x;x\r\nTop ; 10,5; -20.25;X;\t7\r\n;1;2;3;4;\r\n\r\n"
+
+
+def found(text: str) -> list[tuple[str, int, int]]:
+    """Code, row and column of every message."""
+    return [(d.code, *Source("t", text).position(d.span.start)) for d in parse_positions(text)[1]]
+
+
+def test_rows() -> None:
+    table, wrong = parse_positions(TEXT)
+    assert wrong == []
+    assert [(row.name, row.values, row.mask) for row in table.rows] == [
+        ("home", (0, 0, None, None), 3),
+        ("Top", (10.5, -20.25, None, 7), 11),
+        ("", (1, 2, 3, 4), 15),
+    ]
+    assert table.index("HOME") == 0
+    assert table.index("top") == 1
+    assert table.index("") is None
+    assert table.names() == ["home", "Top"]
+
+
+def test_an_unchanged_table_is_written_as_it_was() -> None:
+    assert parse_positions(TEXT)[0].text == TEXT
+
+
+def test_one_changed_row_leaves_the_others_alone() -> None:
+    table = parse_positions(TEXT)[0].with_row(0, "home", (1.5, None, 0.1, -70))
+    assert table.text == TEXT.replace("home;0;0;x;x", "home;1.5;x;0.1;-70")
+    assert table.rows[0].values == (1.5, None, 0.1, -70)
+
+
+def test_a_row_is_appended_with_the_line_ends_of_the_file() -> None:
+    table = parse_positions("A;1;2;3;4\r\n")[0].with_row(1, "B", (None, 2, None, None))
+    assert table.text == "A;1;2;3;4\r\nB;x;2;x;x\r\n"
+    assert PositionTable().with_row(0, "A", (1, 2, 3, 4)).text == "A;1;2;3;4\n"
+
+
+@pytest.mark.parametrize(
+    ("index", "name", "values", "message"),
+    [
+        (3, "N", (1, 2, 3, 4), "row 3 cannot be written: permitted are 0…2"),
+        (-1, "N", (1, 2, 3, 4), "row -1 cannot be written"),
+        (0, "N", (1, 2, 3), "row 0 needs 4 values, got 3"),
+        (0, "a;b", (1, 2, 3, 4), "'a;b' cannot be the name of row 0"),
+        (0, "a\nb", (1, 2, 3, 4), "cannot be the name of row 0"),
+        (0, "N", (1, 2, 3, float("inf")), "inf cannot be written as a number"),
+    ],
+)
+def test_changes_that_are_refused(index: int, name: str, values: tuple[float, ...], message: str) -> None:
+    table = parse_positions("A;1;2;3;4\nB;1;2;3;4\n")[0]
+    with pytest.raises(Misuse, match=message):
+        table.with_row(index, name, values)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("A;1;2;3\n", [("W150", 1, 1)]),
+        ("A;1;2;3;4;5\n", [("W150", 1, 1)]),
+        ("A;1;2;3;4\nB;1;zwei;3;\n", [("W151", 2, 5), ("W151", 2, 12)]),
+        ("A;1;1e3;3;4\n", [("W151", 1, 5)]),
+        (f"A;{'9' * 40};x;x;x\n", [("W151", 1, 3)]),
+        ("A;1;2;3;4\na;1;2;3;4\n", [("W152", 2, 1)]),
+        ("A;1;2;3;4\n\n\nB;1;2;3;4\n\n", [("W154", 2, 1), ("W154", 3, 1)]),
+        ("my pos;1;2;3;4\n", [("W250", 1, 1)]),
+    ],
+)
+def test_messages_have_row_and_column(text: str, expected: list[tuple[str, int, int]]) -> None:
+    assert found(text) == expected
+
+
+def test_a_wrong_cell_keeps_its_row() -> None:
+    table, _ = parse_positions("A;1;?;3;4\nB;1;2;3;4\n")
+    assert table.rows[0].values == (1, None, 3, 4)
+    assert table.index("B") == 1
+
+
+def test_the_table_has_227_rows() -> None:
+    text = "".join(f"P{n};1;2;3;4\n" for n in range(MAX_POSITIONS + 1))
+    assert MAX_POSITIONS == 227
+    assert found(text) == [("W153", 228, 1)]
+    with pytest.raises(Misuse, match="permitted are 0…226"):
+        parse_positions(text)[0].with_row(227, "last", (1, 2, 3, 4))
+
+
+real = st.floats(width=32, allow_nan=False, allow_infinity=False)
+
+
+@given(st.lists(st.tuples(real, real, st.none(), real), max_size=5))
+def test_values_survive_writing_and_reading(rows: list[tuple[float | None, ...]]) -> None:
+    table = table_of([(f"P{n}", row) for n, row in enumerate(rows)])
+    assert [row.values for row in parse_positions(table.text)[0].rows] == rows
+
+
+@given(real)
+def test_numbers_are_written_without_exponent(value: float) -> None:
+    text = number_text(value)
+    assert set(text) <= set("-0123456789.")
+    assert struct.pack("<d", float(text)) == struct.pack("<d", value)

@@ -1,0 +1,186 @@
+"""Text to tree: spans, spellings, and that nothing at all can make the parser fail."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from steptwin.diagnostics import Diagnostic
+from steptwin.wbc.check import check
+from steptwin.wbc.positions import parse_positions
+from steptwin.wbc.statements import FUNCTIONS, STATEMENTS
+from steptwin.wbc.syntax import parse
+from steptwin.wbc.tree import (
+    Assign,
+    Binary,
+    Broken,
+    Call,
+    Command,
+    Condition,
+    Constant,
+    Label,
+    Name,
+    Node,
+    Number,
+    Position,
+    PositionRecord,
+    Record,
+    Statement,
+)
+
+PLACE = (0, 0)
+
+
+def name(text: str) -> Name:
+    return Name(*PLACE, text, text.upper())
+
+
+def number(text: str, value: float) -> Number:
+    return Number(*PLACE, text, value)
+
+
+def only(text: str) -> Statement:
+    program, diagnostics = parse(text)
+    assert diagnostics == []
+    (line,) = program.lines
+    assert line.statement is not None
+    return line.statement
+
+
+# fmt: off
+STATEMENTS_READ: list[tuple[str, Statement]] = [
+    ("#speed 60", Constant(*PLACE, name("speed"), number("60", 60))),
+    ("#home -70", Constant(*PLACE, name("home"), number("-70", -70))),
+    ("#pump OUT3", Constant(*PLACE, name("pump"), name("OUT3"))),
+    ("# pump OUT3", Constant(*PLACE, name("pump"), name("OUT3"))),
+    ("MAIN:", Label(*PLACE, name("MAIN"))),
+    ("MAIN :", Label(*PLACE, name("MAIN"))),
+    ("SET X = 20,5", Assign(*PLACE, True, name("X"), number("20,5", 20.5))),
+    ("set X=20.5", Assign(*PLACE, True, name("X"), number("20.5", 20.5))),
+    ("M1 = ON", Assign(*PLACE, False, name("M1"), name("ON"))),
+    ("$R10 = $D8", Assign(*PLACE, False, name("$R10"), name("$D8"))),
+    ("X = Y-5", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("Y"), "-", number("5", 5)))),
+    ("X = Y -5", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("Y"), "-", number("5", 5)))),
+    ("X = Y - -5", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("Y"), "-", number("-5", -5)))),
+    ("X = -5 << 2", Assign(*PLACE, False, name("X"), Binary(*PLACE, number("-5", -5), "<<", number("2", 2)))),
+    ("X = a && b", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("a"), "&&", name("b")))),
+    ("X = a & b", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("a"), "&", name("b")))),
+    ("X = a || b", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("a"), "||", name("b")))),
+    ("X = a % 3", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("a"), "%", number("3", 3)))),
+    ("X = sin(30)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("sin"), (number("30", 30),)))),
+    ("X = min(a,b)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("min"), (name("a"), name("b"))))),
+    ("X = max(1,5, 2)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("max"), (number("1,5", 1.5), number("2", 2))))),
+    ("X = max(a,1,5)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("max"), (name("a"), number("1,5", 1.5))))),
+    ("IF IN1 = 1", Command(*PLACE, "IF", (Condition(*PLACE, name("IN1"), "=", number("1", 1)),))),
+    ("while x>=-5", Command(*PLACE, "WHILE", (Condition(*PLACE, name("x"), ">=", number("-5", -5)),))),
+    ("Wait PosM1 <= y", Command(*PLACE, "WAIT", (Condition(*PLACE, name("PosM1"), "<=", name("y")),))),
+    ("ELSE", Command(*PLACE, "ELSE", ())),
+    ("DELAY 0,5", Command(*PLACE, "DELAY", (number("0,5", 0.5),))),
+    ("JUMP main", Command(*PLACE, "JUMP", (name("main"),))),
+    ("HOME M1 -20", Command(*PLACE, "HOME", (name("M1"), number("-20", -20)))),
+    ("PABS M1 x", Command(*PLACE, "PABS", (name("M1"), name("x")))),
+    ("BRAKE M2", Command(*PLACE, "BRAKE", (name("M2"),))),
+    ("MOVEPTP @top", Command(*PLACE, "MOVEPTP", (Position(*PLACE, name("top")),))),
+    ("MOVEPTP @ top", Command(*PLACE, "MOVEPTP", (Position(*PLACE, name("top")),))),
+    ("MOVEPTP 5", Command(*PLACE, "MOVEPTP", (number("5", 5),))),
+    ("MOVELIN_REL n", Command(*PLACE, "MOVELIN_REL", (name("n"),))),
+    ("PULSE(OUT1,0,5)", Command(*PLACE, "PULSE", (name("OUT1"), number("0,5", 0.5)))),
+    ("pulse ( OUT1 , t )", Command(*PLACE, "PULSE", (name("OUT1"), name("t")))),
+    ("//!record " + "0a" * 16, Record(*PLACE, b"\n" * 16)),
+    ("//!position 3 " + "0A" * 18, PositionRecord(*PLACE, 3, b"\n" * 18)),
+]
+# fmt: on
+
+
+@pytest.mark.parametrize(("text", "expected"), STATEMENTS_READ, ids=[text for text, _ in STATEMENTS_READ])
+def test_statement(text: str, expected: Statement) -> None:
+    assert only(text) == expected
+    comment = "" if text.startswith("//") else "  // why"
+    assert only(f"\t {text}{comment}").start == 2
+
+
+def test_every_statement_without_operands_is_read() -> None:
+    for row in STATEMENTS.values():
+        if not row.operands:
+            assert only(row.keyword.lower()) == Command(*PLACE, row.keyword, ())
+
+
+def test_every_function_is_read() -> None:
+    for row in FUNCTIONS.values():
+        arguments = ", ".join(["a", "b"][: row.arguments])
+        statement = only(f"X = {row.name}({arguments})")
+        assert isinstance(statement, Assign)
+        assert isinstance(statement.value, Call)
+
+
+def test_spans_are_the_words() -> None:
+    text = "  SET speed = max(count, -2,5) // fast\nMOVEPTP @top"
+    first, second = parse(text)[0].lines
+    assert isinstance(first.statement, Assign)
+    call = first.statement.value
+    assert isinstance(call, Call)
+    assert isinstance(second.statement, Command)
+
+    def words(node: Node) -> str:
+        return text[node.start : node.end]
+
+    assert words(first) == "  SET speed = max(count, -2,5) // fast"
+    assert words(first.statement) == "SET speed = max(count, -2,5)"
+    assert words(first.statement.target) == "speed"
+    assert words(call) == "max(count, -2,5)"
+    assert [words(argument) for argument in call.arguments] == ["count", "-2,5"]
+    assert first.comment is not None
+    assert words(first.comment) == "// fast"
+    position = second.statement.operands[0]
+    assert isinstance(position, Position)
+    assert words(position) == "@top"
+    assert words(position.name) == "top"
+
+
+def test_a_comma_divides_two_numbers_where_two_are_needed() -> None:
+    text = "X = min(-1,25)"
+    program, diagnostics = parse(text)
+    statement = program.lines[0].statement
+    assert isinstance(statement, Assign)
+    assert isinstance(statement.value, Call)
+    assert [text[a.start : a.end] for a in statement.value.arguments] == ["-1", "25"]
+    assert statement.value.arguments == (number("-1", -1), number("25", 25))
+    assert [d.code for d in diagnostics] == ["W214"]
+
+
+def test_a_broken_line_hides_no_other() -> None:
+    program, diagnostics = parse("WAIT\nM1 = ON\nPABS 500\nM2 = ON\n")
+    kinds = [type(line.statement) for line in program.lines]
+    assert kinds == [Broken, Assign, Broken, Assign]
+    assert [d.code for d in diagnostics] == ["W113", "W127"]
+
+
+def test_lines_are_those_of_the_source() -> None:
+    program, _ = parse("M1 = ON\r\n\r\n  // end\x0bM2 = ON\rM3 = ON")
+    assert [line.start for line in program.lines] == [0, 9, 11, 20, 28]
+
+
+WORDS = st.sampled_from(
+    [
+        *(*STATEMENTS, *(row.name for row in FUNCTIONS.values()), "SET", "x", "M1", "OUT9", "$I5", "$R3", "INT_IN1", "ON"),
+        *("@p", "@", ":", "#", "//", "=", "==", "<", ">=", "<>", "+", "&&", "^", "(", ")", ",", ";"),
+        *("1,5", "-", "5", "1.2.3", "ę", "\n", "\n", " "),
+    ]
+)
+SOUP = st.lists(WORDS, max_size=40).map(" ".join)
+ANYTHING = st.one_of(st.text(max_size=200), SOUP, st.lists(WORDS, max_size=40).map("".join))
+
+
+def inside(diagnostic: Diagnostic, text: str) -> bool:
+    return 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+
+
+@settings(max_examples=300)
+@given(text=ANYTHING, table=ANYTHING)
+def test_no_text_makes_the_checker_fail(text: str, table: str) -> None:
+    positions, about_table = parse_positions(table)
+    checked = check(text, positions)
+    assert all(inside(d, text) for d in checked.diagnostics)
+    assert all(inside(d, table) for d in about_table)
+    assert (checked.executable is None) == bool(checked.errors)
