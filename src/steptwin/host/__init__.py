@@ -1,0 +1,51 @@
+"""Drivers for the real devices and their twins.
+
+``with Mic488("/dev/ttyUSB0") as mic:`` for threads, ``async with AsyncMic488("tcp://host:502") as mic:`` for asyncio.
+Errors are `steptwin.errors.Misuse`, `Refusal` and `LineFailure`; what is listed here are their kinds.
+"""
+
+from __future__ import annotations
+
+from steptwin.host.exchange import LineLost, NoAnswer, Overtaken
+from steptwin.host.mic488.axis import AsyncAxis
+from steptwin.host.mic488.driver import AsyncMic488, Mic488Status, load_config
+from steptwin.host.mic488.failures import MoveFailed, NoMic488, NotReady, Refused, Untold
+from steptwin.host.mic488.jog import AsyncJog
+from steptwin.host.mic488.lines import AsyncModbusLine
+from steptwin.host.mic488.motion import MoveEnd, Reason
+from steptwin.host.mic488.program import AsyncProgram, ProgramState
+from steptwin.host.mic488.snapshot import Change, Snapshot
+from steptwin.host.mic488.sync import Axis, Jog, Mic488, ModbusLine, Program, UserRegisters, UserView
+from steptwin.host.mic488.user import AsyncUserRegisters, AsyncUserView
+
+__all__ = [
+    "AsyncAxis",
+    "AsyncJog",
+    "AsyncMic488",
+    "AsyncModbusLine",
+    "AsyncProgram",
+    "AsyncUserRegisters",
+    "AsyncUserView",
+    "Axis",
+    "Change",
+    "Jog",
+    "LineLost",
+    "Mic488",
+    "Mic488Status",
+    "ModbusLine",
+    "MoveEnd",
+    "MoveFailed",
+    "NoAnswer",
+    "NoMic488",
+    "NotReady",
+    "Overtaken",
+    "Program",
+    "ProgramState",
+    "Reason",
+    "Refused",
+    "Snapshot",
+    "Untold",
+    "UserRegisters",
+    "UserView",
+    "load_config",
+]

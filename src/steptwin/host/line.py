@@ -1,0 +1,45 @@
+"""What a driver needs of a line, whatever waits for its answers.
+
+Tasks wait on a `steptwin.host.tasks.TaskLine`, threads on a `steptwin.host.threads.ThreadLine`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from contextlib import AbstractAsyncContextManager
+from typing import Any, Protocol
+
+from steptwin.host.exchange import A, Job, Q
+from steptwin.machine import Nanos
+
+
+class Line(Protocol[Q, A]):
+    """A line that may be shared by several drivers, tasks or threads.
+
+    ``notes`` is where drivers of one device on the line keep what they have in common.
+    """
+
+    notes: dict[Hashable, Any]
+
+    @property
+    def place(self) -> str:
+        """Where it is, for people."""
+        ...
+
+    async def open(self) -> None:
+        """Open the port or the connection. Raises `LineLost`. An exchange opens a line that was lost again."""
+        ...
+
+    async def exchange(self, job: Job[Q, A]) -> A:
+        """The answer. Raises `Refusal` or `LineFailure`."""
+        ...
+
+    async def sleep(self, seconds: float) -> None: ...
+
+    def now(self) -> Nanos: ...
+
+    def lock(self, key: Hashable) -> AbstractAsyncContextManager[object]:
+        """For several exchanges that belong together; the same key gives the same lock."""
+        ...
+
+    async def close(self) -> None: ...

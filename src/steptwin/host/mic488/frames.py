@@ -1,0 +1,93 @@
+"""Frames on a line in words, for logs and for listening in on others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.describe import Wording
+from steptwin.mic488.registermap import DataType, RegisterMap
+from steptwin.mic488.registers import register_map
+from steptwin.wire import pdu as modbus
+from steptwin.wire.slave import Direction
+
+
+class Heard(NamedTuple):
+    """One frame: towards the device or back, or bytes that are no frame (direction None)."""
+
+    time: Nanos
+    direction: Direction | None
+    unit: int | None
+    raw: bytes
+    meaning: str
+
+    def __str__(self) -> str:
+        arrow = "?" if self.direction is None else "→" if self.direction is Direction.IN else "←"
+        return f"{self.time / SECOND:12.6f} s  {arrow} {self.raw.hex(' ')}  {self.meaning}"
+
+
+class FrameWords:
+    """Puts the frames of a line into words and hands them to ``sinks``.
+
+    What DATA_TYPE says is learnt from the frames: from its reads and writes, for each unit.
+    """
+
+    def __init__(self, registers: RegisterMap | None = None, *, tcp: bool = False) -> None:
+        self.sinks: list[Callable[[Heard], object]] = []
+        self._tcp = tcp
+        self._registers = registers or register_map()
+        self._wordings: dict[int, Wording] = {}
+        self._asked: dict[int, bytes] = {}
+
+    def know(self, unit: int, wording: Wording) -> None:
+        """Use what is known of a unit."""
+        self._wordings[unit] = wording
+
+    def observe(self, now: Nanos, direction: Direction, raw: bytes) -> None:
+        """A frame as a master sent or heard it: a `steptwin.wire.slave.FrameObserver`."""
+        self._tell(self.frame(now, direction, raw))
+
+    def rubbish(self, now: Nanos, raw: bytes) -> None:
+        self._tell(Heard(now, None, None, raw, "no frame"))
+
+    def _tell(self, heard: Heard) -> None:
+        for sink in self.sinks:
+            sink(heard)
+
+    def frame(self, now: Nanos, direction: Direction, raw: bytes) -> Heard:
+        least = 8 if self._tcp else 4
+        if len(raw) < least:
+            return Heard(now, None, None, raw, "no frame")
+        unit, pdu = (raw[6], raw[7:]) if self._tcp else (raw[0], raw[1:-2])
+        wording = self._wordings.get(unit)
+        if wording is None:
+            wording = self._wordings[unit] = Wording(self._registers)
+        if direction is Direction.IN:
+            self._asked[unit] = pdu
+            text = wording.request(pdu)
+        else:
+            asked = self._asked.pop(unit, None)
+            self._learn(wording, asked, pdu)
+            text = wording.response(pdu, asked)
+        return Heard(now, direction, unit, raw, f"{'broadcast' if unit == 0 else f'unit {unit}'}: {text}")
+
+    def _learn(self, wording: Wording, asked: bytes | None, answered: bytes) -> None:
+        """Notice what DATA_TYPE was read as or set to."""
+        address = wording.register_map.of("DATA_TYPE").address
+        try:
+            request = modbus.decode_request(asked or b"")
+            response = modbus.answer(request, answered)
+        except (modbus.ModbusException, modbus.BadResponse):
+            return
+        match request, response:
+            case modbus.Read(function, first, count), modbus.Registers(words) if function == modbus.READ_HOLDING_REGISTERS:
+                if not first <= address < first + count:
+                    return
+                value = words[address - first]
+            case modbus.WriteRegister(where, value), _ if where == address:
+                pass
+            case _:
+                return
+        if value in (DataType.REAL, DataType.DINT):
+            wording.data_type = DataType(value)

@@ -1,0 +1,44 @@
+"""Several axes that begin in the same instant (AXIS_CTR_MODE, manual 4.5)."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.host.mic488.axis import AsyncAxis
+from steptwin.host.mic488.motion import Kind
+from steptwin.host.mic488.unit import Unit, check_axis
+
+_REGISTERS = {
+    Kind.POSITION: ("POS_ABS", "AXIS_POS_ABS_TRIG"),
+    Kind.DISTANCE: ("POS_REL", "AXIS_POS_REL_TRIG"),
+    Kind.VELOCITY: ("VEL_ABS", "AXIS_VEL_ABS_TRIG"),
+}
+DIRECT, TRIGGER = 0, 1
+
+
+async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values: Mapping[int, float]) -> None:
+    """Store a value for each axis and start them with one write. The trigger itself is sent once only."""
+    if not values:
+        raise Misuse("no axis is given to be moved")
+    chosen = sorted(check_axis(axis) for axis in values)
+    for axis in chosen:
+        axes[axis].check(kind, values[axis])
+    register, starter = _REGISTERS[kind]
+    mode = unit.item("AXIS_CTR_MODE")
+    allowed = unit.stop_guard(*chosen)
+    async with unit.lock():
+        control = await unit.ready(*chosen)
+        await unit.write(mode, TRIGGER, allowed=allowed)
+        try:
+            for axis in chosen:
+                await unit.set_axis(register, axis, values[axis], control.data_type, allowed=allowed)
+            await unit.write(unit.item(starter), sum(1 << axis - 1 for axis in chosen), allowed=allowed)
+        except BaseException:
+            with contextlib.suppress(SteptwinError):
+                await unit.write(mode, DIRECT)
+            raise
+        for axis in chosen:
+            axes[axis].told(kind, values[axis], control)
+        await unit.write(mode, DIRECT)

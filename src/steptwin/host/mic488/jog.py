@@ -1,0 +1,188 @@
+"""Jogging as a dead-man's switch.
+
+The axis is never told to run. Again and again it is told to move a bounded distance from where it is (POS_REL, at the velocity
+of the jog), just far enough to run on for the hold time and then brake. Held in time, it runs evenly; not held, because the
+button was let go, the program hangs, was killed or the line was cut, it comes to rest by itself.
+
+Suffixes: ``_u`` configured units, ``_s`` seconds, ``_ns`` nanoseconds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from steptwin.errors import LineFailure, Misuse, SteptwinError
+from steptwin.host.exchange import Overtaken
+from steptwin.host.mic488.failures import NotReady, Untold
+from steptwin.host.mic488.motion import MOVING, Kind, Motion, MoveEnd, Reason, reason_of, status_text
+from steptwin.host.mic488.unit import Control, Unit
+from steptwin.host.mic488.waiting import dynamics
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.status import Status
+
+HOLD_S = 0.4
+"""How long an axis runs on after it was held last, before it brakes."""
+HOLD_RANGE_S = (0.2, 2.0)
+RENEWALS = 4
+"""How often it is held in that time."""
+
+
+class AsyncJog:
+    """A jog of one axis: ``async with axis.jog(5.0) as jog: while pressed(): await jog.hold()``.
+
+    `hold` returns after a quarter of the hold time: call it again at once for as long as the axis is to run. It says False when
+    the axis has stopped for another reason, which `end` tells. At the end of the block the axis ramps down, and VMAX, which a
+    jog has to change, is what it was. (A killed program cannot put it back: VMAX stays the velocity of the jog.)
+    """
+
+    def __init__(
+        self,
+        unit: Unit,
+        axis: int,
+        velocity_u: float,
+        hold_s: float,
+        told: Callable[[Kind, float, Control | None], None],
+    ) -> None:
+        least, most = HOLD_RANGE_S
+        if not least <= hold_s <= most:
+            raise Misuse(f"a hold time of {hold_s:g} s is outside {least:g} to {most:g} s")
+        self._unit = unit
+        self._axis = axis
+        self._velocity_u = velocity_u
+        self._hold_s = hold_s
+        self._told = told
+        self._renew_ns: Nanos = round(hold_s / RENEWALS * SECOND)
+        self._reach_u = 0.0
+        self._vmax_u: float | None = None
+        self._held_ns: Nanos | None = None  # when it was held last
+        self._allowed = unit.stop_guard(axis)
+        self.end: MoveEnd | None = None
+        """Why the axis does not run any more."""
+
+    @property
+    def reach_u(self) -> float:
+        """How far the axis goes at most after it was held last, in u."""
+        return self._reach_u
+
+    async def __aenter__(self) -> Self:
+        unit, axis = self._unit, self._axis
+        self._allowed = unit.stop_guard(axis)
+        async with unit.lock():
+            control = await unit.ready(axis)
+            self._told(Kind.DISTANCE, self._velocity_u, control)
+            _, _, _, dec, vmax = await dynamics(unit, axis)
+            speed = abs(self._velocity_u)
+            self._reach_u = speed * self._hold_s + speed * speed / (2.0 * dec)
+            if vmax != speed:
+                self._vmax_u = vmax
+                await unit.set_axis("VMAX", axis, speed, control.data_type)
+        try:
+            self._held_ns = unit.line.now()
+            await self._renew(control)
+        except SteptwinError as error:
+            with contextlib.suppress(SteptwinError):
+                await self._put_back()
+            if isinstance(error, LineFailure):
+                raise self._untold("may have begun to jog", error) from error
+            raise
+        return self
+
+    async def hold(self) -> bool:
+        """Let the axis run on; False when it has stopped. Raises `Untold` when the controller cannot be told in time."""
+        if self._held_ns is None:
+            raise Misuse("a jog is held inside its with block")
+        if self.end is not None:
+            return False
+        unit = self._unit
+        await unit.line.sleep((self._held_ns + self._renew_ns - unit.line.now()) / SECOND)
+        deadline = self._held_ns + round(self._hold_s * SECOND)
+        if unit.line.now() > deadline:
+            # Whoever held the button was away: it must not go on by itself when he comes back.
+            self._stopped(Reason.NOT_HELD, f"{(unit.line.now() - self._held_ns) / SECOND:.2f} s since it was held")
+            return False
+        while True:
+            try:
+                control = await self._look()
+                if self._has_ended(control):
+                    return False
+                await self._renew(control)
+            except LineFailure as failure:
+                if unit.line.now() < deadline:
+                    continue
+                raise self._untold("cannot be held any more", failure) from failure
+            return self.end is None
+
+    async def _look(self) -> Control:
+        control = await self._unit.control(timeout_ns=self._exchange_ns())
+        if control.triggered:
+            raise NotReady(f"{self._unit.place}: somebody has set AXIS_CTR_MODE to TRIGGER: M{self._axis} is not jogged any more")
+        return control
+
+    def _exchange_ns(self) -> Nanos:
+        """A lost answer must not take the time in which another could be had."""
+        return min(self._unit.timeout_ns, self._renew_ns)
+
+    async def _renew(self, control: Control) -> None:
+        unit = self._unit
+        distance = self._reach_u if self._velocity_u > 0.0 else -self._reach_u
+        at = unit.line.now()
+        try:
+            await unit.set_axis(
+                "POS_REL", self._axis, distance, control.data_type, allowed=self._allowed, timeout_ns=self._exchange_ns()
+            )
+        except Overtaken:
+            self._stopped(Reason.STOPPED, "by this program")
+        else:
+            self._held_ns = at
+
+    def _has_ended(self, control: Control) -> bool:
+        status = control.axes[self._axis - 1]
+        if status in MOVING:
+            return False
+        motion = Motion(Kind.DISTANCE, self._reach_u, self._held_ns or 0, Status.ON)
+        reason = reason_of(status, motion)
+        self._stopped(Reason.NOT_HELD if reason is Reason.TARGET else reason, status_text(status))
+        return True
+
+    def _stopped(self, reason: Reason, detail: str) -> None:
+        unit = self._unit
+        held = self._held_ns or unit.line.now()
+        self.end = MoveEnd(self._axis, reason, None, unit.unit_name(self._axis), (unit.line.now() - held) / SECOND, detail)
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        try:
+            await self.release()
+        except SteptwinError:
+            if error is None or not isinstance(error, LineFailure):
+                raise
+
+    async def release(self) -> None:
+        """Ramp down, and put VMAX back. Raises `Untold` when the controller cannot be told."""
+        unit = self._unit
+        if self.end is None and self._held_ns is not None and self._allowed():
+            try:
+                data_type = unit.wording.data_type
+                await unit.set_axis("VEL_ABS", self._axis, 0.0, data_type, allowed=self._allowed)
+            except LineFailure as failure:
+                raise self._untold("cannot be told to stop", failure) from failure
+            self._stopped(Reason.RELEASED, "")
+            self._told(Kind.VELOCITY, 0.0, None)
+        await self._put_back()
+
+    async def _put_back(self) -> None:
+        vmax, self._vmax_u = self._vmax_u, None
+        if vmax is not None and vmax != abs(self._velocity_u):
+            await self._unit.set_axis("VMAX", self._axis, vmax, self._unit.wording.data_type)
+
+    def _untold(self, what: str, failure: LineFailure) -> Untold:
+        unit = self._unit
+        name = unit.unit_name(self._axis)
+        since = (unit.line.now() - (self._held_ns or unit.line.now())) / SECOND
+        self._stopped(Reason.COMMUNICATION, str(failure))
+        return Untold(
+            f"M{self._axis} {what}: the controller cannot be told ({failure}). "
+            f"It stops by itself, at most {self._reach_u:g} {name} after it was held last, {since:.2f} s ago"
+        )

@@ -1,0 +1,111 @@
+"""Motions as a driver sees them: how long they last, and why they ended.
+
+Suffixes: ``_u`` configured units (u, u/s, u/s²), ``_s`` seconds.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.registers import AXIS_STATUS_TEXTS
+from steptwin.mic488.status import Status
+from steptwin.motion import MotionState, plan_position
+
+MOVING = frozenset({Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION})
+
+_SCALE = 2**20
+"""Pulses a distance is taken as when its length in pulses is not known: plenty for a duration."""
+
+
+class Reason(enum.Enum):
+    """Why a motion ended."""
+
+    TARGET = "target reached"
+    LIMIT_L = "stopped at limit L"
+    LIMIT_R = "stopped at limit R"
+    STOPPED = "stopped by somebody"
+    POSITION_ERROR = "position error (encoder)"
+    DISABLED = "drive switched off"
+    DIVERTED = "sent elsewhere by somebody"
+    OVERDUE = "still moving"
+    RELEASED = "released"
+    NOT_HELD = "not held"
+    COMMUNICATION = "communication lost"
+
+
+_REASONS: dict[int, Reason] = {
+    Status.OFF: Reason.DISABLED,
+    Status.ON: Reason.STOPPED,
+    Status.REACHED: Reason.TARGET,
+    Status.ERROR: Reason.POSITION_ERROR,
+    Status.LIMIT_L: Reason.LIMIT_L,
+    Status.LIMIT_R: Reason.LIMIT_R,
+}
+
+
+class Kind(enum.Enum):
+    """What an axis was told."""
+
+    POSITION = "position"
+    DISTANCE = "distance"
+    VELOCITY = "velocity"
+    HOMING = "homing"
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A motion command. ``value_u`` is the position, distance or velocity; ``before`` the status of the axis before it."""
+
+    kind: Kind
+    value_u: float
+    at: Nanos
+    before: int
+
+
+@dataclass(frozen=True, slots=True)
+class MoveEnd:
+    """How a motion of ``axis`` ended. ``ok``: as it was meant to."""
+
+    axis: int
+    reason: Reason
+    position_u: float | None
+    unit: str
+    after_s: float
+    detail: str = ""
+    cause: Exception | None = None
+
+    @property
+    def ok(self) -> bool:
+        return self.reason in (Reason.TARGET, Reason.RELEASED)
+
+    def __str__(self) -> str:
+        where = "" if self.position_u is None else f" at {self.position_u:g} {self.unit}"
+        return f"M{self.axis}: {self.reason.value}{where}{f' ({self.detail})' if self.detail else ''}"
+
+
+def status_text(code: int) -> str:
+    return AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
+
+
+def reason_of(status: int, motion: Motion | None) -> Reason:
+    """Why an axis that does not move any more stands. Coming to rest is the target of a velocity of 0."""
+    if status == Status.ON and (motion is None or (motion.kind is Kind.VELOCITY and motion.value_u == 0.0)):
+        return Reason.TARGET
+    return _REASONS.get(status, Reason.STOPPED)
+
+
+def travel_s(distance_u: float, velocity_u: float, acc_u: float, dec_u: float, vmax_u: float) -> float | None:
+    """How long a position move over ``distance_u`` takes that begins with ``velocity_u``; None where no plan is possible."""
+    try:
+        reach = max(abs(distance_u), velocity_u * velocity_u / (2.0 * dec_u))
+        if reach == 0.0:
+            return 0.0
+        scale = _SCALE / reach
+        state = MotionState(0, 0, 0.0, velocity_u * scale)
+        profile = plan_position(state, round(distance_u * scale), acc_u * scale, dec_u * scale, vmax_u * scale)
+    except (Misuse, ArithmeticError, ValueError):
+        return None
+    return 0.0 if profile.end is None else profile.end / SECOND

@@ -1,0 +1,239 @@
+"""Values by name: how a name chooses registers, how their values travel, and how many are read with few frames. Pure."""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections.abc import Iterable, Sequence
+from math import isfinite
+from typing import NamedTuple, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, words_to_dint, words_to_real
+from steptwin.mic488.registermap import DataType, Effect, Register, RegisterMap, Space, Type
+from steptwin.wire import pdu
+
+Value: TypeAlias = bool | int | float
+
+BRIDGE = {Space.HOLDING: 16, Space.COIL: 256, Space.INPUT: 256}
+"""Addresses nobody asked for that are read along to save a frame: at 38400 bit/s a frame costs as much as 38 characters."""
+
+_MOST = {Space.HOLDING: pdu.MAX_REGISTERS, Space.COIL: pdu.MAX_BITS, Space.INPUT: pdu.MAX_BITS}
+_READS = {Space.HOLDING: pdu.READ_HOLDING_REGISTERS, Space.COIL: pdu.READ_COILS, Space.INPUT: pdu.READ_DISCRETE_INPUTS}
+_SPACES = {space: number for number, space in enumerate(Space)}
+_NAME = re.compile(r"(?P<name>\w+?)(?:\[(?P<cell>\d{1,5})\])?(?::(?P<view>\w+))?\Z")
+FORM = "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD"
+
+
+class View(enum.Enum):
+    """How user registers are looked at."""
+
+    WORD = "word"
+    INT = "int"
+    DINT = "dint"
+    REAL = "real"
+
+    @property
+    def size(self) -> int:
+        return 2 if self in (View.DINT, View.REAL) else 1
+
+    @property
+    def range(self) -> str:
+        return {"word": "0…65535", "int": "−32768…32767", "dint": "−2³¹…2³¹−1", "real": "±3.4e38"}[self.value]
+
+
+class Item:
+    """One value of a controller: a register, or some of the user registers. Items of the same registers and view are equal."""
+
+    __slots__ = ("_key", "address", "cell", "register", "size", "view")
+
+    def __init__(self, register: Register, cell: int = 0, view: View = View.WORD) -> None:
+        self.register = register
+        self.cell = cell
+        self.view = view
+        self.address = register.address + cell
+        self.size = view.size if register.type is Type.MEMORY else register.type.size
+        self._key = (_SPACES[register.space], self.address, view.value)
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Item) and self._key == other._key
+
+    def __lt__(self, other: Item) -> bool:
+        return self._key < other._key
+
+    def __repr__(self) -> str:
+        return f"<Item {self.name}>"
+
+    def at(self, cell: int) -> Item:
+        """The same view of another user register."""
+        return Item(self.register, cell, self.view)
+
+    @property
+    def name(self) -> str:
+        if self.register.type is not Type.MEMORY:
+            return self.register.name
+        return f"{self.register.name}[{self.cell}]{'' if self.view is View.WORD else f':{self.view.value}'}"
+
+
+def named(registers: RegisterMap, text: str) -> Item:
+    """The value of that name: ``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``. Raises `Misuse`."""
+    match = _NAME.match(text.strip())
+    if match is None:
+        raise Misuse(f"{text!r} is no name of a value: {FORM}")
+    register = registers.named(match["name"])
+    if register.type is not Type.MEMORY:
+        if match["cell"] or match["view"]:
+            raise Misuse(f"{text!r}: {register.name} is one value of type {register.type.value}; name it without [ ] and :")
+        return Item(register)
+    if match["cell"] is None:
+        raise Misuse(f"{text!r}: choose one of {register.name}[0] to {register.name}[{register.cells - 1}]")
+    try:
+        view = View((match["view"] or "word").lower())
+    except ValueError:
+        raise Misuse(f"{text!r}: permitted behind : are word, int, dint and real") from None
+    return user_item(registers, int(match["cell"]), view)
+
+
+def user_item(registers: RegisterMap, number: int, view: View, count: int = 1) -> Item:
+    """User register ``number`` as ``view``. Raises `Misuse` unless ``count`` values from there on are user registers."""
+    register = registers.of("USER_REGISTER")
+    last = register.cells - view.size * count
+    if not 0 <= number <= last:
+        raise Misuse(f"user register {number} as {view.name}{'' if count == 1 else f' × {count}'} is outside 0 to {last}")
+    if view.size == 2 and number % 2:
+        raise Misuse(f"user register {number} as {view.name}: {view.name}s begin at even registers")
+    return Item(register, number, view)
+
+
+# ---------------------------------------------------------------------- values and words
+
+
+def decoded(item: Item, words: Sequence[int], data_type: DataType) -> Value:
+    """The value in its words (or its bit)."""
+    kind = _kind(item, data_type)
+    if kind is Type.BIT:
+        return bool(words[0])
+    if kind is Type.REAL:
+        return words_to_real(words[0], words[1])
+    if kind is Type.DINT:
+        return words_to_dint(words[0], words[1])
+    return word_to_int(words[0]) if item.view is View.INT else words[0]
+
+
+def _kind(item: Item, data_type: DataType) -> Type:
+    kind = item.register.type
+    if kind is Type.VALUE:
+        return Type.DINT if data_type is DataType.DINT else Type.REAL
+    if kind is Type.MEMORY:
+        return {View.DINT: Type.DINT, View.REAL: Type.REAL}.get(item.view, Type.WORD)
+    return kind
+
+
+def encoded(item: Item, value: Value, data_type: DataType, unit: str = "u") -> pdu.Request:
+    """The request that writes ``value``, which is in units with DATA_TYPE REAL and in pulses with DINT.
+
+    Raises `Misuse` when the register cannot be written or does not take the value.
+    """
+    register = item.register
+    if not register.accepts:
+        raise Misuse(f"{register.name} can only be read")
+    if register.type is Type.BIT:
+        if value not in (0, 1):
+            raise Misuse(f"{register.name} = {value}: permitted are 0 (OFF) and 1 (ON)")
+        return pdu.WriteCoil(register.address, bool(value))
+    words = _words(item, value, data_type, unit)
+    if len(words) == 1:
+        return pdu.WriteRegister(item.address, words[0])
+    return pdu.WriteRegisters(item.address, words)
+
+
+def _words(item: Item, value: Value, data_type: DataType, unit: str) -> tuple[int, ...]:
+    register = item.register
+    kind = _kind(item, data_type)
+    shown = f"{item.name} = {value:g} {register.unit(data_type, unit)}".rstrip()
+    if kind is not Type.REAL and not (isfinite(value) and value == int(value)):
+        raise Misuse(f"{shown}: a whole number is needed")
+    if register.type is Type.MEMORY:
+        if item.view is View.INT and -0x8000 <= value <= 0x7FFF:
+            return (int(value) & 0xFFFF,)
+        if item.view in (View.INT, View.WORD) and (item.view is View.INT or not 0 <= value <= 0xFFFF):
+            raise Misuse(f"{shown}: permitted {item.view.range}")
+    elif not register.permits(value):
+        raise Misuse(f"{shown}: permitted {register.permitted} {register.unit(data_type, unit)}".rstrip())
+    if kind is Type.REAL:
+        return real_to_words(value)
+    return dint_to_words(int(value)) if kind is Type.DINT else (int(value),)
+
+
+# ---------------------------------------------------------------------- reading with few frames
+
+
+class Block(NamedTuple):
+    """One read and the values in it, each with its place."""
+
+    request: pdu.Read
+    items: tuple[tuple[Item, int], ...]
+
+    def values(self, words: Sequence[int], data_type: DataType) -> dict[Item, Value]:
+        return {item: decoded(item, words[place : place + item.size], data_type) for item, place in self.items}
+
+
+def plan(registers: RegisterMap, items: Iterable[Item]) -> list[Block]:
+    """The fewest reads that give all values, over what may be read only (MIC-3). Raises `Misuse` for what cannot be read."""
+    blocks: list[Block] = []
+    group: list[Item] = []
+    for item in sorted(set(items)):
+        if not item.register.reads:
+            raise Misuse(f"{item.register.name} can only be written")
+        if group and not _joins(registers, group, item):
+            blocks.append(_block(group))
+            group = []
+        group.append(item)
+    if group:
+        blocks.append(_block(group))
+    return blocks
+
+
+def _joins(registers: RegisterMap, group: list[Item], item: Item) -> bool:
+    space = item.register.space
+    start, end = group[0].address, max(member.address + member.size for member in group)
+    if group[0].register.space is not space or item.address + item.size - start > _MOST[space]:
+        return False
+    gap = item.address - end
+    if gap <= 0:
+        return True
+    between = registers.pieces(space, end, gap)
+    return gap <= BRIDGE[space] and all(p.whole and p.register is not None and p.register.reads for p in between)
+
+
+def _block(group: list[Item]) -> Block:
+    start, end = group[0].address, max(member.address + member.size for member in group)
+    request = pdu.Read(_READS[group[0].register.space], start, end - start)
+    return Block(request, tuple((item, item.address - start) for item in group))
+
+
+# ---------------------------------------------------------------------- repeating
+
+
+def repeatable(registers: RegisterMap, request: pdu.Request) -> bool:
+    """Whether a request whose answer was lost may be sent again: only where that cannot move anything twice."""
+    match request:
+        case pdu.Read():
+            return True
+        case pdu.WriteCoil(address):
+            touched = [registers.find(Space.COIL, address)]
+        case pdu.WriteRegister(address, value):
+            touched = [registers.find(Space.HOLDING, address)]
+            if touched[0] is not None and touched[0].key == "PROGRAM_CTRL":
+                return value == 0  # stopping twice is stopping; starting and pausing depend on what happened meanwhile
+        case pdu.WriteRegisters(address, values):
+            touched = [piece.register for piece in registers.pieces(Space.HOLDING, address, len(values))]
+    return all(register is not None and _repeatable(register) for register in touched)
+
+
+def _repeatable(register: Register) -> bool:
+    # A homing that has ended already would be done again: the same goal, but a second motion.
+    return register.effect in (Effect.STORE, Effect.ACT) or (register.effect is Effect.MOVE and register.key != "HOME")
