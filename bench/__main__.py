@@ -1,0 +1,231 @@
+"""``make bench``: requests per second and latencies against pymodbus' and libmodbus' servers, in one run on pinned processors.
+
+The server runs on the last processor, the client (C, so that it is not what is measured) on the first. Four axes of the
+controller are moving while their positions and velocities are read; the peers serve static registers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import json
+import os
+import pty
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).parent
+BIN = Path(sys.executable).parent
+PROCESSORS = sorted(os.sched_getaffinity(0))
+
+MODULES = sorted(path.stem for path in HERE.glob("*.py") if path.stem not in {"__init__", "__main__", "fleet", "pymodbus_server"})
+"""Every other module here measures something in its `main`."""
+
+# name: (request PDU, bytes of the response PDU)
+REQUESTS = {
+    "FC3x10": (bytes.fromhex("032724000a"), 22),
+    "FC3x40": (bytes.fromhex("0327240028"), 82),
+    "FC16x2": (bytes.fromhex("1000640002040000447a"), 5),
+    "FC5": (bytes.fromhex("051770ff00"), 5),
+}
+
+
+PEERS = ("steptwin", "libmodbus", "pymodbus")
+
+
+@dataclass(frozen=True)
+class Figures:
+    per_second: float
+    p50_us: float
+    p99_us: float
+
+
+def build(source: str, folder: Path, *flags: str) -> Path:
+    program = folder / Path(source).stem
+    subprocess.run(["cc", "-O2", "-o", str(program), str(HERE / source), *flags], check=True)
+    return program
+
+
+def on_processor(number: int) -> list[str]:
+    return ["taskset", "-c", str(PROCESSORS[number])]
+
+
+def free_port() -> int:
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+@contextlib.contextmanager
+def server(command: list[str]) -> Generator[None]:
+    """A server process on its processor, until it says that it is ready."""
+    process = subprocess.Popen(
+        on_processor(-1) + command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True
+    )
+    try:
+        if process.stdout is None or "ready" not in process.stdout.readline():
+            raise RuntimeError(f"{command[:3]} did not start")
+        yield
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+@contextlib.contextmanager
+def steptwin(folder: Path) -> Generator[dict[str, dict[str, object]]]:
+    """The real thing with four axes moving; its end points."""
+    ready = folder / "ready.json"
+    command = [str(BIN / "steptwin"), "serve", "mic488", "--tcp", "127.0.0.1:0", "--pty", str(folder / "line")]
+    command += ["--name", f"bench-{os.getpid()}", "--ready-file", str(ready)]
+    process = subprocess.Popen(on_processor(-1) + command, stdout=subprocess.DEVNULL, start_new_session=True)
+    try:
+        deadline = time.monotonic() + 10
+        while not ready.exists():
+            if process.poll() is not None or time.monotonic() > deadline:
+                raise RuntimeError("steptwin did not start")
+            time.sleep(0.02)
+        places = {e["kind"]: e for e in json.loads(ready.read_text())["end_points"]}
+        with socket.create_connection(("127.0.0.1", places["tcp"]["port"])) as s:
+            for pdu in ["06271e000f", *(f"10{10068 + 2 * axis:04x}0002040000447a" for axis in range(4))]:
+                s.sendall(mbap(bytes.fromhex(pdu)))
+                if s.recv(300)[7] & 0x80:
+                    raise RuntimeError(f"{pdu} was refused")
+        yield places
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def mbap(pdu: bytes) -> bytes:
+    return b"\0\1\0\0" + (len(pdu) + 1).to_bytes(2, "big") + b"\1" + pdu
+
+
+def rtu(pdu: bytes) -> bytes:
+    from steptwin.wire.rtu import encode_frame
+
+    return encode_frame(1, pdu)
+
+
+def run_client(client: Path, *arguments: object) -> Figures | None:
+    done = subprocess.run(
+        [*on_processor(0), str(client), *map(str, arguments)], capture_output=True, text=True, check=False, close_fds=False
+    )
+    if done.returncode:
+        print(f"  client: {done.stderr.strip()}", file=sys.stderr)
+        return None
+    count, seconds, p50, p99 = map(float, done.stdout.split())
+    return Figures(count / seconds, p50, p99)
+
+
+def row(name: str, results: dict[str, Figures | None]) -> None:
+    cells = [_cell(results[who]) for who in PEERS]
+    ratios = [f"{_ratio(results['steptwin'], results[who])} × {who}" for who in PEERS[1:]]
+    print(f"{name:<18} {'  '.join(cells)}  {' '.join(ratios)}", flush=True)
+
+
+def _cell(figures: Figures | None) -> str:
+    if figures is None:
+        return f"{'failed':>27}"
+    return f"{figures.per_second:9.0f}/s {figures.p50_us:6.0f} {figures.p99_us:6.0f} us"
+
+
+def _ratio(ours: Figures | None, theirs: Figures | None) -> str:
+    return f"{ours.per_second / theirs.per_second:6.2f}" if ours and theirs else f"{'-':>6}"
+
+
+def best(runs: list[Figures | None]) -> Figures | None:
+    """The run with the median rate: these machines are noisy."""
+    good = sorted((r for r in runs if r), key=lambda r: r.per_second)
+    return good[len(good) // 2] if good else None
+
+
+def compare_tcp(client: Path, libmodbus: Path, folder: Path, seconds: float, rounds: int) -> None:
+    lib_port, py_port = free_port(), free_port()
+    with (
+        steptwin(folder) as places,
+        server([str(libmodbus), "tcp", str(lib_port)]),
+        server([sys.executable, "-W", "ignore", str(HERE / "pymodbus_server.py"), "tcp", str(py_port)]),
+    ):
+        ports = {"steptwin": places["tcp"]["port"], "libmodbus": lib_port, "pymodbus": py_port}  # type: ignore[index]
+        for connections in (1, 16, 100):
+            for name, (pdu, _) in REQUESTS.items():
+                runs: dict[str, list[Figures | None]] = {who: [] for who in ports}
+                for _ in range(rounds):
+                    for who, port in ports.items():
+                        runs[who].append(run_client(client, "tcp", port, connections, seconds, mbap(pdu).hex()))
+                row(f"tcp {name} ×{connections}", {who: best(r) for who, r in runs.items()})
+
+
+def compare_tty(client: Path, libmodbus: Path, folder: Path, seconds: float, rounds: int) -> None:
+    with contextlib.ExitStack() as stack:
+        ends = {"steptwin": stack.enter_context(steptwin(folder))["pty"]["path"]}  # type: ignore[index]
+        for who, command in {
+            "libmodbus": [str(libmodbus), "rtu"],
+            "pymodbus": [sys.executable, "-W", "ignore", str(HERE / "pymodbus_server.py"), "rtu"],
+        }.items():
+            # The peers open one end of a pty as their serial port; the client takes the other by its number.
+            master, slave = pty.openpty()
+            stack.callback(os.close, master)
+            stack.callback(os.close, slave)
+            stack.enter_context(server([*command, os.ttyname(slave)]))
+            os.set_inheritable(master, True)
+            ends[who] = f"fd:{master}"
+        for name in ("FC3x10", "FC16x2"):
+            pdu, size = REQUESTS[name]
+            runs: dict[str, list[Figures | None]] = {who: [] for who in ends}
+            for _ in range(rounds):
+                for who, path in ends.items():
+                    runs[who].append(run_client(client, "tty", path, size + 3, seconds, rtu(pdu).hex()))
+            row(f"pty {name}", {who: best(r) for who, r in runs.items()})
+
+
+def fleet(client: Path, seconds: float, controllers: int) -> None:
+    port = free_port()
+    with server([sys.executable, str(HERE / "fleet.py"), str(port)]):
+        figures = run_client(client, "rate", port, controllers, seconds, mbap(REQUESTS["FC3x10"][0]).hex(), 10)
+    if figures:
+        print(
+            f"{controllers} controllers in one process, FC3x10 each at 10 Hz: {figures.per_second:.0f}/s, "
+            f"p50 {figures.p50_us / 1000:.2f} ms, p99 {figures.p99_us / 1000:.2f} ms"
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
+    parser.add_argument(
+        "what", nargs="*", default=["tcp", "pty", "fleet", "motion"], help="tcp, pty, fleet, motion (default: all)"
+    )
+    parser.add_argument("--seconds", type=float, default=1.0, help="of each measurement")
+    parser.add_argument("--rounds", type=int, default=3, help="of each measurement, the median counts")
+    parser.add_argument("--controllers", type=int, default=5000)
+    options = parser.parse_args()
+    if not shutil.which("cc"):
+        parser.error("a C compiler and libmodbus are needed: make peers")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        client = build("client.c", folder)
+        flags = subprocess.run(["pkg-config", "--cflags", "--libs", "libmodbus"], capture_output=True, text=True, check=True)
+        libmodbus = build("libmodbus_server.c", folder, *flags.stdout.split())
+        if {"tcp", "pty"} & set(options.what):
+            print(f"{'':<18} {'steptwin, p50, p99':>27}  {'libmodbus (C, select)':>27}  {'pymodbus (async)':>27}")
+        if "tcp" in options.what:
+            compare_tcp(client, libmodbus, folder, options.seconds, options.rounds)
+        if "pty" in options.what:
+            compare_tty(client, libmodbus, folder, options.seconds, options.rounds)
+        if "fleet" in options.what:
+            fleet(client, max(5.0, options.seconds), options.controllers)
+    for name in MODULES:
+        if name in options.what:
+            importlib.import_module(f"bench.{name}").main()
+
+
+if __name__ == "__main__":
+    main()

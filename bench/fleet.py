@@ -1,0 +1,52 @@
+"""Many MIC488 controllers in one process, one for every connection: ``fleet.py PORT``."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import sys
+
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.device import Mic488
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.clock import Clock
+from steptwin.runtime.tcp import Clients, Connection
+from steptwin.wire.slave import TcpSlavePort
+from steptwin.world.kernel import Kernel
+
+ENABLE_ALL = bytes.fromhex("06271e000f")
+RUN = [bytes.fromhex("10") + (10068 + 2 * axis).to_bytes(2, "big") + bytes.fromhex("0002040000447a") for axis in range(4)]
+"""VEL_ABS = 1000 imp/s."""
+
+
+async def main(port: int) -> None:
+    loop = asyncio.get_running_loop()
+    clock = Clock()
+    config = ControllerConfig()
+    clients = Clients()
+    clients = Clients()
+
+    def connect() -> Connection:
+        kernel = Kernel(clock.now())
+        device = Mic488(config)
+        kernel.add("1", device)
+        for request in (ENABLE_ALL, *RUN):
+            device.execute(request, kernel.now)
+        return Connection(Cell(kernel, clock), lambda: TcpSlavePort({1: device}), clients)
+
+    await loop.create_server(connect, "127.0.0.1", port, backlog=1024)
+    gc.freeze()
+    gc.disable()
+    print("ready", flush=True)
+    await asyncio.Event().wait()
+
+
+if __name__ == "__main__":
+    import resource
+
+    import uvloop
+
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        runner.run(main(int(sys.argv[1])))

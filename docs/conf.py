@@ -1,0 +1,22 @@
+"""Sphinx configuration. `make docs` builds with warnings as errors."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from steptwin import __version__
+
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+
+project = "steptwin"
+copyright = "the steptwin authors"  # noqa: A001 - Sphinx wants this name
+release = __version__
+
+extensions = ["myst_parser", "command_output"]
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+
+html_theme = "furo"
+html_title = f"steptwin {release}"
+html_copy_source = False

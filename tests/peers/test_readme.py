@@ -1,0 +1,96 @@
+"""What README and getting-started tell a newcomer to type, typed against the demo."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def commands(page: str, program: str) -> list[list[str]]:
+    """The command lines of a page that run ``program``."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+    lines = [shlex.split(line, comments=True) for block in blocks for line in block.splitlines()]
+    return [line for line in lines if line and Path(line[0]).name == program]
+
+
+def values(output: str) -> list[float]:
+    return [float(value) for value in re.findall(r"^\[\d+\]: \t(\S+)", output, re.MULTILINE)]
+
+
+def poll(command: list[str], enough: int) -> list[float]:
+    """The values that a polling command printed, ended by Ctrl-C."""
+    with subprocess.Popen(["stdbuf", "-oL", *command], stdout=subprocess.PIPE, text=True) as process:
+        lines = []
+        while len(values("".join(lines))) < enough and process.stdout is not None:
+            lines.append(process.stdout.readline())
+            assert lines[-1], "it ended by itself"
+        process.send_signal(signal.SIGINT)
+        return values("".join(lines))
+
+
+def test_the_readmes_session(require_peer: Callable[[str], str], serve: Callable[..., Any], connect: Callable[..., Any]) -> None:
+    twin = serve("--demo")
+    master = connect(twin.tcp_port)
+    mbpoll = require_peer("mbpoll")
+    typed = commands("README.md", "mbpoll")
+    assert [line[line.index("-p") + 1] for line in typed] == ["5020"] * len(typed)
+    run = iter([mbpoll, *line[1 : line.index("-p") + 1], str(twin.tcp_port), *line[line.index("-p") + 2 :]] for line in typed)
+
+    def type_next() -> str:
+        return subprocess.run(next(run), capture_output=True, text=True, check=True).stdout
+
+    type_next()
+    assert master.status(1) == 1
+    # The demo takes 4.5 s for its 100 mm.
+    master.dynamics(1, acc=2000.0, dec=2000.0, vmax=200.0)
+    type_next()
+    seen = poll(next(run), 3)
+    assert seen == sorted(set(seen))
+    assert seen[-1] <= 100.0
+    assert values(type_next()) in ([3.0], [4.0])
+    assert master.follow(1, 3)[-1][2:] == (100.0, 0.0, 4)
+
+    master.move(1, -9.0)
+    assert master.follow(1, 3)[-1][2:] == (-9.0, 0.0, 4)
+    type_next()
+    homed = master.follow(1, 6)[-1]
+    assert (homed.position, homed.status) == (0.0, 4)
+
+    type_next()
+    assert master.status(1) == 2
+    type_next()
+    assert master.status(1) == 1
+    assert master.sample(1).velocity == 0.0
+    assert next(run, None) is None
+
+
+def test_the_pty_as_getting_started_polls_it(require_peer: Callable[[str], str], serve: Callable[..., Any]) -> None:
+    pty = str(serve("--demo").pty)
+    ((_, *arguments),) = commands("docs/getting-started.md", "mbpoll")
+    assert poll([require_peer("mbpoll"), *arguments[:-1], pty], 2) == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/getting-started.md"])
+def test_commands_for_a_running_twin(page: str, serve: Callable[..., Any]) -> None:
+    twin = serve("--demo")
+    typed = [arguments for _, *arguments in commands(page, "steptwin") if arguments[0] != "serve"]
+    assert len(typed) >= 3
+    for arguments in typed:
+        run = twin.command(*arguments)
+        assert (run.returncode, run.stderr) == (0, ""), arguments
+
+
+def test_every_option_of_serve_is_in_getting_started(serve: Callable[..., Any]) -> None:
+    helped = serve().command("serve", "mic488", "--help").stdout
+    offered = set(re.findall(r"^  (--[a-z-]+)", helped, re.MULTILINE)) - {"--help"}
+    rows = re.findall(r"^\| (`--.*?) \|", (ROOT / "docs/getting-started.md").read_text(), re.MULTILINE)
+    assert {option for row in rows for option in re.findall(r"`(--[a-z-]+)", row)} == offered

@@ -1,0 +1,37 @@
+"""Pages compared with what they speak of."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROW = re.compile(r"^\| ((?:MIC|WBC|M)-\d+) \|", re.MULTILINE)
+PREFIXES = ("MIC", "M")
+
+
+def rows(prefix: str) -> list[str]:
+    page = (ROOT / "docs/interpretations.md").read_text()
+    return [name for name in ROW.findall(page) if name.startswith(f"{prefix}-")]
+
+
+@pytest.mark.parametrize("prefix", PREFIXES)
+def test_interpretations_are_numbered_without_gap_or_double(prefix: str) -> None:
+    listed = rows(prefix)
+    assert listed
+    assert listed == [f"{prefix}-{n}" for n in range(1, len(listed) + 1)]
+
+
+@pytest.mark.parametrize("prefix", PREFIXES)
+def test_interpretations_cited_in_the_code_are_explained_to_users(prefix: str) -> None:
+    cited = {name for file in (ROOT / "src").rglob("*.py") for name in re.findall(rf"\b{prefix}-\d+\b", file.read_text())}
+    assert cited <= set(rows(prefix))
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_links_into_the_repository_lead_somewhere(page: str) -> None:
+    targets = [target for target in re.findall(r"\]\(([^)#]+)", (ROOT / page).read_text()) if ":" not in target]
+    assert targets
+    assert [target for target in targets if not (ROOT / target).exists()] == []
