@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROW = re.compile(r"^\| ((?:MIC|WBC|M)-\d+) \|", re.MULTILINE)
-PREFIXES = ("MIC", "M")
+PREFIXES = ("MIC", "WBC", "M")
 
 
 def rows(prefix: str) -> list[str]:
