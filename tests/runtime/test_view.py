@@ -17,7 +17,7 @@ from steptwin.runtime.lines import banner
 from steptwin.runtime.mic488 import LineOptions, Mic488Line
 from steptwin.runtime.output import Output
 from steptwin.runtime.server import EndPoint
-from steptwin.runtime.view import LiveView, page
+from steptwin.runtime.view import Mic488View, page
 
 Run = Callable[..., Any]
 
@@ -37,7 +37,7 @@ def screen(run: Run, line: Mic488Line, width: int, height: int, requests: tuple[
     """The screen two seconds after ``requests``, as a terminal of that size shows it."""
 
     async def scene() -> list[str]:
-        view = LiveView(line, Cell(line.kernel, Clock()), Output(None))
+        view = Mic488View(line, Cell(line.kernel, Clock()), Output(None))
         view.watch(banner(line, END_POINTS, REMARKS))
         port = line.tcp_port()
         for request in requests:
@@ -120,7 +120,7 @@ def test_pulses_have_no_decimals(run: Run) -> None:
 def test_notices_are_among_the_events(run: Run) -> None:
     async def scene() -> list[str]:
         line = demo()
-        view = LiveView(line, Cell(line.kernel, Clock()), Output(None))
+        view = Mic488View(line, Cell(line.kernel, Clock()), Output(None))
         view.watch(banner(line, END_POINTS, REMARKS))
         for number in range(9):
             view.notice(f"notice {number}")

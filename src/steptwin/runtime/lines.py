@@ -2,14 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from steptwin.machine import SECOND
-from steptwin.mic488.device import Event
-from steptwin.runtime.mic488 import Mic488Line
+from steptwin.machine import SECOND, Nanos
+from steptwin.runtime.frames import FrameLine
 from steptwin.runtime.output import Output
 from steptwin.runtime.server import EndPoint, Server
+
+
+class Happening(Protocol):
+    """An event of a machine."""
+
+    @property
+    def time(self) -> Nanos: ...
+    @property
+    def text(self) -> str: ...
+
+
+class FrameSource(Protocol):
+    """Whatever puts into words what goes over a line."""
+
+    sinks: list[Callable[[FrameLine], None]]
+
+
+class ServedLine(Protocol):
+    """What a face shows of controllers on a line."""
+
+    @property
+    def title(self) -> str: ...
+    @property
+    def frames(self) -> FrameSource: ...
+    def watch_events(self, sink: Callable[[int, Happening], None]) -> None:
+        """Tell ``sink`` unit and event."""
+        ...
+
+    def told(self, unit: int, event: Happening) -> str:
+        """An event in words; the unit is named where there are several."""
+        ...
 
 
 class Face(Protocol):
@@ -24,7 +54,7 @@ class Face(Protocol):
         ...
 
 
-def banner(line: Mic488Line, end_points: Sequence[EndPoint], remarks: Sequence[str]) -> list[str]:
+def banner(line: ServedLine, end_points: Sequence[EndPoint], remarks: Sequence[str]) -> list[str]:
     """What is served, where, and what to know about it."""
     places = [f"  {end_point.protocol:<13} {end_point.place}" for end_point in end_points]
     return [line.title, *places, *(f"  {remark}" for remark in remarks), "Ctrl-C ends"]
@@ -33,7 +63,7 @@ def banner(line: Mic488Line, end_points: Sequence[EndPoint], remarks: Sequence[s
 class Lines:
     """End points, events, notices, and with ``frames`` every frame."""
 
-    def __init__(self, line: Mic488Line, output: Output, *, frames: bool) -> None:
+    def __init__(self, line: ServedLine, output: Output, *, frames: bool) -> None:
         self._line = line
         self._output = output
         self._frames = frames
@@ -50,5 +80,5 @@ class Lines:
             line.frames.sinks.append(lambda frame: output.line(str(frame)))
         await server.until_ended()
 
-    def _event(self, unit: int, event: Event) -> None:
+    def _event(self, unit: int, event: Happening) -> None:
         self._output.line(f"{event.time / SECOND:12.6f} s  {self._line.told(unit, event)}")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Protocol
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
 
 from steptwin.machine import Nanos
 from steptwin.runtime.cell import Cell
@@ -25,6 +26,17 @@ class Port(Protocol):
     def deadline(self) -> Nanos | None: ...
 
 
+@runtime_checkable
+class TalkingPort(Port, Protocol):
+    """A port that has something to send without having been asked; it calls ``on_output`` then."""
+
+    on_output: Callable[[], None] | None
+
+    def close(self) -> None:
+        """Nobody is there any more."""
+        ...
+
+
 class Writer(Protocol):
     def write(self, data: bytes) -> None: ...
 
@@ -32,14 +44,18 @@ class Writer(Protocol):
 class Feed:
     """Between a stream of bytes and a port: bytes in, answers out, timers for what is due later."""
 
-    __slots__ = ("_cell", "_loop", "_port", "_timer", "_writer")
+    __slots__ = ("_cell", "_loop", "_port", "_talks", "_timer", "_writer")
 
     def __init__(self, cell: Cell, port: Port, writer: Writer) -> None:
         self._cell = cell
         self._port = port
         self._writer = writer
         self._loop = asyncio.get_running_loop()
-        self._timer: asyncio.TimerHandle | None = None
+        self._timer: asyncio.Handle | None = None
+        self._talks: TalkingPort | None = None
+        if isinstance(port, TalkingPort):
+            self._talks = port
+            port.on_output = self._fetch_soon
 
     def take(self, data: bytes) -> None:
         cell = self._cell
@@ -57,6 +73,12 @@ class Feed:
             self._timer.cancel()
         self._timer = self._loop.call_later(self._cell.clock.wait_s(due), self._wake)
 
+    def _fetch_soon(self) -> None:
+        # The port says so while machines are being advanced.
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.call_soon(self._wake)
+
     def _wake(self) -> None:
         self._timer = None
         now = self._cell.enter()
@@ -71,6 +93,8 @@ class Feed:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+        if self._talks is not None:
+            self._talks.close()
 
 
 class Link(Protocol):

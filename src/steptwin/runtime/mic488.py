@@ -19,6 +19,7 @@ from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.demo import place_switches
 from steptwin.runtime.frames import FrameLog, WatchedRtuPort
+from steptwin.runtime.lines import Happening
 from steptwin.runtime.links import Port
 from steptwin.runtime.memory import StateDirectory
 from steptwin.wire.line import SerialLine
@@ -129,7 +130,7 @@ class Mic488Line:
         for unit, device in self.devices.items():
             device.on_event = partial(sink, unit)
 
-    def told(self, unit: int, event: Event) -> str:
+    def told(self, unit: int, event: Happening) -> str:
         """An event in words; the unit is named where there are several."""
         return f"unit {unit}: {event.text}" if len(self.devices) > 1 else event.text
 

@@ -35,6 +35,8 @@ class PtyLink:
         self._device = ""
         self._stirring: select.epoll | None = None
         self._feed: Feed | None = None
+        self._quiet = True
+        """Nobody has sent anything since the last program left."""
 
     async def open(self) -> Path:
         """Make the pty and its link. Raises `LineFailure`, or `Misuse` where the path is taken."""
@@ -71,7 +73,9 @@ class PtyLink:
                 raise Misuse(f"{self.path} is somebody's link to {target}: choose another --pty")
 
     def write(self, data: bytes) -> None:
-        """Send; what finds no room is lost, as on a serial line whose other end does not listen."""
+        """Send; what finds no room or nobody there is lost, as on a serial line whose other end does not listen."""
+        if self._quiet and _is_hung_up(self._master):
+            return
         try:
             os.write(self._master, data)
         except OSError:
@@ -93,6 +97,7 @@ class PtyLink:
         if self._feed is not None:
             self._feed.close()
         self._feed = Feed(self._cell, self._make_port(), self)
+        self._quiet = True
         if self._stirring is not None:
             self._loop.add_reader(self._stirring.fileno(), self._stirred)
             # Our own coming and going was reported too.
@@ -106,6 +111,7 @@ class PtyLink:
         """Whether there is something to read; it is read then."""
         if not any(events & select.EPOLLIN for _, events in stirring.poll(0)):
             return False
+        self._quiet = False
         self._loop.remove_reader(stirring.fileno())
         self._loop.add_reader(self._master, self._readable)
         return True
@@ -139,6 +145,13 @@ class PtyLink:
                 self.path.unlink()
             self._owned.release()
             self._owned = None
+
+
+def _is_hung_up(master: int) -> bool:
+    """Whether no program has the terminal open."""
+    poll = select.poll()
+    poll.register(master, 0)
+    return bool(poll.poll(0))
 
 
 def _is_raw(terminal: int) -> bool:

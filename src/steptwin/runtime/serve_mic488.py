@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import sys
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,11 +21,9 @@ from steptwin.runtime.links import where
 from steptwin.runtime.mic488 import LineOptions, Mic488Line, open_state
 from steptwin.runtime.output import Output
 from steptwin.runtime.server import Server, clear_ready_file
+from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop, shows_live_view
 from steptwin.runtime.tcp import parse_address
 from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
-
-LONGEST_NAME = 40
-"""Paths of sockets are short: about 100 characters in all."""
 
 RTU = "Modbus RTU"
 TCP = "Modbus TCP"
@@ -59,14 +55,12 @@ class Mic488Options:
 
 def serve(options: Mic488Options) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
-    if options.line_timing not in ("real", "off"):
-        raise Misuse(f"--line-timing {options.line_timing}: permitted are 'real' and 'off'")
+    check_line_timing(options.line_timing)
     if options.baud is not None and not 300 <= options.baud <= 1_000_000:
         raise Misuse(f"--baud {options.baud}: permitted are 300 to 1000000 bit/s")
     if options.gap_ms is not None and not 0.0 < options.gap_ms <= 10_000.0:
         raise Misuse(f"--gap {options.gap_ms:g}: permitted are more than 0 and at most 10000 ms")
-    if not LONGEST_NAME >= len(options.name) > 0 or not options.name.replace("-", "").replace("_", "").isalnum():
-        raise Misuse(f"--name {options.name!r}: permitted are 1 to {LONGEST_NAME} letters, digits, '-' and '_'")
+    check_name(options.name)
     known_firmware(options.firmware)
     for address in (options.tcp, options.rtu_tcp):
         if address is not None:
@@ -78,16 +72,8 @@ def serve(options: Mic488Options) -> None:
     units = parse_units(options.units) if options.units is not None else [config.address]
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    with asyncio.Runner(loop_factory=_fastest_loop()) as runner:
+    with asyncio.Runner(loop_factory=fastest_loop()) as runner:
         runner.run(_serve(options, config, units))
-
-
-def _fastest_loop() -> Callable[[], asyncio.AbstractEventLoop] | None:
-    try:
-        import uvloop
-    except ImportError:
-        return None
-    return uvloop.new_event_loop
 
 
 def load_config(path: Path, firmware: str) -> ControllerConfig:
@@ -115,7 +101,7 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
     with ExitStack() as stack:
         output = Output(sys.stdout)
         stack.callback(output.close)
-        live = output.isatty() and not options.log_frames and os.environ.get("TERM", "dumb") not in ("dumb", "unknown")
+        live = shows_live_view(output, log_frames=options.log_frames)
         baud = options.baud or config.ports[0].baud
         line = Mic488Line(
             config,
@@ -137,9 +123,9 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
 
 
 def _live_view(line: Mic488Line, cell: Cell, output: Output) -> Face:
-    from steptwin.runtime.view import LiveView
+    from steptwin.runtime.view import Mic488View
 
-    return LiveView(line, cell, output)
+    return Mic488View(line, cell, output)
 
 
 async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: int) -> None:

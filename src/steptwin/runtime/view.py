@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable, Sequence
 from math import ceil, log10
@@ -13,12 +14,12 @@ from rich.text import Text
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.axis import Axis
-from steptwin.mic488.device import Event, Mic488
+from steptwin.mic488.device import Mic488
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.status import ControllerStatus, Status
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.frames import FrameLine
-from steptwin.runtime.lines import banner
+from steptwin.runtime.lines import Happening, ServedLine, banner
 from steptwin.runtime.mic488 import Mic488Line
 from steptwin.runtime.output import Output
 from steptwin.runtime.server import Server
@@ -43,10 +44,13 @@ _STYLES = {
 }
 
 
-class LiveView:
-    """Axes, inputs and outputs, the last events and frames, ten times a second, on the terminal's second screen."""
+class LiveView(ABC):
+    """Controllers, the last events and frames, ten times a second, on the terminal's second screen."""
 
-    def __init__(self, line: Mic488Line, cell: Cell, output: Output) -> None:
+    traffic = "frames"
+    """What goes over the line, in a word."""
+
+    def __init__(self, line: ServedLine, cell: Cell, output: Output) -> None:
         self._line = line
         self._cell = cell
         self._output = output
@@ -59,7 +63,7 @@ class LiveView:
     def notice(self, text: str) -> None:
         self._tell(self._cell.clock.now(), text)
 
-    def _event(self, unit: int, event: Event) -> None:
+    def _event(self, unit: int, event: Happening) -> None:
         self._tell(event.time, self._line.told(unit, event))
 
     def _tell(self, time: Nanos, text: str) -> None:
@@ -95,10 +99,9 @@ class LiveView:
     def lines(self, now: Nanos, width: int, height: int) -> list[Text]:
         """What the screen shows, from top to bottom: as much as it has room for."""
         lines = [*self._head, Text()]
-        devices = list(self._line.devices.items())
-        for left, (unit, device) in zip(range(len(devices), 0, -1), devices, strict=True):
-            block = _controller(unit, device, now, width)
-            if len(lines) + len(block) > height - FEWEST_FRAMES and left < len(devices):
+        blocks = self.blocks(now, width)
+        for left, block in zip(range(len(blocks), 0, -1), blocks, strict=True):
+            if len(lines) + len(block) > height - FEWEST_FRAMES and left < len(blocks):
                 lines += [Text(f"… and {left} more units: make the window higher", style="yellow"), Text()]
                 break
             lines += [*block, Text()]
@@ -107,8 +110,23 @@ class LiveView:
         room = height - len(lines) - 1
         if room > 0 and self._frames:
             shown = list(self._frames)[-room:]
-            lines += [Text("frames", style="bold"), *map(_frame, shown)]
+            lines += [Text(self.traffic, style="bold"), *map(_frame, shown)]
         return lines[:height]
+
+    @abstractmethod
+    def blocks(self, now: Nanos, width: int) -> list[list[Text]]:
+        """The lines of each controller."""
+
+
+class Mic488View(LiveView):
+    """Axes, inputs and outputs."""
+
+    def __init__(self, line: Mic488Line, cell: Cell, output: Output) -> None:
+        super().__init__(line, cell, output)
+        self._devices = line.devices
+
+    def blocks(self, now: Nanos, width: int) -> list[list[Text]]:
+        return [_controller(unit, device, now, width) for unit, device in self._devices.items()]
 
 
 def page(lines: Iterable[Text]) -> Text:

@@ -1,0 +1,37 @@
+"""What the commands that serve twins have in common: options that mean the same for all, the event loop, the choice of a face."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable
+
+from steptwin.errors import Misuse
+from steptwin.runtime.output import Output
+
+LONGEST_NAME = 40
+"""Paths of sockets are short: about 100 characters in all."""
+
+
+def check_name(name: str) -> None:
+    if not LONGEST_NAME >= len(name) > 0 or not name.replace("-", "").replace("_", "").isalnum():
+        raise Misuse(f"--name {name!r}: permitted are 1 to {LONGEST_NAME} letters, digits, '-' and '_'")
+
+
+def check_line_timing(wanted: str) -> None:
+    if wanted not in ("real", "off"):
+        raise Misuse(f"--line-timing {wanted}: permitted are 'real' and 'off'")
+
+
+def fastest_loop() -> Callable[[], asyncio.AbstractEventLoop] | None:
+    """The event loop to serve with; None is that of the standard library."""
+    try:
+        import uvloop
+    except ImportError:
+        return None
+    return uvloop.new_event_loop
+
+
+def shows_live_view(output: Output, *, log_frames: bool) -> bool:
+    """Whether ``output`` is a terminal to draw on, and nobody wants the frames there."""
+    return output.isatty() and not log_frames and os.environ.get("TERM", "dumb") not in ("dumb", "unknown")
