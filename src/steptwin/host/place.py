@@ -1,4 +1,4 @@
-"""Where a device is reached: ``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu+tcp://host:5021``, ``rfc2217://host:port``."""
+"""Where a device is reached: ``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CONNECT_S = 3.0
 MODBUS_PORT = 502
 READ_BYTES = 4096
 BAUDS = (300, 1_000_000)
-FORMS = "expected a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, rtu+tcp://HOST:PORT or rfc2217://HOST:PORT"
+FORMS = "expected a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT"
 
 
 class Channel(Protocol):
@@ -72,7 +72,7 @@ def parse_place(text: str, baud: int) -> Place:
         return Place(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme == "rfc2217":
         return Place(SerialEndpoint(text, baud), serial=SerialLine(baud))
-    if scheme not in ("tcp", "rtu+tcp"):
+    if scheme not in ("tcp", "rtu-tcp"):
         raise Misuse(f"{text!r} is no address: {FORMS}")
     try:
         parts = urlsplit(text)

@@ -64,7 +64,7 @@ def load_config(path: str | Path, firmware: str = DEFAULT_FIRMWARE) -> Controlle
 
 
 class AsyncMic488:
-    """A MIC488 at an address (``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu+tcp://host:5021``) or on a line shared with others.
+    """A MIC488 at an address (``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``) or on a line shared with others.
 
     ``firmware``: found out when not given. ``config``: the vendor tool's ``.cfg`` or what is in it; without it units have no
     name and pulses are not known. ``observe``: only look; else DATA_TYPE is set to REAL where it is not. ``log`` is given every
