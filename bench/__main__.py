@@ -21,6 +21,7 @@ import time
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 BIN = Path(sys.executable).parent
@@ -46,6 +47,8 @@ class Figures:
     per_second: float
     p50_us: float
     p99_us: float
+    cpu_us: float
+    """Processor time that the server took for each request: what other processes on the machine do matters less to it."""
 
 
 def build(source: str, folder: Path, *flags: str) -> Path:
@@ -64,24 +67,29 @@ def free_port() -> int:
         return s.getsockname()[1]
 
 
+def cpu_ns(process: int) -> int:
+    """Processor time that a process of one thread has taken (Linux)."""
+    return int(Path(f"/proc/{process}/schedstat").read_text().split()[0])
+
+
 @contextlib.contextmanager
-def server(command: list[str]) -> Generator[None]:
-    """A server process on its processor, until it says that it is ready."""
+def server(command: list[str]) -> Generator[int]:
+    """A server process on its processor, until it says that it is ready; its process id."""
     process = subprocess.Popen(
         on_processor(-1) + command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, start_new_session=True
     )
     try:
         if process.stdout is None or "ready" not in process.stdout.readline():
             raise RuntimeError(f"{command[:3]} did not start")
-        yield
+        yield process.pid
     finally:
         process.terminate()
         process.wait(10)
 
 
 @contextlib.contextmanager
-def steptwin(folder: Path) -> Generator[dict[str, dict[str, object]]]:
-    """The real thing with four axes moving; its end points."""
+def steptwin(folder: Path) -> Generator[tuple[dict[str, dict[str, Any]], int]]:
+    """The real thing with four axes moving; its end points and process id."""
     ready = folder / "ready.json"
     command = [str(BIN / "steptwin"), "serve", "mic488", "--tcp", "127.0.0.1:0", "--pty", str(folder / "line")]
     command += ["--name", f"bench-{os.getpid()}", "--ready-file", str(ready)]
@@ -98,7 +106,7 @@ def steptwin(folder: Path) -> Generator[dict[str, dict[str, object]]]:
                 s.sendall(mbap(bytes.fromhex(pdu)))
                 if s.recv(300)[7] & 0x80:
                     raise RuntimeError(f"{pdu} was refused")
-        yield places
+        yield places, process.pid
     finally:
         process.terminate()
         process.wait(10)
@@ -114,7 +122,8 @@ def rtu(pdu: bytes) -> bytes:
     return encode_frame(1, pdu)
 
 
-def run_client(client: Path, *arguments: object) -> Figures | None:
+def run_client(client: Path, server: int, *arguments: object) -> Figures | None:
+    before = cpu_ns(server)
     done = subprocess.run(
         [*on_processor(0), str(client), *map(str, arguments)], capture_output=True, text=True, check=False, close_fds=False
     )
@@ -122,23 +131,25 @@ def run_client(client: Path, *arguments: object) -> Figures | None:
         print(f"  client: {done.stderr.strip()}", file=sys.stderr)
         return None
     count, seconds, p50, p99 = map(float, done.stdout.split())
-    return Figures(count / seconds, p50, p99)
+    return Figures(count / seconds, p50, p99, (cpu_ns(server) - before) / count / 1000)
 
 
 def row(name: str, results: dict[str, Figures | None]) -> None:
     cells = [_cell(results[who]) for who in PEERS]
-    ratios = [f"{_ratio(results['steptwin'], results[who])} × {who}" for who in PEERS[1:]]
-    print(f"{name:<18} {'  '.join(cells)}  {' '.join(ratios)}", flush=True)
+    ratios = [_ratio(results["steptwin"], results[who]) for who in PEERS[1:]]
+    print(f"{name:<17} {'  '.join(cells)}  {' '.join(ratios)}", flush=True)
 
 
 def _cell(figures: Figures | None) -> str:
     if figures is None:
-        return f"{'failed':>27}"
-    return f"{figures.per_second:9.0f}/s {figures.p50_us:6.0f} {figures.p99_us:6.0f} us"
+        return f"{'failed':>31}"
+    return f"{figures.per_second:7.0f}/s {figures.p50_us:6.0f} {figures.p99_us:6.0f} {figures.cpu_us:7.1f}"
 
 
 def _ratio(ours: Figures | None, theirs: Figures | None) -> str:
-    return f"{ours.per_second / theirs.per_second:6.2f}" if ours and theirs else f"{'-':>6}"
+    if not ours or not theirs:
+        return f"{'-':>14}"
+    return f"{ours.per_second / theirs.per_second:6.2f} ({theirs.cpu_us / ours.cpu_us:5.2f})"
 
 
 def best(runs: list[Figures | None]) -> Figures | None:
@@ -150,23 +161,28 @@ def best(runs: list[Figures | None]) -> Figures | None:
 def compare_tcp(client: Path, libmodbus: Path, folder: Path, seconds: float, rounds: int) -> None:
     lib_port, py_port = free_port(), free_port()
     with (
-        steptwin(folder) as places,
-        server([str(libmodbus), "tcp", str(lib_port)]),
-        server([sys.executable, "-W", "ignore", str(HERE / "pymodbus_server.py"), "tcp", str(py_port)]),
+        steptwin(folder) as (places, our_process),
+        server([str(libmodbus), "tcp", str(lib_port)]) as lib_process,
+        server([sys.executable, "-W", "ignore", str(HERE / "pymodbus_server.py"), "tcp", str(py_port)]) as py_process,
     ):
-        ports = {"steptwin": places["tcp"]["port"], "libmodbus": lib_port, "pymodbus": py_port}  # type: ignore[index]
+        ports = {
+            "steptwin": (our_process, places["tcp"]["port"]),
+            "libmodbus": (lib_process, lib_port),
+            "pymodbus": (py_process, py_port),
+        }
         for connections in (1, 16, 100):
             for name, (pdu, _) in REQUESTS.items():
                 runs: dict[str, list[Figures | None]] = {who: [] for who in ports}
                 for _ in range(rounds):
-                    for who, port in ports.items():
-                        runs[who].append(run_client(client, "tcp", port, connections, seconds, mbap(pdu).hex()))
+                    for who, (process, port) in ports.items():
+                        runs[who].append(run_client(client, process, "tcp", port, connections, seconds, mbap(pdu).hex()))
                 row(f"tcp {name} ×{connections}", {who: best(r) for who, r in runs.items()})
 
 
 def compare_tty(client: Path, libmodbus: Path, folder: Path, seconds: float, rounds: int) -> None:
     with contextlib.ExitStack() as stack:
-        ends = {"steptwin": stack.enter_context(steptwin(folder))["pty"]["path"]}  # type: ignore[index]
+        places, process = stack.enter_context(steptwin(folder))
+        ends = {"steptwin": (process, places["pty"]["path"])}
         for who, command in {
             "libmodbus": [str(libmodbus), "rtu"],
             "pymodbus": [sys.executable, "-W", "ignore", str(HERE / "pymodbus_server.py"), "rtu"],
@@ -175,22 +191,22 @@ def compare_tty(client: Path, libmodbus: Path, folder: Path, seconds: float, rou
             master, slave = pty.openpty()
             stack.callback(os.close, master)
             stack.callback(os.close, slave)
-            stack.enter_context(server([*command, os.ttyname(slave)]))
+            process = stack.enter_context(server([*command, os.ttyname(slave)]))
             os.set_inheritable(master, True)
-            ends[who] = f"fd:{master}"
+            ends[who] = (process, f"fd:{master}")
         for name in ("FC3x10", "FC16x2"):
             pdu, size = REQUESTS[name]
             runs: dict[str, list[Figures | None]] = {who: [] for who in ends}
             for _ in range(rounds):
-                for who, path in ends.items():
-                    runs[who].append(run_client(client, "tty", path, size + 3, seconds, rtu(pdu).hex()))
+                for who, (process, path) in ends.items():
+                    runs[who].append(run_client(client, process, "tty", path, size + 3, seconds, rtu(pdu).hex()))
             row(f"pty {name}", {who: best(r) for who, r in runs.items()})
 
 
 def fleet(client: Path, seconds: float, controllers: int) -> None:
     port = free_port()
-    with server([sys.executable, str(HERE / "fleet.py"), str(port)]):
-        figures = run_client(client, "rate", port, controllers, seconds, mbap(REQUESTS["FC3x10"][0]).hex(), 10)
+    with server([sys.executable, str(HERE / "fleet.py"), str(port)]) as process:
+        figures = run_client(client, process, "rate", port, controllers, seconds, mbap(REQUESTS["FC3x10"][0]).hex(), 10)
     if figures:
         print(
             f"{controllers} controllers in one process, FC3x10 each at 10 Hz: {figures.per_second:.0f}/s, "
@@ -203,8 +219,8 @@ def main() -> None:
     parser.add_argument(
         "what", nargs="*", default=["tcp", "pty", "fleet", "motion"], help="tcp, pty, fleet, motion (default: all)"
     )
-    parser.add_argument("--seconds", type=float, default=1.0, help="of each measurement")
-    parser.add_argument("--rounds", type=int, default=3, help="of each measurement, the median counts")
+    parser.add_argument("--seconds", type=float, default=0.25, help="of each measurement")
+    parser.add_argument("--rounds", type=int, default=9, help="of each measurement, the median counts")
     parser.add_argument("--controllers", type=int, default=5000)
     options = parser.parse_args()
     if not shutil.which("cc"):
@@ -215,7 +231,11 @@ def main() -> None:
         flags = subprocess.run(["pkg-config", "--cflags", "--libs", "libmodbus"], capture_output=True, text=True, check=True)
         libmodbus = build("libmodbus_server.c", folder, *flags.stdout.split())
         if {"tcp", "pty"} & set(options.what):
-            print(f"{'':<18} {'steptwin, p50, p99':>27}  {'libmodbus (C, select)':>27}  {'pymodbus (async)':>27}")
+            print("Requests per second, p50 and p99 of the answer's time and processor time per request in us;")
+            print("then the ratio of requests per second to each peer's, and (of its processor time to ours).")
+            print(
+                f"{'':<17} {'steptwin':>31}  {'libmodbus (C, select)':>31}  {'pymodbus (async)':>31}  × libmodbus     × pymodbus"
+            )
         if "tcp" in options.what:
             compare_tcp(client, libmodbus, folder, options.seconds, options.rounds)
         if "pty" in options.what:
