@@ -2,42 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
+import m1486_programs
 import pytest
-from hypothesis import strategies as st
-
-from steptwin.m1486.commands import TABLE, CommandSpec, Kind, takes_variable
-from steptwin.m1486.syntax import Command, Condition, Line, Program
-from steptwin.m1486.variants import Variant
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "m1486"
 
 
-def _command(spec: CommandSpec, variant: Variant) -> st.SearchStrategy[Command]:
-    if spec.kind is Kind.NONE:
-        return st.just(Command(spec.key))
-    numbers = st.sampled_from(spec.permitted(variant))
-    if spec.kind is Kind.CONDITION:
-        labels = st.integers(1, variant.labels)
-        return st.builds(Condition, numbers, st.booleans(), labels).map(lambda condition: Command(spec.key, condition))
-    if takes_variable(spec.key):
-        numbers = st.none() | numbers
-    return numbers.map(lambda number: Command(spec.key, number))
-
-
-def _program(variant: Variant) -> st.SearchStrategy[Program]:
-    command = st.one_of([_command(spec, variant) for spec in TABLE])
-    comment = st.none() | st.text(st.characters(exclude_characters="\r\n"), max_size=10).map(str.strip)
-    line = st.builds(Line, st.none() | command, comment)
-    return st.lists(line, max_size=30).map(lambda lines: Program(tuple(lines)))
-
-
 @pytest.fixture(scope="session")
-def permitted_programs() -> Callable[[Variant], st.SearchStrategy[Program]]:
-    """Programs of commands that the variant takes, in any order."""
-    return _program
+def permitted_programs() -> m1486_programs.Programs:
+    return m1486_programs.permitted_programs
 
 
 @pytest.fixture(scope="session")

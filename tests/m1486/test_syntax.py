@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import example, given
@@ -9,6 +10,9 @@ from hypothesis import strategies as st
 from steptwin.diagnostics import Fix, Span
 from steptwin.m1486.syntax import Command, Condition, Line, Program, format_program, parse, parse_line
 from steptwin.m1486.variants import Variant, variant
+
+if TYPE_CHECKING:
+    from m1486_programs import Programs
 
 
 def commands(text: str) -> list[Command]:
@@ -223,9 +227,7 @@ def test_examples_of_the_manual_survive_print(manual_examples: dict[int, str], n
 
 @pytest.mark.parametrize("v", [variant("A"), variant("E1")], ids=lambda v: v.name)
 @given(data=st.data())
-def test_permitted_programs_survive_print(
-    v: Variant, permitted_programs: Callable[[Variant], st.SearchStrategy[Program]], data: st.DataObject
-) -> None:
+def test_permitted_programs_survive_print(v: Variant, permitted_programs: Programs, data: st.DataObject) -> None:
     program = data.draw(permitted_programs(v))
     again, diagnostics = parse(format_program(program))
     assert diagnostics == []
@@ -233,9 +235,7 @@ def test_permitted_programs_survive_print(
 
 
 @given(data=st.data())
-def test_commands_are_read_however_they_are_written(
-    permitted_programs: Callable[[Variant], st.SearchStrategy[Program]], data: st.DataObject
-) -> None:
+def test_commands_are_read_however_they_are_written(permitted_programs: Programs, data: st.DataObject) -> None:
     program = data.draw(permitted_programs(variant("B")))
     texts = []
     for command in program.commands:

@@ -50,6 +50,14 @@ class StepTrain:
         #: +1, −1, or 0 at rest
         self.direction = profile.segments[0].direction if profile.segments else 0
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, StepTrain):
+            return NotImplemented
+        return (self.profile, self.divisions, self.microstepping) == (other.profile, other.divisions, other.microstepping)
+
+    def __hash__(self) -> int:
+        return hash((self.profile, self.divisions))
+
     def stretches(self) -> Iterator[tuple[int, int | None, int]]:
         """(begin, end, grid) of each division in turn; the last has no end."""
         for i, (begin, grid) in enumerate(self.divisions):

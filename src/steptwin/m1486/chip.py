@@ -1,0 +1,529 @@
+"""The M1486 as a pure machine: serial port, command memory, program, motor, pins.
+
+A chip is made of how it is tied and timed, and driven by four calls::
+
+    chip = M1486(variant("E1"), address=3, interface=DUAL_DAC, baud=4800, is_timed=True, image=kept)
+    chip.receive(b"f12800\\rr\\r", now)  # characters from the host; chips that share a line: `steptwin.m1486.line`
+    chip.set_pin("B3", 0, now)  # and what happens outside
+    chip.advance(chip.deadline())  # time
+    chip.to_send(now)  # characters to the host, with their moments
+
+What it does is told by ``on_event`` (moves, waits, outputs, uploads, stops, wrong data: `EVENT_CODES`), `take_edges` (pins) and
+``drive`` (motion: `Drive.train` is the pulse train in force, `Drive.revision` counts trains; `steptwin.m1486.signals` makes
+pulses and converter data of it). A program file is in the memory from the start when ``image`` is what
+`steptwin.m1486.eeprom.image_of` makes of it; it then runs at power-on, on chips with RAM as well as on those with EEPROM.
+`M1486.snapshot` and `M1486.restore` (or `copy_state` and `set_state`, without their check) take all state out and put it back.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from steptwin.errors import Misuse, TimeReversal
+from steptwin.m1486.drive import Drive, Motion
+from steptwin.m1486.eeprom import pack, unpack
+from steptwin.m1486.execute import WrongData
+from steptwin.m1486.functions import COMPLEMENT, CONTINUE, EDGE, LIMITOFF, OUTPUTS, RECOVER, RUNSIGN
+from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface
+from steptwin.m1486.memory import CommandMemory, FileState
+from steptwin.m1486.motor import Motor
+from steptwin.m1486.pins import LINE_PINS, Pins, known_pin
+from steptwin.m1486.program import Program
+from steptwin.m1486.receiver import Receiver
+from steptwin.m1486.signals import data_level
+from steptwin.m1486.uart import Uart
+from steptwin.m1486.unit import NumericUnit
+from steptwin.m1486.variants import DEFAULT, Store, Variant
+from steptwin.machine import MILLISECOND, Edge, Nanos
+from steptwin.state import Plain, Stateful
+
+EVENTS_KEPT = 1000
+
+#: What an `Event` can be about.
+EVENT_CODES = {
+    "moves": "R has started a move",
+    "seeks": "a seek has started",
+    "stops": "a motion is being stopped by K or LIMIT",
+    "stands": "a motion has ended",
+    "wait": "W, O or Z waits",
+    "output": "an output has changed",
+    "upload": "U sends a byte",
+    "kill": "K was received",
+    "clear-kill": "C75 was received",
+    "wrong-data": "a command was dropped (M-11)",
+    "file": "] has closed a file",
+    "file-refused": "a file was larger than the memory (M-12)",
+    "reset": "defaults, by \\ or RST",
+    "restart": "the program begins again, by RST",
+    "power-on": "off and on again",
+    "shutdown": "SD is low",
+    "store-failed": "the EEPROM's new content could not be kept",
+}
+
+#: Open address pins; a chip alone needs no other address (chapter II, Serial interface).
+OPEN_ADDRESS = 15
+
+#: RST has to be high for so long to end shutdown (chapter IV, Shutdown mode).
+SHUTDOWN_RESET_NS: Nanos = 10 * MILLISECOND
+
+
+class Event(NamedTuple):
+    """Something worth telling. ``code`` is stable, one of `EVENT_CODES`; ``text`` is for people."""
+
+    time: Nanos
+    code: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All state of a chip at a moment, and what it belongs to. It can be pickled; motions are shared."""
+
+    variant: Variant
+    is_timed: bool
+    statement_ns: Nanos
+    state: Plain
+
+
+def _nothing() -> None:
+    pass
+
+
+class M1486(Stateful):
+    """One chip. Characters and pins are applied after everything that is due at their moment.
+
+    ``address`` (0-15), ``interface`` and ``baud`` (bit/s, one of the variant's four, by default the fastest) are how pins are
+    tied at power-on. ``statement_ns`` is the time of a command (M-19), 0 permitted. ``is_timed``: characters take their time on
+    the wire. ``image`` is the stored file the chip is switched on with (`steptwin.m1486.eeprom`); chips with RAM lose it when
+    they are switched off. Raises `Misuse`.
+
+    Hooks: ``store`` is called with the image whenever the EEPROM has a new one (empty: erased) and returns when it is safe; an
+    `OSError` says that it is not. ``changed`` is called whenever the next deadline or an output may have changed, ``on_event``
+    for every event, ``on_sent`` when characters have left.
+    """
+
+    __slots__ = (
+        "_due",
+        "_edges",
+        "_rst_high_since",
+        "address",
+        "changed",
+        "events",
+        "image",
+        "interface",
+        "io",
+        "is_shut_down",
+        "is_timed",
+        "memory",
+        "motor",
+        "now",
+        "on_event",
+        "on_sent",
+        "program",
+        "receiver",
+        "store",
+        "uart",
+        "unit",
+        "variant",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset({"changed", "is_timed", "on_event", "on_sent", "store", "variant"})
+
+    def __init__(
+        self,
+        variant: Variant = DEFAULT,
+        *,
+        address: int = OPEN_ADDRESS,
+        interface: Interface = STEP_DIRECTION,
+        baud: int | None = None,
+        statement_ns: Nanos | None = None,
+        is_timed: bool = False,
+        image: bytes = b"",
+    ) -> None:
+        if not 0 <= address <= OPEN_ADDRESS:
+            raise Misuse(f"address {address}: four pins give 0 to {OPEN_ADDRESS}")
+        if statement_ns is not None and statement_ns < 0:
+            raise Misuse(f"statement_ns = {statement_ns}: must not be negative")
+        self.variant = variant
+        self.is_timed = is_timed
+        self.store: Callable[[bytes], None] | None = None
+        self.changed: Callable[[], None] = _nothing
+        self.on_event: Callable[[Event], None] | None = None
+        self.on_sent: Callable[[], None] | None = None
+
+        self.now: Nanos = 0
+        self.image = image
+        file = unpack(image, variant)
+        self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+        self._edges: list[Edge] = []
+        self._due: Nanos | None = None
+        self._rst_high_since: Nanos | None = None
+        self.is_shut_down = False
+        self.interface = interface
+        self.unit = NumericUnit()
+        self.io = Pins(address, baud_pins(variant, baud), interface, self._level_changed)
+        self.address = self.io.address()
+        self.uart = Uart(variant.baud(*self.io.baud_pins()), is_timed=is_timed)
+        self.program = Program(self, 2 * variant.memory_bits // 8, variant.statement_ns if statement_ns is None else statement_ns)
+        self.memory = CommandMemory(variant, self.program)
+        self.motor = Motor(self, Drive(variant, interface, 0))
+        self.receiver = Receiver(self)
+        if file is not None and (variant.store is Store.RAM or self.address != 0):
+            self.memory.load(file)
+        self._touch()
+
+    @property
+    def drive(self) -> Drive:
+        return self.motor.drive
+
+    @property
+    def axes(self) -> tuple[Drive]:
+        """For the world: the one axis."""
+        return (self.motor.drive,)
+
+    # ------------------------------------------------------------------ time
+
+    def advance(self, now: Nanos) -> None:
+        if now < self.now:
+            raise TimeReversal(self.now, now)
+        due = self._due
+        while due is not None and due <= now:
+            self._run_instant(due, now)
+            due = self._due
+        self.now = now
+
+    def _run_instant(self, at: Nanos, until: Nanos) -> None:
+        """Something that is due at ``at``. A character that arrives comes after everything else, so that it does not matter
+        in which pieces characters are handed over."""
+        self.now = at
+        if self.is_shut_down:
+            self._end_shutdown()
+        elif not self._run_hardware(at):
+            due = self.program.deadline()
+            if due is not None and due <= at:
+                self._run_program(at, until)
+            elif (byte := self.uart.arrived(at)) is not None:
+                self.receiver.character(byte)
+        self._touch()
+
+    def _run_hardware(self, at: Nanos) -> bool:
+        due = self.motor.deadline()
+        if due is not None and due <= at:
+            self.motor.ended()
+            self.receiver.compress()
+            return True
+        due = self.receiver.busy_until
+        if due is not None and due <= at:
+            self.receiver.eeprom_done()
+            return True
+        if self.uart.leave(at):
+            if self.on_sent is not None:
+                self.on_sent()
+            return True
+        return False
+
+    def _run_program(self, at: Nanos, until: Nanos) -> None:
+        """As far as nothing else happens; one command where somebody waits for what it does."""
+        if self.drive.motion is not Motion.REST or self.receiver.is_stalled:
+            until = at
+        due = self._hardware_deadline()
+        self.program.run(until if due is None else max(at, min(until, due - 1)))
+        self.receiver.compress()
+
+    def _hardware_deadline(self) -> Nanos | None:
+        dues = (self.motor.deadline(), self.receiver.busy_until, self.uart.arrival(), self.uart.departure())
+        return min((due for due in dues if due is not None), default=None)
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+    def _touch(self) -> None:
+        """State changed: find the next deadline anew."""
+        if self.is_shut_down:
+            since = self._rst_high_since
+            self._due = None if since is None else since + SHUTDOWN_RESET_NS
+        else:
+            due, other = self._hardware_deadline(), self.program.deadline()
+            self._due = other if due is None else due if other is None else min(due, other)
+        self.changed()
+
+    def _settle(self) -> None:
+        """After an input: what it leads to at this moment."""
+        self._touch()
+        self.advance(self.now)
+
+    def is_idle(self) -> bool:
+        """Nothing is going on and nothing waits to be done; a program that is held or waits for a line is not idle."""
+        at_work = self.program.ready > self.now or not self.program.is_at_end
+        hardware = self._hardware_deadline() is not None or self.receiver.is_stalled
+        return not (at_work or hardware or self.program.is_held)
+
+    # ------------------------------------------------------------------ the serial port
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Characters from the host begin at ``now``."""
+        self.advance(now)
+        if self.is_shut_down:
+            return
+        self.uart.receive(data, now)
+        self._settle()
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        """Characters that have left by ``now``, each with the moment of its end."""
+        self.advance(now)
+        return [(moment, bytes((byte,))) for moment, byte in self.uart.take_sent()]
+
+    def send(self, byte: int) -> None:
+        if self.uart.send(byte, self.now) and self.on_sent is not None:
+            self.on_sent()
+
+    # ------------------------------------------------------------------ pins
+
+    def set_pin(self, pin: str, value: float, now: Nanos) -> None:
+        """Pull a pin low (0) or let it go high (1) from outside: B1–B21, JOG, LIMIT, SD, RST, S&D, DUAL."""
+        name = known_pin(pin)
+        if value not in (0.0, 1.0):
+            raise Misuse(f"{name} = {value:g}: a digital input is 0 or 1")
+        self.advance(now)
+        level = int(value)
+        if name in LINE_PINS:
+            self.io.set_external(LINE_PINS[name], level)
+        elif self.io[name] != level:
+            self.io.others[name] = level
+            self._control_changed(name, level)
+        self._settle()
+
+    def _control_changed(self, name: str, level: int) -> None:
+        if name == "RST":
+            self._rst_changed(level)
+        elif self.is_shut_down:
+            return
+        elif name == "SD":
+            if not level and self.variant.has_shutdown:
+                self._shut_down()
+        elif name == "LIMIT":
+            self.motor.limit_changed(level)
+        elif name == "JOG" and not level:
+            self.motor.jog()
+
+    def _level_changed(self, name: str, level: int) -> None:
+        self._edges.append(Edge(self.now, name, float(level)))
+        line = LINE_PINS.get(name)
+        if line is not None and not self.is_shut_down:
+            self.program.line_changed(line, level)
+            self.motor.line_changed(line, level)
+
+    def pins(self) -> Mapping[str, float]:
+        shown = {f"B{line}": float(self.level(line)) for line in LINES}
+        return shown | {name: float(level) for name, level in self.io.others.items()}
+
+    def take_edges(self) -> list[Edge]:
+        edges, self._edges = self._edges, []
+        return edges
+
+    def level(self, line: int) -> int:
+        """What can be read on a line; where the driver interface has its pin, the interface's signal (M-21)."""
+        if line in self.interface.occupied:
+            return data_level(line, self.drive.currents(self.now))
+        return self.io.levels[line]
+
+    # ------------------------------------------------------------------ what commands ask of their chip
+
+    def read(self, lines: range) -> int:
+        """Lines as a number, lowest line = least significant bit; inverted by function 47."""
+        number = sum(self.level(line) << bit for bit, line in enumerate(lines))
+        return number ^ (1 << len(lines)) - 1 if self.unit.on(COMPLEMENT) else number
+
+    def put_out(self, lines: range, bits: int) -> None:
+        """Set outputs, lowest line = least significant bit. Raises `WrongData` where the interface has one (M-21)."""
+        taken = [line for line in lines if line in self.interface.occupied]
+        if taken:
+            raise WrongData(f"B{taken[0]} belongs to the {self.interface.title} interface")
+        for bit, line in enumerate(lines):
+            level = bits >> bit & 1
+            if self.io.latches[line] != level:
+                self.event("output", f"B{line} {'high' if level else 'low'}")
+                self.io.set_latch(line, level)
+
+    def switch(self, function: int, on: bool) -> None:
+        """T and C of a function."""
+        self.unit.switch(function, on)
+        if function == RUNSIGN:
+            self.motor.show_runsign()
+        elif function in (LIMITOFF, EDGE, RECOVER):
+            self.motor.look_at_limit()
+
+    def upload(self, number: int, byte: int) -> None:
+        self.event("upload", f"U{number} sends {byte:02X}H")
+        self.send(byte)
+
+    def event(self, code: str, text: str) -> None:
+        event = Event(self.now, code, text)
+        self.events.append(event)
+        if self.on_event is not None:
+            self.on_event(event)
+
+    def wrong_data(self, what: str) -> None:
+        """M-11: the command is dropped, and the program stops unless function 44 is ON."""
+        stops = not self.unit.on(CONTINUE)
+        self.event("wrong-data", f"wrong data: {what}{'; the program stops' if stops else ''}")
+        if stops:
+            self.program.abandon()
+
+    # ------------------------------------------------------------------ what the receiver asks of its chip
+
+    def wrong_data_received(self, what: str) -> None:
+        """The same; a file that is arriving is not to run then."""
+        self.wrong_data(what)
+        if self.memory.file is FileState.OPEN and not self.unit.on(CONTINUE):
+            self.memory.refuse_file()
+
+    def kill(self) -> None:
+        self.event("kill", "Kill")
+        self.motor.kill()
+
+    def clear_kill(self) -> None:
+        self.event("clear-kill", "Clear kill")
+        self.program.is_killed = False
+
+    def close_file(self) -> None:
+        """``]``: the file runs, and an E type keeps it."""
+        file = self.memory.close_file()
+        if file is None:
+            return
+        self.event("file", f"a file of {8 * len(file.code)} bits")
+        if self.variant.store is Store.EEPROM:
+            self._keep(pack(file))
+
+    def software_reset(self) -> None:
+        """``\\``: defaults; an E type erases its EEPROM. Address and baud rate stay."""
+        self.event("reset", "reset")
+        self._set_defaults()
+        if self.variant.store is Store.EEPROM:
+            self._keep(b"")
+            self.receiver.erase()
+
+    def _keep(self, image: bytes) -> None:
+        self.image = image
+        if self.store is not None:
+            try:
+                self.store(image)
+            except OSError as error:
+                self.event("store-failed", f"the EEPROM could not be kept: {error}")
+
+    # ------------------------------------------------------------------ power, RST, shutdown
+
+    def power_cycle(self, now: Nanos) -> None:
+        """Off and on again. Pins stay tied as they are, and the motor stands where it stood."""
+        self.advance(now)
+        self.is_shut_down = False
+        self.event("power-on", "power-on")
+        self._read_pins()
+        self._start_anew()
+        self._settle()
+
+    def _start_anew(self) -> None:
+        """Defaults; an E type runs its stored file. M-30: with all address pins low it is only reset, and keeps the file."""
+        self.receiver.reset()
+        self._set_defaults()
+        if self.variant.store is Store.EEPROM and self.address != 0:
+            self._run_stored_file()
+
+    def _run_stored_file(self) -> None:
+        file = unpack(self.image, self.variant)
+        if file is not None:
+            self.memory.load(file)
+            self.program.restart(self.memory.begin)
+
+    def _read_pins(self) -> None:
+        self.address = self.io.address()
+        self.uart.set_baud(self.variant.baud(*self.io.baud_pins()))
+
+    def _set_defaults(self) -> None:
+        self.motor.stop_at_once()
+        self.io.release_outputs()
+        self.interface = self.io.interface()
+        self.unit.reset()
+        self.drive.reset_settings(self.variant, self.interface)
+        self.drive.set_counter(0, self.now)
+        self.memory.reset()
+        self.program.reset()
+
+    def _rst_changed(self, level: int) -> None:
+        self._rst_high_since = self.now if level else None
+        if level and not self.is_shut_down:
+            self._read_pins()
+            if self.address == 0:
+                self.event("reset", "RST with all address pins low: reset")
+                self._start_anew()
+            else:
+                self.event("restart", "RST: the program begins again")
+                self._restart()
+
+    def _restart(self) -> None:
+        """The program in memory begins again (an E type's stored file); settings and position stay (M-23)."""
+        self.motor.stop_at_once()
+        self.receiver.reset()
+        if self.variant.store is Store.EEPROM:
+            self.memory.reset()
+            self._run_stored_file()
+        else:
+            if self.memory.file is not FileState.CLOSED:
+                self.memory.drop_file()
+            self.program.restart(self.memory.begin)
+
+    def _shut_down(self) -> None:
+        self.event("shutdown", "shutdown")
+        self.motor.stop_at_once()
+        self.uart.clear()
+        self.is_shut_down = True
+        self._rst_high_since = None
+        if not self.unit.on(OUTPUTS):
+            self.io.tie_low(True)
+
+    def _end_shutdown(self) -> None:
+        """RST has been high for long enough. The address pins are not read; M-31: the program begins again, as with RST."""
+        self._rst_high_since = None
+        if not self.io["SD"]:
+            return
+        self.is_shut_down = False
+        self.event("restart", "shutdown is over: the program begins again")
+        self.io.tie_low(False)
+        self.uart.set_baud(self.variant.baud(*self.io.baud_pins()))
+        self._restart()
+
+    # ------------------------------------------------------------------ debugging
+
+    def resume(self, now: Nanos) -> None:
+        """Do the command before which a hook on commands (`Program.watch`) has halted the program, and go on."""
+        self.advance(now)
+        self.program.resume()
+        self._settle()
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> Snapshot:
+        """All state at the present moment; hooks are no part of it."""
+        return Snapshot(self.variant, self.is_timed, self.program.statement_ns, self.copy_state())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take the state of a snapshot, its moment too. Raises `Misuse` when it belongs to another kind of chip."""
+        belongs = (snapshot.variant, snapshot.is_timed, snapshot.statement_ns)
+        if belongs != (self.variant, self.is_timed, self.program.statement_ns):
+            raise Misuse(
+                f"the snapshot is of {snapshot.variant.title} with other timing, or of another type than {self.variant.title}"
+            )
+        self.set_state(snapshot.state)
+        self.changed()
+
+
+def baud_pins(variant: Variant, baud: int | None) -> int:
+    """BR1 and BR0 as a number for a baud rate, by default the highest. Raises `Misuse` with the four there are."""
+    rates = [variant.baud(code >> 1, code & 1) for code in range(4)]
+    if baud is None:
+        return len(rates) - 1
+    if baud not in rates:
+        raise Misuse(f"{baud} bit/s: {variant.title} has {', '.join(map(str, rates))}")
+    return rates.index(baud)

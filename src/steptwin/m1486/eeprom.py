@@ -1,0 +1,59 @@
+"""The stored file of an E type as bytes: what survives without power.
+
+Layout: version, number of labels, for each label its number and its place (two bytes, low first), then the commands as they
+lie in the memory. No bytes at all: nothing is stored.
+"""
+
+from __future__ import annotations
+
+from steptwin.errors import Misuse
+from steptwin.m1486.commands import When, when
+from steptwin.m1486.encoding import encode
+from steptwin.m1486.memory import Image
+from steptwin.m1486.syntax import Program
+from steptwin.m1486.variants import Variant
+
+_VERSION = 1
+_HEAD = 2
+_LABEL = 3
+
+
+def pack(image: Image) -> bytes:
+    labels = b"".join(bytes((label, place & 0xFF, place >> 8)) for label, place in sorted(image.labels.items()))
+    return bytes((_VERSION, len(image.labels))) + labels + image.code
+
+
+def unpack(data: bytes, variant: Variant) -> Image | None:
+    """The file in ``data``, None if there is none. Raises `Misuse` if it is none of this kind or does not fit the variant."""
+    if not data:
+        return None
+    begin = _HEAD + _LABEL * data[1] if len(data) >= _HEAD else 0
+    if data[0] != _VERSION or not _HEAD <= begin <= len(data):
+        raise Misuse("this is not the stored file of an M1486")
+    code = data[begin:]
+    labels = {data[i]: data[i + 1] | data[i + 2] << 8 for i in range(_HEAD, begin, _LABEL)}
+    if 8 * len(code) > variant.memory_bits:
+        raise Misuse(f"the stored file takes {8 * len(code)} bits: {variant.title} has {variant.memory_bits}")
+    if any(place > len(code) or not 1 <= label <= variant.labels for label, place in labels.items()):
+        raise Misuse(f"the stored file has labels that {variant.title} does not have: permitted are 1 to {variant.labels}")
+    return Image(code, labels)
+
+
+def image_of(program: Program, variant: Variant) -> bytes:
+    """A program as the stored file that downloading it gives; with or without ``[ ]`` around it.
+
+    Raises `Misuse` for a program that is more than one file for one chip.
+    """
+    commands = program.all_commands
+    if len(commands) > 1 and (commands[0].key, commands[-1].key) == ("[", "]"):
+        commands = commands[1:-1]
+    code = b""
+    labels: dict[int, int] = {}
+    for command in commands:
+        if command.key == "@":
+            labels[command.number or 0] = len(code)
+        elif when(command.key, command.number) is When.QUEUED:
+            code += encode(command)
+        else:
+            raise Misuse(f"{command} cannot be stored: a program to switch on with is one file for one chip")
+    return pack(Image(code, labels))

@@ -1,0 +1,149 @@
+"""Chips on one serial line: all hear the host, and all speak on the same wire to it (manual chapter II, Serial interface).
+
+How a shell builds a line::
+
+    chips = [M1486(variant("B"), address=0, interface=STEP_DIRECTION, baud=4800), M1486(variant("B"), address=7)]
+    chain = SerialChain(chips)
+    port = chain.port()  # one for each program that is connected
+    port.receive(b"x7\\rf12800\\rr\\r", now)
+    port.to_send(later)  # [(moment, characters)], the same for every port
+
+Chips are machines of their own: a shell adds each to its `steptwin.world.kernel.Kernel` and advances that before it hands
+over characters. What a chip does is told by its hooks (`steptwin.m1486.chip.M1486`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+
+
+class SerialChain(Stateful):
+    """Up to sixteen chips with addresses of their own, in the order given. Its state is what is on the wire; the chips keep
+    their own.
+
+    M-33: outputs on one wire pull it low together. Characters that chips begin at the same moment come to the host as one,
+    their bitwise AND; a character that begins while another chip's is on the wire is lost and counted in ``collisions``.
+    Raises `Misuse` for two chips with the same address, or with different baud rates or line timing.
+    """
+
+    __slots__ = ("_ports", "_wire_free", "chips", "collisions")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_ports", "chips"})
+
+    def __init__(self, chips: Iterable[M1486]) -> None:
+        #: By the address each had when the line was made.
+        self.chips: dict[int, M1486] = {}
+        for chip in chips:
+            if chip.address in self.chips:
+                raise Misuse(f"two chips with address {chip.address:X} on one line")
+            self.chips[chip.address] = chip
+        if not self.chips:
+            raise Misuse("a chain needs at least one chip")
+        rates = {chip.uart.baud for chip in self.chips.values()}
+        if len(rates) > 1:
+            raise Misuse(f"chips with different baud rates on one line: {', '.join(map(str, sorted(rates)))} bit/s")
+        if len({chip.is_timed for chip in self.chips.values()}) > 1:
+            raise Misuse("chips with and without line timing on one line")
+        self._ports: list[LinePort] = []
+        self._wire_free: Nanos = 0
+        self.collisions = 0
+        for chip in self.chips.values():
+            chip.on_sent = self._wake_ports
+
+    def port(self) -> LinePort:
+        """A place on the line for one more program. What the chips send from now on reaches every port."""
+        port = LinePort(self)
+        self._ports.append(port)
+        return port
+
+    def leave(self, port: LinePort) -> None:
+        if port in self._ports:
+            self._ports.remove(port)
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Every chip hears the host."""
+        for chip in self.chips.values():
+            chip.receive(data, now)
+
+    def collect(self, now: Nanos) -> None:
+        """Give the ports what has left the chips by ``now``."""
+        merged = self._merged(now)
+        for port in self._ports:
+            port.pending += merged
+
+    def departure(self) -> Nanos | None:
+        """When the next character will have left a chip."""
+        dues = (chip.uart.departure() for chip in self.chips.values())
+        return min((due for due in dues if due is not None), default=None)
+
+    def _merged(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        together: dict[tuple[Nanos, int], int] = {}
+        for chip in self.chips.values():
+            chip.advance(now)
+            # Without line timing a chip sends several characters at one moment: the first of one chip meets the first of another.
+            moment, rank = -1, 0
+            for sent, byte in chip.uart.take_sent():
+                moment, rank = sent, rank + 1 if sent == moment else 0
+                together[moment, rank] = together.get((moment, rank), 0xFF) & byte
+        merged: list[tuple[Nanos, bytes]] = []
+        for (moment, _), byte in sorted(together.items()):
+            if moment - self._character_ns() < self._wire_free:
+                self.collisions += 1
+                continue
+            self._wire_free = moment
+            merged.append((moment, bytes((byte,))))
+        return merged
+
+    def _character_ns(self) -> Nanos:
+        return next(iter(self.chips.values())).uart.character_ns
+
+    def _wake_ports(self) -> None:
+        for port in self._ports:
+            port.wake()
+
+
+class LinePort:
+    """One program's place on the line; a `steptwin.machine.WirePort` that a link of the runtime serves.
+
+    ``on_output`` is called when there is something to fetch that nobody asked for.
+    """
+
+    broken = None
+    """A line cannot be broken by what is on it; a connection can."""
+
+    def __init__(self, chain: SerialChain) -> None:
+        self._chain = chain
+        self.pending: list[tuple[Nanos, bytes]] = []
+        self.on_output: Callable[[], None] | None = None
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        """`receive`, then everything `to_send` has."""
+        self.receive(data, now)
+        return b"".join(data for _, data in self.to_send(now))
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        self._chain.receive(data, now)
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        """What the chips have sent by ``now`` and this port has not fetched, each with the moment of its end."""
+        self._chain.collect(now)
+        pending, self.pending = self.pending, []
+        return pending
+
+    def deadline(self) -> Nanos | None:
+        """When there may be more to send: characters that are on their way. ``on_output`` tells of others."""
+        return self._chain.departure()
+
+    def wake(self) -> None:
+        if self.on_output is not None:
+            self.on_output()
+
+    def close(self) -> None:
+        """The program has gone."""
+        self.on_output = None
+        self._chain.leave(self)

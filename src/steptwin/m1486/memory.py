@@ -1,0 +1,203 @@
+"""The command memory of a chip: a ring of bytes that commands pass through, labels, and the registers 1 to 8.
+
+M-12: a command stays where it is until the ring comes round and overwrites it. Commands before ``end`` may run; those between
+``end`` and ``write`` belong to a file in ``[ ]`` that is still open or are being written to an EEPROM.
+
+Places are counted in a circle of twice the size of the ring, so that a full ring and an empty one are told apart; the byte of
+a place is its remainder by the size.
+"""
+
+from __future__ import annotations
+
+import enum
+from array import array
+from typing import ClassVar, NamedTuple, Protocol
+
+from steptwin.m1486.encoding import LONGEST
+from steptwin.m1486.registers import GENERAL
+from steptwin.m1486.variants import Variant
+from steptwin.state import Stateful
+
+
+class FileState(enum.Enum):
+    """What becomes of the commands that arrive."""
+
+    CLOSED = "closed"
+    #: Between ``[`` and ``]``: they are stored.
+    OPEN = "open"
+    #: The same, but the file is not to run: they are dropped.
+    REFUSED = "refused"
+
+
+class Image(NamedTuple):
+    """A file as it is stored: its bytes and where its labels are, counted from its first byte."""
+
+    code: bytes
+    labels: dict[int, int]
+
+
+class Reader(Protocol):
+    """Whoever runs the commands and has to know what is not there any more."""
+
+    def bytes_changed(self, first: int, count: int) -> None: ...
+    def labels_changed(self) -> None: ...
+
+
+class CommandMemory(Stateful):
+    """The memory of one chip. On some variants its last bytes are the registers 1 to 8 too."""
+
+    __slots__ = (
+        "_bytes",
+        "_file_labels",
+        "_own",
+        "_reader",
+        "_shared",
+        "begin",
+        "end",
+        "file",
+        "labels",
+        "size",
+        "span",
+        "write",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_reader", "_shared", "size", "span"})
+
+    def __init__(self, variant: Variant, reader: Reader) -> None:
+        self._reader = reader
+        self.size = variant.memory_bits // 8
+        #: How many places there are.
+        self.span = 2 * self.size
+        #: First byte of the registers that share the memory; None where they have a place of their own.
+        self._shared = self.size - variant.shared_bits // 8 if variant.shared_bits else None
+        self._clear()
+
+    def reset(self) -> None:
+        """Empty it: the next command goes to the first byte."""
+        self._clear()
+        self._reader.bytes_changed(0, self.size)
+        self._reader.labels_changed()
+
+    def _clear(self) -> None:
+        self._bytes = array("B", bytes(self.size))
+        self._own = array("H", bytes(2 * len(GENERAL)))
+        #: Where the next command goes.
+        self.write = 0
+        #: Commands before this place may run.
+        self.end = 0
+        #: Where the program that a restart runs begins (M-23); None once it is overwritten.
+        self.begin: int | None = 0
+        self.file = FileState.CLOSED
+        self.labels: dict[int, int] = {}
+        self._file_labels: dict[int, int] = {}
+
+    # ------------------------------------------------------------------ commands
+
+    def age(self, place: int) -> int:
+        """How many bytes were written from ``place`` on."""
+        return (self.write - place) % self.span
+
+    def is_lost(self, place: int) -> bool:
+        return self.age(place) > self.size
+
+    def has_room(self, size: int, oldest: int) -> bool:
+        """Whether ``size`` bytes leave everything from ``oldest`` on as it is."""
+        return self.age(oldest) + size <= self.size
+
+    def fits_file(self, size: int) -> bool:
+        """Whether the open file may grow by ``size`` bytes."""
+        return self.age(self.end) + size <= self.size
+
+    def store(self, raw: bytes) -> None:
+        """Write a command where the ring has come to; what was there is lost."""
+        place = self.write
+        for offset, byte in enumerate(raw):
+            self._bytes[(place + offset) % self.size] = byte
+        self.write = (place + len(raw)) % self.span
+        self._reader.bytes_changed(place % self.size, len(raw))
+        self._forget_lost_places()
+
+    def _forget_lost_places(self) -> None:
+        lost = [label for label, place in self.labels.items() if self.is_lost(place)]
+        for label in lost:
+            del self.labels[label]
+        if lost:
+            self._reader.labels_changed()
+        if self.begin is not None and self.is_lost(self.begin):
+            self.begin = None
+
+    def fetch(self, place: int) -> bytes:
+        """The bytes of the command at ``place`` and perhaps some more."""
+        first = place % self.size
+        raw = self._bytes[first : first + LONGEST].tobytes()
+        return raw if len(raw) == LONGEST else raw + self._bytes[: LONGEST - len(raw)].tobytes()
+
+    def label(self, number: int) -> None:
+        """Give the next command a label; inside a file it is there when the file is."""
+        if self.file is FileState.OPEN:
+            self._file_labels[number] = self.write
+        else:
+            self.labels[number] = self.write
+            self._reader.labels_changed()
+
+    def enable(self) -> None:
+        """What has been written may run."""
+        self.end = self.write
+
+    # ------------------------------------------------------------------ files
+
+    def open_file(self) -> None:
+        self.file = FileState.OPEN
+        self._file_labels = {}
+
+    def refuse_file(self) -> None:
+        """Drop the file that is open, and what is still to come of it."""
+        self.file = FileState.REFUSED
+        self.write = self.end
+
+    def drop_file(self) -> None:
+        """Forget a file that is open, as if it had never begun."""
+        self.file = FileState.CLOSED
+        self.write = self.end
+
+    def close_file(self) -> Image | None:
+        """The file may run; None when it was refused."""
+        stored = self.file is FileState.OPEN
+        self.file = FileState.CLOSED
+        if not stored:
+            return None
+        self.begin = begin = self.end
+        code = bytes(self._bytes[(begin + offset) % self.size] for offset in range(self.age(begin)))
+        image = Image(code, {label: (place - begin) % self.span for label, place in self._file_labels.items()})
+        self.labels |= self._file_labels
+        self.enable()
+        self._reader.labels_changed()
+        return image
+
+    def load(self, image: Image) -> None:
+        """Put a stored file at the beginning of the empty memory; it may run."""
+        registers = self._own
+        self.reset()
+        self._own = registers
+        self._bytes[: len(image.code)] = array("B", image.code)
+        self.write = len(image.code)
+        self.labels = dict(image.labels)
+        self.enable()
+        self._reader.labels_changed()
+
+    # ------------------------------------------------------------------ registers 1 to 8
+
+    def register(self, number: int) -> int:
+        if self._shared is None:
+            return self._own[number - 1]
+        low = self._shared + 2 * (number - 1)
+        return self._bytes[low] | self._bytes[low + 1] << 8
+
+    def set_register(self, number: int, value: int) -> None:
+        """Keep the low 16 bits of ``value``. Where registers share the memory, what stood there is no command any more."""
+        if self._shared is None:
+            self._own[number - 1] = value & 0xFFFF
+            return
+        low = self._shared + 2 * (number - 1)
+        self._bytes[low] = value & 0xFF
+        self._bytes[low + 1] = value >> 8 & 0xFF
+        self._reader.bytes_changed(low, 2)

@@ -1,0 +1,136 @@
+"""The pins of the chip as they are electrically: open-drain user lines, control inputs, outputs (manual chapters II and VI).
+
+Levels are 0 and 1. A user line is high unless the chip or somebody outside pulls it low.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.m1486.lines import DUAL_DAC, LINES, RUNSIGN_LINE, SEEK_ENDS_LOW, STEP_DIRECTION, TWO_DACS, Interface
+from steptwin.state import Stateful
+
+LINE_PINS = {f"B{line}": line for line in LINES}
+#: Inputs that are nothing else.
+CONTROL_PINS = ("JOG", "LIMIT", "SD", "RST", "S&D", "DUAL")
+OUTPUT_PINS = ("BOOST", "DIRECTION")
+#: Second names of pins, by what shares them.
+ALIASES = {
+    "BR0": "B5", "BR1": "B6", "JOG DIRECTION": "B7", "JOGDIR": "B7", "SHUTDOWN": "SD",
+    "ADDR0": "B18", "ADDR1": "B19", "ADDR2": "B20", "ADDR3": "B21",
+}  # fmt: skip
+
+JOG_DIRECTION_LINE = 7
+_BAUD_LINES = (5, 6)
+_ADDRESS_LINES = (18, 19, 20, 21)
+
+
+class Pins(Stateful):
+    """Levels of all pins. ``told`` is called with name and level whenever a line or an output has changed."""
+
+    __slots__ = ("_told", "external", "latches", "levels", "others", "runsign", "tied_low")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_told"})
+
+    def __init__(self, address: int, baud_code: int, interface: Interface, told: Callable[[str, int], None]) -> None:
+        self._told = told
+        # Index 0 of these lists is no line.
+        #: What pulls a line from outside; by default nothing does.
+        self.external = [1] * (LINES.stop)
+        for bit, line in enumerate(_ADDRESS_LINES):
+            self.external[line] = address >> bit & 1
+        for bit, line in enumerate(_BAUD_LINES):
+            self.external[line] = baud_code >> bit & 1
+        #: What the program has put out.
+        self.latches = [1] * (LINES.stop)
+        #: What function 40 puts out on its line; None while it is OFF.
+        self.runsign: int | None = None
+        #: In shutdown with function 45 OFF.
+        self.tied_low = False
+        self.others = dict.fromkeys((*CONTROL_PINS, *OUTPUT_PINS), 1)
+        self.others |= {"RST": 0, "DIRECTION": 0, "S&D": int(interface is not STEP_DIRECTION)}
+        self.others["DUAL"] = int(interface is not DUAL_DAC)
+        #: What can be read on a line.
+        self.levels = list(self.external)
+
+    def __getitem__(self, name: str) -> int:
+        return self.others[name]
+
+    def set_output(self, name: str, level: int) -> None:
+        if self.others[name] != level:
+            self.others[name] = level
+            self._told(name, level)
+
+    def set_external(self, line: int, level: int) -> bool:
+        """Pull or release a line from outside; True if its level changed."""
+        self.external[line] = level
+        return self._settle(line)
+
+    def set_latch(self, line: int, level: int) -> None:
+        self.latches[line] = level
+        self._settle(line)
+
+    def set_runsign(self, level: int | None) -> None:
+        self.runsign = level
+        self._settle(RUNSIGN_LINE)
+
+    def tie_low(self, low: bool) -> None:
+        self.tied_low = low
+        for line in LINES:
+            self._settle(line)
+
+    def release_outputs(self) -> None:
+        """All outputs high, as after power-up."""
+        self.runsign = None
+        self.tied_low = False
+        for line in LINES:
+            self.latches[line] = 1
+            self._settle(line)
+
+    def _settle(self, line: int) -> bool:
+        own = self.latches[line]
+        if line == RUNSIGN_LINE and self.runsign is not None:
+            own = self.runsign
+        level = self.external[line] & (0 if self.tied_low else own)
+        if level == self.levels[line]:
+            return False
+        self.levels[line] = level
+        self._told(f"B{line}", level)
+        return True
+
+    # ------------------------------------------------------------------ what is read at a reset
+
+    def address(self) -> int:
+        return _number([self.levels[line] for line in _ADDRESS_LINES])
+
+    def baud_pins(self) -> tuple[int, int]:
+        """BR1 and BR0."""
+        return self.levels[_BAUD_LINES[1]], self.levels[_BAUD_LINES[0]]
+
+    def interface(self) -> Interface:
+        """S&D goes before DUAL."""
+        if not self.others["S&D"]:
+            return STEP_DIRECTION
+        return TWO_DACS if self.others["DUAL"] else DUAL_DAC
+
+
+def seek_ends(line: int, level: int) -> bool:
+    """Whether a seek ends when ``line`` has this level."""
+    return level == (0 if line in SEEK_ENDS_LOW else 1)
+
+
+def known_pin(pin: str) -> str:
+    """The pin a name means, in either case and by its second name too. Raises `Misuse` with the inputs there are."""
+    name = pin.strip().upper()
+    name = ALIASES.get(name, name)
+    if name not in LINE_PINS and name not in CONTROL_PINS:
+        raise Misuse(
+            f"no input pin {pin!r}: inputs are B1 to B21, {', '.join(CONTROL_PINS)}; "
+            f"{', '.join(f'{other} is {line}' for other, line in ALIASES.items())}"
+        )
+    return name
+
+
+def _number(bits: list[int]) -> int:
+    return sum(bit << n for n, bit in enumerate(bits))

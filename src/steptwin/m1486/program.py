@@ -1,0 +1,300 @@
+"""Running the commands in the memory: one after the other, each taking its time (M-19).
+
+Each command is compiled, when it is first met, into a closure that does it and returns the place of the next one. Those that
+only compute run in a bare loop; a closure that is not there yet or does more raises `_Look`, and the command is done with the
+chip's clock set to its moment. With a hook on commands every one is looked at.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
+
+from steptwin.m1486.encoding import LONGEST, decode
+from steptwin.m1486.execute import Effect, WrongData, compile_command
+from steptwin.m1486.syntax import Command
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.state import Plain, Stateful
+
+if TYPE_CHECKING:
+    from steptwin.m1486.chip import M1486
+
+#: Where commands take no time, so many of them happen at one moment; then a while passes, so that a loop without end lets
+#: time go on. The while is long enough for a chip that polls a line to cost little.
+BURST = 1000
+BURST_NS: Nanos = MILLISECOND
+
+LOST = -1
+"""The place of a loop's beginning, or of a return, that has been overwritten."""
+
+CommandHook = Callable[[Nanos, int, Command | None], bool | None]
+"""Told of every command before it is done: moment, place in memory, command (None where the bytes are none). True halts the
+program before it."""
+
+
+class Waiting(enum.Enum):
+    """What the next command waits for beside its time."""
+
+    NOTHING = "nothing"
+    MOTION = "the end of the motion"
+    LINE = "a line"
+
+
+class _Look(Exception):
+    """The command is not compiled or does more than compute."""
+
+
+def _look() -> NoReturn:
+    raise _Look
+
+
+class _Compiled(NamedTuple):
+    effect: Effect
+    following: int
+    command: Command | None
+
+
+class Program(Stateful):
+    """Where the program stands, and what it waits for.
+
+    ``statement_ns`` is the time of a command (M-19). ``loop_starts`` and ``loop_counts`` are the loops in progress, from the
+    outermost in; ``back`` is the place after the call in progress.
+    """
+
+    __slots__ = (
+        "_burst",
+        "_burst_at",
+        "_chip",
+        "_code",
+        "_compiled",
+        "_linked",
+        "_on_command",
+        "back",
+        "is_halted",
+        "is_killed",
+        "is_limited",
+        "line",
+        "line_level",
+        "loop_counts",
+        "loop_starts",
+        "pc",
+        "ready",
+        "statement_ns",
+        "waiting",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_chip", "_code", "_compiled", "_linked", "_on_command", "statement_ns"})
+
+    def __init__(self, chip: M1486, places: int, statement_ns: Nanos) -> None:
+        self._chip = chip
+        self._code: list[Callable[[], int]] = [_look] * places
+        self._compiled: dict[int, _Compiled] = {}
+        #: Places of commands whose closures know where labels are.
+        self._linked: list[int] = []
+        self._on_command: CommandHook | None = None
+        self.statement_ns = statement_ns
+        self.ready: Nanos = 0
+        self._burst = 0
+        self._burst_at: Nanos = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """As after power-up, with an empty memory."""
+        self.pc = 0
+        self.is_killed = False
+        self.is_limited = False
+        self.is_halted = False
+        self._forget_nesting()
+
+    def _forget_nesting(self) -> None:
+        self.loop_starts: list[int] = []
+        self.loop_counts: list[int] = []
+        self.back: int | None = None
+        self.waiting = Waiting.NOTHING
+        self.line = 0
+        self.line_level = 0
+
+    # ------------------------------------------------------------------ whether it runs
+
+    @property
+    def is_held(self) -> bool:
+        """Stopped for a while: by K or LIMIT without function 51, or by a debugger."""
+        return self.is_killed or self.is_limited or self.is_halted
+
+    @property
+    def is_at_end(self) -> bool:
+        """Nothing is left to be done; a command in progress may still wait."""
+        return self.pc == self._chip.memory.end and self.waiting is Waiting.NOTHING
+
+    def deadline(self) -> Nanos | None:
+        if self.waiting is not Waiting.NOTHING or self.pc == self._chip.memory.end or self.is_held:
+            return None
+        return max(self.ready, self._chip.now)
+
+    def abandon(self) -> None:
+        """Give up what has been stored so far; commands that come now are done (M-11)."""
+        self.pc = self._chip.memory.end
+        self._forget_nesting()
+
+    def restart(self, begin: int | None) -> None:
+        """Run from ``begin`` on, or nothing."""
+        self.reset()
+        self.pc = self._chip.memory.end if begin is None else begin
+
+    # ------------------------------------------------------------------ waiting
+
+    def wait_until(self, moment: Nanos) -> None:
+        self.ready = max(self.ready, moment)
+
+    def wait_for_motion(self) -> None:
+        self.waiting = Waiting.MOTION
+
+    def wait_for_line(self, line: int, level: int) -> None:
+        self.waiting = Waiting.LINE
+        self.line = line
+        self.line_level = level
+
+    def motion_ended(self) -> None:
+        if self.waiting is Waiting.MOTION:
+            self.waiting = Waiting.NOTHING
+
+    def line_changed(self, line: int, level: int) -> None:
+        if self.waiting is Waiting.LINE and (line, level) == (self.line, self.line_level):
+            self.waiting = Waiting.NOTHING
+
+    # ------------------------------------------------------------------ running
+
+    def run(self, until: Nanos) -> None:
+        """Do what is due from the chip's moment to ``until``, at most up to the first command that does more than compute."""
+        chip = self._chip
+        now = chip.now
+        statement = self.statement_ns
+        most = (until - now) // statement + 1 if statement else self._left_at(now)
+        code = self._code
+        place = self.pc
+        done = 0
+        try:
+            for done in range(most):  # noqa: B007 - the count is wanted where the loop breaks
+                place = code[place]()
+            done = most
+        except _Look:
+            self.pc = place
+            self._pass(now, done)
+            chip.now = now + done * statement
+            self._look_at(place)
+            return
+        except WrongData as wrong:
+            self.pc = self._compiled[place].following
+            self._pass(now, done + 1)
+            chip.now = now + done * statement
+            chip.wrong_data(str(wrong))
+            return
+        self.pc = place
+        self._pass(now, done)
+
+    def _left_at(self, now: Nanos) -> int:
+        if self._burst_at != now:
+            self._burst_at = now
+            self._burst = 0
+        return BURST - self._burst
+
+    def _pass(self, now: Nanos, commands: int) -> None:
+        """Let the time of so many commands pass."""
+        if self.statement_ns:
+            self.ready = now + commands * self.statement_ns
+            return
+        self._burst += commands
+        self.ready = now
+        if self._burst >= BURST:
+            self._burst = 0
+            self.ready = now + BURST_NS
+
+    def _look_at(self, place: int) -> None:
+        """Do the command at ``place`` at the chip's moment."""
+        chip = self._chip
+        if place == chip.memory.end:
+            return
+        compiled = self._compiled.get(place) or self._compile(place)
+        if self._on_command is not None and self._on_command(chip.now, place, compiled.command):
+            self.is_halted = True
+            return
+        self._do(compiled)
+
+    def _do(self, compiled: _Compiled) -> None:
+        chip = self._chip
+        self._pass(chip.now, 1)
+        self.pc = compiled.following
+        try:
+            self.pc = compiled.effect()
+        except WrongData as wrong:
+            chip.wrong_data(str(wrong))
+
+    def _compile(self, place: int) -> _Compiled:
+        chip = self._chip
+        stored = decode(chip.memory.fetch(place))
+        if stored is None:
+            compiled = _Compiled(_no_command, self._after(place, 1), None)
+        else:
+            command, size = stored
+            following = self._after(place, size)
+            code = compile_command(chip, command, place, following)
+            compiled = _Compiled(code.effect, following, command)
+            if code.computes and self._on_command is None:
+                self._code[place] = code.effect
+            if code.is_linked:
+                self._linked.append(place)
+        self._compiled[place] = compiled
+        return compiled
+
+    def _after(self, place: int, size: int) -> int:
+        return (place + size) % len(self._code)
+
+    # ------------------------------------------------------------------ what the memory tells
+
+    def bytes_changed(self, first: int, count: int) -> None:
+        size = len(self._code) // 2
+        if count == size:
+            self._forget_code()
+        else:
+            for byte in range(first - LONGEST + 1, first + count):
+                for place in (byte % size, byte % size + size):
+                    self._code[place] = _look
+                    self._compiled.pop(place, None)
+        memory = self._chip.memory
+        for level, start in enumerate(self.loop_starts):
+            if start != LOST and memory.is_lost(start):
+                self.loop_starts[level] = LOST
+        if self.back is not None and self.back != LOST and memory.is_lost(self.back):
+            self.back = LOST
+
+    def labels_changed(self) -> None:
+        for place in self._linked:
+            self._code[place] = _look
+            self._compiled.pop(place, None)
+        self._linked.clear()
+
+    def _forget_code(self) -> None:
+        self._code[:] = [_look] * len(self._code)
+        self._compiled.clear()
+        self._linked.clear()
+
+    def set_state(self, plain: Plain) -> None:
+        super().set_state(plain)
+        self._forget_code()
+
+    # ------------------------------------------------------------------ watching
+
+    def watch(self, hook: CommandHook | None) -> None:
+        """Have ``hook`` told of every command, or nobody."""
+        self._on_command = hook
+        self._forget_code()
+
+    def resume(self) -> None:
+        """Do the command before which a hook has halted the program, and go on."""
+        if self.is_halted:
+            self.is_halted = False
+            self._do(self._compiled.get(self.pc) or self._compile(self.pc))
+
+
+def _no_command() -> NoReturn:
+    raise WrongData("these bytes of the command memory are no command")

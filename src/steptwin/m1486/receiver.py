@@ -1,0 +1,317 @@
+"""The chip's receiving side: characters into the input buffer, commands out of it into the command memory (manual chapter II,
+Serial interface and Memory).
+
+What acts when received (K, X, C75) is recognised on the way in (M-27). Blanks, line feeds and comments go no further (M-1, M-2).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar
+
+from steptwin.m1486.commands import CLEAR_KILL, When, find, permitted_text, when
+from steptwin.m1486.encoding import SIZES, encode
+from steptwin.m1486.functions import REPORT, RETURN
+from steptwin.m1486.memory import FileState
+from steptwin.m1486.syntax import Command, Condition, parse_line
+from steptwin.m1486.variants import Store, Variant
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+
+if TYPE_CHECKING:
+    from steptwin.m1486.chip import M1486
+
+CR = 0x0D
+_SKIPPED = frozenset(b"\n \t")
+_SEMICOLON = ord(";")
+NO_ROOM = 0x5E
+THREE_FREE = 0x7E
+EMPTY = 0x7F
+#: A character that leaves fewer free than this behind it is sent back inverted.
+_LAST_BYTES = 3
+_HEX = "0123456789ABCDEF"
+_CLEAR_KILL = f"C{CLEAR_KILL}"
+#: Characters of a line that are looked at as they arrive; the longest command that acts then has three.
+_MOST_SEEN = 4
+#: Lines that are read only once.
+_LINES_KEPT = 4096
+
+
+class Receiver(Stateful):
+    """Input buffer, selection in a chain, and the way of commands into memory."""
+
+    __slots__ = (
+        "_buffer",
+        "_capacity",
+        "_chip",
+        "_in_comment",
+        "_is_torn",
+        "_lines",
+        "_seen",
+        "_seen_stored",
+        "_skips_line",
+        "busy_until",
+        "is_deaf",
+        "is_listening",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_capacity", "_chip"})
+
+    def __init__(self, chip: M1486) -> None:
+        self._chip = chip
+        self._capacity = chip.variant.input_bits // 8
+        self.reset()
+
+    def reset(self) -> None:
+        """As after power-up: empty, and all chips of a chain listen."""
+        self._buffer: deque[int] = deque()
+        #: Whole lines in the buffer.
+        self._lines = 0
+        # Of the line that is arriving: its first characters, in capitals; how many of it are in the buffer; whether a beginning
+        # that needed no room is missing there; whether it was longer than the buffer, so that its rest is no command.
+        self._seen = ""
+        self._seen_stored = 0
+        self._in_comment = False
+        self._is_torn = False
+        self._skips_line = False
+        self.is_listening = True
+        #: Until when the EEPROM is being written or erased; nothing is compressed meanwhile.
+        self.busy_until: Nanos | None = None
+        #: What arrives meanwhile is lost.
+        self.is_deaf = False
+
+    @property
+    def waiting(self) -> int:
+        """Characters in the input buffer."""
+        return len(self._buffer)
+
+    @property
+    def free(self) -> int:
+        return self._capacity - len(self._buffer)
+
+    @property
+    def is_stalled(self) -> bool:
+        """Whether whole commands wait in the buffer."""
+        return self._lines > 0
+
+    # ------------------------------------------------------------------ characters
+
+    def character(self, byte: int) -> None:
+        """A character has arrived."""
+        if self.is_deaf:
+            return
+        if byte == CR:
+            self._end_of_line()
+        elif self._in_comment or byte in _SKIPPED:
+            self._echo(byte)
+        elif byte == _SEMICOLON:
+            self._in_comment = True
+            self._echo(byte)
+        else:
+            self._part_of_line(byte)
+
+    def _part_of_line(self, byte: int) -> None:
+        if len(self._seen) < _MOST_SEEN:
+            char = chr(byte)
+            self._seen += char.upper() if char.isascii() else char
+        if self._acts_when_received():
+            self._echo(byte)
+        elif self.is_listening and not self._skips_line:
+            self._store(byte)
+
+    def _acts_when_received(self) -> bool:
+        """M-27: no other command begins with K or X, so these lines are never put into the buffer."""
+        return self._seen[:1] in ("K", "X")
+
+    def _echo(self, byte: int) -> None:
+        if self.is_listening and self._chip.unit.on(RETURN):
+            self._chip.send(byte)
+
+    def _store(self, byte: int) -> bool:
+        """Put a character into the buffer; with the answers of a buffer that is filling up."""
+        free = self.free
+        if free == 0 or self._is_torn:
+            self._refuse(byte)
+            return False
+        self._echo(byte)
+        self._buffer.append(byte)
+        self._seen_stored += 1
+        if free <= _LAST_BYTES:
+            self._chip.send(~byte & 0xFF)
+        return True
+
+    def _refuse(self, byte: int) -> None:
+        if byte != CR and _CLEAR_KILL.startswith(self._seen):
+            # This may become C75, which needs no room. If it becomes something else, it has lost its beginning.
+            self._is_torn = True
+            return
+        self._chip.send(NO_ROOM)
+        if not self._lines and not self._is_torn:
+            # No command is as long as the buffer; waiting for its end would be for ever.
+            self._buffer.clear()
+            self._skips_line = True
+            self._chip.wrong_data_received("a line longer than the input buffer")
+
+    def _end_of_line(self) -> None:
+        seen, stored, skipped = self._seen, self._seen_stored, self._skips_line
+        if self._acts_when_received():
+            self._echo(CR)
+            self._begin_line()
+            self._act(seen)
+        elif not self.is_listening or skipped:
+            self._echo(CR)
+            self._begin_line()
+        elif seen == _CLEAR_KILL:
+            self._echo(CR)
+            self._begin_line()
+            self._take_back(stored)
+            self._chip.clear_kill()
+        elif (self._buffer and self._buffer[-1] != CR) or self._is_torn:
+            self._lines += self._store(CR)
+            self._begin_line()
+        else:
+            self._echo(CR)
+            self._begin_line()
+        self.compress()
+
+    def _begin_line(self) -> None:
+        self._seen = ""
+        self._seen_stored = 0
+        self._in_comment = False
+        self._is_torn = False
+        self._skips_line = False
+
+    def _act(self, line: str) -> None:
+        """A line that begins with K or X."""
+        if line[0] == "X":
+            self._select(line[1:])
+        elif self.is_listening:
+            if line == "K":
+                self._chip.kill()
+            else:
+                self._chip.wrong_data_received(f"{line}: K takes no number")
+
+    def _select(self, argument: str) -> None:
+        """X: only the chip with this address listens from now on."""
+        chip = self._chip
+        if argument == "G":
+            self.is_listening = True
+        elif len(argument) == 1 and argument in _HEX and find("X", int(argument, 16), chip.variant) is not None:
+            self.is_listening = int(argument, 16) == chip.address
+        elif self.is_listening:
+            chip.wrong_data_received(
+                f"X{argument} names no chip: permitted are {permitted_text('X', chip.variant)}, or G for all"
+            )
+
+    def _take_back(self, stored: int) -> None:
+        """A line that acted when received leaves the buffer again."""
+        for _ in range(stored):
+            self._buffer.pop()
+        self._removed(stored)
+
+    def _removed(self, count: int) -> None:
+        """Function 57: say that there is room again."""
+        if count == 0 or not self._chip.unit.on(REPORT):
+            return
+        if self.free - count < _LAST_BYTES <= self.free:
+            self._chip.send(THREE_FREE)
+        if not self._buffer:
+            self._chip.send(EMPTY)
+
+    # ------------------------------------------------------------------ compression
+
+    def compress(self) -> None:
+        """Move commands from the buffer to the memory as far as that is possible now."""
+        while self._lines and self.busy_until is None:
+            length = self._buffer.index(CR)
+            text = bytes(self._buffer[i] for i in range(length)).decode("latin-1")
+            command = _read(text, self._chip.variant)
+            if self._is_stopped_by_motor() or (isinstance(command, Command) and self._lacks_memory(command)):
+                return
+            for _ in range(length + 1):
+                self._buffer.popleft()
+            self._lines -= 1
+            self._removed(length + 1)
+            if isinstance(command, Command):
+                self._take(command)
+            else:
+                self._chip.wrong_data_received(f"{text}: {command}")
+
+    def _is_stopped_by_motor(self) -> bool:
+        """Compression stands still while the motor runs, but not inside ``[ ]``."""
+        return self._chip.drive.is_busy and self._chip.memory.file is FileState.CLOSED
+
+    def _lacks_memory(self, command: Command) -> bool:
+        """Whether a command would overwrite others that are still to be done."""
+        chip = self._chip
+        memory = chip.memory
+        if memory.file is FileState.REFUSED or when(command.key, command.number) is not When.QUEUED:
+            return False
+        size = SIZES[command.key[0]]
+        if memory.file is FileState.OPEN and not memory.fits_file(size):
+            return False
+        return not memory.has_room(size, chip.program.pc)
+
+    def _take(self, command: Command) -> None:
+        chip = self._chip
+        memory = chip.memory
+        match command.key:
+            case "[":
+                if memory.file is FileState.CLOSED:
+                    memory.open_file()
+            case "]":
+                chip.close_file()
+            case "\\":
+                chip.software_reset()
+            case "@":
+                memory.label(command.number or 0)
+            case "C" if command.number == CLEAR_KILL:
+                chip.clear_kill()
+            case _:
+                self._store_command(command)
+
+    def _store_command(self, command: Command) -> None:
+        chip = self._chip
+        memory = chip.memory
+        if memory.file is FileState.REFUSED:
+            return
+        raw = encode(command)
+        if memory.file is FileState.OPEN and not memory.fits_file(len(raw)):
+            memory.refuse_file()
+            chip.send(NO_ROOM)
+            chip.event("file-refused", f"the file is larger than the command memory of {chip.variant.memory_bits} bits")
+            return
+        memory.store(raw)
+        if chip.variant.store is Store.EEPROM:
+            self.busy_until = chip.now + chip.variant.write_ns
+        elif memory.file is FileState.CLOSED:
+            memory.enable()
+
+    def erase(self) -> None:
+        """The EEPROM is being erased; what arrives meanwhile is lost."""
+        self.busy_until = self._chip.now + self._chip.variant.erase_ns
+        self.is_deaf = True
+
+    def eeprom_done(self) -> None:
+        """Writing or erasing has ended: what was written may run, and what waits goes on."""
+        self.busy_until = None
+        self.is_deaf = False
+        if self._chip.memory.file is FileState.CLOSED:
+            self._chip.memory.enable()
+        self.compress()
+
+
+@lru_cache(_LINES_KEPT)
+def _read(text: str, variant: Variant) -> Command | str:
+    """The command of a line, or what is wrong with it."""
+    line, found = parse_line(text)
+    command = line.command
+    if command is None:
+        return found[0].message if found else "no command"
+    number = command.number
+    argument = command.argument
+    if not command.from_variable and find(command.key, number, variant) is None:
+        return f"permitted is {permitted_text(command.key, variant)}"
+    if isinstance(argument, Condition) and find("J", argument.label, variant) is None:
+        return f"label {argument.label} is out of range: permitted is {permitted_text('J', variant)}"
+    return Command(command.key, argument)

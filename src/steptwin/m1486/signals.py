@@ -1,0 +1,61 @@
+"""What the driver interface puts on its pins: STEP pulses, data for the converters. Projections of the motion, not state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+from steptwin.machine import Nanos
+from steptwin.motion.divisions import StepTrain
+from steptwin.motion.waveforms import currents
+
+if TYPE_CHECKING:
+    from steptwin.motion.pulses import Times
+
+#: Chapter IV: a STEP pulse is at least this long, and data are valid for at least this long before STROBE goes low.
+STEP_PULSE_NS: Nanos = 1_800
+DATA_VALID_NS: Nanos = 960
+
+#: Lines that are data pins: B8 and B9 share D1.0 and D1.1, B10 to B16 share D2.0 to D2.6, B17 shares PHASE2.
+_FIRST_D1, _FIRST_D2, _PHASE2 = 8, 10, 17
+
+
+class Strobe(NamedTuple):
+    """One value for the dual converter, taken over when STROBE goes low."""
+
+    time: Nanos
+    #: 1 or 2: DIR is 0 for channel 1 and 1 for channel 2.
+    channel: int
+    magnitude: int
+    #: Level of PHASE2; M-25: high is negative current.
+    phase: int
+
+
+def step_pulses(train: StepTrain, after: Nanos, until: Nanos) -> Times:
+    """Moments at which STEP goes low, with ``after`` < time <= ``until`` (int64 ns)."""
+    from steptwin.motion.pulses import step_times
+
+    return step_times(train, after, until)
+
+
+def strobes(train: StepTrain, characteristic: int, after: Nanos, until: Nanos) -> Iterator[Strobe]:
+    """What the Dual DAC interface gives for the steps with ``after`` < time <= ``until``: both channels for each, in turn."""
+    for moment in step_pulses(train, after, until).tolist():
+        values = currents(characteristic, train.count(moment))
+        for channel, current in enumerate(values, start=1):
+            yield Strobe(moment + (2 * channel - 1) * DATA_VALID_NS, channel, abs(current), phase_level(current))
+
+
+def phase_level(current: int) -> int:
+    """M-25."""
+    return int(current < 0)
+
+
+def data_level(line: int, phases: tuple[int, int]) -> int:
+    """Level of a line that the interface occupies, between two steps. Dual DAC leaves channel 2 on its pins."""
+    first, second = phases
+    if line == _PHASE2:
+        return phase_level(second)
+    if line >= _FIRST_D2:
+        return abs(second) >> line - _FIRST_D2 & 1
+    return abs(first) >> line - _FIRST_D1 & 1

@@ -1,0 +1,92 @@
+"""The chip's serial port: characters that take their time on the wire, in both directions.
+
+Without line timing a character arrives and leaves at the moment at which it is handed over.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from steptwin.machine import SECOND, Nanos
+from steptwin.state import Stateful
+from steptwin.wire.line import CharacterClock, SerialLine
+
+#: More characters than this never wait for the line: a real sender would not have got rid of them yet.
+MOST_WAITING = 1 << 16
+
+
+class Uart(Stateful):
+    """8N1 at the baud rate that was read from the pins. ``sent`` are the characters that have left and were not fetched."""
+
+    __slots__ = ("_arriving", "_incoming", "_is_timed", "_leaving", "_outgoing", "overrun", "sent")
+    FIXED = frozenset({"_is_timed"})
+
+    def __init__(self, baud: int, *, is_timed: bool) -> None:
+        self._is_timed = is_timed
+        self._arriving: deque[tuple[Nanos, int]] = deque()
+        self._leaving: deque[tuple[Nanos, int]] = deque()
+        self.sent: list[tuple[Nanos, int]] = []
+        self.overrun = 0
+        """Characters that found no room on the line."""
+        self._incoming = self._outgoing = CharacterClock(SerialLine(baud))
+        self.set_baud(baud)
+
+    @property
+    def baud(self) -> int:
+        return self._incoming.line.baud
+
+    @property
+    def character_ns(self) -> Nanos:
+        """At least so long after one character the next one ends."""
+        line = self._outgoing.line
+        return line.bits * SECOND // line.baud if self._is_timed else 0
+
+    def set_baud(self, baud: int) -> None:
+        """What is on its way at the old rate is lost."""
+        self._incoming = CharacterClock(SerialLine(baud))
+        self._outgoing = CharacterClock(SerialLine(baud))
+        self.clear()
+
+    def clear(self) -> None:
+        self._arriving.clear()
+        self._leaving.clear()
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Characters are put on the line towards the chip at ``now``, or as soon as it is free."""
+        room = MOST_WAITING - len(self._arriving)
+        self.overrun += max(0, len(data) - room)
+        for byte in data[:room]:
+            self._arriving.append((self._incoming.send(1, now) if self._is_timed else now, byte))
+
+    def send(self, byte: int, now: Nanos) -> bool:
+        """Put a character on the line towards the host; True if it has left with that."""
+        if self._is_timed:
+            self._leaving.append((self._outgoing.send(1, now), byte))
+        else:
+            self.sent.append((now, byte))
+        return not self._is_timed
+
+    def arrived(self, now: Nanos) -> int | None:
+        """The next character that has arrived by ``now``."""
+        if self._arriving and self._arriving[0][0] <= now:
+            return self._arriving.popleft()[1]
+        return None
+
+    def leave(self, now: Nanos) -> bool:
+        """Characters whose time is over by ``now`` have been sent; True if there are any."""
+        before = len(self.sent)
+        while self._leaving and self._leaving[0][0] <= now:
+            self.sent.append(self._leaving.popleft())
+        return len(self.sent) > before
+
+    def take_sent(self) -> list[tuple[Nanos, int]]:
+        sent, self.sent = self.sent, []
+        return sent
+
+    def arrival(self) -> Nanos | None:
+        """When the next character arrives."""
+        return self._arriving[0][0] if self._arriving else None
+
+    def departure(self) -> Nanos | None:
+        """When the next character has left."""
+        return self._leaving[0][0] if self._leaving else None

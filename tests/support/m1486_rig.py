@@ -1,0 +1,108 @@
+"""A host in virtual time for tests of the M1486: it types commands, reads bytes, and watches pins and motions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from steptwin.m1486.chip import M1486, Event
+from steptwin.m1486.variants import variant
+from steptwin.machine import MILLISECOND, SECOND, Edge
+from steptwin.motion.divisions import StepTrain
+from steptwin.motion.pulses import step_times
+
+
+class Bench:
+    """One chip. Commands take 1 ms unless ``statement_ns`` says otherwise; characters take no time unless ``is_timed``."""
+
+    def __init__(self, kind: str = "B", **options: Any) -> None:
+        self.chip = M1486(variant(kind), **options)
+        self.trains: list[tuple[int, StepTrain]] = []
+        self.edges: list[Edge] = []
+        self._revision = 0
+        self.chip.changed = self._changed
+        self._changed()
+
+    def _changed(self) -> None:
+        self.edges += self.chip.take_edges()
+        if self.chip.drive.revision != self._revision:
+            self._revision = self.chip.drive.revision
+            self.trains.append((self.chip.now, self.chip.drive.train))
+
+    @property
+    def now(self) -> int:
+        return self.chip.now
+
+    def raw(self, data: bytes) -> bytes:
+        """Send characters; what the chip sends at once."""
+        self.chip.receive(data, self.now)
+        return self.sent()
+
+    def send(self, *lines: str) -> bytes:
+        """Send lines, each with CR."""
+        return self.raw("".join(f"{line}\r" for line in lines).encode("latin-1"))
+
+    def file(self, *lines: str) -> bytes:
+        return self.send("[", *lines, "]")
+
+    def run(self, seconds: float = 0.0, *, ms: float = 0.0) -> bytes:
+        """Let time pass; what the chip sends meanwhile."""
+        self.chip.advance(self.now + round(seconds * SECOND + ms * MILLISECOND))
+        return self.sent()
+
+    def finish(self, limit: float = 1000.0) -> bytes:
+        """Let time pass until nothing happens by itself any more."""
+        end = self.now + round(limit * SECOND)
+        while (due := self.chip.deadline()) is not None:
+            if due > end:
+                raise AssertionError(f"the chip is still busy after {limit} s")
+            self.chip.advance(due)
+        self.chip.advance(max(self.now, self.chip.program.ready))
+        return self.sent()
+
+    def sent(self) -> bytes:
+        return b"".join(data for _, data in self.chip.to_send(self.now))
+
+    def do(self, *lines: str) -> bytes:
+        """Send lines one after the other, each when the one before has been done."""
+        answers = b""
+        for line in lines:
+            answers += self.send(line) + self.finish()
+        return answers
+
+    def pin(self, **levels: int) -> None:
+        for name, level in levels.items():
+            self.chip.set_pin(name, level, self.now)
+
+    def level(self, pin: str) -> int:
+        return int(self.chip.pins()[pin])
+
+    @property
+    def counter(self) -> int:
+        return self.chip.drive.counter_u(self.now)
+
+    @property
+    def true(self) -> int:
+        return self.chip.drive.true_u(self.now)
+
+    @property
+    def variable(self) -> int:
+        return self.chip.unit.variable
+
+    def events(self, code: str) -> list[Event]:
+        return [event for event in self.chip.events if event.code == code]
+
+    @property
+    def wrong(self) -> list[str]:
+        return [event.text for event in self.events("wrong-data")]
+
+    def sum_of_pulses(self) -> int:
+        """Where all pulses given so far lead, in minimum microsteps: from the trains, pulse by pulse."""
+        total = 0
+        for index, (begin, train) in enumerate(self.trains):
+            end = self.trains[index + 1][0] if index + 1 < len(self.trains) else self.now
+            total += sum(train.count(moment) - train.count(moment - 1) for moment in set(step_times(train, begin, end).tolist()))
+        return total
+
+
+def seconds(events: list[Event]) -> list[float]:
+    return [event.time / SECOND for event in events]
