@@ -6,7 +6,7 @@ from array import array
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Edge, Nanos
@@ -70,6 +70,12 @@ def _nothing() -> None:
     pass
 
 
+class Serving(Protocol):
+    """What serves the requests of a controller: its `Slave`, or something in front of that."""
+
+    def answer(self, device: Mic488, pdu: bytes) -> bytes: ...
+
+
 class Mic488(Stateful):
     """One controller. Commands and inputs are applied after everything that is due at their moment.
 
@@ -77,14 +83,13 @@ class Mic488(Stateful):
     is wrong. ``lenient`` lets masters read holes and write-only registers (MIC-3).
 
     Hooks: ``store`` is called with the stored user registers when they are saved and returns when they are safe; an `OSError`
-    says that they are not. ``changed`` is called whenever the next deadline or an output may have changed, ``on_event`` for
-    every event.
+    says that they are not, bytes say what was stored instead. ``slave`` serves the requests. ``changed`` is called whenever the
+    next deadline or an output may have changed, ``on_event`` for every event.
     """
 
     __slots__ = (
         "_due",
         "_edges",
-        "_slave",
         "analog_v",
         "axes",
         "changed",
@@ -102,13 +107,14 @@ class Mic488(Stateful):
         "outputs",
         "program",
         "registers",
+        "slave",
         "store",
         "trigger_mode",
         "triggered",
         "user",
         "written",
     )
-    FIXED = frozenset({"_slave", "changed", "config", "firmware", "lenient", "on_event", "registers", "store"})
+    FIXED = frozenset({"changed", "config", "firmware", "lenient", "on_event", "registers", "slave", "store"})
 
     def __init__(
         self, config: ControllerConfig, firmware: str = DEFAULT_FIRMWARE, *, lenient: bool = False, memory: bytes | None = None
@@ -117,8 +123,8 @@ class Mic488(Stateful):
         self.registers = register_map(firmware)
         self.firmware = self.registers.firmware
         self.lenient = lenient
-        self._slave = slave(firmware, lenient=lenient)
-        self.store: Callable[[bytes], None] | None = None
+        self.slave: Serving = slave(firmware, lenient=lenient)
+        self.store: Callable[[bytes], bytes | None] | None = None
         self.changed: Callable[[], None] = _nothing
         self.on_event: Callable[[Event], None] | None = None
 
@@ -158,6 +164,16 @@ class Mic488(Stateful):
         self.inputs.power_on()
         self.event("power-on", "power-on")
         self._power_on()
+
+    def power_off(self, now: Nanos) -> None:
+        """Program, drives and outputs off. Until a `power_cycle` nothing more is to be asked of the controller."""
+        self.advance(now)
+        self.program.command(0, now)
+        for number in range(OUTPUTS):
+            self.set_output(number, False)
+        for axis in self.axes:
+            axis.disable(now)
+        self.touch()
 
     # ------------------------------------------------------------------ time
 
@@ -215,7 +231,7 @@ class Mic488(Stateful):
     def execute(self, pdu: bytes, now: Nanos) -> bytes:
         """Apply a request at ``now`` and answer it; a request that cannot be served is answered with its exception."""
         self.advance(now)
-        return self._slave.answer(self, pdu)
+        return self.slave.answer(self, pdu)
 
     # ------------------------------------------------------------------ pins
 
@@ -357,9 +373,8 @@ class Mic488(Stateful):
     def save_memory(self) -> None:
         """USER_REG_SAVE. An `OSError` of the hook leaves the stored copy as it was."""
         memory = b"".join(word.to_bytes(2, "big") for word in self.user[self._stored()])
-        if self.store is not None:
-            self.store(memory)
-        self.memory = memory
+        stored = self.store(memory) if self.store is not None else None
+        self.memory = memory if stored is None else stored
 
     def zero_memory(self) -> None:
         """USER_REG_ZERO: the registers, not their stored copy."""

@@ -126,6 +126,14 @@ class Kernel:
         machine.changed = self._mark
         self._mark()
 
+    def replace(self, name: str, machine: DrivingMachine) -> None:
+        """Let another machine stand where ``name`` stands: one around it, with the same pins and axes."""
+        if name not in self.machines:
+            raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
+        self.machines[name] = machine
+        machine.changed = self._mark
+        self._mark()
+
     def connect(self, wire: Wire) -> None:
         """Add a wire; the target takes the source's present level at once."""
         self._check(wire.source)
