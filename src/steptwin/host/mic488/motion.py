@@ -24,6 +24,7 @@ class Reason(enum.Enum):
     """Why a motion ended."""
 
     TARGET = "target reached"
+    REST = "at rest"
     LIMIT_L = "stopped at limit L"
     LIMIT_R = "stopped at limit R"
     STOPPED = "stopped by somebody"
@@ -79,7 +80,7 @@ class MoveEnd:
 
     @property
     def ok(self) -> bool:
-        return self.reason in (Reason.TARGET, Reason.RELEASED)
+        return self.reason in (Reason.TARGET, Reason.REST, Reason.RELEASED)
 
     def __str__(self) -> str:
         where = "" if self.position_u is None else f" at {self.position_u:g} {self.unit}"
@@ -91,9 +92,9 @@ def status_text(code: int) -> str:
 
 
 def reason_of(status: int, motion: Motion | None) -> Reason:
-    """Why an axis that does not move any more stands. Coming to rest is the target of a velocity of 0."""
+    """Why an axis that does not move any more stands: rest is all there is to say without a motion or after a velocity of 0."""
     if status == Status.ON and (motion is None or (motion.kind is Kind.VELOCITY and motion.value_u == 0.0)):
-        return Reason.TARGET
+        return Reason.REST
     return _REASONS.get(status, Reason.STOPPED)
 
 

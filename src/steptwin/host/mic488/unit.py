@@ -93,6 +93,8 @@ class Unit:
         if self._has_status:
             self._control_items.append(Item(registers.of("M_STATUS")))
         self._control_items += self.axis_items("STATUS")
+        (self._control_block,) = plan(registers, self._control_items)
+        self._control_query = Query(self.number, self._control_block.request, lambda _: "read the control registers")
 
     @property
     def place(self) -> str:
@@ -133,9 +135,7 @@ class Unit:
         except pdu.ModbusException as exception:
             raise Refused(self.place, query, exception) from None
 
-    async def look(
-        self, function: int, address: int, count: int, timeout_ns: Nanos | None = None, most: int | None = None
-    ) -> bytes:
+    async def look(self, function: int, address: int, count: int) -> bytes:
         """The answer to a read."""
         key = (function, address, count)
         query = self._queries.get(key)
@@ -143,7 +143,7 @@ class Unit:
             if len(self._queries) >= QUERIES_KEPT:
                 self._queries.clear()
             query = self._queries[key] = Query(self.number, pdu.Read(function, address, count), self.wording.request)
-        return await self._exchange(query, False, None, timeout_ns, self.tries if most is None else most)
+        return await self._exchange(query, False, None, None, self.tries)
 
     # ------------------------------------------------------------------ values
 
@@ -255,10 +255,8 @@ class Unit:
         if after is not None and known is not None and known.at >= after:
             return known
         at = self.line.now()
-        (block,) = plan(self.registers, self._control_items)
-        request = block.request
-        answer = await self.look(request.function, request.address, request.count, timeout_ns)
-        values = block.values(words(answer), DataType.REAL)
+        answer = await self._exchange(self._control_query, False, None, timeout_ns, self.tries)
+        values = self._control_block.values(words(answer), DataType.REAL)
         found = [int(values[item]) for item in self._control_items]
         if found[0] not in (DataType.REAL, DataType.DINT):
             raise NotReady(f"{self.place}: unit {self.number} says DATA_TYPE = {found[0]}, which no MIC488 does")

@@ -1,0 +1,58 @@
+"""User registers as numbers of a type. The bytes are those of the manual: the low word comes first."""
+
+from __future__ import annotations
+
+import pytest
+from host_rig import Wire, driver
+
+from steptwin.errors import Misuse
+
+
+def test_views_of_the_same_registers() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.user.reals.write(100, 12.5)
+    assert (wire.twin.user[100], wire.twin.user[101]) == (0x0000, 0x4148)
+    mic.user.dints.write(102, -2)
+    assert (wire.twin.user[102], wire.twin.user[103]) == (0xFFFE, 0xFFFF)
+    mic.user.ints.write(104, -3)
+    assert wire.twin.user[104] == 0xFFFD
+    assert mic.user.words.read(104) == 0xFFFD
+    assert (mic.user.reals.read(100), mic.user.dints.read(102), mic.user.ints.read(104)) == (12.5, -2, -3)
+    assert mic.user.words.read_many(100, 5) == [0, 0x4148, 0xFFFE, 0xFFFF, 0xFFFD]
+
+
+def test_many_values_take_few_frames() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    wire.sent.clear()
+    values = [n / 4 for n in range(100)]
+    mic.user.reals.write_many(0, values)
+    assert len(wire.sent) == 2
+    assert mic.user.reals.read_many(0, 100) == values
+    assert len(wire.sent) == 4
+
+
+def test_what_no_register_holds() -> None:
+    mic = driver(Wire())
+    with pytest.raises(Misuse, match="permitted −32768…32767"):
+        mic.user.ints.write(0, 40000)
+    with pytest.raises(Misuse, match="a whole number is needed"):
+        mic.user.words.write(0, 1.5)  # type: ignore[arg-type]
+    with pytest.raises(Misuse, match="DINTs begin at even registers"):
+        mic.user.dints.read(1)
+    with pytest.raises(Misuse, match="user register 1 as WORD × 100000 is outside"):
+        mic.user.words.read_many(1, 100_000)
+
+
+def test_the_non_volatile_copy() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.user.words.write(1000, 7)
+    mic.user.save()
+    mic.user.zero()
+    assert mic.user.words.read(1000) == 0
+    mic.user.load()
+    assert mic.user.words.read(1000) == 7
+    with pytest.raises(Misuse, match="USER_REG_SAVE"):
+        driver(Wire(firmware="1.23")).user.save()
