@@ -11,6 +11,7 @@ app = typer.Typer(help="Serve a twin until Ctrl-C.", no_args_is_help=True)
 
 DEFAULT_TCP = "127.0.0.1:5020"
 DEFAULT_RTU_TCP = "127.0.0.1:5021"
+DEFAULT_M1486_TCP = "127.0.0.1:5022"
 
 
 @app.command()
@@ -73,5 +74,60 @@ def mic488(
             name=name,
             listen_any=listen_any,
             demo=demo,
+        )
+    )
+
+
+@app.command()
+def m1486(
+    variant: Annotated[str, typer.Option(help="Type: A, B, C, E1, E2, or A2x and so on (24 MHz).")] = "B",
+    chain: Annotated[str, typer.Option(help="Addresses of the chips on the line, such as 0,7; hexadecimal digits.")] = "F",
+    interface: Annotated[str, typer.Option(help="Driver interface: sd, dual or two.")] = "sd",
+    wire: Annotated[
+        list[str] | None, typer.Option(help="From a pin of one chip to an input of another: 0.B1=7.B3. Again for more.")
+    ] = None,
+    pty: Annotated[Path | None, typer.Option(help="The line on a pseudo terminal; PATH becomes a link to it.")] = None,
+    serial: Annotated[str | None, typer.Option(help="The line on a real serial port, 8N1.")] = None,
+    baud: Annotated[int | None, typer.Option(help="Baud rate the BR pins choose. Default: the highest of the type.")] = None,
+    tcp: Annotated[str | None, typer.Option(help="The line as raw TCP on HOST:PORT; port 0 takes a free one.")] = None,
+    state: Annotated[
+        Path | None, typer.Option(help="Directory of the EEPROMs of E types. Without it they end with the twin.")
+    ] = None,
+    program: Annotated[Path | None, typer.Option(help="Program a single chip is switched on with.")] = None,
+    line_timing: Annotated[str, typer.Option(help="'real': characters take the time a wire would; 'off'.")] = "off",
+    ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
+    log_frames: Annotated[
+        bool, typer.Option("--log-frames", help="Print everything on the line with time, direction, bytes and meaning.")
+    ] = False,
+    name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "m1486",
+    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+) -> None:
+    """Serve virtual M1486 chips on one line; several programs may be connected to it.
+
+    Without any of --pty, --serial and --tcp it listens on a pty and on 127.0.0.1:5022 (raw TCP).
+    """
+    from steptwin.runtime.serve_m1486 import M1486Options, serve
+
+    if not (pty or serial or tcp):
+        from steptwin.runtime.control import runtime_directory
+
+        pty, tcp = runtime_directory() / name, DEFAULT_M1486_TCP
+    serve(
+        M1486Options(
+            variant=variant,
+            chain=chain,
+            interface=interface,
+            wires=tuple(wire or ()),
+            pty=pty,
+            serial=serial,
+            baud=baud,
+            tcp=tcp,
+            state=state,
+            program=program,
+            line_timing=line_timing,
+            ready_file=ready_file,
+            log_frames=log_frames,
+            name=name,
+            listen_any=listen_any,
         )
     )
