@@ -25,7 +25,7 @@ from typing import ClassVar, NamedTuple
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.m1486.drive import Drive, Motion
 from steptwin.m1486.eeprom import pack, unpack
-from steptwin.m1486.execute import WrongData
+from steptwin.m1486.effects import WrongData
 from steptwin.m1486.functions import COMPLEMENT, CONTINUE, EDGE, LIMITOFF, OUTPUTS, RECOVER, RUNSIGN
 from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface
 from steptwin.m1486.memory import CommandMemory, FileState

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from steptwin.m1486.drive import SEEK_LANDING_U, Drive, Motion, WrongMove
-from steptwin.m1486.execute import WrongData
+from steptwin.m1486.effects import WrongData
 from steptwin.m1486.functions import EDGE, FULLSTEP, FULLSTEPSS, LIMITOFF, RECOVER, RUNSIGN
 from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.microsteps import FULL_STEP

@@ -11,8 +11,9 @@ import enum
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
 
+from steptwin.m1486.effects import Effect, WrongData
 from steptwin.m1486.encoding import LONGEST, decode
-from steptwin.m1486.execute import Effect, WrongData, compile_command
+from steptwin.m1486.execute import compile_command
 from steptwin.m1486.syntax import Command
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Plain, Stateful

@@ -1,0 +1,147 @@
+"""Program control: loops, jumps, subroutines, conditions, waits (manual chapter VII.1)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.m1486.commands import find, permitted_text
+from steptwin.m1486.effects import Effect, Makers, WrongData, refusing
+from steptwin.m1486.functions import CARRY, USER_FLAGS
+from steptwin.m1486.syntax import Condition
+from steptwin.machine import MILLISECOND
+
+if TYPE_CHECKING:
+    from steptwin.m1486.chip import M1486
+
+#: M-5: loops inside one another.
+LOOP_LEVELS = 4
+
+MAKERS = Makers()
+
+
+@MAKERS.does("Loop", computes=True)
+def _loop(chip: M1486, count: int, _place: int, following: int) -> Effect:
+    program = chip.program
+
+    def run() -> int:
+        counts = program.loop_counts
+        if len(counts) >= LOOP_LEVELS:
+            raise WrongData(f"more than {LOOP_LEVELS} loops inside one another")
+        counts.append(count)
+        program.loop_starts.append(following)
+        return following
+
+    return run
+
+
+@MAKERS.does("End of loop", computes=True)
+def _end_of_loop(chip: M1486, _number: int, _place: int, following: int) -> Effect:
+    program = chip.program
+
+    def run() -> int:
+        counts = program.loop_counts
+        if not counts:
+            raise WrongData("E outside a loop")  # M-20
+        left = counts[-1] - 1
+        if left:
+            counts[-1] = left
+            start = program.loop_starts[-1]
+            if start >= 0:
+                return start
+        counts.pop()
+        start = program.loop_starts.pop()
+        if left and start < 0:
+            raise WrongData("the beginning of the loop has been overwritten")
+        return following
+
+    return run
+
+
+@MAKERS.does("Jump", computes=True, is_linked=True)
+def _jump(chip: M1486, label: int, _place: int, _following: int) -> Effect:
+    target = chip.memory.labels.get(label)
+    if target is None:
+        return refusing(f"there is no label {label}")  # M-17
+    return lambda: target
+
+
+@MAKERS.does("Subroutine", computes=True, is_linked=True)
+def _call(chip: M1486, label: int, _place: int, following: int) -> Effect:
+    target = chip.memory.labels.get(label)
+    if target is None:
+        return refusing(f"there is no label {label}")  # M-17
+    program = chip.program
+
+    def run() -> int:
+        if program.back is not None:
+            raise WrongData("a subroutine inside a subroutine")
+        program.back = following
+        return target
+
+    return run
+
+
+@MAKERS.does("End of subroutine", computes=True)
+def _return(chip: M1486, _number: int, _place: int, _following: int) -> Effect:
+    program = chip.program
+
+    def run() -> int:
+        back = program.back
+        if back is None:
+            raise WrongData("a dot outside a subroutine")  # M-20
+        program.back = None
+        if back < 0:
+            raise WrongData("the command after the call has been overwritten")
+        return back
+
+    return run
+
+
+@MAKERS.does("Wait")
+def _wait(chip: M1486, milliseconds: int, _place: int, following: int) -> Effect:
+    duration = milliseconds * MILLISECOND // chip.variant.clock
+
+    def run() -> int:
+        chip.program.wait_until(chip.now + duration)
+        chip.event("wait", f"waits {duration / MILLISECOND:g} ms")
+        return following
+
+    return run
+
+
+@MAKERS.does("Clear kill")
+def _clear_kill(_chip: M1486, _number: int, _place: int, following: int) -> Effect:
+    # A program that comes here is not stopped; C75 itself acts when it is received.
+    return lambda: following
+
+
+def condition(chip: M1486, asked: Condition, following: int) -> tuple[Effect, bool]:
+    """The closure of ``I``, and whether it only computes."""
+    line, high, label = asked.line, asked.high, asked.label
+    if find("I", line, chip.variant) is None or find("J", label, chip.variant) is None:
+        text = f"I{line}{'H' if high else 'L'}{label}"
+        return refusing(f"{text} is out of range: permitted is {permitted_text('I', chip.variant)}"), True
+    target = chip.memory.labels.get(label)
+    # M-17: a missing label matters only when the condition holds.
+    jump: Effect = refusing(f"there is no label {label}") if target is None else lambda: target
+    unit, io = chip.unit, chip.io
+
+    def if_line() -> int:
+        return jump() if (io.levels[line] == 1) is high else following
+
+    def if_interface_line() -> int:
+        return jump() if (chip.level(line) == 1) is high else following
+
+    def if_flag() -> int:
+        return jump() if unit.flags[line - USER_FLAGS.start] is high else following
+
+    def if_carry() -> int:
+        return jump() if unit.carry is high else following
+
+    if line == CARRY:
+        return if_carry, True
+    if line in USER_FLAGS:
+        return if_flag, True
+    if line in chip.interface.occupied:
+        return if_interface_line, False
+    return if_line, True
