@@ -12,7 +12,8 @@ from dataclasses import replace
 from steptwin.machine import SECOND, Edge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Event, Mic488
-from steptwin.world.kernel import Kernel, PinName, PositionSwitch
+from steptwin.world.contacts import PositionSwitch, place
+from steptwin.world.kernel import Kernel, PinName
 
 OFFSETS = {"1.23": 1000, "1.40": 10000, "1.70": 10000}
 
@@ -105,7 +106,7 @@ class Rig:
 
     def switch(self, axis: int, low: int | None, high: int | None, pin: str, *, normally_closed: bool = False) -> None:
         self.kernel.advance(self.now)
-        self.kernel.place(PositionSwitch("m", axis, low, high, PinName("m", pin), normally_closed))
+        place(self.kernel, PositionSwitch("m", axis, low, high, PinName("m", pin), normally_closed))
         self.kernel.deadline()
 
     def events(self, code: str) -> list[Event]:

@@ -14,7 +14,8 @@ from steptwin.machine import MILLISECOND, SECOND, Edge, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_velocity
-from steptwin.world.kernel import MAX_ROUNDS_PER_INSTANT, Kernel, PinName, PositionSwitch, Wire
+from steptwin.world.contacts import PositionSwitch, place
+from steptwin.world.kernel import MAX_ROUNDS_PER_INSTANT, Kernel, PinName, Wire
 
 ENABLE_M1 = bytes.fromhex("06 271E 0001")
 REAL_1000 = "0000 447A"
@@ -227,7 +228,7 @@ def on_axis(low: int | None, high: int | None, *, normally_closed: bool = False)
     kernel = Kernel()
     relay = Relay()
     kernel.add("r", relay)
-    kernel.place(PositionSwitch("r", 1, low, high, PinName("r", "A"), normally_closed))
+    place(kernel, PositionSwitch("r", 1, low, high, PinName("r", "A"), normally_closed))
     return kernel, relay
 
 
@@ -350,7 +351,7 @@ def test_wires_between_what_is_not_there_are_misuse(source: str, target: str, me
 def test_switches_where_nothing_is_are_misuse(machine: str, axis: int, pin: str, message: str) -> None:
     kernel, _, _ = two_controllers()
     with pytest.raises(Misuse, match=message):
-        kernel.place(PositionSwitch(machine, axis, None, 10, PinName("one", pin)))
+        place(kernel, PositionSwitch(machine, axis, None, 10, PinName("one", pin)))
     kernel.advance(SECOND)
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.world.kernel import Kernel, PinName, PositionSwitch
+from steptwin.world.contacts import PositionSwitch, place
+from steptwin.world.kernel import Kernel, PinName
 
 GEAR = 100.0
 """Pulses per mm."""
@@ -23,5 +24,5 @@ def demo_config() -> ControllerConfig:
 
 def place_switches(kernel: Kernel, machine: str) -> None:
     for axis in range(1, 5):
-        kernel.place(PositionSwitch(machine, axis, None, int(KL_MM * GEAR), PinName(machine, f"IN{axis}")))
-        kernel.place(PositionSwitch(machine, axis, int(KR_MM * GEAR), None, PinName(machine, f"IN{axis + 4}")))
+        place(kernel, PositionSwitch(machine, axis, None, int(KL_MM * GEAR), PinName(machine, f"IN{axis}")))
+        place(kernel, PositionSwitch(machine, axis, int(KR_MM * GEAR), None, PinName(machine, f"IN{axis + 4}")))

@@ -1,4 +1,4 @@
-"""The event kernel: machines, wires between their pins, switches that an axis runs over.
+"""The event kernel: machines, wires between their pins, and what stands between them.
 
 A kernel is itself a machine in virtual time. Machines that share no wire belong into kernels of their own, so that each is
 advanced only when something happens to it.
@@ -6,13 +6,15 @@ advanced only when something happens to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Edge, Nanos, PinMachine
 from steptwin.motion import Profile
+from steptwin.state import Plain
+from steptwin.world.trace import Record, Recorder
 
 MAX_ROUNDS_PER_INSTANT = 1000
 """Signals propagate in zero time; more rounds than this at one moment are a loop of wires."""
@@ -36,6 +38,21 @@ class DrivingMachine(PinMachine, Protocol):
     def axes(self) -> Sequence[Drive]: ...
 
 
+class Part(Protocol):
+    """What stands between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
+
+    def deadline(self) -> Nanos | None:
+        """When something happens by itself; as for a machine."""
+        ...
+
+    def look(self, now: Nanos) -> None:
+        """Do what is due by ``now`` and react to what machines did; called until nothing changes. Levels go to `Kernel.drive`."""
+        ...
+
+    def copy_state(self) -> Plain: ...
+    def set_state(self, plain: Plain) -> None: ...
+
+
 class PinName(NamedTuple):
     machine: str
     pin: str
@@ -46,76 +63,63 @@ class PinName(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """From an output to an input; ``inverted`` turns the level round."""
+    """From an output to an input; ``inverted`` turns the level round, which arrives ``delay`` later."""
 
     source: PinName
     target: PinName
     inverted: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class PositionSwitch:
-    """A switch that is on while an axis stands from ``low`` to ``high`` (counted pulses since power-on; None is open).
-
-    ``axis`` counts from 1. ``normally_closed`` gives 0 while the switch is on.
-    """
-
-    machine: str
-    axis: int
-    low: int | None
-    high: int | None
-    target: PinName
-    normally_closed: bool = False
+    delay: Nanos = 0
 
     def __post_init__(self) -> None:
-        if self.low is not None and self.high is not None and self.low > self.high:
-            raise Misuse(f"switch on {self.target}: low {self.low} imp is above high {self.high} imp")
-
-    def on(self, count: int) -> bool:
-        return (self.low is None or count >= self.low) and (self.high is None or count <= self.high)
-
-    def next_change(self, profile: Profile, now: Nanos) -> Nanos | None:
-        """First moment after ``now`` at which the axis crosses an edge of the switch. Counts go one by one."""
-        count = profile.count(now)
-        if self.low is not None and count < self.low:
-            ahead = [self.low]
-        elif self.high is not None and count > self.high:
-            ahead = [self.high]
-        else:
-            ahead = [] if self.low is None else [self.low - 1]
-            ahead += [] if self.high is None else [self.high + 1]
-        times = [t for edge in ahead if (t := profile.pulse_time(edge, now)) is not None]
-        return min(times, default=None)
+        if self.delay < 0:
+            raise Misuse(f"wire to {self.target}: a delay of {self.delay} ns is negative")
 
 
-class _Watched:
-    """A switch with its prediction."""
+class Flight(NamedTuple):
+    """A level on its way along a wire."""
 
-    __slots__ = ("due", "revision", "switch")
+    arrival: Nanos
+    target: PinName
+    level: float
 
-    def __init__(self, switch: PositionSwitch) -> None:
-        self.switch = switch
-        self.revision = -1
-        self.due: Nanos | None = None
+
+class KernelState(NamedTuple):
+    """State of a kernel and of everything in it."""
+
+    now: Nanos
+    machines: tuple[Any, ...]
+    parts: tuple[Plain, ...]
+    levels: Mapping[PinName, float]
+    flights: tuple[Flight, ...]
 
 
 class Kernel:
-    """Runs machines together. Ties in time are broken by the order in which machines were added.
+    """Runs machines together. Ties in time are broken by the order in which machines and parts were added.
 
     Whoever commands a machine directly (a request, a pin) at a moment first advances the kernel to that moment, so that
     nothing on a wire is late; what the command leads to settles with the next `advance`, `deadline` or `settle`.
+
+    ``record`` is told of every edge of an output and of a driven input, and of every new plan of an axis.
     """
 
-    def __init__(self, now: Nanos = 0) -> None:
+    def __init__(self, now: Nanos = 0, record: Recorder | None = None) -> None:
         self.now = now
         self.machines: dict[str, DrivingMachine] = {}
+        self.parts: list[Part] = []
         self.observers: list[Callable[[str, Edge], None]] = []
         """Called with machine name and edge, in order, for every output edge."""
-        self._wires: dict[PinName, list[Wire]] = {}
-        self._watched: list[_Watched] = []
-        self._due: Nanos | None = None
         self.stale = False
         """Something changed since signals last settled."""
+        self._record = record
+        self._wires: dict[PinName, list[Wire]] = {}
+        self._levels: dict[PinName, float] = {}
+        """What was driven to each input last."""
+        self._flights: list[Flight] = []
+        self._plans: dict[tuple[str, int], tuple[int, Profile]] = {}
+        """Revision and profile of each axis as recorded last."""
+        self._due: Nanos | None = None
+
+    # ------------------------------------------------------------------ what is in it
 
     def add(self, name: str, machine: DrivingMachine) -> None:
         """Add a machine that is not ahead of the kernel's time (`TimeReversal`); its ``changed`` hook is taken."""
@@ -123,46 +127,67 @@ class Kernel:
             raise Misuse(f"there is a machine {name!r} already")
         machine.advance(self.now)
         self.machines[name] = machine
-        machine.changed = self._mark
-        self._mark()
+        machine.changed = self.mark
+        self.mark()
 
     def replace(self, name: str, machine: DrivingMachine) -> None:
         """Let another machine stand where ``name`` stands: one around it, with the same pins and axes."""
         if name not in self.machines:
             raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
         self.machines[name] = machine
-        machine.changed = self._mark
-        self._mark()
+        machine.changed = self.mark
+        self.mark()
+
+    def add_part(self, part: Part) -> None:
+        """Add something between machines; it looks at them when signals settle next."""
+        self.parts.append(part)
+        self.mark()
 
     def connect(self, wire: Wire) -> None:
-        """Add a wire; the target takes the source's present level at once."""
-        self._check(wire.source)
-        self._check(wire.target)
-        self._drive(wire, self.machines[wire.source.machine].pins()[wire.source.pin])
+        """Add a wire; without delay the target takes the source's present level at once."""
+        self.check(wire.source)
+        self.check(wire.target)
+        self._send(wire, self.machines[wire.source.machine].pins()[wire.source.pin])
         self._wires.setdefault(wire.source, []).append(wire)
-        self._mark()
+        self.mark()
 
-    def place(self, switch: PositionSwitch) -> None:
-        """Add a switch; its input takes its present state at once."""
-        self._check(switch.target)
-        machine = self.machines.get(switch.machine)
-        axes = 0 if machine is None else len(machine.axes)
-        if not 1 <= switch.axis <= axes:
-            raise Misuse(f"switch on {switch.target}: no axis {switch.axis} of {switch.machine!r}, which has {axes} axes")
-        watched = _Watched(switch)
-        self._look(watched)
-        self._watched.append(watched)
-        self._mark()
-
-    def _check(self, name: PinName) -> None:
+    def check(self, name: PinName) -> None:
+        """`Misuse` unless there is such a machine with such a pin."""
         machine = self.machines.get(name.machine)
         if machine is None:
             raise Misuse(f"no machine {name.machine!r}: there are {', '.join(self.machines) or 'none'}")
         if name.pin not in machine.pins():
             raise Misuse(f"{name.machine!r} has no pin {name.pin!r}: pins are {', '.join(machine.pins())}")
 
-    def _mark(self) -> None:
+    def drive_of(self, machine: str, axis: int) -> Drive:
+        """The drive of ``axis`` (from 1). `Misuse` where there is none."""
+        found = self.machines.get(machine)
+        axes = () if found is None else found.axes
+        if not 1 <= axis <= len(axes):
+            raise Misuse(f"no axis {axis} of {machine!r}, which has {len(axes)} axes")
+        return axes[axis - 1]
+
+    def mark(self) -> None:
+        """Something changed: signals have to settle."""
         self.stale = True
+
+    # ------------------------------------------------------------------ levels
+
+    def drive(self, target: PinName, level: float) -> None:
+        """Give an input a level now; only a change is passed on."""
+        if self._levels.get(target) == level:
+            return
+        self._levels[target] = level
+        self.machines[target.machine].set_pin(target.pin, level, self.now)
+        if self._record is not None:
+            self._record(Record(self.now, target.machine, "edge", target.pin, level))
+
+    def _send(self, wire: Wire, value: float) -> None:
+        level = (0.0 if value else 1.0) if wire.inverted else value
+        if wire.delay:
+            self._flights.append(Flight(self.now + wire.delay, wire.target, level))
+        else:
+            self.drive(wire.target, level)
 
     # ------------------------------------------------------------------ time
 
@@ -177,6 +202,8 @@ class Kernel:
                 due = machine.deadline()
                 if due is not None and due <= self.now:
                     machine.advance(self.now)
+            if self._flights:
+                self._arrive()
             self.settle()
         self.now = now
 
@@ -187,43 +214,97 @@ class Kernel:
         return self._due
 
     def settle(self) -> None:
-        """Carry edges along wires and states of switches to inputs until nothing changes; find the next deadline."""
+        """Carry edges along wires and let parts look until nothing changes; find the next deadline."""
         for _ in range(MAX_ROUNDS_PER_INSTANT):
             self.stale = False
-            self._look_at_switches()
+            for part in self.parts:
+                part.look(self.now)
             for name, machine in self.machines.items():
                 for edge in machine.take_edges():
-                    for observer in self.observers:
-                        observer(name, edge)
-                    for wire in self._wires.get(PinName(name, edge.pin), ()):
-                        self._drive(wire, edge.value)
+                    self._edge(name, edge)
             if not self.stale:
                 break
         else:
             raise Runaway(f"signals did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at {self.now} ns: a loop of wires")
+        if self._record is not None:
+            self._record_plans(self._record)
         dues = [due for machine in self.machines.values() if (due := machine.deadline()) is not None]
-        dues += [watched.due for watched in self._watched if watched.due is not None]
+        dues += [due for part in self.parts if (due := part.deadline()) is not None]
+        dues += [flight.arrival for flight in self._flights]
         self._due = min(dues, default=None)
 
-    def _drive(self, wire: Wire, value: float) -> None:
-        level = (0.0 if value else 1.0) if wire.inverted else value
-        self.machines[wire.target.machine].set_pin(wire.target.pin, level, self.now)
+    def _edge(self, name: str, edge: Edge) -> None:
+        if self._record is not None:
+            self._record(Record(edge.time, name, "edge", edge.pin, edge.value))
+        for observer in self.observers:
+            observer(name, edge)
+        for wire in self._wires.get(PinName(name, edge.pin), ()):
+            self._send(wire, edge.value)
 
-    def _look_at_switches(self) -> None:
-        for watched in self._watched:
-            drive = self._drive_of(watched.switch)
-            if watched.revision != drive.revision or (watched.due is not None and watched.due <= self.now):
-                self._look(watched)
+    def _arrive(self) -> None:
+        """Levels that have come to the end of their wires."""
+        arrived = [flight for flight in self._flights if flight.arrival <= self.now]
+        self._flights = [flight for flight in self._flights if flight.arrival > self.now]
+        for flight in arrived:
+            self.drive(flight.target, flight.level)
 
-    def _look(self, watched: _Watched) -> None:
-        switch = watched.switch
-        drive = self._drive_of(switch)
-        watched.revision = drive.revision
-        watched.due = switch.next_change(drive.profile, self.now)
-        level = float(switch.on(drive.profile.count(self.now)) is not switch.normally_closed)
-        target = self.machines[switch.target.machine]
-        if target.pins()[switch.target.pin] != level:
-            target.set_pin(switch.target.pin, level, self.now)
+    def _record_plans(self, record: Recorder) -> None:
+        for name, machine in self.machines.items():
+            for number, drive in enumerate(machine.axes, start=1):
+                seen = self._plans.get((name, number))
+                if seen is not None and seen[0] == drive.revision:
+                    continue
+                profile = drive.profile
+                self._plans[name, number] = (drive.revision, profile)
+                if seen is None or not _only_rests(seen[1], profile):
+                    record(Record(self.now, name, "plan", str(number), getattr(drive, "train", profile)))
 
-    def _drive_of(self, switch: PositionSwitch) -> Drive:
-        return self.machines[switch.machine].axes[switch.axis - 1]
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> KernelState:
+        """State of everything at the kernel's moment."""
+        if self.stale:
+            self.settle()
+        return KernelState(
+            self.now,
+            tuple(map(_snapshot, self.machines.values())),
+            tuple(part.copy_state() for part in self.parts),
+            self._levels.copy(),
+            tuple(self._flights),
+        )
+
+    def restore(self, state: KernelState) -> None:
+        """Take the state of a kernel with the same machines and parts."""
+        self.now = state.now
+        for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
+            _restore(machine, its_state)
+        for part, its_state in zip(self.parts, state.parts, strict=True):
+            part.set_state(its_state)
+        self._levels = dict(state.levels)
+        self._flights = list(state.flights)
+        for name, machine in self.machines.items():
+            for number, drive in enumerate(machine.axes, start=1):
+                self._plans[name, number] = (drive.revision, drive.profile)
+        self.settle()
+
+
+def _snapshot(machine: Any) -> Any:
+    """State of a machine, and of what stands around it."""
+    inner = getattr(machine, "inner", None)
+    return machine.snapshot() if inner is None else (machine.copy_state(), _snapshot(inner))
+
+
+def _restore(machine: Any, state: Any) -> None:
+    inner = getattr(machine, "inner", None)
+    if inner is None:
+        machine.restore(state)
+    else:
+        machine.set_state(state[0])
+        _restore(inner, state[1])
+
+
+def _only_rests(before: Profile, after: Profile) -> bool:
+    """Whether ``after`` only says that the axis stands where ``before`` has ended."""
+    if after.segments or before.end is None or before.end > after.start:
+        return False
+    return before.base + before.counts[-1] == after.base

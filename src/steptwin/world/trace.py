@@ -22,8 +22,9 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.motion import Profile
+from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import StepTrain
+from steptwin.motion.paths import ArcSegment
 
 KINDS = ("plan", "edge", "frame", "statement", "event", "input", "fault")
 DIGEST_BYTES = 16
@@ -152,6 +153,7 @@ _HEAD = struct.Struct("<qI")
 _LENGTH = struct.Struct("<cI")
 _FLOAT = struct.Struct("<cd")
 _SEGMENT = struct.Struct("<6db")
+_ARC = struct.Struct("<6dqb")
 
 
 def encode(record: Record) -> bytes:
@@ -188,5 +190,15 @@ def _framed(tag: bytes, data: bytes) -> bytes:
 
 def _profile(profile: Profile) -> bytes:
     parts = [_FLOAT.pack(b"f", profile.final_p)]
-    parts += [_SEGMENT.pack(s.end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction) for s in profile.segments]
+    parts += [_segment(s) if isinstance(s, Segment) else _arc(s) for s in profile.segments]
     return _framed(b"p", f"{profile.start} {profile.base} ".encode() + b"".join(parts))
+
+
+def _segment(s: Segment) -> bytes:
+    return _SEGMENT.pack(s.end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction)
+
+
+def _arc(s: ArcSegment) -> bytes:
+    course = s.course
+    shape = _ARC.pack(s.end_s, course.centre_p, course.radius_p, course.angle_q, course.turn_q, s.end_p, s.half, s.direction)
+    return b"a" + shape + _segment(s.way)

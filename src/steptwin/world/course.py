@@ -1,0 +1,231 @@
+"""Where an axis really is while its drive follows one plan: in closed form, from the state it began with.
+
+All positions are whole pulses in the frame of the mechanics, which has its zero where the description of the axis says. The
+*field* is where the pulses given so far would have the rotor. The *rotor* follows the field, less what was lost, and stands
+where a stop or a lack of torque holds it. The *load* is moved by the rotor through backlash of ``play`` pulses: it is at the
+rotor after a way up, and ``play`` above it after a way down.
+
+Between two turns of the field both are what they were, or the field and a constant: a course is a list of such pieces.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from math import ceil, inf
+from operator import attrgetter
+from typing import NamedTuple, TypeAlias
+
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import Profile
+from steptwin.motion.divisions import StepTrain
+from steptwin.world.kernel import Drive
+from steptwin.world.motor import Motor
+
+Plan: TypeAlias = Profile | StepTrain
+
+
+def plan_of(drive: Drive) -> Plan:
+    """What gives the pulses of a drive: its profile, or the train of pulses that the profile drives."""
+    train: StepTrain | None = getattr(drive, "train", None)
+    return drive.profile if train is None else train
+
+
+def profile_of(plan: Plan) -> Profile:
+    return plan.profile if isinstance(plan, StepTrain) else plan
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """How an axis is built, in pulses of the mechanics."""
+
+    sign: int = 1
+    """Direction for positive pulses."""
+    zero: int = 0
+    """Where the axis stands when its drive has given no pulse."""
+    low: int | None = None
+    high: int | None = None
+    """Hard stops of the load."""
+    play: int = 0
+    motor: Motor | None = None
+
+    @property
+    def ideal(self) -> bool:
+        """Whether the load cannot but be where the field is."""
+        return self.low is None and self.high is None and self.play == 0 and self.motor is None
+
+
+class Standing(NamedTuple):
+    """State of an axis at a moment."""
+
+    rotor: int
+    load: int
+    stalled: bool = False
+    """The rotor has lost the field."""
+
+
+class Piece(NamedTuple):
+    """From ``begin`` on the rotor is the field and ``rotor``, or at ``rotor``; likewise the load."""
+
+    begin: Nanos
+    direction: int
+    rotor_follows: bool
+    rotor: int
+    load_follows: bool
+    load: int
+    stalled: bool
+
+
+class Course:
+    """The way of an axis from ``begin`` on while ``plan`` is in force; immutable. ``blocked``: nothing moves the rotor."""
+
+    __slots__ = ("_now", "begin", "blocked", "build", "pieces", "plan")
+
+    def __init__(
+        self, build: Build, plan: Plan, begin: Nanos, standing: Standing, *, blocked: bool = False, jump: float = 0.0
+    ) -> None:
+        """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``."""
+        self.build = build
+        self.plan = plan
+        self.begin = begin
+        self.blocked = blocked
+        self.pieces: list[Piece] = []
+        self._now = standing
+        motor = build.motor
+        if motor is not None and abs(jump) > motor.catch_p and profile_of(plan).moving(begin):
+            self._now = standing._replace(stalled=True)
+        self._lay(begin)
+
+    # ------------------------------------------------------------------ questions
+
+    def field(self, now: Nanos) -> int:
+        return self.build.sign * self.plan.count(now) + self.build.zero
+
+    def at(self, now: Nanos) -> Standing:
+        """Where everything is at ``now``, not before ``begin``."""
+        piece = self._piece(now)
+        field = self.field(now) if piece.rotor_follows or piece.load_follows else 0
+        rotor = piece.rotor + field if piece.rotor_follows else piece.rotor
+        load = piece.load + field if piece.load_follows else piece.load
+        return Standing(rotor, load, piece.stalled)
+
+    def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
+        """First moment > ``after`` at which the load (or the rotor) has come to ``position`` in ``direction``, or beyond."""
+        first = max(bisect_right(self.pieces, after, key=attrgetter("begin")) - 1, 0)
+        for i in range(first, len(self.pieces)):
+            piece = self.pieces[i]
+            end = self.pieces[i + 1].begin if i + 1 < len(self.pieces) else None
+            follows, value = (piece.rotor_follows, piece.rotor) if rotor else (piece.load_follows, piece.load)
+            if piece.begin > after:
+                here = value + self.field(piece.begin) if follows else value
+                if (here - position) * direction >= 0:
+                    return piece.begin
+            if follows and piece.direction == direction:
+                time = self._time(position - value, max(after, piece.begin))
+                if time is not None and (end is None or time < end):
+                    return time
+        return None
+
+    def _piece(self, now: Nanos) -> Piece:
+        return self.pieces[max(bisect_right(self.pieces, now, key=attrgetter("begin")) - 1, 0)]
+
+    def _time(self, field: int, after: Nanos) -> Nanos | None:
+        return self.plan.pulse_time((field - self.build.zero) * self.build.sign, after)
+
+    # ------------------------------------------------------------------ laying out the pieces
+
+    def _lay(self, begin: Nanos) -> None:
+        profile = profile_of(self.plan)
+        at = profile.start
+        for s, end in zip(profile.segments, profile.ends, strict=True):
+            until = None if end == inf else profile.start + int(end)
+            if until is None or until > begin:
+                self._segment(s, max(at, begin), until)
+            at = at if until is None else until
+        if profile.end is not None:
+            rest = max(profile.end, begin)
+            motor = self.build.motor
+            if self._now.stalled and not self.blocked and (motor is None or motor.holds()):
+                self._catch(rest)
+            self._stand(rest, 1)
+
+    def _segment(self, s: object, begin: Nanos, end: Nanos | None) -> None:
+        """What happens while the field goes one way."""
+        direction = s.direction * self.build.sign  # type: ignore[attr-defined]
+        motor, start = self.build.motor, profile_of(self.plan).start
+        if self.blocked:
+            self._stand(begin, direction)
+            return
+        if motor is None:
+            self._follow(begin, end, direction)
+            return
+        end_s = inf if end is None else (end - start) / SECOND
+        now = begin
+        while True:
+            now_s = (now - start) / SECOND
+            if self._now.stalled:
+                found = motor.catches(s, now_s, end_s, self.build.sign)
+                if found is None:
+                    self._stand(now, direction)
+                    return
+                now = max(now, start + ceil(found * SECOND))
+                self._catch(now)
+            else:
+                found = motor.loses(s, now_s, end_s, self.build.sign)
+                if found is None:
+                    self._follow(now, end, direction)
+                    return
+                lost = max(now, start + ceil(found * SECOND))
+                self._follow(now, lost, direction)
+                self._now = self._now._replace(stalled=True)
+                now = lost
+                if motor.catches(s, (now - start) / SECOND, end_s, self.build.sign) is not None:
+                    # It would be caught and lost for ever in one moment.
+                    self._stand(now, direction)
+                    return
+
+    def _follow(self, begin: Nanos, end: Nanos | None, direction: int) -> None:
+        """The rotor goes with the field until a stop holds it, the load when its play is used up."""
+        build, (rotor, load, _) = self.build, self._now
+        offset = rotor - self.field(begin)
+        slack = 0 if direction > 0 else build.play
+        stop = build.high if direction > 0 else None if build.low is None else build.low - build.play
+        held = (
+            None if stop is None else begin if (stop - rotor) * direction <= 0 else self._time(stop + direction - offset, begin)
+        )
+        if held is not None and end is not None and held >= end:
+            held = None
+        touching = rotor + slack == load
+        met = begin if touching else self._time(load - slack + direction - offset, begin)
+        if met is not None and ((end is not None and met >= end) or (held is not None and met >= held)):
+            met = None
+        if held != begin:
+            if met != begin:
+                self.pieces.append(Piece(begin, direction, True, offset, False, load, False))
+            if met is not None:
+                self.pieces.append(Piece(met, direction, True, offset, True, offset + slack, False))
+        if held is not None and stop is not None:
+            self.pieces.append(Piece(held, direction, False, stop, False, stop + slack, False))
+        if end is not None:
+            rotor = offset + self.field(end)
+            if stop is not None and (rotor - stop) * direction > 0:
+                rotor = stop
+            carried = rotor + slack
+            self._now = Standing(rotor, carried if (carried - load) * direction > 0 else load)
+
+    def _stand(self, now: Nanos, direction: int) -> None:
+        rotor, load, stalled = self._now
+        self.pieces.append(Piece(now, direction, False, rotor, False, load, stalled))
+
+    def _catch(self, now: Nanos) -> None:
+        """The rotor takes the place nearest to it that has the electrical angle of the field."""
+        build, (rotor, load, _) = self.build, self._now
+        period = 1 if build.motor is None else build.motor.period_p
+        behind = self.field(now) - rotor
+        rotor = self.field(now) - (2 * behind + period) // (2 * period) * period
+        low = None if build.low is None else build.low - build.play
+        if low is not None and rotor < low:
+            rotor += -(-(low - rotor) // period) * period
+        if build.high is not None and rotor > build.high:
+            rotor -= -(-(rotor - build.high) // period) * period
+        self._now = Standing(rotor, min(max(load, rotor), rotor + build.play))

@@ -1,0 +1,153 @@
+"""A stepper motor with a pull-out torque curve and a load: when it loses the field, and when it finds it again.
+
+Torques in N·m, speeds in pulses/s. While the torque that a motion needs,
+
+    inertia · acceleration + friction · direction + load,
+
+is not above what the curve gives at its speed, the rotor follows the field. Where it is above, the rotor stands still at once and
+pulses are lost until the field is slow enough to be caught again; then the rotor takes the nearest place that has the same
+electrical angle, so that what is lost is a whole number of electrical periods (four full steps). Velocity within a segment is
+a polynomial, so both moments come in closed form. What a rotor does beyond its stop in a jump of the field is not modelled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf, sqrt
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.motion import Segment
+
+LOOK_S = 0.001
+"""Motions along arcs have no such polynomial: they are looked at this often."""
+_NEAR_S = 1e-5
+_SLACK = 1e-12
+"""Relative: what is needed and what is there may be the same number but for rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """``curve``: (speed in pulses/s, pull-out torque) from speed 0 on, straight between; above the last speed there is none."""
+
+    curve: tuple[tuple[float, float], ...]
+    inertia: float
+    """N·m per pulse/s²: of rotor and load together."""
+    friction: float
+    """Against the direction of motion."""
+    load: float
+    """Constant; positive where it pulls the axis towards lower positions."""
+    catch_p: float
+    """Highest speed of the field (pulses/s) at which a standing rotor follows it."""
+    period_p: int
+    """Pulses of an electrical period."""
+
+    def __post_init__(self) -> None:
+        speeds = [speed for speed, _ in self.curve]
+        if not self.curve or speeds[0] != 0.0 or any(a >= b for a, b in pairwise(speeds)):
+            raise Misuse("a torque curve begins at speed 0, and each speed is higher than the one before")
+        if any(torque < 0.0 for _, torque in self.curve) or self.inertia < 0.0 or self.friction < 0.0:
+            raise Misuse("torques of a curve, inertia and friction must not be negative")
+
+    def torque(self, speed: float) -> float:
+        """What the motor gives at ``speed`` (pulses/s, not negative); below 0 above the end of the curve."""
+        constant, slope = self._line(speed)
+        return constant + slope * speed
+
+    def _line(self, speed: float) -> tuple[float, float]:
+        """The straight piece of the curve in which ``speed`` lies: torque at speed 0, and its slope."""
+        for (s0, t0), (s1, t1) in pairwise(self.curve):
+            if speed <= s1:
+                slope = (t1 - t0) / (s1 - s0)
+                return t0 - slope * s0, slope
+        last, torque = self.curve[-1]
+        return (torque, 0.0) if speed <= last else (-1.0, 0.0)
+
+    def holds(self) -> bool:
+        """Whether a standing rotor is not turned by the load."""
+        return abs(self.load) <= self.curve[0][1] + self.friction
+
+    def needs(self, acceleration: float, direction: int) -> float:
+        """Torque for an acceleration (pulses/s²) while moving in ``direction``."""
+        return self.inertia * acceleration + self.friction * direction + self.load
+
+    def loses(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
+        """First moment from ``begin_s`` on and before ``end_s`` at which more is needed than there is; seconds of segment ``s``.
+
+        ``sign`` is the direction of the mechanics for positive pulses.
+        """
+        if not isinstance(s, Segment):
+            return self._loses_looking(s, begin_s, end_s, sign)
+        d = s.direction
+        speed = (d * s.c1, d * 2.0 * s.c2, d * 3.0 * s.c3)
+        need = (self.needs(sign * 2.0 * s.c2, sign * d), self.inertia * sign * 6.0 * s.c3)
+        if end_s == inf:
+            return begin_s if self._lacks(abs(s.velocity(begin_s)), need[0]) else None
+        begins = [begin_s, *self._corners(s, begin_s, end_s)]
+        for t0, t1 in zip(begins, [*begins[1:], end_s], strict=True):
+            constant, slope = self._line(abs(s.velocity(0.5 * (t0 + t1))))
+            for way in (1.0, -1.0):
+                spare = (
+                    constant + slope * speed[0] - way * need[0],
+                    slope * speed[1] - way * need[1],
+                    slope * speed[2],
+                )
+                lost = _first_below_0(spare, t0 - s.anchor_s, t1 - s.anchor_s, _SLACK * (abs(constant) + abs(need[0])))
+                if lost is not None:
+                    return lost + s.anchor_s
+        return None
+
+    def _lacks(self, speed: float, need: float) -> bool:
+        torque = self.torque(speed)
+        return abs(need) > torque + _SLACK * (abs(torque) + abs(need))
+
+    def _corners(self, s: Segment, begin_s: float, end_s: float) -> list[float]:
+        """Moments at which the speed passes a corner of the curve."""
+        if s.c2 == 0.0:
+            return []
+        v0, v1 = abs(s.velocity(begin_s)), abs(s.velocity(end_s))
+        inside = [speed for speed, _ in self.curve if min(v0, v1) < speed < max(v0, v1)]
+        return sorted(min(max(s.when_speed(speed), begin_s), end_s) for speed in inside)
+
+    def _loses_looking(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
+        looks = 0 if end_s == inf else int((end_s - begin_s) / LOOK_S)
+        for n in range(looks + 1):
+            t = begin_s + n * LOOK_S
+            acceleration = (s.velocity(t + _NEAR_S) - s.velocity(t - _NEAR_S)) / (2.0 * _NEAR_S)
+            if self._lacks(abs(s.velocity(t)), self.needs(sign * acceleration, sign * s.direction)):
+                return t
+        return None
+
+    def catches(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
+        """First moment from ``begin_s`` on and before ``end_s`` at which a standing rotor follows the field again."""
+        t = begin_s
+        if abs(s.velocity(t)) > self.catch_p:
+            slows = isinstance(s, Segment) and s.c2 * s.direction < 0.0
+            if not slows or abs(s.velocity(end_s)) >= self.catch_p:
+                return None
+            t = min(max(s.when_speed(self.catch_p), begin_s), end_s)
+        acceleration = (2.0 * s.c2 + 6.0 * s.c3 * (t - s.anchor_s)) if isinstance(s, Segment) else 0.0
+        need = self.needs(sign * acceleration, sign * s.direction)
+        return None if self._lacks(abs(s.velocity(t)), need) or t >= end_s else t
+
+
+def _first_below_0(q: tuple[float, float, float], begin: float, end: float, slack: float) -> float | None:
+    """First u in begin…end at which q0 + q1·u + q2·u² goes below 0 (by more than ``slack`` at the ends)."""
+    q0, q1, q2 = q
+    if q0 + begin * (q1 + begin * q2) < -slack:
+        return begin
+    roots: list[float] = []
+    if q2 == 0.0:
+        if q1 < 0.0:
+            roots = [-q0 / q1]
+    else:
+        inside = q1 * q1 - 4.0 * q2 * q0
+        if inside > 0.0:
+            half = -0.5 * (q1 + (sqrt(inside) if q1 >= 0.0 else -sqrt(inside)))
+            roots = [half / q2] + ([q0 / half] if half != 0.0 else [])
+            roots = [u for u in roots if q1 + 2.0 * q2 * u < 0.0]
+    for u in sorted(roots):
+        if begin < u <= end:
+            return u if q0 + end * (q1 + end * q2) < -slack or u < end else None
+    return end if q0 + end * (q1 + end * q2) < -slack else None
