@@ -77,6 +77,8 @@ class Axis(Stateful):
         "limit_r_p",
         "number",
         "offset_p",
+        "on_arc",
+        "on_path",
         "pending",
         "profile",
         "ramp_p",
@@ -123,6 +125,9 @@ class Axis(Stateful):
         self.velocity_p = 0.0
         self.ramp_p = self.up_p
         """Velocity a velocity move (or a homing) goes to, and its ramp while slowing down."""
+        self.on_path = False
+        """On a line, circle or arc, which it runs together with another axis."""
+        self.on_arc = False
         self._rest(now, Status.OFF)
         motor = self.profile.count(now)
         self.offset_p = -motor
@@ -180,7 +185,9 @@ class Axis(Stateful):
         self.revision += 1
         self.status = self.arrival
         self.homing.leg = Homing.NONE
-        self.control.arrived(self, now)
+        self.on_path = False
+        # WBC-17
+        self.control.arrived(self, now, corrects=not self.on_arc)
 
     # ------------------------------------------------------------------ commands: drive and stop
 
@@ -226,10 +233,11 @@ class Axis(Stateful):
     def _forget(self) -> None:
         """A new command replaces whatever was going on."""
         self.jogging = 0
+        self.on_path = self.on_arc = False
         self.homing.leg = Homing.NONE
         self.control.stop()
 
-    def _ready(self, what: str) -> bool:
+    def ready(self, what: str) -> bool:
         """Whether motion commands are heard: with EN off they are accepted and do nothing (MIC-8)."""
         if self.status is Status.OFF:
             self.host.axis_event(self.number, "drive-off", f"{what} ignored: M{self.number} is not enabled")
@@ -243,7 +251,7 @@ class Axis(Stateful):
         self.move_by(coordinate_p - self.coordinate_p(now), now)
 
     def move_by(self, distance_p: int, now: Nanos) -> None:
-        if not self._ready("position command"):
+        if not self.ready("position command"):
             return
         self._forget()
         self.target_p = self.profile.count(now) + distance_p
@@ -253,7 +261,7 @@ class Axis(Stateful):
 
     def move_velocity(self, velocity_p: float, now: Nanos) -> None:
         """Velocity mode: ACC for speeding up and slowing down; ramped to 0 it ends with status 1 (MIC-11)."""
-        if not self._ready("velocity command"):
+        if not self.ready("velocity command"):
             return
         self._forget()
         self.run(self._clamped(velocity_p), Status.VELOCITY, now)
@@ -275,7 +283,7 @@ class Axis(Stateful):
 
         A velocity of 0 chooses no switch: the drive comes to rest as in velocity mode.
         """
-        if not self._ready("homing"):
+        if not self.ready("homing"):
             return
         self._forget()
         velocity_p = self._clamped(velocity_p)
@@ -284,6 +292,21 @@ class Axis(Stateful):
         else:
             self.homing.start(self, velocity_p, now)
 
+    def follow_path(self, profile: Profile, arrival: Status, *, corrected: bool) -> None:
+        """Take part in a line or arc, from rest: ``profile`` starts now and respects the soft limits already.
+
+        ``arrival`` is the status at its end; ``corrected``: encoder correction is on (WBC-17).
+        """
+        now = profile.start
+        self._forget()
+        self.on_path = True
+        self.on_arc = not corrected
+        self.target_p = profile.base + profile.counts[-1]
+        self.speed_p = self.cruise_p
+        self._begin(profile, Status.POSITION, arrival)
+        if corrected:
+            self.control.watch(self, now)
+
     def set_coordinate(self, coordinate_p: int, now: Nanos) -> None:
         """POS_ACT written: the coordinate shifts, a motion keeps its velocity and its remaining distance (MIC-13).
 
@@ -291,7 +314,7 @@ class Axis(Stateful):
         """
         self.offset_p = coordinate_p - self.profile.count(now)
         if self.profile.moving(now):
-            if self._edge(-1) is not None or self._edge(1) is not None:
+            if self.edge(-1) is not None or self.edge(1) is not None:
                 self._replan(now)
         elif self.status is not Status.CORRECTION and self.config.pos_ctrl_mode == PositionControl.ENCODER:
             self.control.reference(self, now)
@@ -347,7 +370,7 @@ class Axis(Stateful):
 
     def _replan(self, now: Nanos) -> None:
         """Limits or coordinates have changed under a motion: plan it anew from where it is."""
-        if not self.profile.moving(now) or self.homing.passes_soft_limits:
+        if not self.profile.moving(now) or self.homing.passes_soft_limits or self.on_path:
             return
         if self.status is Status.POSITION:
             self._go(now)
@@ -356,11 +379,11 @@ class Axis(Stateful):
 
     def _steer(self, status: Status, now: Nanos) -> None:
         """Towards ``velocity_p``, slowing down with ``ramp_p``."""
-        state = self._state(now)
+        state = self.state(now)
         ramp_p = self._braking(state, self.ramp_p)
         velocity_p = self.velocity_p
         direction = 1 if velocity_p > 0.0 else -1
-        edge = None if velocity_p == 0.0 else self._edge(direction)
+        edge = None if velocity_p == 0.0 else self.edge(direction)
         if edge is None:
             self._begin(plan_velocity(state, velocity_p, self.up_p, ramp_p), status, Status.ON)
         else:
@@ -369,12 +392,12 @@ class Axis(Stateful):
 
     def _go(self, now: Nanos) -> None:
         """Position mode to ``target_p``, at most to the soft limit on the way."""
-        state = self._state(now)
+        state = self.state(now)
         dec_p = self._braking(state, self.down_p)
         target, velocity = self.target_p, state.velocity
         rest = _rest_p(state, dec_p)
         for direction in (-1, 1):
-            edge = self._edge(direction)
+            edge = self.edge(direction)
             outward = (target - rest) * direction > 0.0 or velocity * direction > 0.0
             if edge is not None and outward and (target - edge) * direction > 0:
                 profile = self._to_edge(state, edge, direction, dec_p, self.speed_p)
@@ -394,7 +417,7 @@ class Axis(Stateful):
         if velocity == 0.0:
             return dec_p
         direction = 1 if velocity > 0.0 else -1
-        edge = self._edge(direction)
+        edge = self.edge(direction)
         if edge is None or (_rest_p(state, dec_p) - edge) * direction <= NEAR_P:
             return dec_p
         hardest = max(self.up_p, self.down_p)
@@ -402,12 +425,12 @@ class Axis(Stateful):
             self.host.axis_event(self.number, "overrun", f"M{self.number} cannot brake before its soft limit")
         return hardest
 
-    def _edge(self, direction: int) -> int | None:
+    def edge(self, direction: int) -> int | None:
         """Soft limit in ``direction`` as motor position; None where nothing limits (MIC-12) or homing ignores it (MIC-30)."""
         limit, none = (self.limit_r_p, DINT_MAX) if direction > 0 else (self.limit_l_p, DINT_MIN)
         return None if limit == none or self.homing.passes_soft_limits else limit - self.offset_p
 
-    def _state(self, now: Nanos) -> MotionState:
+    def state(self, now: Nanos) -> MotionState:
         """Where a motion begins. A coordinate that has wrapped is the new one from here on."""
         state = MotionState.of(self.profile, now)
         coordinate = state.count + self.offset_p

@@ -6,7 +6,8 @@ from array import array
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Edge, Nanos
@@ -16,11 +17,13 @@ from steptwin.mic488.encoder import Coupling, Motion
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 from steptwin.mic488.inputs import Inputs
 from steptwin.mic488.position_control import PositionControl
-from steptwin.mic488.program import ProgramControl
+from steptwin.mic488.program import LoadedProgram, ProgramControl
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
 from steptwin.mic488.slave import slave
 from steptwin.mic488.status import ControllerStatus, Status
 from steptwin.state import Plain, Stateful
+from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.positions import PositionTable
 
 MAX_EVENTS_PER_INSTANT = 10_000
 """More than this at one moment is a runaway, not a motion."""
@@ -51,6 +54,8 @@ class Snapshot:
     config: ControllerConfig
     firmware: str
     state: Plain
+    banks: tuple[tuple[int, str], ...] = ()
+    """Texts of programs and position tables."""
 
 
 def check_pin(pin: str, value: float) -> None:
@@ -64,6 +69,9 @@ def check_pin(pin: str, value: float) -> None:
             raise Misuse(f"{name} = {value:g} V: an analog input takes 0 to 10 V")
     else:
         raise Misuse(f"no input pin {pin!r}: inputs are IN1 to IN{INPUTS} and AIN1 to AIN{ANALOG_INPUTS}")
+
+
+_NO_BANKS: Mapping[int, Any] = MappingProxyType({})
 
 
 def _nothing() -> None:
@@ -80,7 +88,8 @@ class Mic488(Stateful):
     """One controller. Commands and inputs are applied after everything that is due at their moment.
 
     ``memory`` are the stored user registers (two bytes each, high byte first; none stored: all 0); `Misuse` when their number
-    is wrong. ``lenient`` lets masters read holes and write-only registers (MIC-3).
+    is wrong. ``lenient`` lets masters read holes and write-only registers (MIC-3). ``programs`` and ``positions`` are what is in
+    the banks at power-on (`steptwin.mic488.program.load` makes programs), ``statement_time`` what one statement takes (WBC-6).
 
     Hooks: ``store`` is called with the stored user registers when they are saved and returns when they are safe; an `OSError`
     says that they are not, bytes say what was stored instead. ``slave`` serves the requests. ``changed`` is called whenever the
@@ -117,7 +126,15 @@ class Mic488(Stateful):
     FIXED = frozenset({"changed", "config", "firmware", "lenient", "on_event", "registers", "slave", "store"})
 
     def __init__(
-        self, config: ControllerConfig, firmware: str = DEFAULT_FIRMWARE, *, lenient: bool = False, memory: bytes | None = None
+        self,
+        config: ControllerConfig,
+        firmware: str = DEFAULT_FIRMWARE,
+        *,
+        lenient: bool = False,
+        memory: bytes | None = None,
+        programs: Mapping[int, LoadedProgram] = _NO_BANKS,
+        positions: Mapping[int, PositionTable] = _NO_BANKS,
+        statement_time: Nanos = STATEMENT_TIME,
     ) -> None:
         self.config = config
         self.registers = register_map(firmware)
@@ -137,7 +154,7 @@ class Mic488(Stateful):
         self.analog_v = [0.0] * ANALOG_INPUTS
         self.outputs = [False] * OUTPUTS
         self.axes = tuple(Axis(n, config.axes[n - 1], self) for n in range(1, AXES + 1))
-        self.program = ProgramControl(self)
+        self.program = ProgramControl(self, programs, positions, statement_time)
         self.error_led = False
         self._power_on()
 
@@ -182,24 +199,33 @@ class Mic488(Stateful):
             raise TimeReversal(self.now, now)
         due = self._due
         while due is not None and due <= now:
-            self._run_instant(due)
+            self._run_instant(due, now)
             due = self._due
         self.now = now
 
-    def _run_instant(self, at: Nanos) -> None:
+    def _run_instant(self, at: Nanos, until: Nanos) -> None:
+        """Run everything due at ``at``; a program that concerns nothing else may go on up to ``until``."""
         self.now = at
         for _ in range(MAX_EVENTS_PER_INSTANT):
+            happened = False
+            changed: list[int] = []
             due = self.inputs.deadline()
             if due is not None and due <= at:
-                self.program.inputs_changed(self.inputs.settle(at), at)
+                changed = self.inputs.settle(at)
+                happened = True
             for axis in self.axes:
                 due = axis.deadline()
                 if due is not None and due <= at:
                     axis.advance(at)
+                    happened = True
+            if happened:
+                self.program.disturbed(at, inside=True)
+                self.program.inputs_changed(changed, at)
             due = self.program.deadline()
             if due is not None and due <= at:
-                self.program.advance(at)
-            self.touch()
+                others = self._due_without_program()
+                self.program.advance(at, until if others is None else min(until, others - 1))
+            self._find_due()
             if self._due is None or self._due > at:
                 return
         raise Runaway(f"more than {MAX_EVENTS_PER_INSTANT} events of one MIC488 at {at} ns")
@@ -208,23 +234,42 @@ class Mic488(Stateful):
         return self._due
 
     def touch(self) -> None:
-        """State changed: find the next deadline and the ERR lamp anew."""
+        """State was changed from outside: tell the program, find the next deadline and the ERR lamp anew."""
+        self.program.disturbed(self.now, inside=False)
+        self._find_due()
+
+    def _due_without_program(self) -> Nanos | None:
         due = self.inputs.deadline()
-        lit = self.program.error
         for axis in self.axes:
             at = axis.deadline()
             if at is not None and (due is None or at < due):
                 due = at
-            if axis.status is Status.ERROR:
-                lit = True
+        return due
+
+    def _find_due(self) -> None:
+        due = self._due_without_program()
         at = self.program.deadline()
         if at is not None and (due is None or at < due):
             due = at
         self._due = due
+        lit = self.program.error
+        for axis in self.axes:
+            if axis.status is Status.ERROR:
+                lit = True
         if lit is not self.error_led:
             self.error_led = lit
             self._edges.append(Edge(self.now, "ERR", float(lit)))
         self.changed()
+
+    # ------------------------------------------------------------------ banks of programs and positions
+
+    def load_program(self, bank: int, program: LoadedProgram) -> None:
+        """Fill a program bank. `Misuse` for a bank that does not exist or whose program is running or paused."""
+        self.program.load_program(bank, program)
+
+    def load_positions(self, bank: int, table: PositionTable) -> None:
+        """Fill a position bank. `Misuse` for a bank that does not exist or is in use."""
+        self.program.load_positions(bank, table)
 
     # ------------------------------------------------------------------ the Modbus face
 
@@ -385,13 +430,15 @@ class Mic488(Stateful):
 
     def snapshot(self) -> Snapshot:
         """All state at the present moment; hooks are no part of it."""
-        return Snapshot(self.config, self.firmware.name, self.copy_state())
+        return Snapshot(self.config, self.firmware.name, self.copy_state(), self.program.contents())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Take the state of a snapshot, its moment too. Raises `Misuse` when it belongs to another configuration or firmware."""
+        """Take the state of a snapshot, its moment too. `Misuse` when it is of another configuration, firmware or program."""
         if snapshot.firmware != self.firmware.name:
             raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {self.firmware.name}")
         if snapshot.config != self.config:
             raise Misuse("the snapshot is of a controller with another configuration")
+        if snapshot.banks != self.program.contents():
+            raise Misuse("the snapshot is of a controller with other programs or positions in its banks")
         self.set_state(snapshot.state)
         self.changed()

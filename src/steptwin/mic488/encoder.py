@@ -74,6 +74,11 @@ class Encoder(Stateful):
         as_told = counts * self.mot_resol == pulses * self.enc_resol
         return self.coupling is Coupling.DRIVE and self._motion is None and as_told
 
+    @property
+    def turned_by(self) -> Coupling | None:
+        """What turns the shaft; None: mechanics."""
+        return self.coupling if self._motion is None else None
+
     def counter(self, shaft: int) -> int:
         """The counter register, a DINT that wraps."""
         return wrapped_dint(shaft - self._zero)

@@ -89,10 +89,10 @@ class PositionControl(Stateful):
         if axis.config.pos_ctrl_mode == self.ENCFOLLOW and not self._following:
             self.reference(axis, now)
 
-    def arrived(self, axis: Axis, now: Nanos) -> None:
+    def arrived(self, axis: Axis, now: Nanos, *, corrects: bool) -> None:
         """A motion has ended as planned: after a position move, compare with the encoder."""
         self.rested(axis, now)
-        if axis.config.pos_ctrl_mode != self.ENCODER:
+        if axis.config.pos_ctrl_mode != self.ENCODER or not corrects:
             return
         self.tick_ns = None
         missing_p = abs(axis.target_p - self.true_p(axis, now))

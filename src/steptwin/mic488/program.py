@@ -1,16 +1,37 @@
-"""Program control: banks, start, stop, pause (manual 4.1, MIC-22, MIC-26, MIC-28, MIC-31)."""
+"""Program control: banks, start, stop, pause (manual 4.1, MIC-22, MIC-26, MIC-28, MIC-31), and the program that runs."""
 
 from __future__ import annotations
 
 import enum
-from typing import TYPE_CHECKING
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
 
+from steptwin.diagnostics import Source, Span
+from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.mic488 import program_motion as motion
+from steptwin.mic488.program_registers import ACCESS, ProgramRegisters
 from steptwin.mic488.registers import OUTPUTS
 from steptwin.state import Stateful
+from steptwin.wbc import steps as s
+from steptwin.wbc.check import Checked
+from steptwin.wbc.compile import Code, compile_program
+from steptwin.wbc.dialect import dialect_for
+from steptwin.wbc.events import EVENTS
+from steptwin.wbc.machine import Machine
+from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.real import ProgramFault
+from steptwin.wbc.usage import sources
 
 if TYPE_CHECKING:
     from steptwin.mic488.device import Mic488
+
+_MODBUS = next(number for number, event in enumerate(EVENTS) if event.name == "MODBUS")
+_DRIVES = {event.axis - 1: number for number, event in enumerate(EVENTS) if event.axis}
+_ROW_0 = frozenset({"PTPM", "CIRCX", "CIRCY", "CIRCR", "CIRCA", "LINX", "LINY", "LINVEL"})
 
 
 class ProgramState(enum.IntEnum):
@@ -21,61 +42,393 @@ class ProgramState(enum.IntEnum):
     PAUSED = 2
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedProgram:
+    """A program in a bank, ready to run. Code has no state: any number of controllers may share it."""
+
+    source: Source
+    steps: tuple[s.Step, ...]
+    code: Code
+    position_records: Mapping[int, bytes]
+    uses_positions: bool
+
+
+class Fault(NamedTuple):
+    """What stopped a program (WBC-5), and the statement of its text."""
+
+    span: Span
+    text: str
+
+
+def row_values(record: bytes) -> tuple[float | None, ...]:
+    """Parameters of a row of an image: an axis mask, big-endian, and four REAL numbers."""
+    mask, values = int.from_bytes(record[:2], "big"), struct.unpack("<4f", record[2:])
+    return tuple(value if mask >> number & 1 and isfinite(value) else None for number, value in enumerate(values))
+
+
+def load(checked: Checked, name: str = "program") -> LoadedProgram:
+    """A program for banks of controllers. `Misuse` when it has errors."""
+    executable = checked.executable
+    if executable is None:
+        errors = checked.errors
+        reason = errors[0].message if errors else "its positions are not known without a table"
+        raise Misuse(f"{name} cannot run: {reason}")
+    steps = executable.steps
+    used = [source for step in steps for source in sources(step)]
+    used += [step.target for step in steps if isinstance(step, s.Set)]
+    writes_rows = any(isinstance(source, s.Register) and source.row.key in _ROW_0 for source in used)
+    moves_rows = any(isinstance(step, s.RowMotion) for step in steps)
+    code = compile_program(executable, ACCESS)
+    return LoadedProgram(Source(name, checked.text), steps, code, executable.position_records, writes_rows or moves_rows)
+
+
 class ProgramControl(Stateful):
-    """Which program runs on a controller. Bank selections take effect at the next start (MIC-31)."""
+    """Which program runs on a controller. Bank selections take effect at the next start (MIC-31).
 
-    __slots__ = ("_device", "error", "position_bank", "program_bank", "state")
-    FIXED = frozenset({"_device"})
+    To a program it is the controller: what `steptwin.wbc.controller.Controller` asks for.
+    """
 
-    def __init__(self, device: Mic488) -> None:
-        self._device = device
+    __slots__ = (
+        "_program",
+        "_pulses",
+        "_statuses",
+        "_table",
+        "device",
+        "dialect",
+        "error",
+        "fault",
+        "machine",
+        "position_bank",
+        "positions",
+        "program_bank",
+        "programs",
+        "registers",
+        "state",
+        "together",
+    )
+    FIXED = frozenset({"device", "dialect", "positions", "programs"})
+
+    def __init__(
+        self,
+        device: Mic488,
+        programs: Mapping[int, LoadedProgram],
+        positions: Mapping[int, PositionTable],
+        statement_time: Nanos,
+    ) -> None:
+        self.device = device
+        self.dialect = dialect_for(device.firmware.name)
+        self.programs: dict[int, LoadedProgram] = {}
+        self.positions: dict[int, PositionTable] = {}
+        self.machine = Machine(self, statement_time)
+        self.registers = ProgramRegisters()
         self.program_bank = 0
         self.position_bank = 0
         self.state = ProgramState.STOPPED
         self.error = False
         """A program error is pending; cleared by the next start or stop (MIC-26)."""
+        self.fault: Fault | None = None
+        """The last program error; it outlives ``error`` up to the next start."""
+        self._program = 0
+        self._table = 0
+        """Banks of the program that runs, and of its positions."""
+        self._pulses: dict[int, Nanos] = {}
+        """When PULSE inverts which output (from 0)."""
+        self._statuses: tuple[int, ...] = ()
+        self.together = False
+        """M1 and M2 are both on a path: neither leaves it alone."""
+        for bank, program in programs.items():
+            self.load_program(bank, program)
+        for bank, table in positions.items():
+            self.load_positions(bank, table)
+
+    # ------------------------------------------------------------------ banks
+
+    def load_program(self, bank: int, program: LoadedProgram) -> None:
+        """Fill a program bank. `Misuse` for a bank that does not exist or whose program is running or paused."""
+        self._check_bank("program", bank, self._program)
+        if len(program.steps) > self.dialect.max_steps:
+            lines = f"{len(program.steps)} executable lines"
+            raise Misuse(f"{program.source.name}: {lines}, firmware {self.dialect.firmware} holds {self.dialect.max_steps}")
+        self.programs[bank] = program
+
+    def load_positions(self, bank: int, table: PositionTable) -> None:
+        """Fill a position bank. `Misuse` for a bank that does not exist or is in use."""
+        self._check_bank("position", bank, self._table)
+        if len(table.rows) > self.dialect.max_positions:
+            raise Misuse(f"{len(table.rows)} positions: a bank holds {self.dialect.max_positions}")
+        self.positions[bank] = table
+
+    def _check_bank(self, kind: str, bank: int, in_use: int) -> None:
+        last = self.device.firmware.banks - 1
+        if not 0 <= bank <= last:
+            raise Misuse(f"{kind} bank {bank}: permitted are 0…{last}")
+        if self.state is not ProgramState.STOPPED and bank == in_use:
+            raise Misuse(f"{kind} bank {bank} is in use: stop the program first")
+
+    def contents(self) -> tuple[tuple[int, str], ...]:
+        """What a snapshot belongs to: the texts of all banks."""
+        programs = [(bank, self.programs[bank].source.text) for bank in sorted(self.programs)]
+        tables = [(bank, self.positions[bank].text) for bank in sorted(self.positions)]
+        return (*programs, *tables)
+
+    # ------------------------------------------------------------------ start, stop, pause
 
     def power_on(self, now: Nanos) -> None:
         """Nothing runs but what the configuration starts."""
-        configured = self._device.config.program
+        configured = self.device.config.program
         self.program_bank = configured.prog_bank if configured.activate else 0
         self.position_bank = configured.pos_bank if configured.activate else 0
-        self.state = ProgramState.STOPPED
+        self._stop()
         self.error = False
+        self.fault = None
+        self._pulses = {}
+        self.registers.forget_record()
+        self.registers.begin(self.device.config, now)
         if configured.activate:
             self._start(now)
 
     def command(self, value: int, now: Nanos) -> None:
-        """PROGRAM_CTRL written: 0 stop, 1 start, 2 pause."""
+        """PROGRAM_CTRL written: 0 stop, 1 start or continue, 2 pause."""
         if value == ProgramState.RUNNING:
             if self.state is ProgramState.STOPPED:
                 self._start(now)
+            elif self.state is ProgramState.PAUSED:
+                self._resume(now)
+        elif value == ProgramState.PAUSED:
+            self._pause(now)
         elif value == ProgramState.STOPPED:
             self._end(now)
 
     def _start(self, now: Nanos) -> None:
+        program, table = self.programs.get(self.program_bank), self.positions.get(self.position_bank)
+        self.error = False
+        self.fault = None
+        if program is None:
+            self._refuse(f"program bank {self.program_bank} is empty")
+        elif program.uses_positions and (table is None or not table.rows):
+            # WBC-25
+            self._refuse(f"position bank {self.position_bank} is empty")
+        else:
+            self._program, self._table = self.program_bank, self.position_bank
+            self.state = ProgramState.RUNNING
+            self._begin(now)
+            self.machine.start(program.code, now)
+
+    def _refuse(self, text: str) -> None:
         self.error = True
-        self._device.event("program-error", f"program bank {self.program_bank} is empty")
+        self.device.event("program-error", text)
+
+    def _begin(self, now: Nanos) -> None:
+        """What belongs to the program is as at its start (WBC-25)."""
+        self.registers.begin(self.device.config, now)
+        self.registers.row_0 = self._row(0)
+        self._statuses = tuple(axis.status for axis in self.device.axes)
+
+    def _stop(self) -> None:
+        self.machine.stop()
+        self.state = ProgramState.STOPPED
 
     def _end(self, now: Nanos) -> None:
         """As the statement END: drives and outputs off (MIC-31)."""
+        self._stop()
         self.error = False
-        for axis in self._device.axes:
-            axis.disable(now)
+        self._pulses = {}
+        self._drives_off(now)
         for number in range(OUTPUTS):
-            self._device.set_output(number, False)
+            self.device.set_output(number, False)
+
+    def _drives_off(self, now: Nanos) -> None:
+        for axis in self.device.axes:
+            axis.disable(now)
+
+    def _pause(self, now: Nanos) -> None:
+        """WBC-9. Ticks do not go on meanwhile."""
+        if self.state is ProgramState.RUNNING:
+            self.state = ProgramState.PAUSED
+            self.machine.pause(now)
+
+    def _resume(self, now: Nanos) -> None:
+        begun = self.machine.paused_at
+        if begun is not None:
+            self.registers.ticks = {event: at + now - begun for event, at in self.registers.ticks.items()}
+        self.state = ProgramState.RUNNING
+        self.machine.resume(self._code(), now)
+
+    def _code(self) -> Code:
+        return self.programs[self._program].code
+
+    # ------------------------------------------------------------------ where it stands
+
+    @property
+    def statement(self) -> Span | None:
+        """Place, in the source, of the statement in execution or executed next; None when nothing runs."""
+        if self.state is ProgramState.STOPPED:
+            return None
+        return self._span(self.machine.place())
+
+    def _span(self, number: int) -> Span:
+        program = self.programs[self._program]
+        if number < len(program.steps):
+            return Span(program.steps[number].start, program.steps[number].end)
+        return Span(len(program.source.text), len(program.source.text))
+
+    # ------------------------------------------------------------------ time
 
     def deadline(self) -> Nanos | None:
-        return None
+        due = None
+        if self.state is ProgramState.RUNNING:
+            due = self.machine.due
+            for at in self.registers.ticks.values():
+                if due is None or at < due:
+                    due = at
+        for at in self._pulses.values():
+            if due is None or at < due:
+                due = at
+        return due
 
-    def advance(self, now: Nanos) -> None:
-        """Run what is due at ``now``."""
+    def advance(self, now: Nanos, until: Nanos) -> None:
+        """Run what is due at ``now``, and of the program alone what follows up to ``until``."""
+        for number in sorted(number for number, at in self._pulses.items() if at <= now):
+            del self._pulses[number]
+            self.device.set_output(number, not self.device.outputs[number])
+            self.machine.disturb(now)
+        if self.state is not ProgramState.RUNNING:
+            return
+        ticks = self.registers.ticks
+        for event in sorted(event for event, at in ticks.items() if at <= now):
+            ticks[event] += EVENTS[event].period
+            self.machine.happen(self._code(), event, now, now)
+        if self.machine.due is None or self.machine.due > now:
+            return
+        for at in (*ticks.values(), *self._pulses.values()):
+            until = min(until, at - 1)
+        try:
+            self.machine.run(self._code(), max(until, now))
+        except ProgramFault as fault:
+            self._fail(str(fault))
+        self._look_at_drives(self.machine.now, self.machine.after(self.machine.now))
+
+    def _fail(self, text: str) -> None:
+        """WBC-5."""
+        now = self.now = self.machine.now
+        span = self._span(self.machine.pc)
+        self.fault = Fault(span, text)
+        self._stop()
+        line, _ = self.programs[self._program].source.position(span.start)
+        self._refuse(f"line {line}: {text}")
+        for axis in self.device.axes:
+            axis.brake(now)
+
+    # ------------------------------------------------------------------ what happens around it
+
+    def disturbed(self, now: Nanos, *, inside: bool) -> None:
+        """Something happened at ``now`` that was not the program's doing; ``inside``: before its statement of this moment."""
+        first = now if inside else self.machine.after(now)
+        if self.state is ProgramState.RUNNING:
+            self.machine.disturb(first)
+        self._look_at_drives(now, first)
+
+    def _look_at_drives(self, now: Nanos, first: Nanos) -> None:
+        axes = self.device.axes
+        if self.together:
+            x, y = axes[:2]
+            if not (x.on_path and y.on_path):
+                # WBC-26: what is left of a path nobody runs alone.
+                self.together = False
+                for axis in (x, y):
+                    if axis.on_path:
+                        axis.brake(now)
+                        self.device.event("path-left", f"M{axis.number} slows down: the other axis left their path")
+        if self.state is ProgramState.STOPPED:
+            return
+        statuses = tuple(axis.status for axis in axes)
+        if statuses != self._statuses:
+            before, self._statuses = self._statuses, statuses
+            for index, event in _DRIVES.items():
+                if before[index] != statuses[index] and self.registers.switches[event]:
+                    self.machine.happen(self._code(), event, now, first)
 
     def registers_written(self, now: Nanos) -> None:
         """A user register was written over Modbus."""
+        if self.state is not ProgramState.STOPPED and self.registers.switches[_MODBUS]:
+            self.machine.happen(self._code(), _MODBUS, now, self.machine.after(now))
 
     def inputs_changed(self, numbers: list[int], now: Nanos) -> None:
-        """Filtered inputs ``numbers`` (from 0) changed."""
+        """Filtered inputs ``numbers`` (from 0) changed: inside an instant, before the program's statement."""
+        if self.state is ProgramState.STOPPED:
+            return
+        for number in numbers:
+            edge = 1 if self.device.inputs.filtered[number] else 2
+            # Events of inputs come first in `EVENTS`.
+            if self.registers.switches[number] & edge:
+                self.machine.happen(self._code(), number, now, now)
 
     def interrupt_by_position_error(self, now: Nanos) -> None:
         """ERRMODE1: the program stops; firmware 1.70 pauses it [1.74]."""
+        if self.dialect.has("1.70"):
+            self._pause(now)
+        else:
+            self._stop()
+
+    # ------------------------------------------------------------------ what the program asks for
+
+    @property
+    def now(self) -> Nanos:
+        return self.device.now
+
+    @now.setter
+    def now(self, now: Nanos) -> None:
+        self.device.now = now
+
+    def motion(self, keyword: str, axis: int, value: float) -> None:
+        motion.move(self.device.axes[axis - 1], keyword, value, self.now)
+
+    def halt(self, keyword: str, axis: int) -> None:
+        motion.halt(self.device.axes[axis - 1], keyword, self.now)
+
+    def row_motion(self, keyword: str, row: float) -> None:
+        motion.row_motion(self, keyword, row, self.now)
+
+    def row(self, keyword: str, index: float) -> tuple[float | None, ...]:
+        """Row ``index`` (from 0) of the table in use."""
+        rows = self.positions[self._table].rows
+        if not 0 <= index < len(rows) or index != int(index):
+            raise ProgramFault(f"{keyword} {index:g}: the position table has rows 0…{len(rows) - 1}")
+        return self._row(int(index)) if index or self.registers.row_0 is None else self.registers.row_0
+
+    def _row(self, index: int) -> tuple[float | None, ...]:
+        record = self.programs[self._program].position_records.get(index)
+        if record is not None:
+            return row_values(record)
+        table = self.positions.get(self._table)
+        return table.rows[index].values if table is not None and index < len(table.rows) else (None,) * 4
+
+    def at_rest(self) -> bool:
+        return all(motion.finished(axis, self.now) for axis in self.device.axes)
+
+    def pulse(self, output: int, duration: Nanos) -> None:
+        if duration <= 0:
+            raise ProgramFault(f"PULSE(OUT{output}, …): permitted are 0.001 s and more")
+        self._pulses[output - 1] = self.now + duration
+
+    def set_output(self, number: int, on: bool) -> bool:
+        """Output ``number`` from 0; whether that changed anything."""
+        if self.device.outputs[number] is on:
+            return False
+        self.device.set_output(number, on)
+        return True
+
+    def set_switch(self, event: int, mode: int, now: Nanos) -> bool:
+        """CFGINT_… written: switched off, what waits is forgotten."""
+        if not mode:
+            self.machine.pending &= ~(1 << event)
+        return self.registers.switch(event, mode, now)
+
+    def end(self) -> None:
+        self._end(self.now)
+
+    def reset(self) -> None:
+        self._drives_off(self.now)
+        self._pulses = {}
+        self._begin(self.now)
+        self.machine.restart(self._code())

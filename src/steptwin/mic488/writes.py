@@ -115,6 +115,7 @@ class _MemoryPlan:
     def __call__(self, device: Mic488, pdu: bytes) -> bytes:
         device.user[self._place] = array("H", self._unpack(pdu, self.head))
         if device.program.state:
+            device.touch()
             device.program.registers_written(device.now)
             device.touch()
         return pdu[:5]
@@ -149,7 +150,7 @@ class _ControlPlan:
             action(device, stored, now)
             if self._lenient:
                 device.written[register.key, register.index] = stored
-        if not self._quiet:
+        if not self._quiet or device.program.state:
             device.touch()
         return pdu[:5]
 

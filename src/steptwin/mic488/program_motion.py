@@ -1,0 +1,248 @@
+"""The motion statements of a program: single axes, rows of the position table, lines and arcs of M1 (X) and M2 (Y).
+
+Suffixes as in `steptwin.mic488.axis`; ``w`` positions along a path, in configured units of M1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.mic488.axis import MAX_SPEED_P, SLOWEST_RAMP_P, Axis
+from steptwin.mic488.program_registers import position_p
+from steptwin.mic488.status import LIMIT, Status
+from steptwin.motion.paths import Arc, Circular, Straight, arc_between, circle
+from steptwin.motion.planner import MotionState, plan_position
+from steptwin.motion.trig import length
+from steptwin.wbc.paths import row_problem
+from steptwin.wbc.real import ProgramFault
+
+if TYPE_CHECKING:
+    from steptwin.mic488.device import Mic488
+    from steptwin.mic488.program import ProgramControl
+
+Row: TypeAlias = tuple[float | None, ...]
+
+DEGREES_PER_QUARTER = 90.0
+
+
+# ---------------------------------------------------------------------- one axis
+
+
+def move(axis: Axis, keyword: str, value_u: float, now: Nanos) -> None:
+    """HOME, VABS, VREL, PABS, PREL."""
+    what = f"{keyword} M{axis.number}"
+    if keyword == "PABS":
+        axis.move_to(position_p(axis, value_u, what), now)
+    elif keyword == "PREL":
+        axis.move_by(position_p(axis, value_u, what), now)
+    else:
+        _VELOCITIES[keyword](axis, value_u * axis.gear, now)
+
+
+_VELOCITIES: dict[str, Callable[[Axis, float, Nanos], None]] = {
+    "HOME": Axis.home,
+    "VABS": Axis.move_velocity,
+    "VREL": Axis.change_velocity,
+}
+
+
+def halt(axis: Axis, keyword: str, now: Nanos) -> None:
+    """BRAKE, STOP."""
+    if keyword == "BRAKE":
+        axis.brake(now)
+    else:
+        axis.stop(now)
+
+
+def finished(axis: Axis, now: Nanos) -> bool:
+    """Whether WAITPOS waits for this drive no longer (WBC-8)."""
+    if axis.status in (Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION):
+        return False
+    return not axis.profile.moving(now)
+
+
+# ---------------------------------------------------------------------- rows
+
+
+def row_motion(control: ProgramControl, keyword: str, index: float, now: Nanos) -> None:
+    """MOVEPTP, MOVELIN, MOVELIN_REL, MOVETOCIRC, DOCIRC, DOARC with a row. `ProgramFault` when the row does not allow it."""
+    row = control.row(keyword, index)
+    problem = row_problem(keyword, row)
+    if problem is not None:
+        raise ProgramFault(f"{keyword} {index:g}: {problem}")
+    device = control.device
+    if keyword == "MOVEPTP":
+        for axis, value_u in zip(device.axes, row, strict=True):
+            if value_u is not None:
+                move(axis, "PABS", value_u, now)
+        return
+    if any(axis.status is Status.OFF for axis in device.axes[:2]):
+        device.event("drive-off", f"{keyword} ignored: M1 and M2 must be enabled")
+        return
+    try:
+        _PATHS[keyword](_Plane(control, now), row)
+    except Misuse as refusal:
+        raise ProgramFault(f"{keyword} {index:g}: {refusal}") from None
+
+
+class _Pace(NamedTuple):
+    """Speed and acceleration along a path, as far as they are given; ``steepest``: most pulses per unit of the way."""
+
+    speed_u: float | None
+    acc_u: float | None
+    steepest: float
+
+
+class _Plane:
+    """M1 and M2, standing at ``now``: what is still in motion stops without ramp (WBC-26)."""
+
+    def __init__(self, control: ProgramControl, now: Nanos) -> None:
+        self.control = control
+        self.device: Mic488 = control.device
+        self.now = now
+        self.axes = self.device.axes[:2]
+        for axis in self.axes:
+            if axis.profile.moving(now):
+                axis.stop(now)
+            # A coordinate that has wrapped is the new one from here on.
+            axis.state(now)
+        self.counts = [axis.profile.count(now) for axis in self.axes]
+
+    def place_u(self) -> list[float]:
+        """Present coordinates."""
+        return [(count + axis.offset_p) / axis.gear for count, axis in zip(self.counts, self.axes, strict=True)]
+
+    def motor_p(self, place_u: tuple[float | None, float | None], what: str) -> list[int]:
+        """Motor positions of a place; an axis left alone stays."""
+        return [
+            count if value_u is None else position_p(axis, value_u, f"{what} M{axis.number}") - axis.offset_p
+            for axis, value_u, count in zip(self.axes, place_u, self.counts, strict=True)
+        ]
+
+    def line(self, targets_p: list[int], speed_u: float | None) -> None:
+        x, y = self.axes
+        ways_p = [target - count for target, count in zip(targets_p, self.counts, strict=True)]
+        way_u = length(ways_p[0] / x.gear, ways_p[1] / y.gear)
+        slopes = [way_p / way_u if way_u else 0.0 for way_p in ways_p]
+        courses = [Straight(float(count), slope) for count, slope in zip(self.counts, slopes, strict=True)]
+        pace = _Pace(speed_u, self.control.registers.lin_acc_u, max(map(abs, slopes)))
+        self._follow(courses, way_u, targets_p, pace, corrected=True)
+
+    def arc(self, arc: Arc, targets_p: list[int]) -> None:
+        x, y = self.axes
+        way_u = arc.length
+        turn_q = arc.sweep_q / way_u if way_u else 0.0
+        courses = [
+            Circular(arc.centre_x * x.gear - x.offset_p, arc.radius * x.gear, arc.begin_q, turn_q),
+            Circular(arc.centre_y * y.gear - y.offset_p, arc.radius * y.gear, arc.begin_q - 1.0, turn_q),
+        ]
+        self._follow(courses, way_u, targets_p, _Pace(None, None, max(x.gear, y.gear)), corrected=False)
+
+    def _follow(
+        self,
+        courses: list[Straight] | list[Circular],
+        way_u: float,
+        targets_p: list[int],
+        pace: _Pace,
+        *,
+        corrected: bool,
+    ) -> None:
+        """Run ``way_u`` along the courses, at most to the first soft limit. WBC-11: what is not given of ``pace`` is M1's."""
+        first = self.axes[0]
+        speed_u = first.vmax_p / first.gear if pace.speed_u is None else pace.speed_u
+        if speed_u * pace.steepest > MAX_SPEED_P:
+            text = f"{speed_u:g} {first.config.unit_name}/s along the path is above {MAX_SPEED_P:g} imp/s"
+            self.device.event("speed-clamped", text)
+            speed_u = MAX_SPEED_P / pace.steepest
+        slowest_u = SLOWEST_RAMP_P / first.gear
+        up_u = max(pace.acc_u or first.acc_p / first.gear, slowest_u)
+        down_u = max(pace.acc_u or first.dec_p / first.gear, slowest_u)
+        end_w, met = self._way_to_limits(courses, way_u)
+        way = plan_position(MotionState(self.now, 0, 0.0, 0.0), end_w, up_u, down_u, speed_u)
+        moving: list[Axis] = []
+        for axis, course, target_p in zip(self.axes, courses, targets_p, strict=True):
+            edge = met.get(axis.number)
+            final_p = target_p if not met else None if edge is None else edge[0]
+            count = axis.profile.count(self.now)
+            arrival = Status.REACHED if not met else Status.ON if edge is None else LIMIT[edge[1]]
+            axis.follow_path(course.profile(way, count, final_p), arrival, corrected=corrected and not met)
+            if axis.profile.moving(self.now):
+                moving.append(axis)
+        self.control.together = len(moving) == len(self.axes)
+
+    def _way_to_limits(self, courses: list[Straight] | list[Circular], way_u: float) -> tuple[float, dict[int, tuple[int, int]]]:
+        """How far the path goes, and the soft limits (motor position, direction) it then stands on, by axis."""
+        end_w = way_u
+        met: dict[int, tuple[int, int]] = {}
+        for axis, course in zip(self.axes, courses, strict=True):
+            for direction in (-1, 1):
+                edge = axis.edge(direction)
+                beyond_w = None if edge is None else course.first_beyond(float(edge), direction, 0.0, way_u)
+                if edge is None or beyond_w is None or beyond_w > end_w:
+                    continue
+                if beyond_w < end_w:
+                    met.clear()
+                end_w = beyond_w
+                # Behind the limit already, the axis stays where it is.
+                count = axis.profile.count(self.now)
+                met[axis.number] = (max(edge * direction, count * direction) * direction, direction)
+        return end_w, met
+
+
+def _line(plane: _Plane, row: Row) -> None:
+    plane.line(plane.motor_p((row[0], row[1]), "MOVELIN"), row[2])
+
+
+def _line_by(plane: _Plane, row: Row) -> None:
+    ways_p = [
+        position_p(axis, way_u or 0.0, f"MOVELIN_REL M{axis.number}") for axis, way_u in zip(plane.axes, row[:2], strict=True)
+    ]
+    plane.line([count + way_p for count, way_p in zip(plane.counts, ways_p, strict=True)], row[2])
+
+
+def _to_circle(plane: _Plane, row: Row) -> None:
+    """WBC-26: on a straight line, at M1's VMAX, for p3 is the radius."""
+    plane.line(plane.motor_p(_circle(row, 0.0).begin, "MOVETOCIRC"), None)
+
+
+def _do_circle(plane: _Plane, row: Row) -> None:
+    arc = _circle(row, row[3] or 0.0)
+    begin_p = plane.motor_p(arc.begin, "DOCIRC")
+    if any(abs(begin - count) > 1 for begin, count in zip(begin_p, plane.counts, strict=True)):
+        place = "({:g}, {:g})".format(*plane.place_u())
+        begin = "({:g}, {:g})".format(*arc.begin)
+        raise ProgramFault(f"DOCIRC begins at {begin}, but the axes are at {place}: go there with MOVETOCIRC")
+    plane.arc(arc, plane.motor_p(arc.end, "DOCIRC"))
+
+
+def _do_arc(plane: _Plane, row: Row) -> None:
+    x, y = plane.axes
+    x0, y0 = plane.place_u()
+    targets_p = plane.motor_p((row[0], row[1]), "DOARC")
+    x1, y1 = ((target + axis.offset_p) / axis.gear for target, axis in zip(targets_p, plane.axes, strict=True))
+    slack_u = max(1.0 / x.gear, 1.0 / y.gear)
+    plane.arc(arc_between(x0, y0, x1, y1, _given(row[2]), outward=row[3] == 0.0, slack=slack_u), targets_p)
+
+
+def _circle(row: Row, angle_deg: float) -> Arc:
+    """Angles of rows are clockwise."""
+    return circle(_given(row[0]), _given(row[1]), _given(row[2]), -angle_deg / DEGREES_PER_QUARTER)
+
+
+def _given(value: float | None) -> float:
+    """A parameter `row_problem` has looked for."""
+    if value is None:
+        raise ProgramFault("a parameter is missing")
+    return value
+
+
+_PATHS: dict[str, Callable[[_Plane, Row], None]] = {
+    "MOVELIN": _line,
+    "MOVELIN_REL": _line_by,
+    "MOVETOCIRC": _to_circle,
+    "DOCIRC": _do_circle,
+    "DOARC": _do_arc,
+}

@@ -1,0 +1,453 @@
+"""The registers a program sees, and those that exist for programs only: timers, interrupt switches, row 0, vision records."""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections.abc import Callable, Iterable, Mapping
+from math import inf, isnan
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.mic488.axis import MAX_SPEED_P, Axis
+from steptwin.mic488.encoder import Coupling
+from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
+from steptwin.motion.paths import ArcProfile
+from steptwin.motion.planner import LEAST, MOST
+from steptwin.state import Stateful
+from steptwin.wbc.controller import FOREVER, Access, Reader, Tendency, Writer
+from steptwin.wbc.events import BY_REGISTER, EVENTS, INPUTS
+from steptwin.wbc.machine import HORIZON
+from steptwin.wbc.positions import PARAMETERS
+from steptwin.wbc.real import ProgramFault, real
+from steptwin.wbc.registers import TIMER
+
+if TYPE_CHECKING:
+    from steptwin.mic488.config import ControllerConfig
+    from steptwin.mic488.device import Mic488
+    from steptwin.mic488.program import ProgramControl
+
+TIMERS = 16
+TIMER_PERIODS: Mapping[str, Nanos] = MappingProxyType({"TIMA": 10 * MILLISECOND, "TIMB": SECOND})
+_ZEROS = ((0, 0),) * TIMERS
+_TIMER_MOST = int(TIMER.high)
+
+STATUS_SINCE = "1.70"
+
+VISION = ("NEW", "NO", "X", "Y", "A")
+
+
+class ProgramRegisters(Stateful):
+    """Registers that belong to the program. They begin anew with every start of a program (WBC-25)."""
+
+    __slots__ = ("lin_acc_u", "row_0", "switches", "ticks", "timers", "vision")
+
+    def __init__(self) -> None:
+        self.forget_record()
+        self.switches = array("b", bytes(len(EVENTS)))
+        """CFGINT_… by number of the event in `EVENTS`."""
+        self.ticks: dict[int, Nanos] = {}
+        """Next moment of the ticks that are switched on."""
+        self.timers: dict[str, tuple[tuple[int, Nanos], ...]] = dict.fromkeys(TIMER_PERIODS, _ZEROS)
+        """Of each family: the number at a moment, from which it counts on."""
+        self.row_0: tuple[float | None, ...] | None = None
+        """Row 0 of the position table, which programs can write; None: there is none yet."""
+        self.lin_acc_u: float | None = None
+
+    def forget_record(self) -> None:
+        self.vision = array("f", bytes(4 * len(VISION)))
+        """By number in `VISION`; records are kept over starts of programs."""
+
+    def begin(self, config: ControllerConfig, now: Nanos) -> None:
+        for number, event in enumerate(EVENTS):
+            self.switches[number] = config.inputs[event.input - 1].interrupt if 0 < event.input <= INPUTS else 0
+        self.ticks = {}
+        self.timers = dict.fromkeys(TIMER_PERIODS, ((0, now),) * TIMERS)
+        self.lin_acc_u = None
+
+    def timer(self, name: str, number: int, at: Nanos) -> int:
+        """Timer ``number`` from 0."""
+        value, since = self.timers[name][number]
+        return min(value + (at - since) // TIMER_PERIODS[name], _TIMER_MOST)
+
+    def set_timer(self, name: str, number: int, value: int, now: Nanos) -> None:
+        timers = list(self.timers[name])
+        timers[number] = (value, now)
+        self.timers[name] = tuple(timers)
+
+    def switch(self, event: int, mode: int, now: Nanos) -> bool:
+        """CFGINT_… written; whether that changed anything."""
+        if self.switches[event] == mode:
+            return False
+        self.switches[event] = mode
+        period = EVENTS[event].period
+        if period and mode:
+            self.ticks[event] = now + period
+        else:
+            self.ticks.pop(event, None)
+        return True
+
+    def take_record(self, values: Iterable[float]) -> None:
+        """N, X, Y, A of a record of the vision system."""
+        self.vision = array("f", (1.0, *map(real, values)))
+
+
+# ---------------------------------------------------------------------- axes
+
+_OfAxis: TypeAlias = Callable[[Axis, Nanos], float]
+
+
+def _axis_reader(get: _OfAxis) -> Callable[[int], Reader]:
+    def of(number: int) -> Reader:
+        index = number - 1
+        return lambda control, at: real(get(control.device.axes[index], at))
+
+    return of
+
+
+def _axis_writer(put: Callable[[Axis, float, Nanos], bool]) -> Callable[[int], Writer]:
+    def of(number: int) -> Writer:
+        index = number - 1
+        return lambda control, value, now: put(control.device.axes[index], value, now)
+
+    return of
+
+
+def _axis_tendency(stretches: Callable[[Axis, Nanos], Iterable[Nanos] | None]) -> Callable[[int], Tendency]:
+    def of(number: int) -> Tendency:
+        index = number - 1
+        return lambda control, at: stretches(control.device.axes[index], at)
+
+    return of
+
+
+def _segments(axis: Axis, at: Nanos) -> list[Nanos]:
+    """Last moments of the segments of the motion from ``at`` on."""
+    start = axis.profile.start
+    ends = [FOREVER if end == inf else start + int(end) - 1 for end in axis.profile.ends]
+    return [end for end in ends if end >= at]
+
+
+def _position_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
+    ends = _segments(axis, at)
+    if ends:
+        for edge_p in (DINT_MAX + 1, DINT_MIN - 1):
+            wraps = axis.profile.pulse_time(edge_p - axis.offset_p, at)
+            if wraps is not None:
+                ends.append(wraps - 1)
+        ends.sort()
+    return ends
+
+
+def _velocity_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:
+    # Along an arc the velocity of an axis turns between the segments too.
+    return None if axis.on_path and isinstance(axis.profile, ArcProfile) else _segments(axis, at)
+
+
+def _encoder_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:
+    if axis.encoder.turned_by is not Coupling.DRIVE:
+        return None if axis.encoder.turned_by is None else []
+    farthest = abs(axis.encoder_counts(at)) + abs(axis.encoder.counts(MAX_SPEED_P * HORIZON / SECOND))
+    return _segments(axis, at) if axis.encoder.agrees and farthest < DINT_MAX else None
+
+
+def _motion_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
+    end = axis.profile.end
+    return [] if end is None or end <= at else [end - 1]
+
+
+def _set_drive(axis: Axis, on: float, now: Nanos) -> bool:
+    if axis.enabled is bool(on):
+        return False
+    if on:
+        axis.enable(now)
+    else:
+        axis.disable(now)
+    return True
+
+
+def position_p(axis: Axis, value_u: float, what: str) -> int:
+    """Pulses of a position or distance (MIC-14). `ProgramFault` beyond what a position register holds."""
+    pulses = value_u * axis.gear
+    if not DINT_MIN - 0.5 < pulses < DINT_MAX + 0.5:
+        limits = f"{DINT_MIN / axis.gear:g}…{DINT_MAX / axis.gear:g} {axis.config.unit_name}"
+        raise ProgramFault(f"{what} = {value_u:g} {axis.config.unit_name}: permitted are {limits}")
+    return round(pulses)
+
+
+def _set_position(axis: Axis, value_u: float, now: Nanos) -> bool:
+    coordinate_p = position_p(axis, value_u, f"PosM{axis.number}")
+    if coordinate_p == axis.coordinate_p(now):
+        return False
+    axis.set_coordinate(coordinate_p, now)
+    return True
+
+
+def _limit_p(axis: Axis, value_u: float) -> int:
+    """A limit beyond every position limits nothing."""
+    return round(min(max(value_u * axis.gear, DINT_MIN), DINT_MAX))
+
+
+def _set_limit_l(axis: Axis, value_u: float, now: Nanos) -> bool:
+    limit_p = _limit_p(axis, value_u)
+    if limit_p == axis.limit_l_p:
+        return False
+    axis.set_limits(now, left_p=limit_p)
+    return True
+
+
+def _set_limit_r(axis: Axis, value_u: float, now: Nanos) -> bool:
+    limit_p = _limit_p(axis, value_u)
+    if limit_p == axis.limit_r_p:
+        return False
+    axis.set_limits(now, right_p=limit_p)
+    return True
+
+
+def _rate(attribute: str) -> Access:
+    def put(axis: Axis, value_u: float, now: Nanos) -> bool:
+        rate_p = min(max(value_u * axis.gear, LEAST), MOST)
+        if rate_p == getattr(axis, attribute):
+            return False
+        setattr(axis, attribute, rate_p)
+        return True
+
+    return Access(_axis_reader(lambda axis, at: getattr(axis, attribute) / axis.gear), _axis_writer(put))
+
+
+def _set_encoder(axis: Axis, value: float, now: Nanos) -> bool:
+    if axis.encoder_counts(now) == value:
+        return False
+    axis.encoder.set_counter(int(value), axis.shaft(now))
+    return True
+
+
+def _xenc(axis: Axis, at: Nanos) -> float:
+    return axis.encoder.pulses(axis.encoder_counts(at)) / axis.gear
+
+
+# ---------------------------------------------------------------------- inputs, outputs, user registers
+
+
+def _out(number: int) -> Reader:
+    index = number - 1
+    return lambda control, at: 1.0 if control.device.outputs[index] else 0.0
+
+
+def _set_out(number: int) -> Writer:
+    index = number - 1
+
+    def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+        return control.set_output(index, value > 0.0)
+
+    return put
+
+
+def _set_outs(control: ProgramControl, value: float, now: Nanos) -> bool:
+    bits = int(value)
+    changed = [control.set_output(index, bool(bits >> index & 1)) for index in range(len(control.device.outputs))]
+    return any(changed)
+
+
+def _bits(levels: Iterable[bool]) -> float:
+    return float(sum(1 << bit for bit, level in enumerate(levels) if level))
+
+
+def _in(number: int) -> Reader:
+    index = number - 1
+    return lambda control, at: 1.0 if control.device.inputs.filtered[index] else 0.0
+
+
+def _ain(number: int) -> Reader:
+    index = number - 1
+    return lambda control, at: real(control.device.analog(index))
+
+
+_WORD, _DINT, _REAL = (struct.Struct(layout) for layout in ("<h", "<i", "<f"))
+
+
+def _user(layout: struct.Struct) -> Access:
+    """One memory: a register of two words has the low word first."""
+    words = layout.size // 2
+
+    def read(number: int) -> Reader:
+        place = slice(number, number + words)
+
+        def get(control: ProgramControl, at: Nanos) -> float:
+            value = layout.unpack(control.device.user[place])[0]
+            return value if layout is _WORD else 0.0 if isnan(value) else real(value)
+
+        return get
+
+    def write(number: int) -> Writer:
+        place = slice(number, number + words)
+
+        def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+            held = array("H", layout.pack(value if layout is _REAL else int(value)))
+            if control.device.user[place] == held:
+                return False
+            control.device.user[place] = held
+            return True
+
+        return put
+
+    return Access(read, write)
+
+
+# ---------------------------------------------------------------------- the program's own
+
+
+def _timer(name: str) -> Access:
+    def read(number: int) -> Reader:
+        return lambda control, at: float(control.registers.timer(name, number - 1, at))
+
+    def write(number: int) -> Writer:
+        def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+            control.registers.set_timer(name, number - 1, int(value), now)
+            return True
+
+        return put
+
+    def tendency(number: int) -> Tendency:
+        def stretches(control: ProgramControl, at: Nanos) -> list[Nanos]:
+            missing = _TIMER_MOST - control.registers.timer(name, number - 1, at)
+            return [at + missing * TIMER_PERIODS[name]] if missing else []
+
+        return stretches
+
+    return Access(read, write, tendency)
+
+
+def _switch(name: str) -> Access:
+    """CFGINT_…: a family, or a single register (number 0)."""
+
+    def event(number: int) -> int:
+        return EVENTS.index(BY_REGISTER[f"{name}{number}" if number else name])
+
+    def read(number: int) -> Reader:
+        index = event(number)
+        return lambda control, at: float(control.registers.switches[index])
+
+    def write(number: int) -> Writer:
+        index = event(number)
+        return lambda control, value, now: control.set_switch(index, int(value), now)
+
+    return Access(read, write, quiet=False)
+
+
+def _row_0(parameter: int | None = None) -> Access:
+    """A parameter (from 0) of row 0; None: that of the register's number."""
+
+    def index_of(number: int) -> int:
+        return number - 1 if parameter is None else parameter
+
+    def read(number: int) -> Reader:
+        index = index_of(number)
+
+        def get(control: ProgramControl, at: Nanos) -> float:
+            row = control.registers.row_0
+            return 0.0 if row is None else real(row[index] or 0.0)
+
+        return get
+
+    def write(number: int) -> Writer:
+        index = index_of(number)
+
+        def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+            """WBC-16: a parameter that was left alone becomes valid."""
+            row = list(control.registers.row_0 or (None,) * PARAMETERS)
+            before, row[index] = row[index], value
+            control.registers.row_0 = tuple(row)
+            return before != value
+
+        return put
+
+    return Access(read, write)
+
+
+def _lin_acc(control: ProgramControl, at: Nanos) -> float:
+    acc_u = control.registers.lin_acc_u
+    return real(acc_u if acc_u is not None else control.device.axes[0].acc_p / control.device.axes[0].gear)
+
+
+def _set_lin_acc(control: ProgramControl, value: float, now: Nanos) -> bool:
+    before, control.registers.lin_acc_u = control.registers.lin_acc_u, value
+    return before != value
+
+
+def _vision(index: int) -> Access:
+    def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+        before, control.registers.vision[index] = control.registers.vision[index], value
+        return before != value
+
+    return _single(lambda control, at: control.registers.vision[index], put)
+
+
+def _single(read: Callable[[Any, Nanos], float], write: Writer | None = None, *, quiet: bool = True) -> Access:
+    return Access(lambda number: read, None if write is None else lambda number: write, quiet=quiet)
+
+
+def _status(control: ProgramControl, at: Nanos) -> float:
+    device: Mic488 = control.device
+    return float(device.status()) if control.dialect.has(STATUS_SINCE) else 0.0
+
+
+_LIMIT_L = _axis_reader(lambda axis, at: axis.limit_l_p / axis.gear)
+_LIMIT_R = _axis_reader(lambda axis, at: axis.limit_r_p / axis.gear)
+
+ACCESS: Mapping[str, Access] = MappingProxyType(
+    {
+        "OUT": Access(_out, _set_out, quiet=False),
+        "OUTPUTS": _single(lambda control, at: _bits(control.device.outputs), _set_outs, quiet=False),
+        "IN": Access(_in),
+        "INPUTS": _single(lambda control, at: _bits(control.device.inputs.filtered[:16])),
+        "AIN": Access(_ain),
+        "M": Access(
+            _axis_reader(lambda axis, at: axis.profile.moving(at)),
+            _axis_writer(_set_drive),
+            _axis_tendency(_motion_stretches),
+            quiet=False,
+        ),
+        "STATM": Access(_axis_reader(lambda axis, at: axis.status)),
+        "VACTM": Access(
+            _axis_reader(lambda axis, at: axis.profile.velocity(at) / axis.gear),
+            tendency=_axis_tendency(_velocity_stretches),
+        ),
+        "POSM": Access(
+            _axis_reader(lambda axis, at: axis.coordinate_p(at) / axis.gear),
+            _axis_writer(_set_position),
+            _axis_tendency(_position_stretches),
+            quiet=False,
+        ),
+        "ACCM": _rate("acc_p"),
+        "DECM": _rate("dec_p"),
+        "VMAXM": _rate("vmax_p"),
+        "LIMLM": Access(_LIMIT_L, _axis_writer(_set_limit_l), quiet=False),
+        "LIMRM": Access(_LIMIT_R, _axis_writer(_set_limit_r), quiet=False),
+        "ENC": Access(
+            _axis_reader(lambda axis, at: axis.encoder_counts(at)),
+            _axis_writer(_set_encoder),
+            _axis_tendency(_encoder_stretches),
+        ),
+        "XENC": Access(_axis_reader(_xenc), tendency=_axis_tendency(_encoder_stretches)),
+        **{name: _timer(name) for name in TIMER_PERIODS},
+        **{name: _switch(name) for name in ("CFGINT_IN", "CFGINT_MODBUS", "CFGINT_M")},
+        **{name: _switch(name) for name in ("CFGINT_TICK", "CFGINT_TICK100", "CFGINT_TICK1000")},
+        "PTPM": _row_0(),
+        "CIRCX": _row_0(0),
+        "CIRCY": _row_0(1),
+        "CIRCR": _row_0(2),
+        "CIRCA": _row_0(3),
+        "LINX": _row_0(0),
+        "LINY": _row_0(1),
+        "LINVEL": _row_0(2),
+        "LINACC": _single(_lin_acc, _set_lin_acc),
+        **{f"VISION{name}": _vision(index) for index, name in enumerate(VISION)},
+        "STATUS": _single(_status),
+        "$I": _user(_WORD),
+        "$D": _user(_DINT),
+        "$R": _user(_REAL),
+    }
+)
+"""By family in upper case."""

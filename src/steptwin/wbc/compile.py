@@ -1,0 +1,386 @@
+"""Steps to code: a function for every step, made once, without state, shared by all controllers that run the program.
+
+The function of a step takes the machine and its cells (variables, then constants) and returns the number of the step that
+follows; with all bits turned round (``~number``) when the machine has to look around before it goes on.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.wbc import steps as s
+from steptwin.wbc.controller import Access, Reader, Tendency
+from steptwin.wbc.events import EVENTS
+from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, real
+from steptwin.wbc.registers import REAL, REAL_MAX, RegisterRow
+from steptwin.wbc.usage import sources
+
+if TYPE_CHECKING:
+    from steptwin.wbc.machine import Machine
+
+Cells: TypeAlias = "array[float]"
+StepCode: TypeAlias = "Callable[[Machine, Cells], int]"
+Value: TypeAlias = "Callable[[Machine, Cells], float]"
+Seen: TypeAlias = Callable[[Any, Cells, Nanos], float]
+"""(controller, cells, moment) → what a look at that moment depends on."""
+
+# WBC-7
+SHORTEST_DELAY: Nanos = 10 * MILLISECOND
+
+
+class Watch(NamedTuple):
+    """Something a step sees that changes with time. ``tendency`` None: how it changes is not known."""
+
+    seen: Seen
+    tendency: Tendency | None
+
+
+class Entry(NamedTuple):
+    """An interrupt label: its step, and whether it waits for the end of the statement in progress."""
+
+    step: int
+    hard: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """``steps`` has one more than the program: the end. ``cells`` are variables (0) and constants at the start.
+
+    ``watches`` of every step; ``entries`` by number of the event in `EVENTS`.
+    """
+
+    steps: tuple[StepCode, ...]
+    watches: tuple[tuple[Watch, ...], ...]
+    cells: Cells
+    entries: Mapping[int, Entry]
+
+
+def compile_program(executable: s.Executable, registers: Mapping[str, Access]) -> Code:
+    """Code for controllers that give their registers by ``registers`` (family in upper case)."""
+    return _Compiler(executable, registers).code()
+
+
+class _Compiler:
+    def __init__(self, executable: s.Executable, registers: Mapping[str, Access]) -> None:
+        self._executable = executable
+        self._registers = registers
+        self._cells = array("f", [0.0] * len(executable.variables))
+        self._constants: dict[float, int] = {}
+
+    def code(self) -> Code:
+        made = [self._step(number, step) for number, step in enumerate(self._executable.steps)]
+        made.append(_end(len(made)))
+        watches = [tuple(self._watches(step)) for step in self._executable.steps]
+        entries = {
+            EVENTS.index(step.event): Entry(number, step.hard)
+            for number, step in enumerate(self._executable.steps)
+            if isinstance(step, s.Entry)
+        }
+        return Code(tuple(made), (*watches, ()), self._cells, entries)
+
+    def _step(self, number: int, step: s.Step) -> StepCode:
+        following = number + 1
+        match step:
+            case s.Set():
+                return self._set(step, following)
+            case s.If():
+                return self._branch(step.condition, following, step.otherwise)
+            case s.While():
+                return self._branch(step.condition, following, step.close + 1)
+            case s.Else():
+                return _goes_to(step.close)
+            case s.EndWhile():
+                return _goes_to(step.open)
+            case s.EndIf() | s.Entry():
+                return _goes_to(following)
+            case s.Wait():
+                return _wait(self._test(step.condition), number)
+            case s.WaitPos():
+                return _wait_for_rest(number)
+            case s.Delay():
+                return _delay(self._value(step.seconds), following)
+            case s.Jump():
+                return _jump(step.target, (following, 0))
+            case s.Return():
+                return _return
+            case s.End():
+                return _end(number)
+            case s.ProgReset():
+                return _reset
+            case _:
+                return self._act(step, following)
+
+    def _act(self, step: s.Step, following: int) -> StepCode:
+        """Statements that do something to the controller."""
+        match step:
+            case s.Motion(keyword=keyword, axis=axis):
+                value = self._value(step.value)
+                return _acting(lambda m, cells: m.present().motion(keyword, axis, value(m, cells)), following)
+            case s.Halt(keyword=keyword, axis=axis):
+                return _acting(lambda m, cells: m.present().halt(keyword, axis), following)
+            case s.RowMotion(keyword=keyword):
+                row = self._value(step.row)
+                return _acting(lambda m, cells: m.present().row_motion(keyword, row(m, cells)), following)
+            case s.Pulse(output=output):
+                seconds = self._value(step.seconds)
+                return _acting(lambda m, cells: m.present().pulse(output, duration(seconds(m, cells))), following)
+            case _:
+                return _illegal
+
+    # -- values
+
+    def _cell(self, source: s.Source) -> int | None:
+        """The cell of a variable or constant; None for a register."""
+        return None if isinstance(source, s.Register) else self._cell_of(source)
+
+    def _cell_of(self, source: s.Variable | s.Literal) -> int:
+        if isinstance(source, s.Variable):
+            return source.index
+        value = real(source.value)
+        if value not in self._constants:
+            self._constants[value] = len(self._cells)
+            self._cells.append(value)
+        return self._constants[value]
+
+    def _reader(self, register: s.Register) -> Reader:
+        return self._registers[register.row.key].read(register.number)
+
+    def _value(self, source: s.Source) -> Value:
+        if isinstance(source, s.Register):
+            read = self._reader(source)
+            return lambda m, cells: read(m.controller, m.now)
+        cell = self._cell_of(source)
+        return lambda m, cells: cells[cell]
+
+    def _calculated(self, value: s.Source | s.Operation | s.Function) -> Value:
+        if isinstance(value, s.Operation):
+            apply = OPERATIONS[value.operator]
+            left, right = self._value(value.left), self._value(value.right)
+            return lambda m, cells: apply(left(m, cells), right(m, cells))
+        if isinstance(value, s.Function):
+            function = FUNCTIONS[value.name]
+            arguments = [self._value(argument) for argument in value.arguments]
+            if len(arguments) == 1:
+                only = arguments[0]
+                return lambda m, cells: function(only(m, cells))
+            return lambda m, cells: function(*[argument(m, cells) for argument in arguments])
+        return self._value(value)
+
+    def _test(self, condition: s.Comparison) -> Callable[[Machine, Cells], bool]:
+        holds = COMPARISONS[condition.sign]
+        left, right = self._value(condition.left), self._value(condition.right)
+        return lambda m, cells: holds(left(m, cells), right(m, cells))
+
+    # -- branches and assignments; what only concerns cells is written out, for compute loops consist of it
+
+    def _branch(self, condition: s.Comparison, inside: int, outside: int) -> StepCode:
+        a, b = self._cell(condition.left), self._cell(condition.right)
+        if a is not None and b is not None:
+            compares = COMPARISONS[condition.sign]
+            return lambda m, cells: inside if compares(cells[a], cells[b]) else outside
+        test = self._test(condition)
+        return lambda m, cells: inside if test(m, cells) else outside
+
+    def _set(self, step: s.Set, following: int) -> StepCode:
+        if isinstance(step.target, s.Register):
+            return self._set_register(step.target, self._calculated(step.value), following)
+        target, value = step.target.index, step.value
+        if isinstance(value, s.Operation):
+            a, b = self._cell(value.left), self._cell(value.right)
+            if a is not None and b is not None:
+                return _set_cell_of_cells(target, OPERATIONS[value.operator], (a, b), following)
+        return _set_cell(target, self._calculated(value), following)
+
+    def _set_register(self, register: s.Register, value: Value, following: int) -> StepCode:
+        access = self._registers[register.row.key]
+        if access.write is None:
+            raise ValueError(f"{register.name} cannot be written")
+        write = access.write(register.number)
+        taken = _taken(register.row, register.name)
+        if access.quiet:
+
+            def set_quietly(m: Machine, cells: Cells) -> int:
+                if write(m.controller, taken(real(value(m, cells))), m.now):
+                    m.effects += 1
+                return following
+
+            return set_quietly
+
+        around = ~following
+
+        def set_register(m: Machine, cells: Cells) -> int:
+            number = taken(real(value(m, cells)))
+            if not write(m.present(), number, m.now):
+                return following
+            m.effects += 1
+            return around
+
+        return set_register
+
+    # -- what changes with time
+
+    def _watches(self, step: s.Step) -> list[Watch]:
+        if isinstance(step, s.If | s.While | s.Wait):
+            condition = step.condition
+            tendencies = [t for side in (condition.left, condition.right) if (t := self._tendency(side)) is not None]
+            if not tendencies:
+                return []
+            left, right = self._seen(condition.left), self._seen(condition.right)
+            return [Watch(_side(left, right), tendencies[0] if len(tendencies) == 1 else None)]
+        return [Watch(self._seen(source), t) for source in sources(step) if (t := self._tendency(source)) is not None]
+
+    def _tendency(self, source: s.Source) -> Tendency | None:
+        if not isinstance(source, s.Register):
+            return None
+        tendency = self._registers[source.row.key].tendency
+        return None if tendency is None else tendency(source.number)
+
+    def _seen(self, source: s.Source) -> Seen:
+        if isinstance(source, s.Register):
+            read = self._reader(source)
+            return lambda controller, cells, at: read(controller, at)
+        cell = self._cell_of(source)
+        return lambda controller, cells, at: cells[cell]
+
+
+def duration(seconds: float) -> Nanos:
+    """Seconds of DELAY and PULSE, in whole milliseconds (WBC-23)."""
+    return round(seconds * 1000.0) * MILLISECOND
+
+
+def _side(left: Seen, right: Seen) -> Seen:
+    """−1, 0 or 1: which of two values is greater. It changes whenever a condition on them does."""
+
+    def side(controller: Any, cells: Cells, at: Nanos) -> float:
+        a, b = left(controller, cells, at), right(controller, cells, at)
+        return (a > b) - (a < b)
+
+    return side
+
+
+def _taken(row: RegisterRow, name: str) -> Callable[[float], float]:
+    """What a register makes of a REAL: rounded where it is whole; out of range the nearest (WBC-14) or a program error."""
+    domain = row.writes
+    if domain is None or domain == REAL:
+        return lambda value: value
+    low, high = domain.low, domain.high
+
+    def taken(value: float) -> float:
+        if row.saturates:
+            value = min(max(value, low), high)
+        if domain.whole:
+            value = round(value)
+        if not domain.has(value):
+            raise ProgramFault(f"{name} = {value:g}: permitted are numbers {domain}")
+        return value
+
+    return taken
+
+
+def _goes_to(following: int) -> StepCode:
+    return lambda m, cells: following
+
+
+def _set_cell(target: int, value: Value, following: int) -> StepCode:
+    def step(m: Machine, cells: Cells) -> int:
+        x = value(m, cells)
+        cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
+        return following
+
+    return step
+
+
+def _set_cell_of_cells(
+    target: int, apply: Callable[[float, float], float], operands: tuple[int, int], following: int
+) -> StepCode:
+    a, b = operands
+
+    def step(m: Machine, cells: Cells) -> int:
+        x = apply(cells[a], cells[b])
+        cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
+        return following
+
+    return step
+
+
+def _wait(holds: Callable[[Machine, Cells], bool], number: int) -> StepCode:
+    following, again = number + 1, ~number
+
+    def step(m: Machine, cells: Cells) -> int:
+        if holds(m, cells):
+            return following
+        m.waiting = True
+        return again
+
+    return step
+
+
+def _wait_for_rest(number: int) -> StepCode:
+    return _wait(lambda m, cells: m.present().at_rest(), number)
+
+
+def _delay(seconds: Value, following: int) -> StepCode:
+    around = ~following
+
+    def step(m: Machine, cells: Cells) -> int:
+        m.not_before = m.now + max(duration(seconds(m, cells)), SHORTEST_DELAY)
+        return around
+
+    return step
+
+
+def _jump(target: int, frame: tuple[int, Nanos]) -> StepCode:
+    around = ~target
+
+    def step(m: Machine, cells: Cells) -> int:
+        m.stack.append(frame)
+        if m.handling:
+            # WBC-3: from here on new interrupts are let in.
+            m.handling = False
+            return around
+        return target
+
+    return step
+
+
+def _return(m: Machine, cells: Cells) -> int:
+    if not m.stack:
+        raise ProgramFault("RETURN without a JUMP")
+    following, not_before = m.stack.pop()
+    if m.handling or not_before:
+        m.handling = False
+        m.not_before = not_before
+        return ~following
+    return following
+
+
+def _end(number: int) -> StepCode:
+    def step(m: Machine, cells: Cells) -> int:
+        m.present().end()
+        return ~number
+
+    return step
+
+
+def _reset(m: Machine, cells: Cells) -> int:
+    m.present().reset()
+    return ~0
+
+
+def _illegal(m: Machine, cells: Cells) -> int:
+    raise ProgramFault("unknown instruction")
+
+
+def _acting(act: Callable[[Machine, Cells], None], following: int) -> StepCode:
+    around = ~following
+
+    def step(m: Machine, cells: Cells) -> int:
+        act(m, cells)
+        m.effects += 1
+        return around
+
+    return step

@@ -1,0 +1,75 @@
+"""What a running program asks of its controller. The controller is whatever has these; the language knows no machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias
+
+from steptwin.machine import Nanos
+
+Reader: TypeAlias = Callable[[Any, Nanos], float]
+"""(controller, moment) → REAL. Also right for moments to come, as long as nothing happens."""
+
+Writer: TypeAlias = Callable[[Any, float, Nanos], bool]
+"""(controller, REAL, moment) → whether that changed anything."""
+
+Tendency: TypeAlias = Callable[[Any, Nanos], Iterable[Nanos] | None]
+"""(controller, moment) → how a register goes on by itself, as long as nothing happens: the ends, in order, of the stretches in
+which it only rises or only falls; after the last one it stands. `FOREVER` ends a stretch that has no end. None: not known."""
+
+FOREVER: Nanos = 2**62
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """A family of registers: what each function makes of the register's number.
+
+    Values written are within what the register takes, whole where it is whole. ``quiet``: a write touches nothing that has a
+    deadline or an output. Registers without ``tendency`` change only when something happens.
+    """
+
+    read: Callable[[int], Reader]
+    write: Callable[[int], Writer] | None = None
+    tendency: Callable[[int], Tendency] | None = None
+    quiet: bool = True
+
+
+class Controller(Protocol):
+    """Everything raises `steptwin.wbc.real.ProgramFault` when it cannot be done."""
+
+    @property
+    def now(self) -> Nanos:
+        """The present moment, which the program sets before it asks for anything."""
+        ...
+
+    @now.setter
+    def now(self, now: Nanos) -> None: ...
+
+    def motion(self, keyword: str, axis: int, value: float) -> None:
+        """HOME, VABS, VREL, PABS, PREL of ``axis`` (from 1) in configured units."""
+        ...
+
+    def halt(self, keyword: str, axis: int) -> None:
+        """BRAKE, STOP."""
+        ...
+
+    def row_motion(self, keyword: str, row: float) -> None:
+        """A motion with the parameters of row ``row`` of the position table."""
+        ...
+
+    def at_rest(self) -> bool:
+        """Whether every enabled drive has finished (WBC-8)."""
+        ...
+
+    def pulse(self, output: int, duration: Nanos) -> None:
+        """PULSE of ``output`` (from 1)."""
+        ...
+
+    def end(self) -> None:
+        """END: the program is over, drives and outputs go off."""
+        ...
+
+    def reset(self) -> None:
+        """PROGRESET: drives go off, everything else that belongs to the program is as at its start."""
+        ...

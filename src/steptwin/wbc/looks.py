@@ -1,0 +1,53 @@
+"""When a look can first turn out differently (WBC-18): looks before that moment need not be taken."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from steptwin.machine import Nanos
+
+Side = Callable[[Nanos], float]
+"""What is seen at a moment. It only rises or only falls within each stretch."""
+
+
+def first_change(side: Side, begin: Nanos, period: Nanos, stretches: Iterable[Nanos], horizon: Nanos) -> Nanos | None:
+    """The first of the moments ``begin + period``, ``begin + 2 period``, … at which something else is seen than at ``begin``.
+
+    ``stretches`` are the ends of the stretches, in order; after the last one nothing changes any more. None if nothing else is
+    ever seen; the first of the moments after ``horizon`` if not up to there.
+    """
+    seen = side(begin)
+    at = begin + period
+    for end in stretches:
+        if end < at:
+            continue
+        if at > horizon or side(at) != seen:
+            return at
+        last = (min(end, horizon) - at) // period
+        found = _within(side, seen, at, period, last)
+        if found is not None:
+            return found
+        at += (last + 1) * period
+    return at if at > horizon or side(at) != seen else None
+
+
+def _within(side: Side, seen: float, at: Nanos, period: Nanos, last: int) -> Nanos | None:
+    """Of ``at + k · period`` up to k = ``last``, all in one stretch, where ``seen`` is seen at ``at``."""
+    same, step = 0, 1
+    # Most changes are near, and some stretches have no end: steps of growing size first, then halving.
+    while same < last:
+        k = min(same + step, last)
+        if side(at + k * period) != seen:
+            break
+        same = k
+        step *= 8
+    else:
+        return None
+    different = k
+    while different - same > 1:
+        middle = (same + different) // 2
+        if side(at + middle * period) != seen:
+            different = middle
+        else:
+            same = middle
+    return at + different * period

@@ -1,0 +1,431 @@
+"""The execution of a program: one statement every statement time (WBC-6), waits, the return stack, interrupts.
+
+Nothing is looked at in vain (WBC-18). A WAIT whose look failed, and a loop that has come round without changing anything, *rest*:
+the moment at which one of their looks can first turn out differently is foreseen, and until then nothing is executed.
+Whatever happens meanwhile ends the rest (`disturb`); where the program stands at any moment follows from the rest itself, so
+that resting changes nothing but the work.
+
+How a loop is found: at a jump backwards the state is *marked*, and every statement from there on is recorded. Back at the mark
+with the same state, and without any effect on the controller on the way, the loop does the same again and again.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections import deque
+from collections.abc import Iterator
+from functools import partial
+from typing import NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
+from steptwin.state import Stateful
+from steptwin.wbc.compile import Code
+from steptwin.wbc.controller import Controller
+from steptwin.wbc.looks import first_change
+
+# WBC-6
+STATEMENT_TIME: Nanos = MILLISECOND
+SHORTEST_STATEMENT_TIME: Nanos = MICROSECOND
+LONGEST_STATEMENT_TIME: Nanos = SECOND
+
+# WBC-1
+RETURNS = 16
+
+# WBC-24
+STATEMENTS_AT_ONCE = 1000
+BREATH: Nanos = MILLISECOND
+"""With a statement time of 0: so many statements take no time, then as long passes. What waits looks at this interval, and
+whenever something happens."""
+
+LONGEST_LOOP = 512
+"""Statements of a loop that can rest."""
+MARKS = 40
+"""So many marks may come to nothing before only every so many jumps backwards are marked: filling the return stack alone takes
+sixteen rounds."""
+MOST_UNMARKED = 256
+
+HORIZON: Nanos = 3600 * SECOND
+"""How far is foreseen; then the look is taken, which does no harm."""
+
+
+class Visit(NamedTuple):
+    """A statement of a loop, and the state in which it is executed.
+
+    ``offset`` from the mark; ``held``: by a DELAY before it, until that moment.
+    """
+
+    step: int
+    offset: Nanos
+    held: bool
+    handling: bool
+    stack: tuple[tuple[int, Nanos], ...]
+    cells: bytes
+
+
+class Machine(Stateful):
+    """One program in execution, or none. `Misuse` for a ``statement_time`` that is not permitted.
+
+    All state is plain data: a snapshot in the middle of a program is complete but for the program itself.
+    """
+
+    rests = True
+    """Off, every look is taken: what tests compare with."""
+
+    __slots__ = (
+        "_base",
+        "_loop",
+        "_mark",
+        "_marks",
+        "_moment",
+        "_period",
+        "_spent",
+        "_trail",
+        "_unmarked",
+        "cells",
+        "controller",
+        "due",
+        "effects",
+        "handling",
+        "not_before",
+        "now",
+        "paused_at",
+        "pc",
+        "pending",
+        "running",
+        "stack",
+        "statement_time",
+        "waiting",
+    )
+    FIXED = frozenset({"controller", "statement_time"})
+
+    def __init__(self, controller: Controller, statement_time: Nanos = STATEMENT_TIME) -> None:
+        if statement_time and not SHORTEST_STATEMENT_TIME <= statement_time <= LONGEST_STATEMENT_TIME:
+            permitted = f"0 and {SHORTEST_STATEMENT_TIME / MILLISECOND:g} to {LONGEST_STATEMENT_TIME / MILLISECOND:g} ms"
+            raise Misuse(f"statement time = {statement_time / MILLISECOND:g} ms: permitted are {permitted}")
+        self.controller = controller
+        self.statement_time = statement_time
+        self.cells = array("f")
+        self.now: Nanos = 0
+        """The moment of the statement being executed."""
+        self.due: Nanos | None = None
+        """When the next statement is executed; None: nothing but an event will have one executed."""
+        self.running = False
+        self.paused_at: Nanos | None = None
+        self.effects = 0
+        """How often the program has changed something outside its cells since the mark."""
+        self.clear()
+
+    def clear(self) -> None:
+        """As before the first statement."""
+        self.pc = 0
+        self.stack: deque[tuple[int, Nanos]] = deque(maxlen=RETURNS)
+        """Where RETURN goes on, and not before which moment (a DELAY that was interrupted, WBC-19)."""
+        self.handling = False
+        """In an interrupt, which keeps others waiting (WBC-2)."""
+        self.pending = 0
+        """Events that wait, one bit each."""
+        self.waiting = False
+        """The statement at ``pc`` is in progress: its last look failed."""
+        self.not_before: Nanos = 0
+        self._moment: Nanos = 0
+        self._spent = 0
+        self._marks = 0
+        self._unmarked = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        """No loop is being recorded, none rests."""
+        self._trail: list[Visit] | None = None
+        self._mark: Nanos = 0
+        self._loop: tuple[Visit, ...] = ()
+        self._base: Nanos = 0
+        """When the loop, or the look of a WAIT, begins anew, and after which time again."""
+        self._period: Nanos = 0
+
+    # ------------------------------------------------------------------ start, stop, pause
+
+    def start(self, code: Code, now: Nanos) -> None:
+        """The first statement is executed one statement time from now. Variables are 0 (WBC-4)."""
+        self.cells = code.cells[:]
+        self.clear()
+        self.running = True
+        self.paused_at = None
+        self.due = now + self.statement_time
+
+    def restart(self, code: Code) -> None:
+        """PROGRESET."""
+        self.cells[:] = code.cells
+        self.clear()
+
+    def stop(self) -> None:
+        self.running = False
+        self.paused_at = None
+        self.due = None
+        self._forget()
+
+    def pause(self, now: Nanos) -> None:
+        """WBC-9: whatever is waited for is waited for later."""
+        self.disturb(self.after(now))
+        self.running = False
+        self.paused_at = now
+
+    def resume(self, code: Code, now: Nanos) -> None:
+        """Go on, with every wait as much later as the pause was long."""
+        if self.paused_at is None:
+            return
+        begun, self.paused_at = self.paused_at, None
+        later = now - begun
+        if self.due is not None:
+            self.due += later
+        if self.not_before > begun:
+            self.not_before += later
+        frames = [(step, until + later if until > begun else until) for step, until in self.stack]
+        self.stack = deque(frames, maxlen=RETURNS)
+        self.running = True
+        self._break_in(code, now)
+
+    # ------------------------------------------------------------------ what happens meanwhile
+
+    def after(self, now: Nanos) -> Nanos:
+        """When the next statement may be executed after everything at ``now`` has been: there is no time between them at 0."""
+        return now + 1 if self.statement_time else now
+
+    def disturb(self, first: Nanos) -> None:
+        """Something happened: looks from ``first`` on may turn out differently."""
+        self._trail = None
+        if self._loop:
+            self._settle(first)
+        if self.waiting and self.statement_time == 0 and self.running:
+            self.due = first
+
+    def happen(self, code: Code, event: int, now: Nanos, first: Nanos) -> None:
+        """The interrupt of ``event`` (its number in `EVENTS`), which is enabled; one is kept of each (WBC-2).
+
+        ``first`` is the moment of the next statement that could have been executed without it.
+        """
+        if event in code.entries:
+            self.pending |= 1 << event
+            if self.running:
+                self.disturb(first)
+                self._break_in(code, now)
+
+    def _break_in(self, code: Code, now: Nanos) -> None:
+        """INT_: the statement in progress is left where it is (WBC-19)."""
+        if not self.handling:
+            event = next((e for e in self._pending_events() if not code.entries[e].hard), None)
+            if event is not None:
+                self._enter(code, event, now)
+
+    def _pending_events(self) -> Iterator[int]:
+        pending = self.pending
+        return (event for event in range(pending.bit_length()) if pending >> event & 1)
+
+    def _enter(self, code: Code, event: int, now: Nanos) -> None:
+        self.pending &= ~(1 << event)
+        self.stack.append((self.pc, self.not_before))
+        self.pc = code.entries[event].step
+        self.handling = True
+        self.waiting = False
+        self.not_before = 0
+        self.due = now
+        self._trail = None
+
+    # ------------------------------------------------------------------ execution
+
+    def present(self) -> Controller:
+        """The controller at the moment of the statement in execution."""
+        self.controller.now = self.now
+        return self.controller
+
+    def run(self, code: Code, until: Nanos) -> None:
+        """Execute what is due, and what follows up to ``until`` as long as only the program itself is concerned.
+
+        A `ProgramFault` leaves ``pc`` at its statement.
+        """
+        now = self.due
+        if now is None:
+            return
+        if self._loop:
+            self._settle(now)
+        self.now = now
+        if self.pending and not self.handling and not self.waiting:
+            at_end = now >= self.not_before
+            event = next((e for e in self._pending_events() if at_end or not code.entries[e].hard), None)
+            if event is not None:
+                self._enter(code, event, now)
+        if now < self.not_before:
+            self.due = self.not_before
+            return
+        if now != self._moment:
+            self._moment = now
+            self._spent = 0
+        while True:
+            if self._trail is None:
+                if not self._dash(code, until):
+                    return
+            elif not self._record(code, self._trail, until):
+                return
+
+    def _dash(self, code: Code, until: Nanos) -> bool:
+        """Execute until something has to be looked at. True: go on, now recording."""
+        steps, cells, pause = code.steps, self.cells, self.statement_time
+        pc, now, unmarked = self.pc, self.now, self._unmarked
+        marks = self.rests and pause > 0
+        self.waiting = False
+        self.not_before = 0
+        executed = 0
+        try:
+            for executed in range(1, STATEMENTS_AT_ONCE - self._spent + 1):  # noqa: B007
+                following = steps[pc](self, cells)
+                if following < 0:
+                    pc = ~following
+                    self.pc = pc
+                    self._look_around(code)
+                    return False
+                if following <= pc and marks:
+                    if unmarked == 0:
+                        unmarked = self._set_mark(now + pause)
+                        pc = following
+                        self.now = self.due = now + pause
+                        return self.due <= until
+                    unmarked -= 1
+                pc = following
+                now += pause
+                if now > until:
+                    self.due = now
+                    return False
+                self.now = now
+        finally:
+            self.pc = pc
+            self._unmarked = unmarked
+            self._spent += executed
+        if pause:
+            self._spent = 0
+            return True
+        self.due = now + BREATH
+        return False
+
+    def _look_around(self, code: Code) -> None:
+        """A statement acted on the controller, waits, or lets interrupts in."""
+        if not self.running:
+            self.due = None
+            return
+        if self.waiting:
+            self._wait(code)
+            return
+        self.due = self.now + self.statement_time
+        if self.not_before > self.due and not self._can_break_in(code):
+            self.due = self.not_before
+
+    def _can_break_in(self, code: Code) -> bool:
+        return not self.handling and any(not code.entries[e].hard for e in self._pending_events())
+
+    # ------------------------------------------------------------------ rest
+
+    def _wait(self, code: Code) -> None:
+        """A look failed: rest until the next one that can succeed."""
+        self._trail = None
+        period = self.statement_time or BREATH
+        self.due = self.now + period
+        if self.rests:
+            self._base, self._period = self.now, period
+            self._loop = (self._visit(0),)
+            foreseen = self._foresee(code)
+            if foreseen is None:
+                self._loop = ()
+            else:
+                self.due = foreseen if foreseen >= 0 else None
+
+    def _visit(self, offset: Nanos) -> Visit:
+        return Visit(self.pc, offset, self.not_before > 0, self.handling, tuple(self.stack), self.cells.tobytes())
+
+    def _set_mark(self, now: Nanos) -> int:
+        """Begin to record at ``now``; how many jumps backwards are not marked after it."""
+        self._trail = []
+        self._mark = now
+        self.effects = 0
+        return 0 if self._marks < MARKS else MOST_UNMARKED
+
+    def _record(self, code: Code, trail: list[Visit], until: Nanos) -> bool:
+        """As `_dash`, noting every visit, until the loop is closed or turns out to be none. True: go on, not recording."""
+        steps, cells, pause = code.steps, self.cells, self.statement_time
+        while len(trail) < LONGEST_LOOP:
+            now = self.now
+            visit = self._visit(now - self._mark)
+            if trail and visit.step == trail[0].step:
+                if visit._replace(offset=0) == trail[0] and self.effects == 0 and self._rest(code, tuple(trail), visit.offset):
+                    return False
+                break
+            trail.append(visit)
+            self.waiting = False
+            self.not_before = 0
+            following = steps[self.pc](self, cells)
+            if following < 0:
+                self.pc = ~following
+                self._look_around(code)
+                return False
+            self.pc = following
+            self.due = now + pause
+            if self.due > until:
+                return False
+            self.now = self.due
+        self._trail = None
+        self._marks += 1
+        return True
+
+    def _rest(self, code: Code, loop: tuple[Visit, ...], period: Nanos) -> bool:
+        """Rest in a loop that has come round; False when it cannot be foreseen."""
+        self._loop, self._base, self._period = loop, self._mark, period
+        foreseen = self._foresee(code)
+        if foreseen is None:
+            self._loop = ()
+            return False
+        self._trail = None
+        self.due = foreseen if foreseen >= 0 else None
+        return True
+
+    def _foresee(self, code: Code) -> Nanos | None:
+        """When a look of the loop first turns out differently; −1 if never as it looks, None if that is not known."""
+        controller, period = self.controller, self._period
+        soonest = -1
+        for visit in self._loop:
+            watches = code.watches[visit.step]
+            if not watches:
+                continue
+            cells = array("f")
+            cells.frombytes(visit.cells)
+            at = self._base + visit.offset
+            for seen, tendency in watches:
+                stretches = None if tendency is None else tendency(controller, at)
+                if stretches is None:
+                    return None
+                change = first_change(partial(seen, controller, cells), at, period, stretches, at + HORIZON)
+                if change is not None and not 0 <= soonest <= change:
+                    soonest = change
+        return soonest
+
+    def _next_visit(self, first: Nanos) -> tuple[Nanos, Visit]:
+        """The first statement of the resting loop at or after ``first``."""
+        rounds, into = divmod(max(first - self._base, 0), self._period)
+        for visit in self._loop:
+            if visit.offset >= into:
+                break
+        else:
+            rounds, visit = rounds + 1, self._loop[0]
+        return self._base + rounds * self._period + visit.offset, visit
+
+    def _settle(self, first: Nanos) -> None:
+        """End the rest: stand before the first statement of the loop at or after ``first``."""
+        self.due, visit = self._next_visit(first)
+        self.pc = visit.step
+        self.handling = visit.handling
+        self.stack = deque(visit.stack, maxlen=RETURNS)
+        self.cells = array("f")
+        self.cells.frombytes(visit.cells)
+        self.not_before = self.due if visit.held else 0
+        self._loop = ()
+
+    def place(self) -> int:
+        """The step in execution, or executed next."""
+        return self._next_visit(self.after(self.controller.now))[1].step if self._loop else self.pc

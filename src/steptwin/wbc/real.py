@@ -1,0 +1,129 @@
+"""REAL arithmetic of running programs: every value is an IEEE-754 single, every operation rounds once.
+
+What cannot be calculated is a `ProgramFault` (WBC-5). A result beyond the range of REAL is the largest one (WBC-21), so that
+no value is ever infinite or no number.
+"""
+
+from __future__ import annotations
+
+import operator
+import struct
+from collections.abc import Callable, Mapping
+from math import fmod, sqrt
+
+from steptwin.motion.trig import arccosine, arcsine, cosine, sine
+from steptwin.wbc.registers import DINT, REAL_MAX
+
+QUARTER_DEG = 90.0
+_single = struct.Struct("<f")
+
+
+class ProgramFault(Exception):
+    """A running program did what cannot be done; the text says what. The machine turns it into a program error (WBC-5)."""
+
+
+def real(value: float) -> float:
+    """The nearest REAL (WBC-21)."""
+    if -REAL_MAX <= value <= REAL_MAX:
+        return _single.unpack(_single.pack(value))[0]
+    return REAL_MAX if value > 0.0 else -REAL_MAX
+
+
+def whole(value: float) -> int:
+    """The nearest 32-bit integer, ties to even (WBC-10)."""
+    return round(min(max(value, DINT.low), DINT.high))
+
+
+def _quotient(a: float, b: float) -> float:
+    if b == 0.0:
+        raise ProgramFault("division by zero")
+    return a / b
+
+
+def _remainder(a: float, b: float) -> float:
+    if b == 0.0:
+        raise ProgramFault("remainder of a division by zero")
+    return fmod(a, b)
+
+
+def _shift(value: float, by: float) -> int:
+    """To the left for positive ``by``; as of 32-bit integers with sign, nothing is left beyond 31 places (WBC-22)."""
+    number, places = whole(value), whole(by)
+    if places < 0:
+        return number >> min(-places, 31)
+    shifted = (number << min(places, 32)) & 0xFFFF_FFFF
+    return shifted - (1 << 32) if shifted & 0x8000_0000 else shifted
+
+
+OPERATIONS: Mapping[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": _quotient,
+    "%": _remainder,
+    "&": lambda a, b: whole(a) & whole(b),
+    "|": lambda a, b: whole(a) | whole(b),
+    "&&": lambda a, b: 1.0 if whole(a) and whole(b) else 0.0,
+    "||": lambda a, b: 1.0 if whole(a) or whole(b) else 0.0,
+    "<<": _shift,
+    ">>": lambda a, b: _shift(a, -whole(b)),
+}
+
+COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
+    "=": operator.eq,
+    "<": operator.lt,
+    ">": operator.gt,
+    "<=": operator.le,
+    ">=": operator.ge,
+}
+
+
+def _quarters(degrees: float) -> float:
+    return fmod(degrees, 360.0) / QUARTER_DEG
+
+
+def _tangent(degrees: float) -> float:
+    angle_q = _quarters(degrees)
+    below = cosine(angle_q)
+    if below == 0.0:
+        raise ProgramFault(f"tg({degrees:g}) does not exist")
+    return sine(angle_q) / below
+
+
+def _cotangent(degrees: float) -> float:
+    angle_q = _quarters(degrees)
+    below = sine(angle_q)
+    if below == 0.0:
+        raise ProgramFault(f"ctg({degrees:g}) does not exist")
+    return cosine(angle_q) / below
+
+
+def _arcsine(x: float) -> float:
+    if not -1.0 <= x <= 1.0:
+        raise ProgramFault(f"asin({x:g}) does not exist")
+    return arcsine(x) * QUARTER_DEG
+
+
+def _arccosine(x: float) -> float:
+    if not -1.0 <= x <= 1.0:
+        raise ProgramFault(f"acos({x:g}) does not exist")
+    return arccosine(x) * QUARTER_DEG
+
+
+def _root(x: float) -> float:
+    if x < 0.0:
+        raise ProgramFault(f"sqrt({x:g}) does not exist")
+    return sqrt(x)
+
+
+FUNCTIONS: Mapping[str, Callable[..., float]] = {
+    "SIN": lambda degrees: sine(_quarters(degrees)),
+    "COS": lambda degrees: cosine(_quarters(degrees)),
+    "TG": _tangent,
+    "CTG": _cotangent,
+    "ASIN": _arcsine,
+    "ACOS": _arccosine,
+    "SQRT": _root,
+    "MIN": min,
+    "MAX": max,
+}
