@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from steptwin import __version__
-from steptwin.cli import build, check, commands, decompile, fmt, registers, serve, twin
+from steptwin.cli import build, check, commands, decompile, export, fmt, registers, run, serve, twin
 from steptwin.errors import Misuse, SteptwinError
 
 app = typer.Typer(
@@ -24,6 +24,8 @@ app.command()(check.check)
 app.command()(fmt.fmt)
 app.command()(build.build)
 app.command()(decompile.decompile)
+app.command()(run.run)
+app.command()(export.export)
 app.command()(twin.pin)
 app.command()(twin.encoder)
 app.command("power-cycle")(twin.power_cycle)

@@ -1,0 +1,64 @@
+"""``steptwin export``: a recorded trace as files for other programs.
+
+From Python: `steptwin.runtime.export.write_trace`.
+"""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.errors import Misuse
+
+
+class Form(enum.StrEnum):
+    HTML = "html"
+    PNG = "png"
+    SVG = "svg"
+    VCD = "vcd"
+    CSV = "csv"
+    PARQUET = "parquet"
+    JSONL = "jsonl"
+
+
+def export(
+    trace: Annotated[Path, typer.Argument(help="A trace (.jsonl), or the directory that has trace.jsonl.")],
+    to: Annotated[list[Form] | None, typer.Option(help="Format; may be given more than once.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File or directory; default: beside the trace, named alike.")
+    ] = None,
+    begin: Annotated[str, typer.Option("--from", metavar="TIME", help="Where to begin: 9.5, 500ms, 2min.")] = "0",
+    until: Annotated[str | None, typer.Option(metavar="TIME", help="Where to end. Default: the end of the run.")] = None,
+    machine: Annotated[list[str] | None, typer.Option(help="Only this machine; may be given more than once.")] = None,
+    period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
+) -> None:
+    """Write a recorded trace as a timeline (html), a picture (png, svg), signals (vcd) or samples (csv, parquet)."""
+    from steptwin.runtime.export import bar, read_trace, write_trace
+    from steptwin.runtime.timedinputs import parse_duration
+
+    if not to and output is None:
+        raise Misuse(f"nothing to write: name formats with --to ({', '.join(Form)}) or a file with --output")
+    saved = read_trace(trace)
+    formats = [form.value for form in to or ()]
+    begin_ns = parse_duration(begin, "--from")
+    until_ns = saved.until if until is None else parse_duration(until, "--until")
+    period_ns = parse_duration(period, "--period")
+    source = trace / "trace.jsonl" if trace.is_dir() else trace
+    targets = [source.with_suffix(f".{name}") for name in formats] if output is None else [output]
+    for i, target in enumerate(targets):
+        written = write_trace(
+            saved.trace,
+            target,
+            views=saved.views,
+            formats=(formats or None) if output is not None else [formats[i]],
+            begin=begin_ns,
+            until=until_ns,
+            machines=machine or None,
+            period=period_ns,
+            watch=bar,
+        )
+        for path in written:
+            typer.echo(f"{path}: {path.stat().st_size:,} bytes")

@@ -1,0 +1,92 @@
+"""How the axes of a trace are shown: unit, and the terminals that carry their pulses or currents.
+
+A trace knows pulses only. A view is static: it is read from a machine once and then goes with the trace.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from steptwin.machine import MICROSECOND, Nanos
+
+if TYPE_CHECKING:
+    from steptwin.m1486.chip import M1486
+
+
+class StepOutputs(NamedTuple):
+    """STEP and DIR of one axis."""
+
+    step: str = "STEP"
+    dir: str | None = "DIR"
+    """None: the machine has this pin itself, so that its edges are in the trace."""
+    active_low: bool = False
+    width_ns: Nanos = 5 * MICROSECOND
+    """How long a pulse is drawn; shorter where the next one comes within twice this time."""
+
+
+class PhaseOutputs(NamedTuple):
+    """Two phase currents, −127…127, that follow a waveform (`steptwin.motion.waveforms`)."""
+
+    phases: tuple[str, str] = ("PHASE1", "PHASE2")
+    characteristic: int = 1
+    """Until the trace says otherwise: an edge of ``characteristic_pin``."""
+    characteristic_pin: str = "N"
+
+
+class AxisView(NamedTuple):
+    """``pulses_per_unit``: units of its profiles in one ``unit``."""
+
+    name: str
+    unit: str = "imp"
+    pulses_per_unit: float = 1.0
+    outputs: StepOutputs | PhaseOutputs = StepOutputs()
+
+    # Names of variables and columns.
+
+    @property
+    def position_name(self) -> str:
+        return f"{self.name}_position_{self.unit}"
+
+    @property
+    def velocity_name(self) -> str:
+        return f"{self.name}_velocity_{self.unit}_s"
+
+
+AxisViews: TypeAlias = Mapping[tuple[str, str], AxisView]
+"""By machine and subject of its ``plan`` records (``"1"``…)."""
+
+
+def plain_view(axis: str) -> AxisView:
+    """The view of an axis of which nothing is known."""
+    return AxisView(f"M{axis}", outputs=StepOutputs(f"M{axis}_STEP", f"M{axis}_DIR"))
+
+
+def axis_views(machines: Mapping[str, object]) -> dict[tuple[str, str], AxisView]:
+    """The views of all axes of ``machines`` (by name)."""
+    from steptwin.m1486.chip import M1486
+    from steptwin.mic488.device import Mic488
+
+    views: dict[tuple[str, str], AxisView] = {}
+    for name, machine in machines.items():
+        if isinstance(machine, Mic488):
+            for axis in machine.axes:
+                number = str(axis.number)
+                views[name, number] = plain_view(number)._replace(unit=axis.config.unit_name, pulses_per_unit=axis.gear)
+        elif isinstance(machine, M1486):
+            views[name, "1"] = _view_of_m1486(machine)
+    return views
+
+
+def _view_of_m1486(chip: M1486) -> AxisView:
+    """Full steps. STEP goes low, and has done its work when it goes high again; DIRECTION is a pin of the trace."""
+    from steptwin.m1486.lines import STEP_DIRECTION
+    from steptwin.m1486.microsteps import FULL_STEP
+    from steptwin.m1486.signals import STEP_PULSE_NS
+
+    outputs = (
+        StepOutputs("STEP", None, active_low=True, width_ns=STEP_PULSE_NS)
+        if chip.interface is STEP_DIRECTION
+        else PhaseOutputs(characteristic=chip.drive.characteristic)
+    )
+    return AxisView("motor", "step", float(FULL_STEP), outputs)

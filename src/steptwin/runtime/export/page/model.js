@@ -1,0 +1,206 @@
+// What the file knows, and questions about it. Times are nanoseconds from the beginning of the window.
+
+const DATA = JSON.parse(document.getElementById("data").textContent);
+const SPAN = Math.max(DATA.span, 1);
+
+// The last index whose time is <= t in a flat list of records of `size` numbers, -1 if there is none.
+function lastAt(flat, size, t) {
+  let low = 0, high = flat.length / size;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (flat[middle * size] <= t) low = middle + 1; else high = middle;
+  }
+  return low - 1;
+}
+
+// The motion of an axis: cubics, eight numbers each (begin, c0, c1, c2, c3, count, direction, grid).
+const PIECE = 8;
+
+class Motion {
+  constructor(axis) {
+    this.pieces = axis.pieces;
+    this.size = axis.pieces.length / PIECE;
+    this.scale = axis.scale;
+  }
+  at(t) { return Math.max(lastAt(this.pieces, PIECE, t), 0); }
+  begin(i) { return this.pieces[i * PIECE]; }
+  end(i) { return i + 1 < this.size ? this.pieces[(i + 1) * PIECE] : SPAN; }
+  pulses(i, t) {
+    const p = this.pieces, o = i * PIECE, u = (t - p[o]) / 1e9;
+    return p[o + 1] + u * (p[o + 2] + u * (p[o + 3] + u * p[o + 4]));
+  }
+  position(i, t) { return this.pulses(i, t) / this.scale; }
+  velocity(i, t) {
+    const p = this.pieces, o = i * PIECE, u = (t - p[o]) / 1e9;
+    return (p[o + 2] + u * (2 * p[o + 3] + u * 3 * p[o + 4])) / this.scale;
+  }
+  isCurved(i, velocity) {
+    const o = i * PIECE;
+    return this.pieces[o + 4] !== 0 || (!velocity && this.pieces[o + 3] !== 0);
+  }
+  direction(i) { return this.pieces[i * PIECE + 6]; }
+  grid(i) { return this.pieces[i * PIECE + 7]; }
+  // STEP pulses given within piece i up to t.
+  given(i, t) {
+    const o = i * PIECE, direction = this.pieces[o + 6], grid = this.pieces[o + 7], count = this.pieces[o + 5];
+    if (direction === 0) return 0;
+    const all = i + 1 < this.size ? Math.round((this.pieces[o + PIECE + 5] - count) * direction / grid) : Infinity;
+    if (t >= this.end(i) && all !== Infinity) return Math.max(all, 0);
+    return Math.max(Math.min(Math.floor((this.pulses(i, t) - count) * direction / grid + 1e-9), all), 0);
+  }
+  count(t) {
+    const i = this.at(t), o = i * PIECE;
+    return this.pieces[o + 5] + this.direction(i) * this.grid(i) * this.given(i, t);
+  }
+  // The moment of pulse number k (from 1) of piece i.
+  pulseTime(i, k) {
+    const o = i * PIECE, direction = this.direction(i), wanted = (this.pieces[o + 5] + direction * this.grid(i) * k) * direction;
+    let low = this.begin(i), high = this.end(i);
+    while (high - low > 0.5) {
+      const middle = (low + high) / 2;
+      if (this.pulses(i, middle) * direction >= wanted) high = middle; else low = middle;
+    }
+    return Math.ceil(low);
+  }
+  nextPulse(t) {
+    for (let i = this.at(t); i < this.size; i++) {
+      const k = (i === this.at(t) ? this.given(i, t) : 0) + 1;
+      if (this.direction(i) !== 0 && k <= this.given(i, this.end(i))) return Math.max(this.pulseTime(i, k), t + 1);
+    }
+    return null;
+  }
+  previousPulse(t) {
+    for (let i = this.at(t - 1); i >= 0; i--) {
+      const k = this.given(i, Math.min(t - 1, this.end(i)));
+      if (k > 0) return Math.min(this.pulseTime(i, k), t - 1);
+    }
+    return null;
+  }
+  // Least and most of position or velocity in a stretch.
+  range(velocity, from, to) {
+    let least = Infinity, most = -Infinity;
+    for (let i = this.at(from); i < this.size && this.begin(i) <= to; i++) {
+      const a = Math.max(this.begin(i), from), b = Math.min(this.end(i), to);
+      for (const t of this.isCurved(i, velocity) ? [a, a + (b - a) / 3, a + (b - a) * 2 / 3, b] : [a, b]) {
+        const value = velocity ? this.velocity(i, t) : this.position(i, t);
+        if (value < least) least = value;
+        if (value > most) most = value;
+      }
+    }
+    return [least, most];
+  }
+}
+
+class Pin {
+  constructor(pin) {
+    this.changes = pin.changes;
+    this.before = pin.before;
+    this.size = pin.changes.length / 2;
+  }
+  level(t) {
+    const i = lastAt(this.changes, 2, t);
+    return i < 0 ? this.before : this.changes[2 * i + 1];
+  }
+  range(from, to) {
+    const levels = [0, this.level(from) ?? 0];
+    for (let i = lastAt(this.changes, 2, from) + 1; i < this.size && this.changes[2 * i] <= to; i++) levels.push(this.changes[2 * i + 1]);
+    return [levels.reduce((a, b) => Math.min(a, b)), levels.reduce((a, b) => Math.max(a, b))];
+  }
+}
+
+// ---------------------------------------------------------------------- lanes
+
+const HEIGHTS = { group: 28, position: 62, velocity: 46, step: 26, level: 24, analog: 40, frames: 40, statement: 24, marks: 24 };
+const COLORS = { position: "--position", velocity: "--velocity", step: "--step", level: "--level", analog: "--analog", frames: "--out", statement: "--statement" };
+const MARK_COLORS = { frame: "--in", statement: "--statement", event: "--event", input: "--input", fault: "--fault" };
+const MARK_NAMES = { event: "events", input: "inputs", fault: "faults" };
+
+// All lanes of a machine, in the order in which they are shown. Times of marks are in a flat list of their own for searching.
+function lanesOf(machine) {
+  const lanes = [];
+  for (const axis of DATA.axes.filter((axis) => axis.machine === machine)) {
+    const motion = new Motion(axis);
+    const common = { machine, motion, unit: axis.unit };
+    lanes.push({ ...common, kind: "position", name: `${axis.name} position`, first: true, range: motion.range(false, 0, SPAN) });
+    lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, range: motion.range(true, 0, SPAN) });
+    lanes.push({ ...common, kind: "step", name: `${axis.name} pulses` });
+  }
+  const pins = DATA.pins.filter((pin) => pin.machine === machine);
+  pins.forEach((pin, i) => {
+    const data = new Pin(pin);
+    lanes.push({ machine, kind: pin.analog ? "analog" : "level", name: pin.name, pin: data, first: i === 0, range: data.range(0, SPAN) });
+  });
+  const groups = new Map();
+  DATA.marks.forEach((mark, index) => {
+    const [, its, kind, subject] = mark;
+    if (its !== machine) return;
+    const name = kind === "frame" ? subject.split("/")[0] : kind === "statement" ? subject : MARK_NAMES[kind] ?? kind;
+    const key = `${kind} ${name}`;
+    if (!groups.has(key)) {
+      const lane = kind === "frame" ? "frames" : kind === "statement" ? "statement" : "marks";
+      groups.set(key, { machine, kind: lane, name, mark: kind, times: [], marks: [], first: groups.size === 0 });
+    }
+    groups.get(key).times.push(mark[0]);
+    groups.get(key).marks.push(index);
+  });
+  lanes.push(...groups.values());
+  for (const lane of lanes) {
+    lane.height = HEIGHTS[lane.kind];
+    lane.color = COLORS[lane.kind] ?? MARK_COLORS[lane.mark];
+  }
+  return lanes;
+}
+
+function nextChange(lane, t) {
+  if (lane.kind === "step") return lane.motion.nextPulse(t);
+  const [flat, size] = flatOf(lane);
+  const i = lastAt(flat, size, t) + 1;
+  return i * size < flat.length ? flat[i * size] : null;
+}
+
+function previousChange(lane, t) {
+  if (lane.kind === "step") return lane.motion.previousPulse(t);
+  const [flat, size] = flatOf(lane);
+  const i = lastAt(flat, size, t - 0.5);
+  return i >= 0 ? flat[i * size] : null;
+}
+
+function flatOf(lane) {
+  return lane.motion ? [lane.motion.pieces, PIECE] : lane.pin ? [lane.pin.changes, 2] : [lane.times, 1];
+}
+
+// ---------------------------------------------------------------------- texts
+
+function number(value, most = 6) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "?";
+  const text = Math.abs(value) < 1e15 ? Number(value.toPrecision(most)).toString() : value.toExponential(3);
+  return (text === "-0" ? "0" : text).replace("-", "−");
+}
+
+function valueText(lane, t) {
+  switch (lane.kind) {
+    case "position": return `${lane.motion.position(lane.motion.at(t), t).toFixed(lane.motion.scale === 1 ? 1 : 3).replace("-", "−")} ${lane.unit}`;
+    case "velocity": return `${number(lane.motion.velocity(lane.motion.at(t), t), 5)} ${lane.unit}/s`;
+    case "step": return `${number(lane.motion.count(t), 15)} imp`;
+    case "level": return lane.pin.level(t) ? "1" : "0";
+    case "analog": return lane.pin.level(t) === null ? "?" : `${number(lane.pin.level(t), 5)} V`;
+    case "group": return "";
+  }
+  const i = lastAt(lane.times, 1, t);
+  if (i < 0) return "";
+  const text = DATA.marks[lane.marks[i]][4];
+  return lane.kind === "statement" ? text : `${i + 1} of ${lane.times.length}`;
+}
+
+// A moment as seconds with nine digits in groups: 9.070 000 012 s
+function moment(t) {
+  const ns = Math.round(t + DATA.begin), sign = ns < 0 ? "−" : "";
+  const whole = Math.floor(Math.abs(ns) / 1e9), rest = String(Math.abs(ns) % 1e9).padStart(9, "0");
+  return `${sign}${whole}.${rest.slice(0, 3)}\u2009${rest.slice(3, 6)}\u2009${rest.slice(6)} s`;
+}
+
+function duration(ns) {
+  const size = Math.abs(ns);
+  const [unit, name] = size >= 1e9 ? [1e9, "s"] : size >= 1e6 ? [1e6, "ms"] : size >= 1e3 ? [1e3, "µs"] : [1, "ns"];
+  return `${number(ns / unit, 9)} ${name}`;
+}

@@ -1,0 +1,39 @@
+"""How far a long export is."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager
+from typing import TypeAlias
+
+from steptwin.machine import Nanos
+
+Progress: TypeAlias = Callable[[Nanos], None]
+"""Called with the moment up to which an export is done."""
+
+Watch: TypeAlias = Callable[[str, Nanos, Nanos], AbstractContextManager[Progress]]
+"""Called with what is done, from when and until when; gives whom to tell while it lasts."""
+
+
+def silent(_: Nanos) -> None:
+    """Nobody watches."""
+
+
+@contextmanager
+def unwatched(_what: str, _begin: Nanos, _until: Nanos) -> Generator[Progress]:
+    yield silent
+
+
+@contextmanager
+def bar(what: str, begin: Nanos, until: Nanos) -> Generator[Progress]:
+    """A bar on standard error, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task(what, total=max(until - begin, 1))
+        yield lambda done: shown.update(task, completed=done - begin)

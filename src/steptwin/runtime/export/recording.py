@@ -1,0 +1,185 @@
+"""A trace sorted into tracks, one for every axis and pin, and a window of time: what all exports begin with."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.motion import Profile, at_rest
+from steptwin.motion.divisions import StepTrain
+from steptwin.runtime.export.axes import AxisView, AxisViews, plain_view
+from steptwin.world.trace import Record, Trace
+
+Plan: TypeAlias = Profile | StepTrain
+
+
+def profile_of(plan: Plan) -> Profile:
+    return plan.profile if isinstance(plan, StepTrain) else plan
+
+
+@dataclass(slots=True)
+class AxisTrack:
+    """The plans of an axis: each counts from its moment to that of the next. There is one at the beginning of the window."""
+
+    machine: str
+    view: AxisView
+    times: list[Nanos] = field(default_factory=list)
+    plans: list[Plan] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return f"{self.machine}.{self.view.name}"
+
+    def plan(self, now: Nanos) -> Plan:
+        return self.plans[max(bisect_right(self.times, now) - 1, 0)]
+
+    def stretches(self, after: Nanos, until: Nanos) -> Iterator[tuple[Plan, Nanos, Nanos]]:
+        """(plan, after, until) of every plan in force between; pulses at ``until`` belong to the plan before it."""
+        i = max(bisect_right(self.times, after) - 1, 0)
+        for plan in self.plans[i:]:
+            i += 1
+            end = min(self.times[i], until) if i < len(self.times) else until
+            if after < end:
+                yield plan, after, end
+            after = max(after, end)
+            if after >= until:
+                return
+
+    def most_pulses(self, after: Nanos, until: Nanos) -> int:
+        """How many pulses there are, or more: the whole positions passed."""
+        return sum(_passed(profile_of(plan), begin, end) for plan, begin, end in self.stretches(after, until))
+
+
+def _passed(profile: Profile, after: Nanos, until: Nanos) -> int:
+    count = profile.count(max(after, profile.start))
+    passed = 0
+    for end, reached in zip(profile.ends, profile.counts[1:], strict=False):
+        if after < profile.start + end < until:
+            passed += abs(profile.base + reached - count)
+            count = profile.base + reached
+    return passed + abs(profile.count(max(until, profile.start)) - count)
+
+
+@dataclass(slots=True)
+class PinTrack:
+    """The levels of a pin: each counts from its moment to that of the next."""
+
+    machine: str
+    pin: str
+    times: list[Nanos] = field(default_factory=list)
+    levels: list[float] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return f"{self.machine}.{self.pin}"
+
+    @property
+    def analog(self) -> bool:
+        return self.pin.startswith("AIN") or any(level not in (0.0, 1.0) for level in self.levels)
+
+    def level(self, now: Nanos) -> float | None:
+        """The level at ``now``. Before its first change a digital pin had the other one; that of an analog pin is unknown."""
+        i = bisect_right(self.times, now)
+        if i:
+            return self.levels[i - 1]
+        return None if self.analog else 1.0 - self.levels[0]
+
+    def changes(self, after: Nanos, until: Nanos) -> Iterator[tuple[Nanos, float]]:
+        """Changes with ``after`` < time <= ``until``; of several at one moment the last."""
+        for i in range(bisect_right(self.times, after), bisect_right(self.times, until)):
+            if i + 1 == len(self.times) or self.times[i + 1] != self.times[i]:
+                yield self.times[i], self.levels[i]
+
+
+@dataclass(slots=True)
+class Recording:
+    """What happened from ``begin`` to ``until``."""
+
+    begin: Nanos
+    until: Nanos
+    machines: list[str]
+    axes: list[AxisTrack]
+    pins: list[PinTrack]
+    marks: list[Record]
+    """Frames, statements, events, inputs and faults, in order."""
+
+    def of(self, kind: str) -> list[Record]:
+        return [record for record in self.marks if record.kind == kind]
+
+
+def sort_out(
+    trace: Trace,
+    views: AxisViews,
+    begin: Nanos = 0,
+    until: Nanos | None = None,
+    machines: Collection[str] | None = None,
+) -> Recording:
+    """The tracks of ``machines`` (all of them by default) in a window of time; without ``until`` up to where all is at rest.
+
+    Raises `Misuse` for machines that are not in the trace and for a window that ends before it begins.
+    """
+    unknown = sorted(set(machines or ()) - set(trace.machines))
+    if unknown:
+        raise Misuse(f"no machine {unknown[0]!r} in the trace: there are {', '.join(trace.machines) or 'none'}")
+    chosen = [name for name in trace.machines if machines is None or name in machines]
+    axes: dict[tuple[str, str], AxisTrack] = {}
+    pins: dict[tuple[str, str], PinTrack] = {}
+    marks: list[Record] = []
+    last = begin
+    for record in trace:
+        time, machine, kind, subject, value = record
+        if machine not in chosen:
+            continue
+        if until is not None and time > until:
+            break
+        last = max(last, time)
+        if isinstance(value, (Profile, StepTrain)) and kind == "plan":
+            _axis(axes, machine, subject, views).times.append(time)
+            axes[machine, subject].plans.append(value)
+            last = max(last, profile_of(value).end or time)
+        elif isinstance(value, (int, float)) and kind == "edge":
+            track = pins.setdefault((machine, subject), PinTrack(machine, subject))
+            track.times.append(time)
+            track.levels.append(float(value))
+        elif time >= begin:
+            marks.append(record)
+    end = last if until is None else until
+    if end < begin:
+        raise Misuse(f"the window of time ends at {end} ns and begins at {begin} ns: it must not end before it begins")
+    order = {name: i for i, name in enumerate(chosen)}
+    for track in axes.values():
+        _stand_before(track, begin)
+    return Recording(
+        begin,
+        end,
+        chosen,
+        sorted(axes.values(), key=lambda track: (order[track.machine], _numbers(track.view.name))),
+        sorted(pins.values(), key=lambda track: (order[track.machine], _numbers(track.pin))),
+        marks,
+    )
+
+
+def _axis(axes: dict[tuple[str, str], AxisTrack], machine: str, subject: str, views: AxisViews) -> AxisTrack:
+    track = axes.get((machine, subject))
+    if track is None:
+        view = views.get((machine, subject)) or plain_view(subject)
+        track = axes[machine, subject] = AxisTrack(machine, view)
+    return track
+
+
+def _stand_before(track: AxisTrack, begin: Nanos) -> None:
+    """Before its first plan an axis stood where that begins."""
+    if track.times[0] > begin:
+        first = profile_of(track.plans[0])
+        track.times.insert(0, begin)
+        track.plans.insert(0, at_rest(begin, first.count(first.start)))
+
+
+def _numbers(name: str) -> list[str | int]:
+    """Orders IN2 before IN10."""
+    return [int(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+)", name))]

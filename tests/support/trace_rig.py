@@ -1,0 +1,90 @@
+"""Traces of real runs for tests of what reads them: a MIC488 with four axes homing, moving, running into limits."""
+
+from __future__ import annotations
+
+from mic488_rig import EN, OUT, STOP, Rig
+
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Event
+from steptwin.runtime.demo import demo_config, place_switches
+from steptwin.world.trace import Record, Trace
+
+
+class TracedRig(Rig):
+    """A `Rig` that writes down what happens: plans, edges of all pins, frames, events."""
+
+    def __init__(self) -> None:
+        super().__init__(demo_config())
+        self.trace = Trace(["m"])
+        self._levels: dict[str, float] = {}
+        self._revisions = [-1] * 4
+        self._events: list[Event] = []
+        self.device.on_event = self._events.append
+        place_switches(self.kernel, "m")
+        self._look()
+
+    def _look(self) -> None:
+        now = self.kernel.now
+        for n, axis in enumerate(self.device.axes):
+            if axis.revision != self._revisions[n]:
+                self._revisions[n] = axis.revision
+                self._note(now, "plan", str(n + 1), axis.profile)
+        levels = dict(self.device.pins())
+        for pin, level in levels.items():
+            if self._levels.get(pin) != level and (self._levels or level):
+                self._note(now, "edge", pin, level)
+        self._levels = levels
+        for event in self._events:
+            self._note(now, "event", event.code, event.text)
+        self._events.clear()
+
+    def _note(self, time: Nanos, kind: str, subject: str, value: object) -> None:
+        self.trace.add(Record(time, "m", kind, subject, value))
+
+    def wait_ns(self, nanoseconds: int) -> None:
+        end = self.now + nanoseconds
+        while (due := self.kernel.deadline()) is not None and due <= end:
+            super().wait_ns(due - self.now)
+            self._look()
+        super().wait_ns(end - self.now)
+
+    def pin(self, pin: str, value: float) -> None:
+        super().pin(pin, value)
+        self._note(self.now, "input", "pin", f"{pin} = {value:g}")
+        self._look()
+
+    def ask(self, pdu: bytes) -> bytes:
+        self._note(self.now, "frame", "tcp-1/in", pdu)
+        response = super().ask(pdu)
+        self._look()
+        self._note(self.now, "frame", "tcp-1/out", response)
+        return response
+
+
+def mic488_run() -> TracedRig:
+    """22 s: all axes home, M1 and M2 go back and forth, M3 runs into its switch, M4 is stopped; outputs and an analog input."""
+    rig = TracedRig()
+    rig.wait(0.25)
+    for axis in range(4):
+        rig.coil(EN + axis, True)
+        rig.set("HOME", (-12.0, -20.0, -16.0, -9.0)[axis], axis + 1)
+    rig.wait(5.0)
+    for turn in range(3):
+        rig.coil(OUT + turn, True)
+        rig.set("POS_ABS", (40.0, 8.0, 25.0)[turn], 1)
+        rig.wait(0.15)
+        rig.set("POS_ABS", (30.0, 55.0, 2.5)[turn], 2)
+        if turn == 1:
+            rig.set("VEL_ABS", 24.0, 3)
+            rig.set("VEL_ABS", -15.0, 4)
+        for sample in range(14):
+            rig.pin("AIN1", round(5.0 + 4.5 * (sample % 7 - 3) / 3, 3))
+            rig.wait(0.25)
+            rig.position(1 + sample % 4)
+        rig.coil(OUT + turn, False)
+    rig.coil(STOP + 3, True)
+    rig.pin("IN20", 1.0)
+    rig.wait(0.4)
+    rig.pin("IN20", 0.0)
+    rig.wait(5.0)
+    return rig
