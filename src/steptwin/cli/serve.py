@@ -26,6 +26,10 @@ def mic488(
     tcp: Annotated[str | None, typer.Option(help="Modbus TCP on HOST:PORT; port 0 takes a free one.")] = None,
     rtu_tcp: Annotated[str | None, typer.Option(help="RTU frames over TCP on HOST:PORT.")] = None,
     config: Annotated[Path | None, typer.Option(help="The vendor tool's .cfg file.")] = None,
+    program: Annotated[
+        list[str] | None, typer.Option(help="WBC program (.prg) for a bank: BANK=FILE; repeatable. FILE alone is for bank 0.")
+    ] = None,
+    positions: Annotated[list[str] | None, typer.Option(help="Position table (.csv) for a bank: BANK=FILE; repeatable.")] = None,
     state: Annotated[
         Path | None, typer.Option(help="Directory of the non-volatile memory. Without it, memory ends with the twin.")
     ] = None,
@@ -65,6 +69,8 @@ def mic488(
             tcp=tcp,
             rtu_tcp=rtu_tcp,
             config=config,
+            programs=tuple(program or ()),
+            positions=tuple(positions or ()),
             state=state,
             lenient=lenient,
             line_timing=line_timing,
@@ -80,7 +86,7 @@ def mic488(
 
 @app.command()
 def m1486(
-    variant: Annotated[str, typer.Option(help="Type: A, B, C, E1, E2, or A2x and so on (24 MHz).")] = "B",
+    variant: Annotated[str, typer.Option(help="Type: A, B, C, E1, E2, or A2x and so on (24 MHz).")] = "A",
     chain: Annotated[str, typer.Option(help="Addresses of the chips on the line, such as 0,7; hexadecimal digits.")] = "F",
     interface: Annotated[str, typer.Option(help="Driver interface: sd, dual or two.")] = "sd",
     wire: Annotated[

@@ -10,7 +10,7 @@ import typer
 from steptwin.errors import Misuse
 
 Twin = Annotated[str | None, typer.Option(help="Name of the twin; default: the only one running.")]
-Unit = Annotated[int | None, typer.Option(help="Unit, where the twin serves several.")]
+Unit = Annotated[str | None, typer.Option(help="Unit, where the twin serves several: slave address, or address of a chip.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
@@ -71,6 +71,9 @@ def state(twin: Twin = None, unit: Unit = None, json: Json = False) -> None:
     if json:
         _print_json(shown)
         return
+    if shown.get("controller") == "M1486":
+        typer.echo("\n".join(_m1486_lines(shown)))
+        return
     typer.echo(f"firmware {shown['firmware']}, {shown['time_s']:.1f} s after power-on, program {shown['program']['state']}")
     for axis in shown["axes"]:
         unit_name = axis["unit"]
@@ -82,9 +85,32 @@ def state(twin: Twin = None, unit: Unit = None, json: Json = False) -> None:
     typer.echo(f"on: {', '.join(on) or 'nothing'}")
 
 
+def _m1486_lines(shown: dict[str, Any]) -> list[str]:
+    program, motion, buffer = shown["program"], shown["motion"], shown["input_buffer"]
+    where = f"{motion['position']}{'' if motion['position_valid'] else ' (not valid)'}, true {motion['true_position']}"
+    room = f"input buffer {buffer['waiting']} of {buffer['size']} characters"
+    low = [name for name, value in shown["pins"].items() if not value]
+    return [
+        f"M1486{shown['variant']} at address {shown['address']}, {shown['baud']} bit/s, {shown['time_s']:.1f} s after power-on",
+        f"program  {program['does']}{'' if program['next'] is None else ', next: ' + program['next']}",
+        f"memory   {program['memory_bits']} of {program['memory_size_bits']} bits, {room}",
+        f"position {where}, {motion['velocity']:.1f} step/s, {motion['is']}",
+        "settings " + " ".join(f"{name}{shown['settings'][name]}" for name in "SAPVMQN"),
+        f"variable {shown['variable']}, flags on: {_numbers(shown['flags_on'])}, functions on: {_numbers(shown['functions_on'])}",
+        f"low      {', '.join(low) or 'nothing'}",
+    ]
+
+
+def _numbers(numbers: list[int]) -> str:
+    return " ".join(map(str, numbers)) or "none"
+
+
 def _ask(twin: str | None, request: dict[str, object]) -> Any:
     from steptwin.runtime.control import ask
 
+    unit = request.get("unit")
+    if isinstance(unit, str) and unit.isdecimal():
+        request = {**request, "unit": int(unit)}
     return ask(twin, request)
 
 

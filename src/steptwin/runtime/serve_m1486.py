@@ -14,7 +14,7 @@ from steptwin.m1486.check import check
 from steptwin.m1486.chip import baud_pins
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.lines import interface
-from steptwin.m1486.variants import Store, Variant, variant
+from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.lines import Face, Lines
@@ -34,7 +34,7 @@ CHARACTERS = "M1486 line"
 class M1486Options:
     """The command's options as given; see ``steptwin serve m1486 --help``."""
 
-    variant: str = "B"
+    variant: str = DEFAULT.name
     chain: str = "F"
     interface: str = "sd"
     wires: tuple[str, ...] = ()

@@ -1,0 +1,100 @@
+"""``steptwin run``: a program in virtual time, and what it does when. Exit code 1 if something in it went wrong.
+
+From Python: `steptwin.runtime.run_m1486.run` and its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from steptwin.errors import Misuse
+
+if TYPE_CHECKING:
+    from steptwin.machine import Nanos
+    from steptwin.runtime.timedinputs import TimedInput
+
+
+@dataclass(frozen=True)
+class Options:
+    """What was asked for on the command line; None where nothing was said."""
+
+    limit: Nanos | None
+    until_idle: bool
+    inputs: list[TimedInput]
+    trace: Path | None
+    as_json: bool
+    variant: str | None = None
+    interface: str | None = None
+    wire: list[str] | None = None
+
+    def refuse(self, files: str, *names: str) -> None:
+        """Raises `Misuse` when one of these options was given, which mean nothing for such files."""
+        for name in names:
+            if getattr(self, name):
+                raise Misuse(f"--{name} is not for {files}")
+
+
+def run(
+    file: Annotated[Path, typer.Argument(help="What to run; its suffix says what it is: .m1486.")],
+    duration: Annotated[
+        str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until idle.")
+    ] = None,
+    until: Annotated[
+        str | None, typer.Option(metavar="idle", help="'idle': ends also where nothing would happen any more without input.")
+    ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="PIN=VALUE@TIME,...", help="Changes of inputs: B3=0@1.5s,B3=1@2s. 7.B3 names the chip."),
+    ] = None,
+    trace: Annotated[
+        Path | None, typer.Option(help="Write what happened to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    variant: Annotated[str | None, typer.Option(help="M1486: type A, B, C, E1, E2, or A2x and so on. Default A.")] = None,
+    interface: Annotated[str | None, typer.Option(help="M1486: driver interface sd, dual or two. Default sd.")] = None,
+    wire: Annotated[
+        list[str] | None, typer.Option(help="M1486: from a pin of one chip to an input of another, 0.B1=7.B3. Again for more.")
+    ] = None,
+) -> None:
+    """Run a program in virtual time: its moves, waits, outputs and uploads with their times."""
+    from steptwin.runtime.timedinputs import parse_duration, parse_inputs
+
+    runner = _RUNNERS.get(file.suffix.lower())
+    if runner is None:
+        raise Misuse(f"{file}: what is to be run is told by its suffix: {', '.join(_RUNNERS)}")
+    if until not in (None, "idle"):
+        raise Misuse(f"--until {until}: permitted is 'idle'")
+    limit = None if duration is None else parse_duration(duration, "--for")
+    if limit == 0:
+        raise Misuse(f"--for {duration}: must be more than 0")
+    changes = parse_inputs(",".join(inputs or []))
+    if not runner(file, Options(limit, until == "idle", changes, trace, as_json, variant, interface, wire)):
+        raise typer.Exit(1)
+
+
+def _run_m1486(file: Path, options: Options) -> bool:
+    from steptwin.m1486.variants import DEFAULT
+    from steptwin.runtime.run_m1486 import M1486Run
+    from steptwin.runtime.run_m1486 import run as run_program
+
+    wanted = M1486Run(
+        program=file,
+        variant=options.variant or DEFAULT.name,
+        interface=options.interface or "sd",
+        wires=tuple(options.wire or ()),
+        limit=options.limit,
+        until_idle=options.until_idle,
+        inputs=tuple(options.inputs),
+        trace=options.trace,
+        as_json=options.as_json,
+    )
+    return run_program(wanted, typer.echo, lambda text: typer.echo(text, err=True))
+
+
+#: What runs each kind of file; True when nothing went wrong.
+_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {".m1486": _run_m1486}
