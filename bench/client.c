@@ -1,5 +1,8 @@
 /* A fast closed-loop client: every connection sends its request, waits for the whole answer, sends again.
  *
+ * It never sleeps while it measures: waking a client is work of the server, and how often a client sleeps depends on the
+ * server's speed, so that a sleeping client would make the slower server slower still.
+ *
  * client tcp PORT CONNECTIONS SECONDS REQUEST_HEX            as fast as answers come
  * client rate PORT CONNECTIONS SECONDS REQUEST_HEX HERTZ     each connection HERTZ times a second
  * client tty PATH ANSWER_BYTES SECONDS REQUEST_HEX           over a terminal; PATH may be fd:NUMBER, an open one
@@ -103,7 +106,7 @@ static void tcp(int port, int count, double seconds, const unsigned char *reques
         else ask(&all[i], request, size);
     }
     while (now_ns() < end) {
-        int wait = 100;
+        int wait = 0;
         /* Due times are evenly spread, so one pointer going round finds the next of them. */
         while (period) {
             uint64_t t = now_ns();
@@ -144,7 +147,10 @@ static void tty(const char *path, int answer, double seconds, const unsigned cha
         if (write(fd, request, (size_t)size) != size) die("write");
         for (int got = 0; got < answer;) {
             struct pollfd p = {fd, POLLIN, 0};
-            if (poll(&p, 1, 2000) <= 0) { fprintf(stderr, "no answer on %s\n", path); exit(1); }
+            int ready = poll(&p, 1, 0);
+            if (ready < 0) die("poll");
+            if (!ready && now_ns() - sent > 2000000000u) { fprintf(stderr, "no answer on %s\n", path); exit(1); }
+            if (!ready) continue;
             ssize_t n = read(fd, data, sizeof data);
             if (n <= 0) die("read");
             got += (int)n;
