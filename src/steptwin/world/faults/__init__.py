@@ -1,0 +1,35 @@
+"""Faults, seeded and targeted: bytes, frames, protocol, physics.
+
+`parse` and `read` make a `Fault` of a table or a line of text; `Faults` is the set of those that are set. A `FaultyPort` stands
+between a link and a port, `rig` lets a machine in its kernel have faults. `steptwin fault --kinds` shows `KINDS`.
+"""
+
+from steptwin.world.faults.active import Active, Faults
+from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, parse, read, schema
+from steptwin.world.faults.machine import Body, FaultyMachine, Shaft, rig
+from steptwin.world.faults.mic488 import Mic488Body
+from steptwin.world.faults.port import FaultyPort
+from steptwin.world.faults.table import KINDS, Kind, Layer, Line, Occasion, Parameter
+
+__all__ = [
+    "EXAMPLE",
+    "GRAMMAR",
+    "KINDS",
+    "Active",
+    "Body",
+    "Fault",
+    "Faults",
+    "FaultyMachine",
+    "FaultyPort",
+    "Kind",
+    "Layer",
+    "Line",
+    "Mic488Body",
+    "Occasion",
+    "Parameter",
+    "Shaft",
+    "parse",
+    "read",
+    "rig",
+    "schema",
+]

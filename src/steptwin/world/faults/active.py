@@ -1,0 +1,244 @@
+"""Faults that are set: when each one strikes, and the set of them that ports and machines ask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.state import Stateful
+from steptwin.world.chance import Chance
+from steptwin.world.faults.fault import Fault
+from steptwin.world.faults.table import Layer
+from steptwin.world.trace import Record, Recorder
+
+if TYPE_CHECKING:
+    from steptwin.world.faults.machine import FaultyMachine
+
+_MULTIPLE = 0x10
+_LAST_WITH_COUNT = 4
+_LAST_ADDRESSED = 6
+
+
+class Active(Stateful):
+    """A fault that is set, what it has seen so far, and its stream of chance. Times count from ``since``."""
+
+    __slots__ = (
+        "_count",
+        "_every",
+        "_from",
+        "_nth",
+        "_probability",
+        "_until",
+        "chance",
+        "due",
+        "fault",
+        "left",
+        "name",
+        "seen",
+        "since",
+        "struck",
+        "worn",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset(
+        {"_count", "_every", "_from", "_nth", "_probability", "_until", "fault", "name", "since"}
+    )
+
+    def __init__(self, fault: Fault, name: str, seed: int, since: Nanos) -> None:
+        self.fault = fault
+        self.name = name
+        self.since = since
+        self._from = self._moment("from_s") or since
+        self._until = self._moment("until_s")
+        self._nth = fault.whole("nth")
+        self._every = fault.whole("every") or 1
+        self._count = fault.whole("count")
+        self._probability = fault.number("probability") if fault.kind.parameter("probability") else 1.0
+        self.chance = Chance(seed, name)
+        self.seen = 0
+        """Occasions so far."""
+        self.struck = 0
+        """How often it happened."""
+        self.left = 0
+        """Bytes still to be lost."""
+        self.due: Nanos | None = self._moment("at_s")
+        """The next moment of a fault that comes by itself."""
+        self.worn: list[int] = []
+        """Places in the memory that keep what they have."""
+
+    def _moment(self, name: str) -> Nanos | None:
+        seconds = self.fault.get(name)
+        return None if not isinstance(seconds, float) else self.since + round(seconds * SECOND)
+
+    @property
+    def begin(self) -> Nanos:
+        return self._from
+
+    @property
+    def end(self) -> Nanos | None:
+        return self._until
+
+    def strikes(self, now: Nanos) -> bool:
+        """An occasion for this fault has come: whether it happens."""
+        if now < self._from or (self._until is not None and now > self._until):
+            return False
+        if self._count is not None and self.struck >= self._count:
+            return False
+        self.seen += 1
+        if (self._nth is not None and self.seen != self._nth) or self.seen % self._every:
+            return False
+        if self._probability < 1.0 and not self.chance.happens(self._probability):
+            return False
+        self.struck += 1
+        return True
+
+    def step(self) -> None:
+        """The moment ``due`` has come: find the next one."""
+        period = self.fault.get("period_s")
+        if self.due is None or not isinstance(period, float):
+            self.due = None
+            return
+        self.due += max(1, round(period * SECOND))
+        if (self._until is not None and self.due > self._until) or (self._count is not None and self.struck >= self._count):
+            self.due = None
+
+    def ns(self, name: str) -> Nanos:
+        """A duration, whichever unit its name has."""
+        return round(self.fault.number(name) * (SECOND if name.endswith("_s") else SECOND // 1000))
+
+    def matches(self, unit: int, pdu: bytes) -> bool:
+        """Whether a request is addressed."""
+        get = self.fault.get
+        wanted, function, span = get("unit"), get("function"), get("address")
+        if (wanted is not None and wanted != unit) or (function is not None and (not pdu or pdu[0] != function)):
+            return False
+        if not isinstance(span, tuple):
+            return True
+        touched = addresses(pdu)
+        return touched is not None and touched.start <= span[1] and span[0] < touched.stop
+
+    def is_on(self, link: str) -> bool:
+        wanted = self.fault.get("link")
+        return wanted is None or wanted == link
+
+
+def addresses(pdu: bytes) -> range | None:
+    """What a request touches; None where it names no addresses."""
+    if len(pdu) < 5 or not (0 < pdu[0] <= _LAST_ADDRESSED or pdu[0] == _MULTIPLE):
+        return None
+    first = pdu[1] << 8 | pdu[2]
+    single = _LAST_WITH_COUNT < pdu[0] <= _LAST_ADDRESSED
+    return range(first, first + (1 if single else pdu[3] << 8 | pdu[4]))
+
+
+class Faults(Stateful):
+    """The faults of a world or of a served twin. ``seed`` and the name of a fault are all that its chance comes from.
+
+    ``sinks`` are told of everything that happens, as records of kind ``fault``, and of the edges that faults make. Setting and
+    removing faults is for whoever builds the world or stands at the machine, not part of a snapshot: it is restored into the
+    same set of faults.
+    """
+
+    __slots__ = ("_watchers", "active", "link", "machines", "seed", "sinks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_watchers", "link", "machines", "seed", "sinks"})
+
+    def __init__(self, seed: int = 0) -> None:
+        self.seed = seed
+        self.active: tuple[Active, ...] = ()
+        self.sinks: list[Recorder] = []
+        self.machines: dict[str, FaultyMachine] = {}
+        """Machines whose physics can go wrong."""
+        self.link = ""
+        """The link whose request is being served."""
+        self._watchers: list[Callable[[], None]] = []
+
+    def add(self, fault: Fault, now: Nanos = 0) -> Active:
+        """Set a fault at ``now``. `Misuse` for a name that is taken, a machine, pin or axis that is not there."""
+        if fault.name and self._named(fault.name) is not None:
+            raise Misuse(f"there is a fault {fault.name!r} already")
+        active = Active(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
+        machine = None
+        if fault.kind.layer is Layer.PHYSICS:
+            machine = self._machine(fault)
+            machine.check(fault)
+        self.active = (*self.active, active)
+        if machine is not None:
+            machine.begin(active)
+        self._changed()
+        return active
+
+    def remove(self, name: str, now: Nanos) -> Active:
+        """Take a fault away; what it holds is let go. `Misuse` with the names there are."""
+        active = self._named(name)
+        if active is None:
+            raise Misuse(f"no fault {name!r}: set are {', '.join(a.name for a in self.active) or 'none'}")
+        self.active = tuple(a for a in self.active if a is not active)
+        if active.fault.kind.layer is Layer.PHYSICS:
+            self._machine(active.fault).end(active, now)
+        self._changed()
+        return active
+
+    def clear(self, now: Nanos) -> None:
+        for active in self.active:
+            self.remove(active.name, now)
+
+    def _named(self, name: str) -> Active | None:
+        return next((active for active in self.active if active.name == name), None)
+
+    def _free_name(self, kind: str) -> str:
+        name, number = kind, 1
+        while self._named(name) is not None:
+            number += 1
+            name = f"{kind}-{number}"
+        return name
+
+    def _machine(self, fault: Fault) -> FaultyMachine:
+        wanted = fault.get("machine")
+        if wanted is None and len(self.machines) == 1:
+            return next(iter(self.machines.values()))
+        there = ", ".join(self.machines) or "none"
+        if wanted is None:
+            raise Misuse(f"fault {fault.kind.name}: choose a machine: there are {there}")
+        machine = self.machines.get(str(wanted))
+        if machine is None:
+            raise Misuse(f"fault {fault.kind.name}: machine = {wanted!r}: there are {there}")
+        return machine
+
+    def of(self, machine: str) -> list[Active]:
+        """The faults of physics of a machine."""
+        only = len(self.machines) == 1
+        return [
+            active
+            for active in self.active
+            if active.fault.kind.layer is Layer.PHYSICS
+            and (active.fault.get("machine") == machine or (only and not active.fault.get("machine")))
+        ]
+
+    def refusing(self) -> list[Active]:
+        """The faults that keep a request from being carried out."""
+        return [
+            a
+            for a in self.active
+            if a.fault.kind.layer is Layer.PROTOCOL or (a.fault.kind.name == "no-answer" and a.fault.get("lost") == "request")
+        ]
+
+    def watch(self, watcher: Callable[[], None]) -> None:
+        """Call ``watcher`` whenever faults are set or removed."""
+        self._watchers.append(watcher)
+
+    def unwatch(self, watcher: Callable[[], None]) -> None:
+        if watcher in self._watchers:
+            self._watchers.remove(watcher)
+
+    def _changed(self) -> None:
+        for watcher in list(self._watchers):
+            watcher()
+
+    def tell(self, active: Active, place: str, now: Nanos, text: str) -> None:
+        """A fault has happened to a machine or link."""
+        self.record(Record(now, place, "fault", active.name, text))
+
+    def record(self, record: Record) -> None:
+        for sink in self.sinks:
+            sink(record)

@@ -1,0 +1,145 @@
+"""A fault as a value: from a table of a TOML file, from a line of text, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from steptwin.errors import Misuse
+from steptwin.world.faults.table import KINDS, Form, Kind, Parameter, Value, check
+
+GRAMMAR = "KIND [NAME=VALUE ...]"
+EXAMPLE = "crc unit=1 nth=3"
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """``given`` are the parameters that were given; ``name`` tells it from others of its kind, empty: not said."""
+
+    kind: Kind
+    given: Mapping[str, Value]
+    name: str = ""
+
+    def get(self, name: str) -> Value | None:
+        """A parameter, else its default, else None."""
+        value = self.given.get(name)
+        if value is None:
+            parameter = self.kind.parameter(name)
+            return None if parameter is None else parameter.default
+        return value
+
+    def number(self, name: str) -> float:
+        """A parameter that is a number and has a default or was given. `Misuse` if it is none."""
+        value = self.get(name)
+        if isinstance(value, int | float):
+            return value
+        raise Misuse(f"fault {self.kind.name}: {name} = {value!r} is no number")
+
+    def whole(self, name: str) -> int | None:
+        value = self.get(name)
+        return value if isinstance(value, int) else None
+
+    def __str__(self) -> str:
+        """The line that `read` makes this of."""
+        name = {"name": self.name} if self.name else {}
+        parts = [self.kind.name, *(f"{key}={_text(value)}" for key, value in (name | dict(self.given)).items())]
+        return " ".join(parts)
+
+
+def _text(value: Value) -> str:
+    if isinstance(value, tuple):
+        return str(value[0]) if value[0] == value[1] else f"{value[0]}-{value[1]}"
+    return (
+        repr(value)
+        if isinstance(value, float) and value != int(value)
+        else f"{value:.0f}"
+        if isinstance(value, float)
+        else f"{value}"
+    )
+
+
+def parse(mapping: Mapping[str, object], place: str = "fault") -> Fault:
+    """The fault in ``{"kind": "crc", "unit": 1, "nth": 3}``. `Misuse` names key, value, what is permitted, and ``place``."""
+    word = mapping.get("kind")
+    kind = KINDS.get(word) if isinstance(word, str) else None
+    if kind is None:
+        raise Misuse(f"{place}: kind = {word!r}: permitted are {', '.join(KINDS)}")
+    name = mapping.get("name", "")
+    if not isinstance(name, str) or " " in name:
+        raise Misuse(f"{place}: name = {name!r}: permitted is text without blanks")
+    place = f"{place} ({kind.name})"
+    given: dict[str, Value] = {}
+    for key, value in mapping.items():
+        if key not in ("kind", "name"):
+            parameter = kind.parameter(key)
+            if parameter is None:
+                raise Misuse(f"{place}: there is no {key!r}: parameters are {', '.join(p.name for p in kind.parameters)}")
+            given[key] = check(parameter, value, f"{place}: {key}")
+    for parameter in kind.parameters:
+        if parameter.is_required and parameter.name not in given:
+            raise Misuse(f"{place}: {parameter.name} is missing: {parameter.meaning[:1].lower()}{parameter.meaning[1:]}")
+    if "nth" in given and "every" in given:
+        raise Misuse(f"{place}: nth and every exclude each other")
+    fault = Fault(kind, given, name)
+    begin, end = fault.get("from_s") or fault.get("at_s") or 0.0, fault.get("until_s")
+    if isinstance(begin, float) and isinstance(end, float) and end < begin:
+        raise Misuse(f"{place}: until_s = {end:g} is before the fault begins at {begin:g} s")
+    return fault
+
+
+def read(line: str) -> Fault:
+    """The fault in a line such as ``crc unit=1 nth=3``. `Misuse` as for `parse`."""
+    words = line.split()
+    if not words:
+        raise Misuse(f"a fault is {GRAMMAR}, such as {EXAMPLE!r}; kinds are {', '.join(KINDS)}")
+    mapping: dict[str, object] = {"kind": words[0]}
+    kind = KINDS.get(words[0])
+    for word in words[1:]:
+        key, equals, text = word.partition("=")
+        if not equals or not key:
+            raise Misuse(f"fault {line!r}: {word!r} is not NAME=VALUE")
+        if key in mapping:
+            raise Misuse(f"fault {line!r}: {key} is given twice")
+        parameter = kind.parameter(key) if kind is not None else None
+        mapping[key] = text if parameter is None else _value(parameter, text)
+    return parse(mapping)
+
+
+def _value(parameter: Parameter, text: str) -> object:
+    """A number where the text is one; everything else is for `check` to refuse."""
+    if parameter.form in (Form.WHOLE, Form.NUMBER):
+        try:
+            return int(text, 0) if parameter.form is Form.WHOLE else float(text)
+        except ValueError:
+            return text
+    return text
+
+
+def schema() -> dict[str, object]:
+    """JSON schema of a ``[[fault]]`` table of a TOML file."""
+    return {"oneOf": [_object(kind) for kind in KINDS.values()]}
+
+
+def _object(kind: Kind) -> dict[str, object]:
+    properties: dict[str, object] = {"kind": {"const": kind.name, "description": kind.meaning}, "name": {"type": "string"}}
+    properties |= {parameter.name: _property(parameter) for parameter in kind.parameters}
+    required = ["kind", *(parameter.name for parameter in kind.parameters if parameter.is_required)]
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+
+
+def _property(parameter: Parameter) -> dict[str, object]:
+    shown: dict[str, object] = {"description": parameter.meaning}
+    numeric = {"minimum": parameter.least, "maximum": parameter.most}
+    match parameter.form:
+        case Form.WHOLE | Form.NUMBER:
+            kind = "integer" if parameter.form is Form.WHOLE else "number"
+            shown |= {"type": kind, **{key: bound for key, bound in numeric.items() if bound is not None}}
+        case Form.SPAN:
+            shown["type"] = ["integer", "string"]
+        case _:
+            shown["type"] = "string"
+            if parameter.words:
+                shown["enum"] = list(parameter.words)
+    if parameter.default is not None:
+        shown["default"] = parameter.default
+    return shown

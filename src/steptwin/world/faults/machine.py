@@ -1,0 +1,325 @@
+"""Faults of physics: what goes wrong with the inputs, shafts, supply and memory of a machine, and which requests it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Protocol
+
+from steptwin.errors import Misuse
+from steptwin.machine import Edge, Nanos
+from steptwin.state import Stateful
+from steptwin.wire.pdu import DEVICE_BUSY, exception_pdu
+from steptwin.world.faults.active import Active, Faults
+from steptwin.world.faults.answers import NEVER_SENT
+from steptwin.world.faults.fault import Fault
+from steptwin.world.faults.table import Layer, Occasion
+from steptwin.world.kernel import Drive, DrivingMachine, Kernel
+from steptwin.world.trace import Record
+
+
+class Shaft(Protocol):
+    """What an axis moves. All take the moment."""
+
+    def block(self, blocked: bool, now: Nanos) -> None:
+        """Hold the shaft: the drive's pulses turn nothing; let it go again."""
+        ...
+
+    def lose(self, pulses: int, now: Nanos) -> None:
+        """The shaft falls ``pulses`` behind the drive (negative: ahead)."""
+        ...
+
+    def slip(self, counts: int, now: Nanos) -> None:
+        """The encoder turns by ``counts`` on the shaft."""
+        ...
+
+
+class Body(Protocol):
+    """What a kind of machine has that can fail, beyond its pins."""
+
+    shafts: Sequence[Shaft]
+
+    def watch(self, owner: FaultyMachine) -> None:
+        """Have ``owner`` asked before requests are served (`FaultyMachine.refusal`) and memory is kept (`FaultyMachine.kept`)."""
+        ...
+
+    def check_pin(self, pin: str, level: float) -> None:
+        """`Misuse` unless ``pin`` is an input that can take ``level``."""
+        ...
+
+    def power_off(self, now: Nanos) -> None: ...
+    def power_on(self, now: Nanos) -> None: ...
+
+
+class FaultyMachine(Stateful):
+    """Stands around a machine in its kernel and lets its inputs, shafts, supply and memory go wrong.
+
+    Who sets an input by hand sets it here, so that a stuck switch stays stuck.
+    """
+
+    __slots__ = ("_bounces", "_cut", "_faults", "_off_until", "_outer", "_released", "_stuck", "body", "changed", "inner", "name")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "body", "changed", "inner", "name"})
+
+    def __init__(self, inner: DrivingMachine, name: str, faults: Faults, body: Body) -> None:
+        self.inner = inner
+        self.changed = inner.changed
+        inner.changed = self._pass_on
+        self.name = name
+        self.body = body
+        self._faults = faults
+        self._outer: dict[str, float] = {}
+        """Inputs with faults: what lies before the fault."""
+        self._bounces: list[tuple[Nanos, str, float]] = []
+        """Levels to come."""
+        self._stuck: dict[str, str] = {}
+        """Which input which fault holds."""
+        self._released: list[tuple[Nanos, str, int]] = []
+        """When which fault lets which axis go."""
+        self._off_until: Nanos | None = None
+        self._cut: Nanos | None = None
+        """When the supply has failed in the middle of something that must come to its end first."""
+        body.watch(self)
+
+    # ------------------------------------------------------------------ the machine's own
+
+    @property
+    def axes(self) -> Sequence[Drive]:
+        return self.inner.axes
+
+    def _pass_on(self) -> None:
+        self.changed()
+
+    def take_edges(self) -> list[Edge]:
+        return self.inner.take_edges()
+
+    def pins(self) -> Mapping[str, float]:
+        """Levels at the machine, behind the faults."""
+        return self.inner.pins()
+
+    # ------------------------------------------------------------------ time
+
+    def advance(self, now: Nanos) -> None:
+        while (due := self._own()) is not None and due <= now:
+            self.inner.advance(due)
+            self._run(due)
+        self.inner.advance(now)
+
+    def deadline(self) -> Nanos | None:
+        dues = (self.inner.deadline(), self._own())
+        return min((due for due in dues if due is not None), default=None)
+
+    def _own(self) -> Nanos | None:
+        dues = [a.due for a in self._mine() if a.due is not None]
+        dues += [at for at, *_ in self._bounces] + [at for at, *_ in self._released]
+        dues += [at for at in (self._off_until, self._cut) if at is not None]
+        return min(dues, default=None)
+
+    def _run(self, now: Nanos) -> None:
+        if self._cut is not None:
+            self.after_request(now)
+        if self._off_until is not None and self._off_until <= now:
+            self._off_until = None
+            self.body.power_on(now)
+        for active in self._mine():
+            while active.due is not None and active.due <= now:
+                self._moment(active, now)
+        for bounce in [b for b in self._bounces if b[0] <= now]:
+            self._bounces.remove(bounce)
+            self._put(bounce[1], bounce[2], now)
+        for released in [r for r in self._released if r[0] <= now]:
+            self._let_go(released, now)
+        self.changed()
+
+    def _moment(self, active: Active, now: Nanos) -> None:
+        """The moment of a fault that comes by itself."""
+        fault = active.fault
+        if fault.kind.occasion is Occasion.ALWAYS:
+            self._stick(active, now)
+            return
+        if active.strikes(now):
+            axis = fault.whole("axis") or 1
+            match fault.kind.name:
+                case "stall":
+                    self._tell(active, now, f"M{axis} is blocked for {fault.number('for_s'):g} s")
+                    self.body.shafts[axis - 1].block(True, now)
+                    self._released.append((now + active.ns("for_s"), active.name, axis))
+                case "lost-steps":
+                    pulses = int(fault.number("pulses"))
+                    self._tell(active, now, f"M{axis} loses {pulses} pulses")
+                    self.body.shafts[axis - 1].lose(pulses, now)
+                case "slip":
+                    counts = int(fault.number("counts"))
+                    self._tell(active, now, f"the encoder of M{axis} slips by {counts} counts")
+                    self.body.shafts[axis - 1].slip(counts, now)
+                case "supply-drop":
+                    self._tell(active, now, f"no supply for {fault.number('for_s'):g} s")
+                    if self._off_until is None:
+                        self.body.power_off(now)
+                    self._off_until = max(now + active.ns("for_s"), self._off_until or 0)
+        active.step()
+
+    def _let_go(self, released: tuple[Nanos, str, int], now: Nanos) -> None:
+        self._released.remove(released)
+        axis = released[2]
+        if not any(other == axis for *_, other in self._released):
+            self.body.shafts[axis - 1].block(False, now)
+
+    def _mine(self) -> list[Active]:
+        return self._faults.of(self.name)
+
+    def _tell(self, active: Active, now: Nanos, text: str) -> None:
+        self._faults.tell(active, self.name, now, text)
+
+    # ------------------------------------------------------------------ setting and removing
+
+    def check(self, fault: Fault) -> None:
+        """`Misuse` unless the machine has the axis or input."""
+        axis = fault.whole("axis")
+        if axis is not None and axis > len(self.body.shafts):
+            there = f"1 to {len(self.body.shafts)}" if self.body.shafts else "none"
+            raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are {there}, for {self.name!r} has no more shafts")
+        if fault.kind.parameter("pin") is None:
+            return
+        pin = self._pin(fault)
+        levels = self.inner.pins()
+        if pin not in levels:
+            raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: {self.name!r} has {', '.join(levels)}")
+        level = fault.get("value")
+        self.body.check_pin(pin, level if isinstance(level, float) else levels[pin])
+
+    def begin(self, active: Active) -> None:
+        """A fault of this machine was set."""
+        if active.fault.kind.parameter("pin") is not None:
+            pin = self._pin(active.fault)
+            self._outer.setdefault(pin, self.inner.pins()[pin])
+        if active.fault.kind.occasion is Occasion.ALWAYS:
+            active.due = active.begin
+        self.changed()
+
+    def end(self, active: Active, now: Nanos) -> None:
+        """A fault of this machine was removed: what it holds is let go."""
+        if active.fault.kind.parameter("pin") is not None:
+            pin = self._pin(active.fault)
+            self._bounces = [b for b in self._bounces if b[1] != pin]
+            if self._stuck.get(pin, active.name) == active.name:
+                self._stuck.pop(pin, None)
+                self._put(pin, self._outer[pin], now)
+            if not any(other.fault.get("pin") and self._pin(other.fault) == pin for other in self._mine()):
+                del self._outer[pin]
+        for released in [r for r in self._released if r[1] == active.name]:
+            self._let_go(released, now)
+        self.changed()
+
+    # ------------------------------------------------------------------ inputs
+
+    @staticmethod
+    def _pin(fault: Fault) -> str:
+        return str(fault.get("pin")).upper()
+
+    def _put(self, pin: str, level: float, now: Nanos) -> None:
+        self.inner.set_pin(pin, level, now)
+        self._faults.record(Record(now, self.name, "edge", pin, level))
+
+    def set_pin(self, pin: str, value: float, now: Nanos) -> None:
+        """What lies before the faults changes; an input that is held takes it when it is let go."""
+        name = pin.upper()
+        before = self._outer.get(name)
+        if before is None:
+            self.inner.set_pin(pin, value, now)
+            return
+        self.body.check_pin(name, value)
+        self._outer[name] = value
+        if name in self._stuck:
+            return
+        self._bounces = [b for b in self._bounces if b[1] != name]
+        self.inner.set_pin(name, value, now)
+        if value != before:
+            for active in self._mine():
+                if active.fault.kind.name == "bounce" and self._pin(active.fault) == name and active.strikes(now):
+                    self._bounce(active, name, before, value, now)
+
+    def _bounce(self, active: Active, pin: str, before: float, level: float, now: Nanos) -> None:
+        """To ``level`` it has gone; back and there again some times, the last time at the end of the bouncing."""
+        bounces, within = active.fault.whole("bounces") or 1, active.ns("for_ms")
+        moments = sorted(1 + active.chance.below(within) for _ in range(2 * bounces - 1))
+        levels = [before, level] * bounces
+        self._bounces += [(now + at, pin, to) for at, to in zip((*moments, within), levels, strict=True)]
+        self._tell(active, now, f"{pin} bounces {bounces} times in {active.fault.number('for_ms'):g} ms")
+        self.changed()
+
+    def _stick(self, active: Active, now: Nanos) -> None:
+        """The first moment sticks, the second lets go."""
+        pin = self._pin(active.fault)
+        if self._stuck.get(pin) != active.name:
+            wanted = active.fault.get("value")
+            level = wanted if isinstance(wanted, float) else self.inner.pins()[pin]
+            self._bounces = [b for b in self._bounces if b[1] != pin]
+            self._stuck[pin] = active.name
+            self._put(pin, level, now)
+            active.struck += 1
+            self._tell(active, now, f"{pin} is stuck at {level:g}")
+            active.due = active.end
+        else:
+            active.due = None
+            del self._stuck[pin]
+            self._put(pin, self._outer[pin], now)
+            self._tell(active, now, f"{pin} is free")
+
+    # ------------------------------------------------------------------ what the body asks
+
+    def refusal(self, unit: int, pdu: bytes, now: Nanos) -> bytes | None:
+        """The answer to a request that is not to be carried out; None lets it through."""
+        function = pdu[0] if pdu else 0
+        if self._off_until is not None:
+            return exception_pdu(function, NEVER_SENT)
+        for active in self._faults.refusing():
+            if active.matches(unit, pdu) and (not self._faults.link or active.is_on(self._faults.link)) and active.strikes(now):
+                if active.fault.kind.layer is Layer.FRAMES:
+                    self._tell(active, now, f"request lost on its way: {pdu.hex(' ')}")
+                    return exception_pdu(function, NEVER_SENT)
+                code = active.fault.whole("code") or DEVICE_BUSY
+                self._tell(active, now, f"refused with exception {code:02X}: {pdu.hex(' ')}")
+                return exception_pdu(function, code)
+        return None
+
+    def kept(self, old: bytes, new: bytes, now: Nanos) -> bytes:
+        """What the memory holds when ``new`` was to be saved over ``old`` of the same length."""
+        kept = bytearray(new)
+        for active in self._mine():
+            if active.fault.kind.name == "wear" and active.strikes(now):
+                self._wear(active, old, kept, now)
+        for active in self._mine():
+            if active.fault.kind.name == "power-cut" and active.strikes(now):
+                written = active.fault.whole("written")
+                written = active.chance.below(len(new) + 1) if written is None else min(written, len(new))
+                kept[written:] = old[written:]
+                self._tell(active, now, f"no supply after {written} of {len(new)} bytes were saved")
+                self._cut, self._off_until = now, now + active.ns("for_s")
+                self.changed()
+        return bytes(kept)
+
+    def _wear(self, active: Active, old: bytes, kept: bytearray, now: Nanos) -> None:
+        good = active.fault.whole("writes") or 0
+        if active.struck > good and len(active.worn) < len(kept):
+            sound = [place for place in range(len(kept)) if place not in active.worn]
+            active.worn.append(sound[active.chance.below(len(sound))])
+            self._tell(active, now, f"after {active.struck} saves byte {active.worn[-1]} is worn out")
+        for place in active.worn:
+            kept[place] = old[place]
+
+    def after_request(self, now: Nanos) -> bool:
+        """Whether the supply has failed during a request; it is off then."""
+        if self._cut is None:
+            return False
+        self._cut = None
+        self.body.power_off(now)
+        self.changed()
+        return True
+
+
+def rig(kernel: Kernel, name: str, faults: Faults, body: Body) -> FaultyMachine:
+    """Let faults of physics and protocol happen to the machine ``name`` of a kernel."""
+    there = faults.machines.get(name)
+    if there is None:
+        there = faults.machines[name] = FaultyMachine(kernel.machines[name], name, faults, body)
+        kernel.replace(name, there)
+    return there

@@ -1,0 +1,80 @@
+"""The MIC488 as something that can fail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488, Serving, check_pin
+from steptwin.mic488.encoder import Coupling
+from steptwin.wire.pdu import exception_pdu
+from steptwin.world.faults.answers import NEVER_SENT
+from steptwin.world.faults.machine import FaultyMachine, Shaft
+
+
+class EncoderShaft:
+    """The encoder of an axis is all there is of its mechanics."""
+
+    def __init__(self, device: Mic488, axis: int) -> None:
+        self._device = device
+        self._axis = axis
+
+    def block(self, blocked: bool, now: Nanos) -> None:
+        self._device.couple_encoder(self._axis, Coupling.BLOCKED if blocked else Coupling.DRIVE, now)
+
+    def lose(self, pulses: int, now: Nanos) -> None:
+        counts = self._device.axes[self._axis - 1].encoder.counts(pulses)
+        self.slip(-round(counts), now)
+
+    def slip(self, counts: int, now: Nanos) -> None:
+        self._device.turn_encoder(self._axis, counts, now)
+
+
+class Mic488Body:
+    """``unit`` is the one under which the controller is served, ``shafts`` what its axes move: by default their encoders."""
+
+    def __init__(self, device: Mic488, unit: int, shafts: Sequence[Shaft] | None = None) -> None:
+        self._device = device
+        self._unit = unit
+        self.shafts = [EncoderShaft(device, axis.number) for axis in device.axes] if shafts is None else shafts
+
+    def watch(self, owner: FaultyMachine) -> None:
+        device = self._device
+        device.slave = _Watched(device.slave, self._unit, owner)
+        device.store = _keeping(device, device.store, owner)
+
+    def check_pin(self, pin: str, level: float) -> None:
+        check_pin(pin, level)
+
+    def power_off(self, now: Nanos) -> None:
+        self._device.power_off(now)
+
+    def power_on(self, now: Nanos) -> None:
+        self._device.power_cycle(now)
+
+
+class _Watched:
+    """In front of the slave."""
+
+    def __init__(self, slave: Serving, unit: int, owner: FaultyMachine) -> None:
+        self._slave = slave
+        self._unit = unit
+        self._owner = owner
+
+    def answer(self, device: Mic488, pdu: bytes) -> bytes:
+        refusal = self._owner.refusal(self._unit, pdu, device.now)
+        if refusal is not None:
+            return refusal
+        answer = self._slave.answer(device, pdu)
+        return exception_pdu(pdu[0], NEVER_SENT) if self._owner.after_request(device.now) else answer
+
+
+def _keeping(
+    device: Mic488, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine
+) -> Callable[[bytes], bytes | None]:
+    def keep(memory: bytes) -> bytes:
+        kept = owner.kept(device.memory, memory, device.now)
+        stored = store(kept) if store is not None else None
+        return kept if stored is None else stored
+
+    return keep

@@ -1,0 +1,243 @@
+"""A port with a faulty line before it. Without faults its calls are those of the port behind it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+from steptwin.machine import Nanos
+from steptwin.wire.slave import Direction, FrameObserver
+from steptwin.world.faults.active import Active, Faults
+from steptwin.world.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer
+from steptwin.world.faults.stream import spoil
+from steptwin.world.faults.table import Layer, Line
+
+_ASKED = 64
+"""More requests than this never wait for their answers (`steptwin.wire.timed.QUEUE_FRAMES`)."""
+
+
+class InnerPort(Protocol):
+    """What stands behind a line; a port of the M1486 has ``on_output`` and ``close`` too."""
+
+    @property
+    def broken(self) -> str | None: ...
+    def exchange(self, data: bytes, now: Nanos) -> bytes: ...
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
+    def deadline(self) -> Nanos | None: ...
+
+
+class FramedPort(Protocol):
+    """Something that tells of every frame."""
+
+    on_frame: FrameObserver | None
+
+
+class FaultyPort:
+    """One link of a twin, or one line of a world. Only while faults are set, or something delayed is on its way, anything is
+    done here: `exchange`, `to_send` and `deadline` are the inner port's own else.
+
+    ``framed`` is the slave port that tells of frames, inside ``port``; without it bytes alone can go wrong. ``units`` are the
+    units it serves (MIC-23: on TCP a single one is addressed by 0 and 255 too).
+    """
+
+    __slots__ = (
+        "_arriving",
+        "_asked",
+        "_before",
+        "_faults",
+        "_framed",
+        "_fresh",
+        "_held",
+        "_inner",
+        "_leaving",
+        "_line",
+        "_units",
+        "deadline",
+        "exchange",
+        "link",
+        "to_send",
+    )
+
+    exchange: Callable[[bytes, Nanos], bytes]
+    to_send: Callable[[Nanos], list[tuple[Nanos, bytes]]]
+    deadline: Callable[[], Nanos | None]
+
+    def __init__(
+        self,
+        port: InnerPort,
+        link: str,
+        faults: Faults,
+        line: Line,
+        *,
+        framed: FramedPort | None = None,
+        units: tuple[int, ...] = (),
+    ) -> None:
+        self._inner = port
+        self._faults = faults
+        self._line = line
+        self._framed = framed
+        self._units = units
+        self.link = link
+        self._before: FrameObserver | None = None
+        self._asked: deque[bytes] = deque(maxlen=_ASKED)
+        self._fresh: list[tuple[Nanos, Nanos, bytes]] = []  # moment, delay, bytes: as the faults of frames leave them
+        self._held = b""  # answers that come with the next one
+        self._arriving: deque[tuple[Nanos, bytes]] = deque()
+        self._leaving: deque[tuple[Nanos, bytes]] = deque()
+        self._be_transparent()
+        faults.watch(self._choose)
+        self._choose()
+
+    @property
+    def broken(self) -> str | None:
+        return self._inner.broken
+
+    @property
+    def on_output(self) -> Callable[[], None] | None:
+        return getattr(self._inner, "on_output", None)
+
+    @on_output.setter
+    def on_output(self, hook: Callable[[], None] | None) -> None:
+        if hasattr(self._inner, "on_output"):
+            self._inner.on_output = hook  # type: ignore[attr-defined]
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """As `exchange`; what is to be answered waits for `to_send`."""
+        answer = self.exchange(data, now)
+        if answer:
+            self._leaving.append((now, answer))
+            self._be_faulty()
+
+    def close(self) -> None:
+        """Nobody is there any more."""
+        self._faults.unwatch(self._choose)
+        close = getattr(self._inner, "close", None)
+        if close is not None:
+            close()
+
+    # ------------------------------------------------------------------ which way calls go
+
+    def _choose(self) -> None:
+        if self._faults.active:
+            self._be_faulty()
+        elif not (self._arriving or self._leaving):
+            self._be_transparent()
+
+    def _be_transparent(self) -> None:
+        self.exchange = self._inner.exchange
+        self.to_send = self._inner.to_send
+        self.deadline = self._inner.deadline
+        if self._framed is not None and self._framed.on_frame == self._observe:
+            self._framed.on_frame = self._before
+        self._asked.clear()
+        self._held = b""
+
+    def _be_faulty(self) -> None:
+        self.exchange = self._exchange
+        self.to_send = self._to_send
+        self.deadline = self._deadline
+        if self._framed is not None and self._framed.on_frame != self._observe:
+            self._before = self._framed.on_frame
+            self._framed.on_frame = self._observe
+
+    # ------------------------------------------------------------------ the faulty way
+
+    def _exchange(self, data: bytes, now: Nanos) -> bytes:
+        self._deliver(now)
+        for delay, piece in spoil(data, self._bytewise("in"), now, self._teller(now, "towards the twin")):
+            # A line keeps the order of its bytes.
+            at = max(now + delay, self._arriving[-1][0] if self._arriving else now)
+            self._arriving.append((at, piece))
+        return b"".join(piece for _, piece in self._to_send(now))
+
+    def _to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        self._deliver(now)
+        self._take(self._inner.to_send(now), now)
+        out = []
+        while self._leaving and self._leaving[0][0] <= now:
+            out.append(self._leaving.popleft())
+        if not self._faults.active:
+            self._choose()
+        return out
+
+    def _deadline(self) -> Nanos | None:
+        moments = [self._inner.deadline()]
+        moments += [queue[0][0] for queue in (self._arriving, self._leaving) if queue]
+        return min((moment for moment in moments if moment is not None), default=None)
+
+    def _deliver(self, now: Nanos) -> None:
+        while self._arriving and self._arriving[0][0] <= now:
+            _, piece = self._arriving.popleft()
+            self._faults.link = self.link
+            answer = self._inner.exchange(piece, now)
+            self._faults.link = ""
+            self._take([(now, answer)] if answer else [], now)
+
+    def _take(self, sent: list[tuple[Nanos, bytes]], now: Nanos) -> None:
+        """What the inner port sends: bytes as they are, or the frames it told of."""
+        if self._framed is None:
+            fresh = [(moment, 0, data) for moment, data in sent]
+        else:
+            fresh, self._fresh = self._fresh, []
+        outgoing = self._bytewise("out")
+        for moment, delay, data in fresh:
+            for more, piece in spoil(data, outgoing, now, self._teller(now, "from the twin")):
+                at = moment + delay + more
+                self._leaving.append((max(at, self._leaving[-1][0]) if self._leaving else at, piece))
+
+    def _observe(self, moment: Nanos, direction: Direction, raw: bytes) -> None:
+        if direction is Direction.OUT and must_not_be_sent(self._line, raw):
+            self._request_of(raw)
+            return
+        if self._before is not None:
+            self._before(moment, direction, raw)
+        if direction is Direction.IN:
+            self._asked.append(raw)
+            return
+        request = self._request_of(raw)
+        if request is None:  # asked before there were faults
+            self._fresh.append((moment, 0, raw))
+            return
+        faults = [
+            a
+            for a in self._faults.active
+            if a.fault.kind.layer is Layer.FRAMES and self._is_for(a) and a.fault.get("lost") != "request"
+        ]
+        exchange = Exchange(self._line, request, raw)
+        sent = spoil_answer(exchange, self._addressed(exchange.unit), faults, moment, self._teller(moment, ""))
+        if sent.before:
+            self._fresh.append((moment, 0, sent.before))
+        if sent.later:
+            self._held += sent.later
+        elif sent.answer:
+            held, self._held = self._held, b""
+            self._fresh.append((moment, sent.delay, held + sent.answer))
+
+    def _request_of(self, raw: bytes) -> bytes | None:
+        """The oldest request that ``raw`` can be the answer to; older ones get none any more."""
+        unit, function = self._key(raw)
+        for _ in range(len(self._asked)):
+            asked = self._asked.popleft()
+            if self._key(asked) == (unit, function):
+                return asked
+        return None
+
+    def _key(self, raw: bytes) -> tuple[int, int]:
+        unit = raw[0] if self._line is Line.RTU else raw[6]
+        return unit, pdu_of(self._line, raw)[0] & 0x7F
+
+    def _addressed(self, unit: int) -> int:
+        return self._units[0] if self._line is Line.TCP and len(self._units) == 1 and unit in (0, 255) else unit
+
+    def _bytewise(self, direction: str) -> list[Active]:
+        faults = self._faults.active
+        return [
+            a for a in faults if a.fault.kind.layer is Layer.BYTES and a.fault.get("direction") == direction and self._is_for(a)
+        ]
+
+    def _is_for(self, active: Active) -> bool:
+        return self._line in active.fault.kind.lines and active.is_on(self.link)
+
+    def _teller(self, now: Nanos, which: str) -> Callable[[Active, str], None]:
+        return lambda active, text: self._faults.tell(active, self.link, now, f"{which}, {text}" if which else text)
