@@ -17,7 +17,7 @@ Plain: TypeAlias = tuple[Any, ...]
 class Stateful:
     """Base of objects made of plain state and `Stateful` parts (single, or in a tuple).
 
-    Lists, dictionaries, deques and arrays are copied and hold immutable values; all other values are immutable and shared.
+    Lists, dictionaries, deques, arrays and bytearrays are copied and hold immutable values; all other values are immutable and shared.
     """
 
     __slots__ = ()
@@ -54,7 +54,7 @@ def _is_parts(value: object) -> TypeGuard[tuple[Stateful, ...]]:
 def _copied(value: object) -> object:
     if isinstance(value, Stateful):
         return value.copy_state()
-    if isinstance(value, list | dict | deque):
+    if isinstance(value, list | dict | deque | bytearray):
         return value.copy()
     if isinstance(value, array):
         return value[:]

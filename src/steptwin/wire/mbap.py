@@ -10,6 +10,7 @@ import struct
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
+from steptwin.state import Stateful
 from steptwin.wire.pdu import MAX_PDU
 
 HEADER_BYTES = 7
@@ -50,7 +51,7 @@ def encode_frame(transaction: int, unit: int, pdu: bytes) -> bytes:
     return _HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
 
 
-class TcpFramer:
+class TcpFramer(Stateful):
     """Cuts the frames of one direction of one connection, less than 260 bytes held between calls."""
 
     __slots__ = ("broken", "held")

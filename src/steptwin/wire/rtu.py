@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, Nanos
+from steptwin.state import Plain, Stateful
 from steptwin.wire.crc import crc16, with_crc
 from steptwin.wire.pdu import REFUSED
 
@@ -121,7 +122,7 @@ def _length(table: tuple[tuple[int, int] | None, ...], frame: bytes | bytearray,
     return length if length <= MAX_FRAME else _IMPOSSIBLE
 
 
-class RtuFramer:
+class RtuFramer(Stateful):
     """Cuts the frames of one line, at most 256 bytes held between calls.
 
     ``own`` are the units on this side: what begins with one of them, or with the broadcast address, can only be a request
@@ -129,6 +130,7 @@ class RtuFramer:
     """
 
     __slots__ = ("_asked", "_burst", "_fed", "_framed", "_last", "_own", "_scan", "gap_ns", "held")
+    FIXED = frozenset({"_own", "gap_ns"})
 
     def __init__(self, own: Collection[int] = (), gap_ns: Nanos = BURSTY_GAP_NS) -> None:
         if gap_ns < 1:
@@ -153,6 +155,12 @@ class RtuFramer:
     def rubbish(self) -> int:
         """Bytes received and given up so far."""
         return self._fed - self._framed - len(self.held)
+
+    def set_state(self, plain: Plain) -> None:
+        held = self.held
+        super().set_state(plain)
+        held[:] = self.held
+        self.held = held
 
     def deadline(self) -> Nanos | None:
         """When the gap ends, if there is something to give up then."""

@@ -12,6 +12,7 @@ from typing import Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos, WirePort
+from steptwin.state import Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import crc16, with_crc
 from steptwin.wire.pdu import GATEWAY_TARGET_FAILED, REFUSED, WRITE_MULTIPLE_REGISTERS, WRITES, exception_pdu
@@ -82,7 +83,7 @@ def execute_frame(devices: Mapping[int, Device], frame: rtu.RtuFrame, now: Nanos
     return with_crc(raw[:1] + device.execute(raw[1:-2], now))
 
 
-class RtuSlavePort:
+class RtuSlavePort(Stateful):
     """One RTU line, by default without the time a wire takes (`steptwin.wire.timed` has it).
 
     ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15).
@@ -92,6 +93,7 @@ class RtuSlavePort:
     """A line cannot be broken by what is on it; a connection can."""
 
     __slots__ = ("_devices", "_framer", "_held", "_out", "on_frame")
+    FIXED = frozenset({"_devices", "_held", "on_frame"})
 
     def __init__(
         self, devices: Mapping[int, Device], *, gap_ns: Nanos = rtu.BURSTY_GAP_NS, on_frame: FrameObserver | None = None
@@ -153,7 +155,7 @@ class RtuSlavePort:
         return self._framer.deadline()
 
 
-class TcpSlavePort:
+class TcpSlavePort(Stateful):
     """One Modbus TCP connection. ``devices`` is read once.
 
     MIC-23: a single device is addressed by 0 and 255 too. Any other unit is answered with exception 0B, as gateways do: a
@@ -162,6 +164,7 @@ class TcpSlavePort:
     """
 
     __slots__ = ("_devices", "_framer", "_out", "on_frame")
+    FIXED = frozenset({"_devices", "on_frame"})
 
     def __init__(self, devices: Mapping[int, Device], *, on_frame: FrameObserver | None = None) -> None:
         check_units(devices)

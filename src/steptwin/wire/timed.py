@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.state import Stateful
 from steptwin.wire import rtu
 from steptwin.wire.line import CharacterClock, SerialLine
 from steptwin.wire.slave import Device, Direction, FrameObserver, check_units, execute_frame
@@ -42,7 +43,7 @@ class LineTiming:
             raise Misuse(f"a frame interval of {self.interval_ns} ns is negative")
 
 
-class TimedRtuSlavePort:
+class TimedRtuSlavePort(Stateful):
     """As `steptwin.wire.slave.RtuSlavePort`, with line timing. Responses leave when their last character would have.
 
     Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due.
@@ -65,6 +66,7 @@ class TimedRtuSlavePort:
         "on_frame",
         "overrun",
     )
+    FIXED = frozenset({"_devices", "_timing", "on_frame"})
 
     def __init__(
         self,

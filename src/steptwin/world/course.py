@@ -79,7 +79,7 @@ class Piece(NamedTuple):
 class Course:
     """The way of an axis from ``begin`` on while ``plan`` is in force; immutable. ``blocked``: nothing moves the rotor."""
 
-    __slots__ = ("_now", "begin", "blocked", "build", "pieces", "plan")
+    __slots__ = ("_laid", "_now", "_standing", "begin", "blocked", "build", "plan")
 
     def __init__(
         self, build: Build, plan: Plan, begin: Nanos, standing: Standing, *, blocked: bool = False, jump: float = 0.0
@@ -89,14 +89,33 @@ class Course:
         self.plan = plan
         self.begin = begin
         self.blocked = blocked
-        self.pieces: list[Piece] = []
-        self._now = standing
+        self._laid: list[Piece] = []
         motor = build.motor
-        if motor is not None and abs(jump) > motor.catch_p and profile_of(plan).moving(begin):
-            self._now = standing._replace(stalled=True)
-        self._lay(begin)
+        if motor is not None and not motor.follows(jump) and profile_of(plan).moving(begin):
+            standing = standing._replace(stalled=True)
+        self._standing = self._now = standing
 
     # ------------------------------------------------------------------ questions
+
+    @property
+    def pieces(self) -> list[Piece]:
+        """Laid out when somebody asks."""
+        if not self._laid:
+            self._lay(self.begin)
+        return self._laid
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether not a pulse is lost, before or on this course."""
+        begin = self._standing
+        if self.blocked or begin.rotor != self.field(self.begin):
+            return False
+        build, profile = self.build, profile_of(self.plan)
+        if build.ideal or not profile.segments:
+            return True
+        return all(p.rotor_follows or (profile.end is not None and p.begin >= profile.end) for p in self.pieces) and (
+            profile.end is None or self.at(profile.end).rotor == self.field(profile.end)
+        )
 
     def field(self, now: Nanos) -> int:
         return self.build.sign * self.plan.count(now) + self.build.zero
@@ -201,11 +220,11 @@ class Course:
             met = None
         if held != begin:
             if met != begin:
-                self.pieces.append(Piece(begin, direction, True, offset, False, load, False))
+                self._laid.append(Piece(begin, direction, True, offset, False, load, False))
             if met is not None:
-                self.pieces.append(Piece(met, direction, True, offset, True, offset + slack, False))
+                self._laid.append(Piece(met, direction, True, offset, True, offset + slack, False))
         if held is not None and stop is not None:
-            self.pieces.append(Piece(held, direction, False, stop, False, stop + slack, False))
+            self._laid.append(Piece(held, direction, False, stop, False, stop + slack, False))
         if end is not None:
             rotor = offset + self.field(end)
             if stop is not None and (rotor - stop) * direction > 0:
@@ -215,7 +234,7 @@ class Course:
 
     def _stand(self, now: Nanos, direction: int) -> None:
         rotor, load, stalled = self._now
-        self.pieces.append(Piece(now, direction, False, rotor, False, load, stalled))
+        self._laid.append(Piece(now, direction, False, rotor, False, load, stalled))
 
     def _catch(self, now: Nanos) -> None:
         """The rotor takes the place nearest to it that has the electrical angle of the field."""

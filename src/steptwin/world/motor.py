@@ -38,8 +38,9 @@ class Motor:
     """Against the direction of motion."""
     load: float
     """Constant; positive where it pulls the axis towards lower positions."""
-    catch_p: float
-    """Highest speed of the field (pulses/s) at which a standing rotor follows it."""
+    start_p: float | None
+    """Highest speed (pulses/s) that the field may take at once, and at which a standing rotor is caught. None: it may take any,
+    and the rotor is caught where the field stands or turns."""
     period_p: int
     """Pulses of an electrical period."""
 
@@ -49,6 +50,14 @@ class Motor:
             raise Misuse("a torque curve begins at speed 0, and each speed is higher than the one before")
         if any(torque < 0.0 for _, torque in self.curve) or self.inertia < 0.0 or self.friction < 0.0:
             raise Misuse("torques of a curve, inertia and friction must not be negative")
+
+    @property
+    def catch_p(self) -> float:
+        return 0.0 if self.start_p is None else self.start_p
+
+    def follows(self, jump: float) -> bool:
+        """Whether the rotor follows when the speed of the field changes at once by ``jump`` (pulses/s)."""
+        return self.start_p is None or abs(jump) <= self.start_p * (1.0 + 1e-9)
 
     def torque(self, speed: float) -> float:
         """What the motor gives at ``speed`` (pulses/s, not negative); below 0 above the end of the curve."""

@@ -1,0 +1,216 @@
+"""What an axis moves: rotor and load with their stops, play and motor, and the encoder that sees them.
+
+A `Mechanism` follows the plans of one drive. While nothing can come between pulses and load it costs nothing; else each plan
+gives a `Course` in closed form. Positions in pulses of the mechanics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488
+from steptwin.state import Plain, Stateful
+from steptwin.world.course import Build, Course, Standing, plan_of, profile_of
+from steptwin.world.kernel import Drive, Kernel
+
+
+class Shaft(NamedTuple):
+    """What turns an encoder: a course, in the frame of a drive's counted position. Never changed."""
+
+    course: Course
+    on_load: bool
+
+    def count(self, now: Nanos) -> int:
+        standing = self.course.at(now)
+        build = self.course.build
+        return ((standing.load if self.on_load else standing.rotor) - build.zero) * build.sign
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderBuild:
+    """An encoder that the controller ``device`` reads for its axis ``axis`` (from 1).
+
+    ``counts`` (negative: backwards) per ``pulses`` of the drive that turns it; None: as the controller is told.
+    """
+
+    device: Mic488
+    axis: int
+    on_load: bool = False
+    counts: int | None = None
+    pulses: int = 1
+
+
+class Mechanism(Stateful):
+    """The mechanics of axis ``number`` (from 1) of a machine in ``kernel``. It is a part of the kernel, and carries switches."""
+
+    __slots__ = (
+        "_blocked",
+        "_changes",
+        "_coupled",
+        "_course",
+        "_encoders",
+        "_kernel",
+        "_lost",
+        "_revision",
+        "_simple",
+        "build",
+        "machine",
+        "number",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_encoders", "_kernel", "_revision", "build", "machine", "number"})
+
+    def __init__(self, kernel: Kernel, machine: str, number: int, build: Build) -> None:
+        self._kernel = kernel
+        self.machine = machine
+        self.number = number
+        self.build = build
+        self._encoders: list[EncoderBuild] = []
+        self._coupled = False
+        """Whether encoders have been told that they are not simply turned by the drive."""
+        self._lost = 0
+        self._blocked = False
+        self._changes = 0
+        self._simple = build.ideal
+        """Nothing has come between pulses and load yet, and nothing can."""
+        drive = self._drive
+        here = build.sign * plan_of(drive).count(kernel.now) + build.zero
+        if (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
+            raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
+        self._revision = drive.revision
+        self._course = Course(build, plan_of(drive), kernel.now, Standing(here, here))
+
+    @property
+    def _drive(self) -> Drive:
+        return self._kernel.drive_of(self.machine, self.number)
+
+    # ------------------------------------------------------------------ where it is
+
+    def course(self, now: Nanos) -> Course:
+        """The course in force at ``now``, the kernel's moment or later."""
+        drive = self._drive
+        if drive.revision != self._revision:
+            self._renew(drive, now)
+        return self._course
+
+    def at(self, now: Nanos) -> Standing:
+        return self.course(now).at(now)
+
+    def lost(self, now: Nanos) -> int:
+        """Pulses by which the rotor is behind the field."""
+        course = self.course(now)
+        return course.field(now) - course.at(now).rotor
+
+    def version(self) -> object:
+        return self._drive.revision, self._changes
+
+    def place(self, now: Nanos) -> int:
+        return self.at(now).load
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        return self.course(after).reaches(position, after, direction)
+
+    # ------------------------------------------------------------------ time
+
+    def look(self, now: Nanos) -> None:
+        if not self._simple:
+            drive = self._drive
+            if drive.revision != self._revision:
+                self._renew(drive, now)
+
+    def deadline(self) -> Nanos | None:
+        """Courses are laid out ahead: nothing is left to be done."""
+        return None
+
+    def _renew(self, drive: Drive, now: Nanos, standing: Standing | None = None) -> None:
+        """The drive follows another plan, or something has changed in the mechanics."""
+        before, plan = self._course, plan_of(drive)
+        if standing is None:
+            if self._simple:
+                here = self.build.sign * plan.count(now) + self.build.zero - self._lost
+                standing = Standing(here, here)
+            else:
+                standing = before.at(now)
+        jump = profile_of(plan).velocity(now) - profile_of(before.plan).velocity(now)
+        self._revision = drive.revision
+        self._course = Course(self.build, plan, now, standing, blocked=self._blocked, jump=jump)
+        self._changes += 1
+        if self._encoders:
+            self._turn_encoders(now)
+
+    # ------------------------------------------------------------------ encoders
+
+    def fit(self, encoder: EncoderBuild, now: Nanos) -> None:
+        """Put an encoder on the rotor or the load."""
+        self._encoders.append(encoder)
+        if encoder.counts is not None:
+            encoder.device.gear_encoder(encoder.axis, encoder.counts, encoder.pulses, now)
+        self._turn_encoders(now)
+
+    def _turn_encoders(self, now: Nanos) -> None:
+        course = self._course
+        for encoder in self._encoders:
+            own = encoder.device is self._own_device() and encoder.axis == self.number
+            exact = own and course.is_exact and not (encoder.on_load and self.build.play)
+            if not exact or self._coupled:
+                self._coupled = True
+                encoder.device.follow_shaft(encoder.axis, Shaft(course, encoder.on_load), now)
+
+    def _own_device(self) -> object:
+        machine = self._kernel.machines[self.machine]
+        return getattr(machine, "inner", machine)
+
+    # ------------------------------------------------------------------ what can go wrong
+
+    def block(self, blocked: bool, now: Nanos) -> None:
+        """Hold the rotor: pulses are lost; let it go again."""
+        standing = self.at(now)
+        self._simple = False
+        self._blocked = blocked
+        stalled = standing.stalled or (not blocked and self.build.motor is not None)
+        self._renew(self._drive, now, standing._replace(stalled=stalled))
+        self._kernel.mark()
+
+    def lose(self, pulses: int, now: Nanos) -> None:
+        """The rotor falls ``pulses`` behind the field (negative: ahead), as far as stops permit."""
+        build, (rotor, load, stalled) = self.build, self.at(now)
+        rotor -= pulses
+        if build.low is not None:
+            rotor = max(rotor, build.low - build.play)
+        if build.high is not None:
+            rotor = min(rotor, build.high)
+        self._lost += pulses
+        self._simple = False
+        self._renew(self._drive, now, Standing(rotor, min(max(load, rotor), rotor + build.play), stalled))
+        self._kernel.mark()
+
+    def slip(self, counts: int, now: Nanos) -> None:
+        """The encoders turn by ``counts`` on their shaft."""
+        for encoder in self._encoders:
+            encoder.device.turn_encoder(encoder.axis, counts, now)
+        self._kernel.mark()
+
+    def set_state(self, plain: Plain) -> None:
+        """As ever; the drive has its state already."""
+        super().set_state(plain)
+        self._revision = self._drive.revision
+
+
+class RotorMark:
+    """The rotor of a mechanism as a carriage: the index of an encoder is on it."""
+
+    __slots__ = ("_mechanism",)
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+
+    def version(self) -> object:
+        return self._mechanism.version()
+
+    def place(self, now: Nanos) -> int:
+        return self._mechanism.at(now).rotor
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        return self._mechanism.course(after).reaches(position, after, direction, rotor=True)

@@ -1,0 +1,109 @@
+"""What lies on analog inputs: constant, ramp, sine, table. Volts over seconds of the world's time."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion.trig import sine
+from steptwin.state import Stateful
+from steptwin.world.kernel import Kernel, PinName
+
+LOWEST_V, HIGHEST_V = 0.0, 10.0
+RESOLUTION_V = 0.001
+"""Smaller changes are none."""
+
+
+class Waveform(Protocol):
+    def volts(self, t_s: float) -> float: ...
+    def rests(self, t_s: float) -> bool:
+        """Whether nothing changes from ``t_s`` on."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    value: float
+
+    def volts(self, t_s: float) -> float:
+        return self.value
+
+    def rests(self, t_s: float) -> bool:
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Points (seconds, volts) with straight lines between; before the first and after the last their values.
+
+    With ``repeat_s`` it begins anew after so many seconds.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    repeat_s: float | None = None
+
+    def __post_init__(self) -> None:
+        times = [time for time, _ in self.points]
+        if not times or times != sorted(set(times)):
+            raise Misuse("the points of a table need times that grow")
+
+    def volts(self, t_s: float) -> float:
+        if self.repeat_s is not None:
+            t_s -= t_s // self.repeat_s * self.repeat_s
+        i = bisect_right(self.points, t_s, key=lambda point: point[0])
+        if i == 0:
+            return self.points[0][1]
+        if i == len(self.points):
+            return self.points[-1][1]
+        (t0, v0), (t1, v1) = self.points[i - 1], self.points[i]
+        return v0 + (v1 - v0) * (t_s - t0) / (t1 - t0)
+
+    def rests(self, t_s: float) -> bool:
+        return self.repeat_s is None and t_s >= self.points[-1][0]
+
+
+@dataclass(frozen=True, slots=True)
+class Sine:
+    """``mean + amplitude · sin(360° · frequency · t + phase)``; phase in degrees."""
+
+    mean: float
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+
+    def volts(self, t_s: float) -> float:
+        return self.mean + self.amplitude * sine(4.0 * (self.frequency * t_s + self.phase / 360.0))
+
+    def rests(self, t_s: float) -> bool:
+        return self.amplitude == 0.0 or self.frequency == 0.0
+
+
+class Source(Stateful):
+    """Gives an analog input the voltage of a waveform once in a ``period``, within what the input takes."""
+
+    __slots__ = ("_due", "_kernel", "_waveform", "period", "target")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "_waveform", "period", "target"})
+
+    def __init__(self, kernel: Kernel, target: PinName, waveform: Waveform, period: Nanos) -> None:
+        kernel.check(target)
+        if period < 1:
+            raise Misuse(f"source of {target}: a period of {period} ns is not positive")
+        self._kernel = kernel
+        self._waveform = waveform
+        self.target = target
+        self.period = period
+        self._due: Nanos | None = kernel.now
+
+    def look(self, now: Nanos) -> None:
+        if self._due is None or self._due > now:
+            return
+        t_s = now / SECOND
+        volts = min(max(self._waveform.volts(t_s), LOWEST_V), HIGHEST_V)
+        self._kernel.drive(self.target, int(volts / RESOLUTION_V + 0.5) * RESOLUTION_V)
+        self._due = None if self._waveform.rests(t_s) else now + self.period
+
+    def deadline(self) -> Nanos | None:
+        return self._due
