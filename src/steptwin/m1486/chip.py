@@ -101,8 +101,8 @@ class M1486(Stateful):
     they are switched off. Raises `Misuse`.
 
     Hooks: ``store`` is called with the image whenever the EEPROM has a new one (empty: erased) and returns when it is safe; an
-    `OSError` says that it is not. ``changed`` is called whenever the next deadline or an output may have changed, ``on_event``
-    for every event, ``on_sent`` when characters have left.
+    `OSError` says that it is not, bytes say what was stored instead. ``changed`` is called whenever the next deadline or an
+    output may have changed, ``on_event`` for every event, ``on_sent`` when characters have left.
     """
 
     __slots__ = (
@@ -148,7 +148,7 @@ class M1486(Stateful):
             raise Misuse(f"statement_ns = {statement_ns}: must not be negative")
         self.variant = variant
         self.is_timed = is_timed
-        self.store: Callable[[bytes], None] | None = None
+        self.store: Callable[[bytes], bytes | None] | None = None
         self.changed: Callable[[], None] = _nothing
         self.on_event: Callable[[Event], None] | None = None
         self.on_sent: Callable[[], None] | None = None
@@ -406,14 +406,22 @@ class M1486(Stateful):
             self.receiver.erase()
 
     def _keep(self, image: bytes) -> None:
-        self.image = image
+        stored = None
         if self.store is not None:
             try:
-                self.store(image)
+                stored = self.store(image)
             except OSError as error:
                 self.event("store-failed", f"the EEPROM could not be kept: {error}")
+        self.image = image if stored is None else stored
 
     # ------------------------------------------------------------------ power, RST, shutdown
+
+    def power_off(self, now: Nanos) -> None:
+        """Everything off: until a `power_cycle` the chip does nothing, hears nothing and sends nothing."""
+        self.advance(now)
+        self._fall_silent()
+        self.io.release_outputs()
+        self._settle()
 
     def power_cycle(self, now: Nanos) -> None:
         """Off and on again. Pins stay tied as they are, and the motor stands where it stood."""
@@ -476,12 +484,15 @@ class M1486(Stateful):
 
     def _shut_down(self) -> None:
         self.event("shutdown", "shutdown")
+        self._fall_silent()
+        if not self.unit.on(OUTPUTS):
+            self.io.tie_low(True)
+
+    def _fall_silent(self) -> None:
         self.motor.stop_at_once()
         self.uart.clear()
         self.is_shut_down = True
         self._rst_high_since = None
-        if not self.unit.on(OUTPUTS):
-            self.io.tie_low(True)
 
     def _end_shutdown(self) -> None:
         """RST has been high for long enough. The address pins are not read; M-31: the program begins again, as with RST."""

@@ -6,6 +6,7 @@ between a link and a port, `rig` lets a machine in its kernel have faults. `step
 
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, parse, read, schema
+from steptwin.world.faults.m1486 import M1486Body
 from steptwin.world.faults.machine import Body, FaultyMachine, Shaft, rig
 from steptwin.world.faults.mic488 import Mic488Body
 from steptwin.world.faults.port import FaultyPort
@@ -24,6 +25,7 @@ __all__ = [
     "Kind",
     "Layer",
     "Line",
+    "M1486Body",
     "Mic488Body",
     "Occasion",
     "Parameter",

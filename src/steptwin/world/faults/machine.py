@@ -42,6 +42,10 @@ class Body(Protocol):
         """Have ``owner`` asked before requests are served (`FaultyMachine.refusal`) and memory is kept (`FaultyMachine.kept`)."""
         ...
 
+    def pin_name(self, pin: str) -> str:
+        """The one name of a pin, whatever it is called."""
+        ...
+
     def check_pin(self, pin: str, level: float) -> None:
         """`Misuse` unless ``pin`` is an input that can take ``level``."""
         ...
@@ -211,9 +215,8 @@ class FaultyMachine(Stateful):
 
     # ------------------------------------------------------------------ inputs
 
-    @staticmethod
-    def _pin(fault: Fault) -> str:
-        return str(fault.get("pin")).upper()
+    def _pin(self, fault: Fault) -> str:
+        return self.body.pin_name(str(fault.get("pin")))
 
     def _put(self, pin: str, level: float, now: Nanos) -> None:
         self.inner.set_pin(pin, level, now)
@@ -221,7 +224,7 @@ class FaultyMachine(Stateful):
 
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         """What lies before the faults changes; an input that is held takes it when it is let go."""
-        name = pin.upper()
+        name = self.body.pin_name(pin)
         before = self._outer.get(name)
         if before is None:
             self.inner.set_pin(pin, value, now)

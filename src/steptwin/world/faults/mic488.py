@@ -43,6 +43,9 @@ class Mic488Body:
         device.slave = _Watched(device.slave, self._unit, owner)
         device.store = _keeping(device, device.store, owner)
 
+    def pin_name(self, pin: str) -> str:
+        return pin.upper()
+
     def check_pin(self, pin: str, level: float) -> None:
         check_pin(pin, level)
 

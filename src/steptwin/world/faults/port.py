@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from steptwin.machine import Nanos
+from steptwin.state import Plain, Stateful
 from steptwin.wire.slave import Direction, FrameObserver
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer
@@ -33,7 +34,7 @@ class FramedPort(Protocol):
     on_frame: FrameObserver | None
 
 
-class FaultyPort:
+class FaultyPort(Stateful):
     """One link of a twin, or one line of a world. Only while faults are set, or something delayed is on its way, anything is
     done here: `exchange`, `to_send` and `deadline` are the inner port's own else.
 
@@ -57,6 +58,9 @@ class FaultyPort:
         "exchange",
         "link",
         "to_send",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset(
+        {"_before", "_faults", "_framed", "_line", "_units", "deadline", "exchange", "link", "to_send"}
     )
 
     exchange: Callable[[bytes, Nanos], bytes]
@@ -116,12 +120,16 @@ class FaultyPort:
         if close is not None:
             close()
 
+    def set_state(self, plain: Plain) -> None:
+        super().set_state(plain)
+        self._choose()
+
     # ------------------------------------------------------------------ which way calls go
 
     def _choose(self) -> None:
-        if self._faults.active:
+        if self._faults.active or self._arriving or self._leaving:
             self._be_faulty()
-        elif not (self._arriving or self._leaving):
+        else:
             self._be_transparent()
 
     def _be_transparent(self) -> None:

@@ -1,0 +1,48 @@
+"""The M1486 as something that can fail. What its shaft does is for mechanics: the chip has no encoder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486
+from steptwin.m1486.pins import ALIASES, known_pin
+from steptwin.machine import Nanos
+from steptwin.world.faults.machine import FaultyMachine, Shaft
+
+
+class M1486Body:
+    """A file is of no use unless it is whole: one whose saving was cut off, or that meets a worn byte, is gone."""
+
+    def __init__(self, chip: M1486, shafts: Sequence[Shaft] = ()) -> None:
+        self._chip = chip
+        self.shafts = shafts
+
+    def watch(self, owner: FaultyMachine) -> None:
+        chip = self._chip
+        store = chip.store
+        chip.store = lambda image: _keep(chip, store, owner, image)
+
+    def pin_name(self, pin: str) -> str:
+        name = pin.strip().upper()
+        return ALIASES.get(name, name)
+
+    def check_pin(self, pin: str, level: float) -> None:
+        known_pin(pin)
+        if level not in (0.0, 1.0):
+            raise Misuse(f"{pin} = {level:g}: a digital input is 0 or 1")
+
+    def power_off(self, now: Nanos) -> None:
+        self._chip.power_off(now)
+
+    def power_on(self, now: Nanos) -> None:
+        self._chip.power_cycle(now)
+
+
+def _keep(chip: M1486, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine, image: bytes) -> bytes:
+    size = max(len(image), len(chip.image))
+    old, new = chip.image.ljust(size, b"\xff"), image.ljust(size, b"\xff")
+    kept = owner.kept(old, new, chip.now)
+    image = image if kept == new else chip.image if kept == old else b""
+    stored = store(image) if store is not None else None
+    return image if stored is None else stored
