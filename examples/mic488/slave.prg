@@ -1,6 +1,6 @@
 // Serves user registers to a master and moves nothing: inputs and positions are shown, outputs are set, a write is answered.
 // $I100 command (1 count, 2 clear, 3 sum), $I101 answer, $D102 counter, $R104 and $R106 operands, $R108 result,
-// $I110 inputs as bits, $I112 outputs to set, $R114 position of M1, $I120 seconds since the start.
+// $D110 inputs as bits, $I112 outputs to set, $R114 position of M1, $I120 seconds since the start.
 
 #count 1
 #clear 2
@@ -11,7 +11,7 @@ TIMB1 = 0
 CFGINT_MODBUS = INT_HIGH
 
 MAIN:
-$I110 = INPUTS
+$D110 = INPUTS
 $R114 = PosM1
 $I120 = TIMB1
 DELAY 0,05

@@ -22,6 +22,7 @@ from steptwin.runtime.frames import FrameLog, WatchedRtuPort
 from steptwin.runtime.lines import Happening
 from steptwin.runtime.links import Port
 from steptwin.runtime.memory import StateDirectory
+from steptwin.runtime.programbanks import Banks
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
@@ -47,6 +48,7 @@ class Mic488Line:
         config: ControllerConfig,
         units: Sequence[int],
         firmware: str,
+        banks: Banks | None = None,
         *,
         lenient: bool = False,
         state: StateDirectory | None = None,
@@ -54,11 +56,12 @@ class Mic488Line:
         options: LineOptions | None = None,
     ) -> None:
         self.options = options or LineOptions()
+        banks = banks or Banks()
         self.kernel = Kernel()
         self.devices: dict[int, Mic488] = {}
         for unit in units:
             memory = state.load(memory_name(unit)) if state is not None else None
-            device = Mic488(config, firmware, lenient=lenient, memory=memory)
+            device = Mic488(config, firmware, lenient=lenient, memory=memory, programs=banks.programs, positions=banks.positions)
             if state is not None:
                 device.store = partial(state.save, memory_name(unit))
             self.devices[unit] = device

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from steptwin.diagnostics import render
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import ControllerConfig, read_config
@@ -20,9 +21,11 @@ from steptwin.runtime.lines import Face, Lines
 from steptwin.runtime.links import where
 from steptwin.runtime.mic488 import LineOptions, Mic488Line, open_state
 from steptwin.runtime.output import Output
+from steptwin.runtime.programbanks import Banks, Findings, ProgramErrors, parse_banks, read_banks
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop, shows_live_view
 from steptwin.runtime.tcp import parse_address
+from steptwin.wbc.dialect import dialect_for
 from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
 
 RTU = "Modbus RTU"
@@ -42,6 +45,8 @@ class Mic488Options:
     tcp: str | None = None
     rtu_tcp: str | None = None
     config: Path | None = None
+    programs: tuple[str, ...] = ()
+    positions: tuple[str, ...] = ()
     state: Path | None = None
     lenient: bool = False
     line_timing: str = "off"
@@ -70,10 +75,11 @@ def serve(options: Mic488Options) -> None:
     else:
         config = demo_config() if options.demo else ControllerConfig()
     units = parse_units(options.units) if options.units is not None else [config.address]
+    banks = _load_banks(options, config)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
     with asyncio.Runner(loop_factory=fastest_loop()) as runner:
-        runner.run(_serve(options, config, units))
+        runner.run(_serve(options, config, units, banks))
 
 
 def load_config(path: Path, firmware: str) -> ControllerConfig:
@@ -97,7 +103,29 @@ def parse_units(text: str) -> list[int]:
     return units
 
 
-async def _serve(options: Mic488Options, config: ControllerConfig, units: list[int]) -> None:
+def _load_banks(options: Mic488Options, config: ControllerConfig) -> Banks:
+    """What ``--program`` and ``--positions`` name. Findings go to standard error as `check` prints them."""
+    if not options.programs and not options.positions:
+        return Banks()
+    number = known_firmware(options.firmware).banks
+    programs = parse_banks("--program", options.programs, number)
+    positions = parse_banks("--positions", options.positions, number)
+    try:
+        banks = read_banks(programs, positions, config, dialect_for(options.firmware))
+    except ProgramErrors as errors:
+        _show(errors.findings)
+        raise
+    _show(banks.findings)
+    return banks
+
+
+def _show(findings: Findings) -> None:
+    for source, diagnostics in findings:
+        if diagnostics:
+            sys.stderr.write(render(source, diagnostics) + "\n")
+
+
+async def _serve(options: Mic488Options, config: ControllerConfig, units: list[int], banks: Banks) -> None:
     with ExitStack() as stack:
         output = Output(sys.stdout)
         stack.callback(output.close)
@@ -107,6 +135,7 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
             config,
             units,
             options.firmware,
+            banks,
             lenient=options.lenient,
             state=open_state(stack, options.state),
             demo=options.demo,
