@@ -1,0 +1,474 @@
+"""Moves, seeks, forced stops, LIMIT, jog, the position counter and what shows the motion (manual chapters VI, VII.2, VII.4)."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from m1486_rig import Bench
+
+from steptwin.m1486.lines import DUAL_DAC, SEEK_ENDS_LOW, STEP_DIRECTION, TWO_DACS
+from steptwin.machine import SECOND
+
+STEP = 64
+
+
+def speed(bench: Bench) -> float:
+    """Full steps/s, with its sign."""
+    return bench.chip.drive.profile.velocity(bench.now) / STEP
+
+
+def duration(bench: Bench) -> float:
+    """Seconds the last move took."""
+    return (bench.events("stands")[-1].time - bench.events("moves")[-1].time) / SECOND
+
+
+def moving(*lines: str, kind: str = "B", seconds: float = 0.2) -> Bench:
+    """A chip that has been moving for so long."""
+    bench = Bench(kind)
+    bench.do(*lines)
+    bench.send("r")
+    while not bench.chip.drive.is_busy:
+        bench.run(ms=0.5)
+    bench.run(seconds)
+    return bench
+
+
+# ---------------------------------------------------------------------- moves
+
+
+def test_m_3_the_default_move() -> None:
+    # 96 full steps up from 200 to 1000 step/s at 5000 step/s² in 160 ms, and down again; the rest at 1000 step/s.
+    bench = Bench()
+    bench.do("r")
+    assert (bench.counter, bench.true) == (64_000, 64_000)
+    assert duration(bench) == pytest.approx(2 * 0.16 + (1000 - 2 * 96) / 1000, abs=1e-9)
+
+
+def test_a_move_starts_and_ends_at_start_stop_speed() -> None:
+    bench = moving("s100", "a1000", "v500", seconds=0)
+    assert speed(bench) == pytest.approx(100, abs=2)
+    bench.run(0.1)
+    assert speed(bench) == pytest.approx(200, abs=2)
+    bench.run(1.0)
+    assert speed(bench) == 500
+
+
+@pytest.mark.parametrize(("kind", "clock"), [("B", 1), ("B2x", 2)])
+def test_at_24_mhz_speeds_are_doubled_and_accelerations_times_four(kind: str, clock: int) -> None:
+    bench = Bench(kind)
+    bench.do("s100", "a1000", "v500", "r")
+    assert duration(bench) == pytest.approx((2 * 0.4 + (1000 - 2 * 120) / 500) / clock, abs=2e-9)
+
+
+def test_m_8_a_speed_not_above_start_stop_is_constant() -> None:
+    for velocity in (16, 199, 200):
+        bench = Bench()
+        bench.do(f"v{velocity}", "f6400", "r")
+        assert duration(bench) == pytest.approx(100 / velocity, abs=2e-9)
+
+
+def test_m_7_a_short_move_turns_half_way() -> None:
+    bench = Bench()
+    bench.do("f3200", "r")
+    top = math.sqrt(200**2 + 2 * 5000 * 25)
+    assert duration(bench) == pytest.approx(2 * (top - 200) / 5000, abs=2e-9)
+    assert bench.true == 3200
+
+
+@given(
+    st.integers(16, 1950), st.integers(20, 7000), st.integers(16, 20_000), st.integers(1, 65_000), st.sampled_from(["B", "B2x"])
+)
+def test_m_6_the_speed_is_the_integral_of_its_acceleration(start: int, knee: int, top: int, acc: int, kind: str) -> None:
+    """The chip's endless move against the differential equation: A up to P, then falling linearly in time to 0 at V."""
+    bench = Bench(kind, statement_ns=0)
+    bench.do(f"s{start}", f"p{knee}", f"v{top}", f"a{acc}", "g+")
+    bench.send("r")
+    begin, clock = bench.now, 2 if kind == "B2x" else 1
+    steps = 2000
+    # M-6: above P the acceleration at speed v is A √((V − v) / (V − P)).
+    span = (top - start) / acc * 3 + 0.01
+    v, x, dt = float(top if top <= start else start), 0.0, span / steps
+    for _ in range(steps):
+
+        def slope(v: float) -> float:
+            if v >= top or top <= start:
+                return 0.0
+            return acc * math.sqrt((top - v) / (top - knee)) if v > knee and knee < top else float(acc)
+
+        middle = min(v + slope(v) * dt / 2, top)
+        x += middle * dt
+        v = min(v + slope(middle) * dt, float(top))
+    now = begin + round(span / clock * SECOND)
+    profile = bench.chip.drive.profile
+    assert profile.velocity(now) / STEP / clock == pytest.approx(v, rel=5e-3, abs=1.0)
+    assert (profile.position(now)) / STEP == pytest.approx(x, rel=5e-3, abs=1.0)
+
+
+def test_p_above_v_switches_the_parabola_off() -> None:
+    with_default = Bench()
+    with_default.do("v2000", "r")
+    without = Bench()
+    without.do("v2000", "p2000", "r")
+    parabolic = Bench()
+    parabolic.do("v2000", "p1500", "r")
+    assert duration(with_default) == duration(without) < duration(parabolic)
+
+
+def test_directions_and_distances() -> None:
+    bench = Bench()
+    bench.do("=64000", "b640", "r")
+    assert (bench.counter, bench.true) == (63_360, -640)
+    bench.do("d", "r")
+    assert (bench.counter, bench.true) == (64_000, 0)
+    bench.do("f1280", "r", "r")
+    assert bench.counter == 66_560
+
+
+def test_g_finds_its_distance_when_it_is_done_and_m_9_r_repeats_it() -> None:
+    # Chapter VII.2: at 9 000, G10000 is a distance of 1 000 in positive direction; here with multiples of M1.
+    bench = Bench(interface=TWO_DACS)
+    bench.do("=9008", "m8", "g10000", "r")
+    assert (bench.counter, bench.true) == (10_000, 992)
+    bench.do("r")
+    assert bench.counter == 10_992
+    bench.do("d", "r", "r")
+    assert bench.counter == 9008
+
+
+def test_m_10_h_is_a_specification() -> None:
+    bench = Bench()
+    bench.do("=6400", "h")
+    assert bench.counter == 6400
+    assert bench.events("moves") == []
+    bench.do("r")
+    assert (bench.counter, bench.true) == (0, -6400)
+
+
+def test_a_move_of_no_distance_takes_no_time() -> None:
+    bench = Bench()
+    assert bench.do("h", "r", "u20") == b"\x42"
+    assert bench.events("moves") == []
+
+
+def test_distances_that_are_no_multiples_are_wrong_data() -> None:
+    for m, grid in ((1, 64), (4, 16), (64, 1)):
+        for command in ("f", "b", "g", "="):
+            bench = Bench()
+            bench.do(f"m{m}", f"{command}{grid}")
+            assert bench.wrong == []
+            if grid > 1:
+                bench.do(f"{command}{grid + grid // 2}")
+                assert f"is not a multiple of {grid} minimum microsteps (M{m})" in bench.wrong[0]
+    # M may have changed since.
+    bench = Bench(interface=TWO_DACS)
+    bench.do("f16", "m1", "r")
+    assert "16 is not a multiple of 64" in bench.wrong[0]
+
+
+def test_settings_during_a_move_count_from_the_next_one() -> None:
+    bench = moving("f640000", seconds=0.5)
+    before = bench.chip.drive.profile
+    bench.chip.drive.velocity = 500
+    bench.run(0.1)
+    assert bench.chip.drive.profile is before
+
+
+# ---------------------------------------------------------------------- microsteps
+
+
+def test_m_11_divisions_that_do_not_go_together_are_wrong_data_when_a_move_starts() -> None:
+    allowed = {(1, 1), (64, 1), (64, 2), (64, 4), (32, 1), (32, 2), (32, 4), (16, 4), (8, 1), (8, 2), (4, 1), (4, 4), (2, 2)}
+    for m in (1, 2, 4, 8, 16, 32, 64):
+        for q in (1, 2, 4):
+            for command in ("r", ")1"):
+                bench = Bench()
+                bench.pin(B1=1)
+                bench.do(f"m{m}", f"q{q}", "f64")
+                bench.send(command)
+                bench.run(ms=5)
+                assert bool(bench.wrong) is ((m, q) not in allowed)
+
+
+@pytest.mark.parametrize(("q", "most"), [(4, 3000), (2, 6000), (1, 20_000)])
+def test_the_highest_speed_with_q(q: int, most: int) -> None:
+    bench = moving("m64", f"q{q}", "v20000", "a65000", "g+", seconds=2.0)
+    assert speed(bench) == most
+    bench = moving("m64", f"q{q}", "v20000", "a65000", "g+", kind="B2x", seconds=2.0)
+    assert speed(bench) == 2 * most
+
+
+@pytest.mark.parametrize("interface", [STEP_DIRECTION, DUAL_DAC, TWO_DACS], ids=lambda i: i.name)
+@pytest.mark.parametrize(("m", "q"), [(1, 1), (64, 1), (64, 4), (8, 2), (4, 1)])
+def test_pulses_lead_to_the_target_whatever_the_division(interface: object, m: int, q: int) -> None:
+    bench = Bench(interface=interface)
+    bench.do(f"m{m}", f"q{q}", "v4000", "a20000", "f128000", "r", f"b{64 // m * 37}", "r")
+    assert bench.true == bench.sum_of_pulses() == 128_000 - 64 // m * 37
+
+
+def test_the_division_changes_at_the_low_range_limit() -> None:
+    # M8: 12 000 / 8 = 1500 step/s; doubled at 24 MHz together with the speeds.
+    for kind in ("B", "B2x"):
+        bench = moving("m8", "q1", "v3000", "f640000", kind=kind, seconds=3.0)
+        train = bench.chip.drive.train
+        assert [grid for _, grid in train.divisions] == [8, 64, 8]
+        clock = bench.chip.variant.clock
+        change = train.pulse_time(train.divisions[1].begin, 0)
+        assert change is not None
+        assert train.profile.velocity(change) / STEP / clock == pytest.approx(1500, rel=0.02)
+        assert [grid for _, grid in moving("m8", "q1", "v1500", "f640000", kind=kind).chip.drive.train.divisions] == [8]
+
+
+# ---------------------------------------------------------------------- K
+
+
+def test_kill_brakes_with_the_slope_of_the_acceleration_to_a_full_step() -> None:
+    bench = moving("m64", "v1000", "f640000", seconds=1.0)
+    bench.send("k")
+    killed = bench.now
+    bench.finish()
+    stopped = bench.events("stands")[0].time
+    # 800 step/s at 5000 step/s², then at 200 step/s on to the next full step.
+    assert 0.16 <= (stopped - killed) / SECOND <= 0.16 + 1 / 200
+    assert bench.true % STEP == 0
+    assert bench.true == bench.sum_of_pulses()
+
+
+def test_kill_without_function_50_ends_where_the_ramp_ends() -> None:
+    bench = moving("c50", "m8", "v1000", "f640000", seconds=1.0003)
+    bench.send("k")
+    killed = bench.now
+    bench.finish()
+    # At most one microstep more, at 200 step/s.
+    assert 0.16 - 1e-9 <= (bench.events("stands")[0].time - killed) / SECOND <= 0.16 + 1 / 200 / 8
+    assert bench.true % STEP != 0
+    assert bench.true == bench.sum_of_pulses()
+
+
+def test_kill_at_start_stop_speed_stops_at_once() -> None:
+    bench = moving("c50", "v150", "f640000")
+    bench.send("k")
+    assert bench.events("stands")[0].time == bench.now
+
+
+def test_m_16_the_counter_of_a_killed_move_shows_its_target_and_is_not_valid() -> None:
+    bench = moving("v1000", "f640000", seconds=1.0)
+    bench.send("k")
+    bench.finish()
+    assert bench.counter == 640_000
+    assert not bench.chip.drive.is_valid
+    assert 0 < bench.true < 640_000
+    assert "position not valid" in bench.events("stands")[0].text
+    # The next moves count from there; a position that is given makes it valid again.
+    true = bench.true
+    bench.do("b64000", "r")
+    assert (bench.counter, bench.true, bench.chip.drive.is_valid) == (576_000, true - 64_000, False)
+    bench.do("=64")
+    assert (bench.counter, bench.chip.drive.is_valid) == (64, True)
+
+
+def test_the_counter_of_a_killed_endless_move_is_valid() -> None:
+    bench = moving("=6400000", "g-", seconds=1.0)
+    bench.send("k")
+    bench.finish()
+    assert bench.chip.drive.is_valid
+    assert bench.counter == 6_400_000 + bench.true
+    assert bench.true < -6400
+
+
+def test_kill_while_braking_changes_nothing() -> None:
+    bench = moving("v1000", "f640000", seconds=1.0)
+    bench.send("k")
+    train = bench.chip.drive.train
+    bench.run(ms=20)
+    bench.send("k")
+    assert bench.chip.drive.train is train
+    assert len(bench.events("stops")) == 1
+
+
+@settings(max_examples=25)
+@given(st.floats(0, 1.5), st.sampled_from([(1, 1), (64, 1), (64, 4), (8, 2), (4, 1)]), st.booleans(), st.booleans())
+def test_a_kill_at_any_moment_loses_no_pulse(moment: float, mq: tuple[int, int], full: bool, forward: bool) -> None:
+    bench = Bench(statement_ns=0)
+    bench.do(f"m{mq[0]}", f"q{mq[1]}", "v4000", "a9000", "p2000", "T50" if full else "C50", "f160000" if forward else "b160000")
+    bench.send("r")
+    bench.run(moment)
+    bench.send("k")
+    bench.finish()
+    assert bench.true == bench.sum_of_pulses()
+    assert abs(bench.true) <= 160_000
+    assert bench.true % (STEP if full else STEP // mq[0]) == 0
+
+
+# ---------------------------------------------------------------------- LIMIT
+
+
+def test_limit_brakes_like_kill_and_the_program_goes_on() -> None:
+    bench = moving("v1000", "f640000", seconds=1.0)
+    bench.pin(LIMIT=0)
+    bench.send("u20")
+    assert bench.finish() == b"\x42"
+    assert bench.true < 640_000
+    assert not bench.chip.drive.is_valid
+
+
+def test_limit_without_function_51_holds_the_program_until_it_is_high() -> None:
+    bench = Bench()
+    bench.file("c51", "g+", "r", "u20")
+    bench.run(0.5)
+    bench.pin(LIMIT=0)
+    assert bench.run(5.0) == b""
+    assert not bench.chip.drive.is_busy
+    assert bench.send("c75") == b""
+    bench.pin(LIMIT=1)
+    assert bench.finish() == b"\x42"
+
+
+def test_limit_is_a_level_or_an_edge() -> None:
+    for edge in (False, True):
+        bench = Bench()
+        bench.do("t43" if edge else "c43")
+        bench.pin(LIMIT=0)
+        bench.do("f6400", "r")
+        assert bench.true == (6400 if edge else 0)
+    bench = moving("t43", "f640000", seconds=0.5)
+    bench.pin(LIMIT=0)
+    assert bench.chip.drive.is_stopping
+
+
+def test_function_42_disables_limit() -> None:
+    bench = moving("t42", "f64000")
+    bench.pin(LIMIT=0)
+    bench.finish()
+    assert bench.true == 64_000
+
+
+# ---------------------------------------------------------------------- seek
+
+
+@pytest.mark.parametrize("line", range(1, 22))
+def test_a_seek_ends_with_the_level_of_its_line(line: int) -> None:
+    assert (line in SEEK_ENDS_LOW) is (line in {1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19})
+    end = 0 if line in SEEK_ENDS_LOW else 1
+    for command, sign in ((")", 1), ("(", -1)):
+        bench = Bench()
+        bench.pin(**{f"B{line}": 1 - end})
+        bench.do("c52", "s100")
+        bench.send(f"{command}{line}")
+        bench.run(1.0)
+        assert speed(bench) == sign * 100
+        bench.pin(**{f"B{line}": end})
+        assert bench.events("stands")[0].time == bench.now
+        assert bench.true == sign * 100 * STEP
+        assert bench.counter == bench.true % 2**24
+        assert bench.chip.drive.is_valid
+
+
+def test_function_52_ends_a_seek_on_four_full_steps() -> None:
+    bench = Bench(interface=TWO_DACS)
+    bench.do("s100")
+    bench.send("(2")
+    bench.run(0.333)
+    bench.pin(B2=0)
+    assert bench.chip.drive.is_busy
+    bench.finish()
+    assert bench.true % (4 * STEP) == 0
+    assert -36 * STEP <= bench.true <= -33 * STEP
+    assert bench.true == bench.sum_of_pulses()
+
+
+def test_a_seek_whose_line_has_its_level_goes_nowhere() -> None:
+    bench = Bench()
+    assert bench.do(")7", "u20") == b"\x42"
+    assert bench.events("seeks") == []
+
+
+def test_a_seek_can_be_killed_and_limited() -> None:
+    for stop in ("k", "limit"):
+        bench = Bench()
+        bench.pin(B7=0)
+        bench.send(")7")
+        bench.run(0.5)
+        if stop == "k":
+            bench.send("k")
+        else:
+            bench.pin(LIMIT=0)
+        bench.finish()
+        assert not bench.chip.drive.is_busy
+        assert bench.chip.drive.is_valid
+        assert bench.true == bench.sum_of_pulses() > 0
+
+
+# ---------------------------------------------------------------------- jog
+
+
+def test_m_18_jog_steps_one_microstep_in_its_direction() -> None:
+    bench = Bench()
+    bench.do("m8", "=640")
+    for direction, position in ((0, 648), (1, 640), (1, 632)):
+        bench.pin(B7=direction)
+        bench.pin(JOG=0)
+        bench.run(ms=1)
+        bench.pin(JOG=1)
+        bench.run(ms=1)
+        assert bench.counter == position
+        assert bench.level("DIRECTION") == direction
+    assert bench.true == bench.sum_of_pulses() == -8
+
+
+def test_there_is_no_jog_during_a_move_or_a_seek() -> None:
+    bench = moving("f64000")
+    bench.pin(JOG=0)
+    bench.finish()
+    assert bench.true == 64_000
+    bench = Bench()
+    bench.do("c52")
+    bench.pin(B5=0)
+    bench.send(")5")
+    bench.run(0.1)
+    bench.pin(JOG=0)
+    bench.pin(B5=1)
+    assert bench.true == 20 * STEP
+
+
+# ---------------------------------------------------------------------- what shows the motion
+
+
+def test_boost_is_low_during_moves_and_seeks_only() -> None:
+    bench = Bench()
+    assert bench.level("BOOST") == 1
+    bench.file("w10", "f6400", "r", "w10", "(1")
+    bench.run(ms=5)
+    bench.pin(JOG=0)
+    bench.finish(1)
+    bench.pin(B1=0)
+    bench.finish()
+    edges = [(edge.time, edge.value) for edge in bench.edges if edge.pin == "BOOST"]
+    begin, end = bench.events("moves")[0].time, bench.events("stands")[0].time
+    assert edges[:2] == [(begin, 0.0), (end, 1.0)]
+    assert [value for _, value in edges] == [0.0, 1.0, 0.0, 1.0]
+
+
+def test_direction_is_high_for_negative_motion() -> None:
+    bench = Bench()
+    bench.do("f64", "r")
+    assert bench.level("DIRECTION") == 0
+    bench.do("b64", "r")
+    assert bench.level("DIRECTION") == 1
+    bench = Bench(interface=TWO_DACS)
+    bench.do("b64", "r")
+    assert bench.level("DIRECTION") == 0
+
+
+def test_the_position_counter_has_24_bits() -> None:
+    bench = Bench()
+    bench.do("b6400", "r")
+    assert bench.counter == 2**24 - 6400
+    assert bench.do("u1", "u2", "u3") == (2**24 - 6400).to_bytes(3, "little")
+    bench.do("f6400", "r")
+    assert bench.counter == 0
+    bench.do("=16000000", "f15999936", "v20000", "a65000", "r", "c100")
+    assert bench.counter == 0
+    assert bench.true == 15_999_936
