@@ -6,8 +6,8 @@ import asyncio
 import contextlib
 import errno
 import os
-import select
 import socket
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, cast
@@ -131,18 +131,19 @@ class TcpEndpoint:
 
 
 class SocketChannel:
+    """A connection whose time-out the system keeps: that saves a call for each exchange."""
+
     def __init__(self, connected: socket.socket, place: str) -> None:
         connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        connected.setblocking(False)
+        connected.setblocking(True)
         self._socket = connected
         self._place = place
-        self._readable = select.poll()
-        self._readable.register(connected, select.POLLIN)
+        self._timeout_us = 0
 
     def write(self, data: bytes) -> None:
         try:
-            sent = self._socket.send(data)
+            sent = self._socket.send(data, socket.MSG_DONTWAIT)
             if sent < len(data):
                 raise BlockingIOError(errno.EAGAIN, "")
         except BlockingIOError:
@@ -151,10 +152,15 @@ class SocketChannel:
             raise LineLost(f"{self._place}: {reason(error)}") from error
 
     def read(self, timeout_s: float) -> bytes:
-        if not self._readable.poll(max(timeout_s, 0.0) * 1000.0):
-            return b""
+        timeout_us = int(timeout_s * 1e6)
+        flags = 0
+        if timeout_us <= 0:
+            flags = socket.MSG_DONTWAIT
+        elif timeout_us != self._timeout_us:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", *divmod(timeout_us, 1_000_000)))
+            self._timeout_us = timeout_us
         try:
-            data = self._socket.recv(READ_BYTES)
+            data = self._socket.recv(READ_BYTES, flags)
         except BlockingIOError:
             return b""
         except OSError as error:
