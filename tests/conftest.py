@@ -76,6 +76,8 @@ def require_library(require_peer: Callable[[str], str]) -> Callable[[str], list[
 class Served:
     """A twin served by the real command in a process of its own."""
 
+    what: tuple[str, ...] = ("mic488", "--tcp", "127.0.0.1:0", "--rtu-tcp", "127.0.0.1:0")
+
     def __init__(self, directory: Path, *options: str) -> None:
         self.directory = directory
         self.ready_file = directory / "ready.json"
@@ -85,9 +87,9 @@ class Served:
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(directory), "COLUMNS": "200", "TERM": "dumb"}
         self._out = (directory / "out").open("w+")
         self._err = (directory / "err").open("w+")
-        where = ["--tcp", "127.0.0.1:0", "--rtu-tcp", "127.0.0.1:0", "--pty", str(self.pty), "--ready-file", str(self.ready_file)]
+        where = ["--pty", str(self.pty), "--ready-file", str(self.ready_file)]
         self.process = subprocess.Popen(
-            [STEPTWIN, "serve", "mic488", *where, *options], stdout=self._out, stderr=self._err, env=self.environment
+            [STEPTWIN, "serve", *self.what, *where, *options], stdout=self._out, stderr=self._err, env=self.environment
         )
 
     def wait_until_ready(self) -> None:
@@ -134,6 +136,12 @@ class Served:
         self._err.close()
 
 
+class ServedM1486(Served):
+    """The same for M1486 chips."""
+
+    what = ("m1486", "--tcp", "127.0.0.1:0")
+
+
 def until(condition: Callable[[], object], what: str, seconds: float = 10.0) -> None:
     """Wait for a condition; the test fails when it does not come."""
     deadline = time.monotonic() + seconds
@@ -145,10 +153,20 @@ def until(condition: Callable[[], object], what: str, seconds: float = 10.0) -> 
 @pytest.fixture
 def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Served]]:
     """``serve("--demo", ...)`` starts a twin on free ports and a pty of its own; it is ended cleanly after the test."""
+    yield from _serving(tmp_path_factory, Served)
+
+
+@pytest.fixture
+def serve_m1486(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Served]]:
+    """The same for ``steptwin serve m1486``."""
+    yield from _serving(tmp_path_factory, ServedM1486)
+
+
+def _serving(tmp_path_factory: pytest.TempPathFactory, kind: type[Served]) -> Iterator[Callable[..., Served]]:
     served: list[Served] = []
 
     def start(*options: str, directory: Path | None = None) -> Served:
-        twin = Served(directory or tmp_path_factory.mktemp("twin"), *options)
+        twin = kind(directory or tmp_path_factory.mktemp("twin"), *options)
         served.append(twin)
         twin.wait_until_ready()
         return twin

@@ -44,7 +44,7 @@ class Writer(Protocol):
 class Feed:
     """Between a stream of bytes and a port: bytes in, answers out, timers for what is due later."""
 
-    __slots__ = ("_cell", "_loop", "_port", "_talks", "_timer", "_writer")
+    __slots__ = ("_cell", "_loop", "_port", "_talks", "_timer", "_writer", "is_read")
 
     def __init__(self, cell: Cell, port: Port, writer: Writer) -> None:
         self._cell = cell
@@ -52,6 +52,8 @@ class Feed:
         self._writer = writer
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.Handle | None = None
+        self.is_read = True
+        """Whether the other end takes what is written. What is said unasked is lost otherwise, as on a wire."""
         self._talks: TalkingPort | None = None
         if isinstance(port, TalkingPort):
             self._talks = port
@@ -82,8 +84,10 @@ class Feed:
     def _wake(self) -> None:
         self._timer = None
         now = self._cell.enter()
+        heard = self.is_read or self._talks is None
         for _, data in self._port.to_send(now):
-            self._writer.write(data)
+            if heard:
+                self._writer.write(data)
         self._cell.leave()
         due = self._port.deadline()
         if due is not None:

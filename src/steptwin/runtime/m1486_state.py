@@ -13,8 +13,11 @@ from steptwin.m1486.syntax import Command
 from steptwin.machine import SECOND, Nanos
 
 
-def program_words(chip: M1486) -> str:
-    """What the program of a chip does at the chip's moment."""
+_MOTIONS = {Motion.MOVE: "move", Motion.ENDLESS: "endless move", Motion.SEEK: "seek"}
+
+
+def program_words(chip: M1486, now: Nanos) -> str:
+    """What the program of a chip does."""
     program = chip.program
     if chip.is_shut_down:
         return "shut down"
@@ -25,11 +28,11 @@ def program_words(chip: M1486) -> str:
     if program.is_halted:
         return "halted"
     if program.waiting is Waiting.MOTION:
-        return f"waits for the end of the {chip.drive.motion.value}" if chip.drive.is_busy else "runs"
+        return f"waits for the end of the {_MOTIONS.get(chip.drive.motion, 'motion')}"
     if program.waiting is Waiting.LINE:
         return f"waits until B{program.line} is {'high' if program.line_level else 'low'}"
-    if program.ready - chip.now > program.statement_ns:
-        return f"waits {(program.ready - chip.now) / SECOND:.3f} s more"
+    if program.ready - now > program.statement_ns:
+        return f"waits {(program.ready - now) / SECOND:.3f} s more"
     return "has nothing to do" if program.is_at_end else "runs"
 
 
@@ -73,7 +76,7 @@ def state_of(chip: M1486, now: Nanos) -> dict[str, object]:
         "baud": chip.uart.baud,
         "listens": chip.receiver.is_listening,
         "program": {
-            "does": program_words(chip),
+            "does": program_words(chip, now),
             "next": None if following is None else str(following),
             "memory_bits": used_bits(chip),
             "memory_size_bits": chip.variant.memory_bits,

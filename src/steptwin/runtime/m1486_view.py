@@ -31,7 +31,7 @@ class M1486View(LiveView):
 
 def _chip(address: int, chip: M1486, now: Nanos) -> list[Text]:
     title = Text(f"chip {address:X}  {now / SECOND:9.1f} s  ", style="bold")
-    title.append(program_words(chip), style="bold red" if chip.program.is_held or chip.is_shut_down else "green")
+    title.append(program_words(chip, now), style="bold red" if chip.program.is_held or chip.is_shut_down else "green")
     if not chip.receiver.is_listening:
         title.append("  (does not listen)", style="dim")
     return [title, _motion(chip, now), _memory(chip), _numbers(chip), _lines(chip), _others(chip)]

@@ -168,7 +168,7 @@ class _Lines:
             if bench.sent[name]:
                 say(f"  sent {bench.sent[name].hex(' ').upper()}")
             if outcome.ending.why != "idle":
-                say(f"  {program_words(chip)}")
+                say(f"  {program_words(chip, bench.now)}")
         if bench.untyped:
             say(f"{bench.untyped} lines of the file were not taken: there was no room for them")
         if outcome.ending.why == "limit":
@@ -223,6 +223,6 @@ def _chip_data(name: str, chip: M1486, bench: Bench) -> dict[str, object]:
         "position": drive.counter_u(bench.now),
         "position_valid": drive.is_valid,
         "true_position": drive.true_u(bench.now),
-        "program": program_words(chip),
+        "program": program_words(chip, bench.now),
         "sent": bench.sent[name].hex(),
     }

@@ -122,11 +122,11 @@ class Connection(asyncio.Protocol):
             self._transport.resume_reading()
 
     def pause_writing(self) -> None:
-        self._writable = False
+        self._writable = self._feed.is_read = False
         self._transport.pause_reading()
 
     def resume_writing(self) -> None:
-        self._writable = True
+        self._writable = self._feed.is_read = True
         if self._backlog:
             asyncio.get_running_loop().call_soon(self._serve_backlog)
         else:
