@@ -173,3 +173,29 @@ def test_build_refuses_a_program_with_errors(run: Run, file: File, tmp_path: Pat
     assert "error W113" in err
     assert run("build", file("b.prg", "OUT1 = 1\n"), "--positions", file("b.csv", "a;1\n"))[0] == 1
     assert list(tmp_path.glob("*.wbc")) == []
+
+
+def test_run_plays_a_program(run: Run, file: File) -> None:
+    program, table = file("a.prg", PROGRAM), file("a.csv", TABLE)
+    config = file("a.cfg", "[Axis0]\nUnit=3\nGear=10\nVel=50\nAcc=500\nInKL=0\n")
+    arguments = ("run", program, "--positions", table, "--config", config, "--travel", "m1=-2..")
+    code, out, err = run(*arguments)
+    assert (code, err) == (0, "")
+    assert "M1 goes to 10.5 mm 4 MOVEPTP @top" in " ".join(out.split())
+    assert "the program has ended" in out
+    code, out, _ = run(*arguments, "--json", "--for", "50ms", "--statement-time", "10ms")
+    data = json.loads(out)
+    assert (code, data["ended"], data["virtual_s"], data["line"]) == (0, "limit", 0.05, 3)
+
+
+def test_run_says_what_is_wrong(run: Run, file: File) -> None:
+    code, _, err = run("run", file("a.prg", "WAIT\n"))
+    assert code == 1
+    assert "a.prg:1:1: error W113" in err
+    assert "a.prg cannot be loaded: see the errors above" in err
+    code, out, err = run("run", file("b.prg", "$I0 = 1 / $I1\n"))
+    assert (code, err) == (1, "")
+    assert "an error has stopped the program in line 1: division by zero" in out
+    assert run("run", file("c.prg", ""), "--variant", "A")[0] == 2
+    assert run("run", file("d.m1486", ""), "--travel", "M1=1..2") == (2, "", "steptwin: --travel is not for M1486 programs\n")
+    assert run("run", file("c.prg", ""), "--statement-time", "2s")[0] == 2

@@ -31,16 +31,21 @@ class Options:
     variant: str | None = None
     interface: str | None = None
     wire: list[str] | None = None
+    positions: Path | None = None
+    config: Path | None = None
+    firmware: str | None = None
+    travel: list[str] | None = None
+    statement_time: str | None = None
 
     def refuse(self, files: str, *names: str) -> None:
         """Raises `Misuse` when one of these options was given, which mean nothing for such files."""
         for name in names:
             if getattr(self, name):
-                raise Misuse(f"--{name} is not for {files}")
+                raise Misuse(f"--{name.replace('_', '-')} is not for {files}")
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="What to run; its suffix says what it is: .m1486.")],
+    file: Annotated[Path, typer.Argument(help="What to run; its suffix says what it is: .prg or .m1486.")],
     duration: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until idle.")
     ] = None,
@@ -60,6 +65,16 @@ def run(
     wire: Annotated[
         list[str] | None, typer.Option(help="M1486: from a pin of one chip to an input of another, 0.B1=7.B3. Again for more.")
     ] = None,
+    positions: Annotated[Path | None, typer.Option(help="MIC488: position table (.csv).")] = None,
+    config: Annotated[Path | None, typer.Option(help="MIC488: configuration (.cfg).")] = None,
+    firmware: Annotated[str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70, which is the default.")] = None,
+    travel: Annotated[
+        list[str] | None,
+        typer.Option(metavar="Mn=LOW..HIGH,...", help="MIC488: where the switches of axes are, seen from power-on: M1=-10..250."),
+    ] = None,
+    statement_time: Annotated[
+        str | None, typer.Option(metavar="TIME", help="MIC488: what one statement takes; default 1ms, 0 for none.")
+    ] = None,
 ) -> None:
     """Run a program in virtual time: its moves, waits, outputs and uploads with their times."""
     from steptwin.runtime.timedinputs import parse_duration, parse_inputs
@@ -72,8 +87,22 @@ def run(
     limit = None if duration is None else parse_duration(duration, "--for")
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
-    changes = parse_inputs(",".join(inputs or []))
-    if not runner(file, Options(limit, until == "idle", changes, trace, as_json, variant, interface, wire)):
+    options = Options(
+        limit=limit,
+        until_idle=until == "idle",
+        inputs=parse_inputs(",".join(inputs or [])),
+        trace=trace,
+        as_json=as_json,
+        variant=variant,
+        interface=interface,
+        wire=wire,
+        positions=positions,
+        config=config,
+        firmware=firmware,
+        travel=travel,
+        statement_time=statement_time,
+    )
+    if not runner(file, options):
         raise typer.Exit(1)
 
 
@@ -82,6 +111,7 @@ def _run_m1486(file: Path, options: Options) -> bool:
     from steptwin.runtime.run_m1486 import M1486Run
     from steptwin.runtime.run_m1486 import run as run_program
 
+    options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time")
     wanted = M1486Run(
         program=file,
         variant=options.variant or DEFAULT.name,
@@ -96,5 +126,29 @@ def _run_m1486(file: Path, options: Options) -> bool:
     return run_program(wanted, typer.echo, lambda text: typer.echo(text, err=True))
 
 
+def _run_wbc(file: Path, options: Options) -> bool:
+    from steptwin.runtime.run_wbc import WbcRun
+    from steptwin.runtime.run_wbc import run as run_program
+    from steptwin.runtime.timedinputs import parse_duration
+    from steptwin.runtime.wbc_bench import parse_travel
+    from steptwin.wbc.dialect import DEFAULT
+
+    options.refuse("WBC programs", "variant", "interface", "wire")
+    wanted = WbcRun(
+        program=file,
+        positions=options.positions,
+        config=options.config,
+        firmware=options.firmware or DEFAULT.firmware,
+        statement_time=parse_duration(options.statement_time or "1ms", "--statement-time"),
+        travels=parse_travel(",".join(options.travel or [])),
+        limit=options.limit,
+        until_idle=options.until_idle,
+        inputs=tuple(options.inputs),
+        trace=options.trace,
+        as_json=options.as_json,
+    )
+    return run_program(wanted, typer.echo, lambda text: typer.echo(text, err=True))
+
+
 #: What runs each kind of file; True when nothing went wrong.
-_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {".m1486": _run_m1486}
+_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {".m1486": _run_m1486, ".prg": _run_wbc}

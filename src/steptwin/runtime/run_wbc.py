@@ -1,0 +1,199 @@
+"""`steptwin run FILE.prg`: a program of the MIC488 in virtual time, and what it does when."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from steptwin.diagnostics import Severity, render
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.device import check_pin
+from steptwin.mic488.program import ProgramState
+from steptwin.runtime.mic488 import state_of
+from steptwin.runtime.programbanks import Findings, ProgramErrors, read_banks
+from steptwin.runtime.serve_mic488 import load_config
+from steptwin.runtime.timedinputs import TimedInput
+from steptwin.runtime.wbc_bench import NAME, Bench, Ending, Happening, Travel
+from steptwin.wbc.dialect import DEFAULT, dialect_for
+from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.world.trace import Trace
+
+USUAL_LIMIT_NS: Nanos = 60 * SECOND
+LIMIT_UNTIL_IDLE_NS: Nanos = 3600 * SECOND
+JSON_VERSION = 1
+
+_WRONG = frozenset({"program-error", "position-error", "overrun"})
+"""Events after which a run has not gone well."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WbcRun:
+    """What is to be run. ``limit`` ends it where nothing else does; ``until_idle`` ends it also where it waits for ever."""
+
+    program: Path
+    positions: Path | None = None
+    config: Path | None = None
+    firmware: str = DEFAULT.firmware
+    statement_time: Nanos = STATEMENT_TIME
+    travels: Sequence[Travel] = ()
+    limit: Nanos | None = None
+    until_idle: bool = False
+    inputs: Sequence[TimedInput] = ()
+    trace: Path | None = None
+    as_json: bool = False
+
+
+class Outcome(NamedTuple):
+    options: WbcRun
+    ending: Ending
+    wall_s: float
+
+    @property
+    def virtual_s(self) -> float:
+        return self.ending.at / SECOND
+
+    @property
+    def ratio(self) -> float:
+        return self.virtual_s / self.wall_s
+
+
+def run(options: WbcRun, say: Say, warn: Say) -> bool:
+    """Run a program and say what it did; whether everything went right. ``warn`` is told what the checker found.
+
+    Raises `Misuse` for what cannot be run, `ProgramErrors` for a program with errors.
+    """
+    config = ControllerConfig() if options.config is None else load_config(options.config, options.firmware)
+    for change in options.inputs:
+        check_pin(change.pin, change.value)
+    positions = {} if options.positions is None else {0: options.positions}
+    try:
+        banks = read_banks({0: options.program}, positions, config, dialect_for(options.firmware))
+    except ProgramErrors as errors:
+        _warn(errors.findings, warn)
+        raise
+    _warn(banks.findings, warn)
+
+    trace = None if options.trace is None else Trace([NAME])
+    bench = Bench(
+        banks.programs[0],
+        banks.positions.get(0),
+        config,
+        firmware=options.firmware,
+        statement_time=options.statement_time,
+        trace=trace,
+    )
+    bench.place_switches(options.travels, {change.pin for change in options.inputs})
+    limit = options.limit if options.limit is not None else LIMIT_UNTIL_IDLE_NS if options.until_idle else USUAL_LIMIT_NS
+    begin = time.perf_counter()
+    ending = bench.run(options.inputs, limit, until_idle=options.until_idle)
+    outcome = Outcome(options, ending, time.perf_counter() - begin)
+    wrong = any(happening.code in _WRONG for happening in bench.happened)
+    if options.as_json:
+        say(json.dumps(_data(bench, outcome, wrong=wrong), ensure_ascii=False, indent=2))
+    else:
+        _say_lines(bench, outcome, say)
+    if trace is not None and options.trace is not None:
+        _write(trace, options.trace, bench, ending.at)
+    return not wrong
+
+
+def _warn(findings: Findings, warn: Say) -> None:
+    for source, diagnostics in findings:
+        shown = [d for d in diagnostics if d.severity is not Severity.NOTE]
+        if shown:
+            warn(render(source, shown))
+
+
+def _write(trace: Trace, where: Path, bench: Bench, until: Nanos) -> None:
+    from steptwin.runtime.export import axis_views, bar, write_trace
+
+    write_trace(trace, where, views=axis_views({NAME: bench.device}), until=until, watch=bar)
+
+
+# ---------------------------------------------------------------------- what is said
+
+
+def _say_lines(bench: Bench, outcome: Outcome, say: Say) -> None:
+    for text in bench.assumed:
+        say(text)
+    if bench.happened:
+        say("\n".join(_line(bench, happening) for happening in bench.happened))
+    say(_ending(bench, outcome.ending))
+    shown: Any = state_of(bench.device, bench.now)
+    for axis in shown["axes"]:
+        if axis["enabled"] or axis["position_pulses"]:
+            unit = axis["unit"]
+            speed = f", {axis['velocity']:g} {unit}/s" if axis["velocity"] else ""
+            say(f"  M{axis['axis']} at {axis['position']:g} {unit}{speed}, {axis['status_text']}")
+    on = [name for name, level in shown["pins"].items() if level and not name.startswith("AIN")]
+    say(f"  on: {', '.join(on) or 'nothing'}")
+    virtual_s, wall_s = outcome.virtual_s, outcome.wall_s
+    say(f"{virtual_s:.6f} s of virtual time in {wall_s:.3f} s: {outcome.ratio:,.0f} times as fast as life")
+
+
+def _line(bench: Bench, happening: Happening) -> str:
+    shown = f"{happening.time / SECOND:14.6f} s  {happening.text:<34}"
+    step = happening.step
+    if step is not None and step < len(bench.program.steps):
+        shown += f"  {bench.line(step):>4}  {_statement(bench, step)}"
+    return shown.rstrip()
+
+
+def _statement(bench: Bench, step: int) -> str:
+    found = bench.program.steps[step]
+    return bench.program.source.text[found.start : found.end].strip()
+
+
+def _ending(bench: Bench, ending: Ending) -> str:
+    program, source = bench.device.program, bench.program.source
+    if program.fault is not None:
+        return f"an error has stopped the program in line {source.position(program.fault.span.start)[0]}: {program.fault.text}"
+    if ending.why == "ended":
+        return "the program has ended"
+    span = program.statement
+    if span is None:
+        return "ended by the limit of time"
+    where = f"line {source.position(span.start)[0]}: {source.text[span.start : span.end].strip()}"
+    if ending.why == "waiting":
+        return f"it waits for ever in {where}"
+    return f"ended by the limit of time (--for takes a longer one) in {where}"
+
+
+def _data(bench: Bench, outcome: Outcome, *, wrong: bool) -> dict[str, object]:
+    options = outcome.options
+    program, source = bench.device.program, bench.program.source
+    span = program.statement
+    return {
+        "version": JSON_VERSION,
+        "file": str(options.program),
+        "language": "wbc",
+        "firmware": bench.device.firmware.name,
+        "ended": outcome.ending.why,
+        "went_wrong": wrong,
+        "virtual_s": outcome.virtual_s,
+        "wall_s": outcome.wall_s,
+        "ratio": outcome.ratio,
+        "line": None if span is None or program.state is ProgramState.STOPPED else source.position(span.start)[0],
+        "assumed": bench.assumed,
+        "state": state_of(bench.device, bench.now),
+        "events": [_event_data(bench, happening) for happening in bench.happened],
+    }
+
+
+def _event_data(bench: Bench, happening: Happening) -> dict[str, object]:
+    step = happening.step
+    known = step is not None and step < len(bench.program.steps)
+    return {
+        "time_s": happening.time / SECOND,
+        "code": happening.code,
+        "text": happening.text,
+        "line": bench.line(step) if step is not None and known else None,
+        "statement": _statement(bench, step) if step is not None and known else None,
+    }
