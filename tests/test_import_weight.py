@@ -10,7 +10,7 @@ import steptwin
 
 PURE = ("world", "mic488", "m1486", "wbc", "wire", "motion", "machine", "diagnostics", "errors")
 PROJECTIONS = {"steptwin.motion.pulses"}
-HEAVY = {"anyio", "asyncio", "fastapi", "matplotlib", "numpy", "pydantic", "rich", "serialx", "uvloop"}
+HEAVY = {"anyio", "asyncio", "fastapi", "matplotlib", "numpy", "pyarrow", "pydantic", "rich", "serialx", "uvloop"}
 
 
 def modules_of(*packages: str) -> list[str]:
@@ -34,6 +34,10 @@ def test_pure_packages_bring_nothing_heavy() -> None:
 
 def test_the_command_line_brings_nothing_heavy() -> None:
     assert brought_by(["steptwin.cli"]) & HEAVY == set()
+
+
+def test_exports_bring_their_libraries_when_they_write() -> None:
+    assert brought_by(["steptwin.runtime.export"]) & HEAVY == set()
 
 
 def test_the_probe_sees_what_an_import_brings() -> None:

@@ -1,12 +1,18 @@
-"""Traces of real runs for tests of what reads them: a MIC488 with four axes homing, moving, running into limits."""
+"""Traces of real runs for tests of what reads them: a MIC488 with four axes homing, moving, running into limits; an M1486."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from mic488_rig import EN, OUT, STOP, Rig
 
-from steptwin.machine import Nanos
+from steptwin.m1486.chip import M1486
+from steptwin.m1486.lines import STEP_DIRECTION, Interface
+from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Event
-from steptwin.runtime.demo import demo_config, place_switches
+from steptwin.runtime.demo import demo_config
+from steptwin.runtime.export import AxisView, axis_views
+from steptwin.runtime.m1486_bench import Bench as M1486Bench
 from steptwin.world.trace import Record, Trace
 
 
@@ -20,7 +26,9 @@ class TracedRig(Rig):
         self._revisions = [-1] * 4
         self._events: list[Event] = []
         self.device.on_event = self._events.append
-        place_switches(self.kernel, "m")
+        for axis in range(1, 5):
+            self.switch(axis, None, -1000, f"IN{axis}")
+            self.switch(axis, 6000, None, f"IN{axis + 4}")
         self._look()
 
     def _look(self) -> None:
@@ -61,8 +69,14 @@ class TracedRig(Rig):
         return response
 
 
-def mic488_run() -> TracedRig:
-    """22 s: all axes home, M1 and M2 go back and forth, M3 runs into its switch, M4 is stopped; outputs and an analog input."""
+class Run(NamedTuple):
+    trace: Trace
+    views: dict[tuple[str, str], AxisView]
+    until: Nanos
+
+
+def mic488_run() -> Run:
+    """18 s: all axes home, M1 and M2 go back and forth, M3 runs into its switch, M4 is stopped; outputs and an analog input."""
     rig = TracedRig()
     rig.wait(0.25)
     for axis in range(4):
@@ -86,5 +100,20 @@ def mic488_run() -> TracedRig:
     rig.pin("IN20", 1.0)
     rig.wait(0.4)
     rig.pin("IN20", 0.0)
-    rig.wait(5.0)
-    return rig
+    rig.wait(1.0)
+    return Run(rig.trace, axis_views({"m": rig.device}), rig.now)
+
+
+M1486_PROGRAM = (
+    "m8", "q1", "s200", "a5000", "v4000", "n2",
+    "f64000", "r", "c9", "b19200", "r", "t9", "n1", "v1000", "h", "r",
+)  # fmt: skip
+
+
+def m1486_run(interface: Interface = STEP_DIRECTION) -> Run:
+    """An indexer goes 1000 steps forward, changing its microstep in flight, 300 back, and home."""
+    chip = M1486(interface=interface)
+    trace = Trace(["i"])
+    bench = M1486Bench({"i": chip}, "\r".join(M1486_PROGRAM), trace=trace)
+    ending = bench.run([], 60 * SECOND, lambda: None, until_idle=True)
+    return Run(trace, axis_views({"i": chip}), ending.at)

@@ -6,12 +6,9 @@ A trace knows pulses only. A view is static: it is read from a machine once and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from steptwin.machine import MICROSECOND, Nanos
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
 
 
 class StepOutputs(NamedTuple):
@@ -66,6 +63,7 @@ def axis_views(machines: Mapping[str, object]) -> dict[tuple[str, str], AxisView
     """The views of all axes of ``machines`` (by name)."""
     from steptwin.m1486.chip import M1486
     from steptwin.mic488.device import Mic488
+    from steptwin.runtime.m1486_trace import chip_views
 
     views: dict[tuple[str, str], AxisView] = {}
     for name, machine in machines.items():
@@ -74,19 +72,5 @@ def axis_views(machines: Mapping[str, object]) -> dict[tuple[str, str], AxisView
                 number = str(axis.number)
                 views[name, number] = plain_view(number)._replace(unit=axis.config.unit_name, pulses_per_unit=axis.gear)
         elif isinstance(machine, M1486):
-            views[name, "1"] = _view_of_m1486(machine)
+            views |= chip_views({name: machine})
     return views
-
-
-def _view_of_m1486(chip: M1486) -> AxisView:
-    """Full steps. STEP goes low, and has done its work when it goes high again; DIRECTION is a pin of the trace."""
-    from steptwin.m1486.lines import STEP_DIRECTION
-    from steptwin.m1486.microsteps import FULL_STEP
-    from steptwin.m1486.signals import STEP_PULSE_NS
-
-    outputs = (
-        StepOutputs("STEP", None, active_low=True, width_ns=STEP_PULSE_NS)
-        if chip.interface is STEP_DIRECTION
-        else PhaseOutputs(characteristic=chip.drive.characteristic)
-    )
-    return AxisView("motor", "step", float(FULL_STEP), outputs)

@@ -19,7 +19,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion.pulses import Reals
 from steptwin.runtime.export.polyline import curve
 from steptwin.runtime.export.progress import Progress
-from steptwin.runtime.export.recording import AxisTrack, PinTrack, Recording
+from steptwin.runtime.export.recording import AxisTrack, PinTrack, Recording, profile_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,9 +64,10 @@ class _Row(NamedTuple):
 def write_plot(recording: Recording, path: Path, form: str, progress: Progress) -> None:
     """``form`` is png or svg."""
     begin, until = recording.begin, recording.until
-    axes = [track for track in recording.axes if track.times[-1] > begin or len(track.plans) > 1][:MOST_AXES]
+    moving = [track for track in recording.axes if _moves(track, recording)]
+    axes = moving[:MOST_AXES]
     rows = _rows(recording)
-    left_out = len(recording.axes) - len(axes), max(len(rows) - MOST_ROWS, 0)
+    left_out = len(moving) - len(axes), max(len(rows) - MOST_ROWS, 0)
     rows = rows[:MOST_ROWS]
     heights = [_MOTION_IN] * (2 * len(axes)) + ([_ROW_IN * len(rows)] if rows else [])
     with rc_context(_STYLE):
@@ -81,6 +82,10 @@ def write_plot(recording: Recording, path: Path, form: str, progress: Progress) 
             figure.text(1 - _RIGHT_IN / _WIDTH_IN, 0.12 / figure.get_figheight(), note, ha="right", color=_FRAME)
         figure.savefig(path, format=form, dpi=150, metadata={"Date": None} if form == "svg" else {"Software": None})
     progress(until)
+
+
+def _moves(track: AxisTrack, recording: Recording) -> bool:
+    return any(profile_of(plan).moving(after) for plan, after, _ in track.stretches(recording.begin, recording.until))
 
 
 def _rows(recording: Recording) -> list[_Row]:

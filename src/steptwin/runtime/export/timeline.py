@@ -10,21 +10,21 @@ import re
 from collections.abc import Iterator
 from html import escape
 from importlib.resources import files
-from math import ceil
 from typing import IO
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import StepTrain
-from steptwin.motion.paths import ArcSegment
 from steptwin.runtime.export.polyline import Piece, pieces_of
 from steptwin.runtime.export.progress import Progress
 from steptwin.runtime.export.recording import AxisTrack, PinTrack, Plan, Recording, profile_of
 from steptwin.world.trace import Record
 
 _SCRIPTS = ("model.js", "draw.js", "timeline.js")
-_PARTS_PER_QUARTER = 8
-"""Cubics that stand for an arc, for each quarter turn: they are off by less than 1e-7 of its radius."""
+_CLOSE_P = 0.01
+"""Cubics that stand for an arc are off by about as much at most."""
+_LEAST_NS = 100_000
+"""Shorter stretches of an arc are not divided."""
 _MOST_BYTES = 64
 """Of a frame in the page."""
 
@@ -98,10 +98,19 @@ def _cubics(piece: Piece) -> Iterator[tuple[Nanos, tuple[float, float, float, fl
     elif isinstance(segment, Segment):
         yield piece.begin, _from(segment, piece.profile, piece.begin)
     else:
-        parts = _arc_parts(segment, piece)
-        for i in range(parts):
-            begin, end = (piece.begin + (piece.end - piece.begin) * k // parts for k in (i, i + 1))
-            yield begin, _between(piece, begin, end)
+        yield from _along_arc(piece, piece.begin, piece.end)
+
+
+def _along_arc(piece: Piece, begin: Nanos, end: Nanos) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
+    """Halved until the cubics are close."""
+    c0, c1, c2, c3 = cubic = _between(piece, begin, end)
+    middle = (begin + end) // 2
+    u = (middle - begin) / SECOND
+    if end - begin < _LEAST_NS or abs(c0 + u * (c1 + u * (c2 + u * c3)) - piece.look(middle)[0]) < _CLOSE_P:
+        yield begin, cubic
+    else:
+        yield from _along_arc(piece, begin, middle)
+        yield from _along_arc(piece, middle, end)
 
 
 def _from(s: Segment, profile: Profile, begin: Nanos) -> tuple[float, float, float, float]:
@@ -112,11 +121,6 @@ def _from(s: Segment, profile: Profile, begin: Nanos) -> tuple[float, float, flo
         s.c2 + 3.0 * s.c3 * u,
         s.c3,
     )
-
-
-def _arc_parts(segment: ArcSegment, piece: Piece) -> int:
-    begin_w, end_w = (segment.way.position((time - piece.profile.start) / SECOND) for time in (piece.begin, piece.end))
-    return max(ceil(abs((end_w - begin_w) * segment.course.turn_q) * _PARTS_PER_QUARTER), 1)
 
 
 def _between(piece: Piece, begin: Nanos, end: Nanos) -> tuple[float, float, float, float]:

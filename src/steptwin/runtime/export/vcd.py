@@ -42,7 +42,7 @@ def write_vcd(recording: Recording, file: IO[bytes], progress: Progress) -> None
     for after, until in _windows(recording):
         file.writelines(dump.changes(after, until))
         progress(until)
-    if recording.until > recording.begin:
+    if recording.until > dump.latest:
         file.write(b"#%d\n" % recording.until)
 
 
@@ -66,6 +66,8 @@ class _Dump:
 
     def __init__(self, recording: Recording) -> None:
         self._begin = recording.begin
+        self.latest = recording.begin
+        """The moment of the last change given."""
         self._declared: dict[str, list[str]] = {name: [] for name in recording.machines}
         self._initial: list[bytes] = []
         self._codes = 0
@@ -182,6 +184,7 @@ class _Dump:
             return []
         chosen = np.concatenate([chosen for _, chosen in parts])
         order = np.argsort(times, kind="stable")
+        self.latest = int(times[order[-1]])
         return changes_text(times[order], chosen[order], self._tokens + self._quiet_tokens[begin:end])
 
 
@@ -216,15 +219,17 @@ class _Phases(NamedTuple):
 
     def changes(self, after: Nanos, until: Nanos) -> Iterator[tuple[Times, Tokens]]:
         cuts = [] if self.chosen is None else [time for time, _ in self.chosen.changes(after, until)]
-        for begin, end in zip([after, *cuts], [*cuts, until], strict=True):
+        for i, (begin, end) in enumerate(zip([after, *cuts], [*cuts, until], strict=True)):
             table = self._table(begin)
             for plan, a, b in self.track.stretches(begin, end):
-                times, angles = _pulses(plan, a, b), _positions(plan, a, b) % PERIOD
+                times = _pulses(plan, a, b)
+                before = plan.count(max(a, profile_of(plan).start))
+                angles = np.append(before, _positions(plan, a, b)) % PERIOD
                 for tokens in table:
                     chosen = tokens[angles]
-                    differs = np.append(True, chosen[1:] != chosen[:-1])[: len(chosen)]
-                    yield times[differs], chosen[differs]
-            if end in cuts:
+                    differs = chosen[1:] != chosen[:-1]
+                    yield times[differs], chosen[1:][differs]
+            if i < len(cuts):
                 moment = np.array([end], dtype=np.int64)
                 for token in self.at(end):
                     yield moment, np.array([token])

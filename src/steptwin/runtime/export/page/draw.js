@@ -98,8 +98,9 @@ function drawBounds(pen, least, most, top, bottom) {
   c.font = '9.5px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
   c.textAlign = "right";
   const x = Math.min(pen.width, pen.x(SPAN)) - 5;
+  const unit = 10 ** (Math.floor(Math.log10(most - least)) - 4);
   for (const [value, y] of [[most, top + 6], [least, bottom + 1]]) {
-    const text = number(value, 6), wide = c.measureText(text).width;
+    const text = number(Math.round(value / unit) * unit, 6), wide = c.measureText(text).width;
     c.fillStyle = pen.color("--paper");
     c.globalAlpha = 0.7;
     c.fillRect(x - wide - 2, y - 9, wide + 4, 11);

@@ -181,9 +181,9 @@ function valueText(lane, t) {
   switch (lane.kind) {
     case "position": return `${lane.motion.position(lane.motion.at(t), t).toFixed(lane.motion.scale === 1 ? 1 : 3).replace("-", "−")} ${lane.unit}`;
     case "velocity": return `${number(lane.motion.velocity(lane.motion.at(t), t), 5)} ${lane.unit}/s`;
-    case "step": return `${number(lane.motion.count(t), 15)} imp`;
+    case "step": return number(lane.motion.count(t), 15);
     case "level": return lane.pin.level(t) ? "1" : "0";
-    case "analog": return lane.pin.level(t) === null ? "?" : `${number(lane.pin.level(t), 5)} V`;
+    case "analog": return number(lane.pin.level(t), 5) + (lane.name.startsWith("AIN") ? " V" : "");
     case "group": return "";
   }
   const i = lastAt(lane.times, 1, t);
