@@ -40,6 +40,9 @@ class Record(NamedTuple):
     value: object
 
 
+Hashed: TypeAlias = tuple[blake2b, int]
+"""A hash, and how many kept records are in it."""
+
 Recorder: TypeAlias = Callable[[Record], None]
 """Takes each record as it happens: a `Trace`'s `add`, or anything else that wants to know."""
 
@@ -115,6 +118,27 @@ class Trace:
     def faults(self, machine: str | None = None) -> Iterator[Record]:
         return self.of("fault", machine=machine)
 
+    def mark(self) -> Mark:
+        """How far the trace is, for `rewind`."""
+        return Mark(tuple((name, stream.count, stream.latest, stream.hashed()) for name, stream in self._streams.items()))
+
+    def rewind(self, mark: Mark) -> None:
+        """Forget what came after ``mark``, which is of this trace or of one that began the same.
+
+        Where records are kept and ``mark`` is of another trace, those before it must have been copied: see `copy_from`.
+        """
+        known = {name: (count, latest, hashed) for name, count, latest, hashed in mark.streams}
+        for name, stream in self._streams.items():
+            count, latest, hashed = known.get(name, (0, 0, None))
+            stream.rewind(count, latest, hashed)
+
+    def copy_from(self, other: Trace) -> None:
+        """Take over all records of another trace of the same machines."""
+        for name, stream in other._streams.items():
+            own = self._streams.setdefault(name, _Stream())
+            own.records = stream.records.copy()
+            own.count, own.latest = stream.count, stream.latest
+
     def digest(self) -> str:
         """What two runs of the same world share, on any machine and Python version: 32 hexadecimal digits.
 
@@ -125,6 +149,12 @@ class Trace:
             if stream.count:
                 whole.update(_value(name) + stream.digest())
         return whole.hexdigest()
+
+
+class Mark(NamedTuple):
+    """A place in a trace: for each machine how many records there are, the moment of the last, and what was hashed of them."""
+
+    streams: tuple[tuple[str, int, Nanos, Hashed], ...]
 
 
 class _Stream:
@@ -145,6 +175,14 @@ class _Stream:
             self.hash.update(encode(record))
         self._hashed = len(self.records)
         return self.hash.digest()
+
+    def hashed(self) -> Hashed:
+        return self.hash.copy(), self._hashed
+
+    def rewind(self, count: int, latest: Nanos, hashed: Hashed | None) -> None:
+        del self.records[count:]
+        self.count, self.latest = count, latest
+        self.hash, self._hashed = (hashed[0].copy(), hashed[1]) if hashed is not None else (blake2b(digest_size=DIGEST_BYTES), 0)
 
 
 # ---------------------------------------------------------------------- canonical bytes

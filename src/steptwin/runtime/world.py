@@ -1,0 +1,181 @@
+"""A world with its files: the Python interface of worlds.
+
+with World.load("machine.toml") as world:
+    world.run(until="x.position > 100", for_="1 min")
+    print(world.mic488["table"].axis[1].position)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.host.mic488.values import encoded, named
+from steptwin.m1486.chip import M1486
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.device import Mic488
+from steptwin.mic488.registermap import DataType
+from steptwin.runtime.export.progress import Progress, silent
+from steptwin.runtime.textfiles import read_bytes, read_text
+from steptwin.wire.pdu import encode_request
+from steptwin.world import script as do
+from steptwin.world.durations import duration
+from steptwin.world.plant import Plant, PlantSnapshot, Script
+from steptwin.world.spec import WorldSpec, read_world
+from steptwin.world.views import AxisView, LineView, M1486View, Mic488View, Views
+
+LONGEST_RUN_NS: Nanos = 3600 * SECOND
+"""A condition that never comes true is given up after an hour, where nothing else is said."""
+SLICES = 200
+"""In so many parts a run is done, where somebody watches its progress."""
+
+Duration: TypeAlias = float | str
+"""Seconds, or a text such as ``"10 min"``."""
+Reaction: TypeAlias = do.Step | tuple[do.Step, ...] | Callable[[], object]
+"""What `World.at` and `World.when` do: steps, or a function that may do anything with the world."""
+
+
+class World(Plant):
+    """A world in virtual time. It begins at 0 s and runs when it is told to.
+
+    What is done to it from Python goes into its session and can be replayed; what is done to a `device` or `chip` behind its
+    back cannot.
+    """
+
+    def __init__(self, spec: WorldSpec, files: Mapping[str, bytes] | None = None, *, keep_trace: bool = True) -> None:
+        super().__init__(spec, files or {}, encode_write, keep_trace=keep_trace)
+        machines = self.machines
+        self.mic488: Views[Mic488View] = Views(
+            self, "MIC488", {name: Mic488View(self, name, m) for name, m in machines.items() if isinstance(m, Mic488)}
+        )
+        """The MIC488 controllers by name."""
+        self.m1486: Views[M1486View] = Views(
+            self, "M1486", {name: M1486View(self, name, m) for name, m in machines.items() if isinstance(m, M1486)}
+        )
+        """The M1486 chips by name."""
+        self.axis: Views[AxisView] = Views(self, "axis", {name: AxisView(self, axis) for name, axis in self.axes.items()})
+        """The mechanics by the names of their axes."""
+        self.line: Views[LineView] = Views(self, "line", {name: LineView(self, name) for name in self.lines})
+
+    # ------------------------------------------------------------------ making one
+
+    @classmethod
+    def load(cls, path: str | Path, *, keep_trace: bool = True) -> Self:
+        """The world described by a TOML file; other files are looked for beside it. Raises `WorldError` (a `Misuse`)."""
+        place = Path(path)
+        spec = read_world(str(path), read_text(place).source.text)
+        files = {name: read_bytes(place.parent / name) for name in spec.files()}
+        return cls(spec, files, keep_trace=keep_trace)
+
+    @classmethod
+    def from_toml(cls, text: str, files: Mapping[str, bytes] | None = None, *, name: str = "world.toml") -> Self:
+        """The world described by a text. ``files`` are the contents of the files it names. Raises `WorldError`."""
+        return cls(read_world(name, text), files)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Nothing is open: for those who read with `with`."""
+
+    # ------------------------------------------------------------------ running
+
+    @property
+    def time(self) -> float:
+        """The present moment in seconds."""
+        return self.now / SECOND
+
+    def run(  # type: ignore[override]
+        self, until: float | str | None = None, *, for_: Duration | None = None, watch: Progress = silent
+    ) -> str | None:
+        """Run ``for_`` a time, or ``until`` a moment (seconds) or a condition (text, such as ``"idle"``) for an hour at most.
+
+        Gives the condition, or the reason of a script, that ended the run before its time; else None. ``watch`` is told how far
+        it is.
+        """
+        end = self.now + (LONGEST_RUN_NS if for_ is None else duration(for_))
+        condition = until if isinstance(until, str) else None
+        if isinstance(until, int | float):
+            end = round(until * SECOND)
+        elif until is None and for_ is None:
+            raise Misuse("run needs until or for_: a moment, a condition, or a duration")
+        if watch is silent:
+            return super().run(end, condition)
+        begin = self.now
+        for part in range(1, SLICES + 1):
+            reason = super().run(begin + (end - begin) * part // SLICES, condition)
+            watch(self.now)
+            if reason is not None:
+                return reason
+        return None
+
+    def step(self) -> Nanos | None:
+        """Run to the next moment at which anything happens by itself; gives it, None when nothing will."""
+        dues = [due for kernel in self.kernels if (due := kernel.deadline()) is not None]
+        own = self.next()
+        due = min(dues if own is None else [*dues, own], default=None)
+        if due is not None:
+            super().run(max(due, self.now))
+        return due
+
+    # ------------------------------------------------------------------ operators
+
+    def at(self, time: Duration, reaction: Reaction, name: str = "at") -> Script:
+        """Do something at a moment; when it has passed, now."""
+        moment = duration(time)
+        return self.start(name, lambda: do.run_through((do.At(moment), *_steps(reaction))))
+
+    def when(self, condition: str, reaction: Reaction, *, once: bool = False, name: str = "when") -> Script:
+        """Do something whenever a condition comes true, or only the first time. Raises `Misuse`."""
+        self.condition(condition)
+        return self.start(name, lambda: do.run_when(_steps(reaction), condition, once=once))
+
+    def script(self, operator: Callable[[], do.Steps], name: str | None = None) -> Script:
+        """Let an operator work from now on: a function that yields steps (`steptwin.world.script`) and is sent what they give.
+
+        It touches the world by its steps only; so it can be brought back to any moment.
+        """
+        return self.start(name or getattr(operator, "__name__", "script"), operator)
+
+    def press(self, button: str, for_: Duration | None = None) -> None:
+        """Press a button, until it is released or for a time."""
+        self.outside(do.Press(button, None if for_ is None else duration(for_)))
+
+    def release(self, button: str) -> None:
+        self.outside(do.Release(button))
+
+    # ------------------------------------------------------------------ branches
+
+    def branch(self) -> Self:
+        """Another world in the same state, which goes its own way. Scripts that were started from Python go along."""
+        other = type(self)(read_world(self.spec.text.source.name, self.spec.text.source.text), self.files)
+        other.take_over(self)
+        return other
+
+    def take_over(self, other: Plant, snapshot: PlantSnapshot | None = None) -> None:
+        """Take the state and the past of another world of the same description."""
+        snapshot = other.snapshot() if snapshot is None else snapshot
+        for script in other.scripts[len(self.scripts) :]:
+            self.start(script.name, script.make)
+        self.inputs[:] = other.inputs
+        self.failures[:] = other.failures
+        self.trace.copy_from(other.trace)
+        self.restore(snapshot)
+
+
+def _steps(reaction: Reaction) -> tuple[do.Step, ...]:
+    if isinstance(reaction, tuple):
+        return reaction
+    return (do.Call(partial(reaction)),) if callable(reaction) else (reaction,)
+
+
+def encode_write(device: Mic488, register: str, value: float) -> bytes:
+    """The request that writes a register by name. Raises `Misuse` for what it does not take."""
+    item = named(device.registers, register)
+    axis = item.register.axis
+    unit = "u" if axis is None else device.config.axes[axis - 1].unit_name
+    return encode_request(encoded(item, value, DataType(device.data_type), unit))

@@ -1,0 +1,473 @@
+"""From a description to machines in kernels: one kernel for all that is joined by wires, lines and mechanics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import partial
+from math import floor
+
+from steptwin.diagnostics import Severity, Source, render
+from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486
+from steptwin.m1486.eeprom import image_of
+from steptwin.m1486.lines import interface
+from steptwin.m1486.syntax import parse as parse_m1486
+from steptwin.m1486.variants import Store, Variant, variant
+from steptwin.machine import Nanos
+from steptwin.mic488.config import ControllerConfig, read_config
+from steptwin.mic488.device import Mic488
+from steptwin.mic488.inifile import IniFile
+from steptwin.mic488.inputs import index_input
+from steptwin.mic488.program import LoadedProgram, load
+from steptwin.motion.trig import PI
+from steptwin.wbc.check import check
+from steptwin.wbc.dialect import dialect_for
+from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.positions import PositionTable, parse_positions
+from steptwin.wbc.usage import Setup
+from steptwin.wire.slave import Device
+from steptwin.world.chance import Chance
+from steptwin.world.contacts import Button, Switch, Zone
+from steptwin.world.course import Build
+from steptwin.world.faults import Faults
+from steptwin.world.kernel import Kernel, PinName, Wire
+from steptwin.world.lines import ChipLine, Line, ModbusLine, timing_of
+from steptwin.world.mechanics import EncoderBuild, Mechanism, RotorMark
+from steptwin.world.motor import Motor
+from steptwin.world.reader import Path
+from steptwin.world.sources import Constant, Sine, Table, Waveform
+from steptwin.world.sources import Source as AnalogSource
+from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, MotorSpec, SourceSpec, WorldSpec, config_of
+from steptwin.world.trace import Record, Recorder
+
+DEFAULT_BAUD = 38400
+METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0}
+
+Files = Mapping[str, bytes]
+"""Contents of the files a description names."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """An axis with its mechanics."""
+
+    spec: AxisSpec
+    kernel: Kernel
+    mechanism: Mechanism
+    pulses_per_unit: Fraction
+
+    def pulses(self, units: float) -> int:
+        """The pulse nearest to a position."""
+        return floor(Fraction(units) * self.pulses_per_unit + Fraction(1, 2))
+
+    def units(self, pulses: int) -> float:
+        return float(pulses / self.pulses_per_unit)
+
+
+@dataclass(slots=True)
+class Plan:
+    """Everything a world is made of, by name."""
+
+    spec: WorldSpec
+    faults: Faults
+    record: Recorder
+    kernels: list[Kernel] = field(default_factory=list)
+    kernel_of: dict[str, Kernel] = field(default_factory=dict)
+    """Of machines and lines."""
+    machines: dict[str, Mic488 | M1486] = field(default_factory=dict)
+    lines: dict[str, Line] = field(default_factory=dict)
+    line_of: dict[str, tuple[Line, int]] = field(default_factory=dict)
+    """Line and unit (or address) of a machine."""
+    axes: dict[str, Fitted] = field(default_factory=dict)
+    buttons: dict[str, tuple[Button, Kernel]] = field(default_factory=dict)
+
+
+def build(spec: WorldSpec, files: Files, record: Recorder) -> Plan:
+    """The machines of a description at time 0. Raises `WorldError` where its parts do not fit together."""
+    return _Builder(spec, files, record).plan
+
+
+class _Builder:
+    def __init__(self, spec: WorldSpec, files: Files, record: Recorder) -> None:
+        self.spec = spec
+        self.files = files
+        self.plan = Plan(spec, Faults(spec.seed), record)
+        self.plan.faults.sinks.append(record)
+        self._driven: dict[PinName, Path] = {}
+        """What drives each input."""
+        self._make_machines()
+        spec.text.check()
+        self._make_kernels()
+        spec.text.check()
+        self._make_lines()
+        for axis in spec.axes:
+            self._told(axis.path, partial(self._fit, axis))
+        for axis in spec.axes:
+            self._told(axis.path, partial(self._fit_encoder, axis))
+        for wire in spec.wires:
+            self._told(wire.path, partial(self._wire, wire.source, wire.target, wire.path, wire.inverted, wire.delay))
+        for button in spec.buttons:
+            self._told(button.path, partial(self._button, button))
+        for source in spec.sources:
+            self._told(source.path, partial(self._source, source))
+        spec.text.check()
+
+    def _told(self, path: Path, action: Callable[[], None]) -> None:
+        """Do something for the table at ``path``; what is wrong with it is told there."""
+        try:
+            action()
+        except Misuse as error:
+            self.spec.text.wrong(path, "D009", str(error))
+
+    # ------------------------------------------------------------------ machines
+
+    def _make_machines(self) -> None:
+        for spec in self.spec.mic488:
+            self._told(spec.path, partial(self._add_machine, spec, self._mic488))
+        for chip in self.spec.m1486:
+            self._told(chip.path, partial(self._add_machine, chip, self._m1486))
+
+    def _add_machine(self, spec: Mic488Spec | M1486Spec, make: Callable[..., Mic488 | M1486]) -> None:
+        if spec.name in self.plan.machines or any(spec.name == line.name for line in self.spec.lines):
+            raise Misuse(f"{spec.name!r} is the name of something else")
+        machine = make(spec)
+        self.plan.machines[spec.name] = machine
+        machine.on_event = partial(_record_event, self.plan.record, spec.name)
+
+    def _text(self, name: str) -> str:
+        data = self.files[name].removeprefix(b"\xef\xbb\xbf")
+        try:
+            return data.decode()
+        except UnicodeDecodeError:
+            return data.decode("latin-1")
+
+    def _mic488(self, spec: Mic488Spec) -> Mic488:
+        base = ControllerConfig()
+        if spec.config is not None:
+            base = read_config(IniFile.parse(self.files[spec.config], spec.config), spec.firmware)
+        config = config_of(spec, base)
+        positions: dict[int, PositionTable] = {}
+        programs: dict[int, LoadedProgram] = {}
+        if spec.positions is not None:
+            table, findings = parse_positions(self._text(spec.positions))
+            errors = [finding for finding in findings if finding.severity is Severity.ERROR]
+            if errors or table is None:
+                raise Misuse(f"positions do not check:\n{render(Source(spec.positions, self._text(spec.positions)), errors)}")
+            positions[0] = table
+        if spec.program is not None:
+            checked = check(self._text(spec.program), positions.get(0), _setup(config), dialect_for(spec.firmware))
+            if checked.errors:
+                shown = render(Source(spec.program, self._text(spec.program)), checked.errors)
+                raise Misuse(f"the program does not check:\n{shown}")
+            programs[0] = load(checked, spec.program)
+        statement_time = STATEMENT_TIME if spec.statement_time is None else spec.statement_time
+        return Mic488(
+            config, spec.firmware, lenient=spec.lenient, programs=programs, positions=positions, statement_time=statement_time
+        )
+
+    def _m1486(self, spec: M1486Spec) -> M1486:
+        kind = variant(spec.variant)
+        image = b"" if spec.program is None else _image(self._text(spec.program), spec.program, kind)
+        timed = any(line.name == spec.line and line.timing == "real" for line in self.spec.lines)
+        baud = spec.baud
+        if baud is None:
+            baud = next((line.baud for line in self.spec.lines if line.name == spec.line), None)
+        return M1486(
+            kind,
+            address=spec.address,
+            interface=interface(spec.interface),
+            baud=baud,
+            statement_ns=spec.statement_time,
+            is_timed=timed,
+            image=image,
+        )
+
+    # ------------------------------------------------------------------ kernels
+
+    def _make_kernels(self) -> None:
+        """Machines that share a line, a wire or mechanics share a kernel; kernels go by their first machine."""
+        joined = {name: name for name in [*self.plan.machines, *(line.name for line in self.spec.lines)]}
+
+        def root(name: str) -> str:
+            while joined[name] != name:
+                joined[name] = joined[joined[name]]
+                name = joined[name]
+            return name
+
+        order = {name: i for i, name in enumerate(joined)}
+        for one, other, path in self._joints():
+            unknown = [name for name in (one, other) if name not in joined]
+            if unknown:
+                near = self.spec.text.near(unknown[0], joined)
+                there = ", ".join(joined) or "none"
+                self.spec.text.wrong(path, "D009", f"nothing is called {unknown[0]!r}{near}", f"there are {there}")
+                continue
+            first, second = sorted((root(one), root(other)), key=order.__getitem__)
+            joined[second] = first
+        for name in joined:
+            kernel = self.plan.kernel_of.get(root(name))
+            if kernel is None:
+                kernel = Kernel(record=self.plan.record)
+                self.plan.kernels.append(kernel)
+            self.plan.kernel_of[root(name)] = self.plan.kernel_of[name] = kernel
+            if name in self.plan.machines:
+                kernel.add(name, self.plan.machines[name])
+
+    def _joints(self) -> Iterator[tuple[str, str, Path]]:
+        spec = self.spec
+        drives = {axis.name: axis.drive[0] for axis in spec.axes}
+        for controller in (*spec.mic488, *spec.m1486):
+            if controller.line is not None:
+                yield controller.name, controller.line, (*controller.path, "line")
+        for axis in spec.axes:
+            yield axis.drive[0], axis.drive[0], (*axis.path, "drive")
+            for switch in axis.switches:
+                yield axis.drive[0], switch.target[0], (*switch.path, "to")
+            if axis.encoder is not None and axis.encoder.follows in drives:
+                yield axis.drive[0], drives[axis.encoder.follows], (*axis.encoder.path, "follows")
+        for wire in spec.wires:
+            yield wire.source[0], wire.target[0], wire.path
+        for button in spec.buttons:
+            yield button.target[0], button.target[0], (*button.path, "to")
+        for source in spec.sources:
+            yield source.target[0], source.target[0], (*source.path, "to")
+
+    # ------------------------------------------------------------------ lines
+
+    def _make_lines(self) -> None:
+        for spec in self.spec.lines:
+            self._told(spec.path, partial(self._line, spec.name, spec.kind, spec.baud, spec.timing == "real"))
+
+    def _line(self, name: str, kind: str, baud: int | None, is_timed: bool) -> None:
+        plan, kernel = self.plan, self.plan.kernel_of[name]
+        chips: list[M1486] = []
+        devices: dict[int, Device] = {}
+        names: dict[int, str] = {}
+        for spec in (*self.spec.mic488, *self.spec.m1486):
+            if spec.line != name:
+                continue
+            machine = plan.machines[spec.name]
+            if isinstance(machine, M1486) is not (kind == "m1486"):
+                raise Misuse(f"{spec.name!r} cannot be on a line of kind {kind}")
+            if isinstance(machine, M1486):
+                chips.append(machine)
+                names[machine.address] = spec.name
+                continue
+            unit = machine.config.address if not isinstance(spec, Mic488Spec) or spec.unit is None else spec.unit
+            if unit in devices:
+                raise Misuse(f"unit {unit} is both {names[unit]!r} and {spec.name!r}")
+            devices[unit] = machine
+            names[unit] = spec.name
+        if not names:
+            raise Misuse("nothing is on this line")
+        line: Line
+        if kind == "m1486":
+            line = ChipLine(kernel, name, plan.record, plan.faults, chips)
+        else:
+            timing = timing_of(baud or DEFAULT_BAUD) if is_timed else None
+            line = ModbusLine(kernel, name, plan.record, plan.faults, devices=devices, timing=timing)
+        kernel.add_part(line)
+        plan.lines[name] = line
+        for unit, machine_name in names.items():
+            plan.line_of[machine_name] = line, unit
+
+    # ------------------------------------------------------------------ mechanics
+
+    def _fit(self, spec: AxisSpec) -> None:
+        plan = self.plan
+        machine, drive = spec.drive
+        number = int(drive[1:]) if drive.startswith("M") and drive[1:].isdecimal() else 0
+        axes = len(plan.machines[machine].axes)
+        if not 1 <= number <= axes:
+            raise Misuse(f"drive = '{machine}.{drive}': {machine} has {', '.join(f'M{n}' for n in range(1, axes + 1))}")
+        taken = [axis.spec.name for axis in plan.axes.values() if axis.spec.drive == spec.drive]
+        if taken:
+            raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
+        kernel = plan.kernel_of[machine]
+        scale = self._scale(spec, number)
+        pulses = partial(_nearest, scale)
+        build = Build(
+            sign=-1 if spec.inverted else 1,
+            zero=pulses(spec.start),
+            low=None if spec.travel is None else pulses(spec.travel[0]),
+            high=None if spec.travel is None else pulses(spec.travel[1]),
+            play=pulses(spec.backlash),
+            motor=None if spec.motor is None else _motor(spec, spec.motor, scale),
+        )
+        mechanism = Mechanism(kernel, machine, number, build)
+        kernel.add_part(mechanism)
+        plan.axes[spec.name] = Fitted(spec, kernel, mechanism, scale)
+        for switch in spec.switches:
+            zone = Zone(None, None)
+            if switch.below is not None:
+                zone = Zone(None, pulses(switch.below), pulses(switch.hysteresis))
+            elif switch.above is not None:
+                zone = Zone(pulses(switch.above), None, pulses(switch.hysteresis))
+            elif switch.position is not None:
+                half = 0.5 * switch.width
+                zone = Zone(pulses(switch.position - half), pulses(switch.position + half), pulses(switch.hysteresis))
+            target = self._input(switch.target, (*switch.path, "to"))
+            part = Switch(
+                kernel,
+                mechanism,
+                zone,
+                target,
+                normally_closed=switch.contact == "NC",
+                bounce_ns=switch.bounce,
+                bounces=switch.bounces,
+                chance=Chance(self.spec.seed, f"bounce {target}"),
+            )
+            kernel.add_part(part)
+
+    def _scale(self, spec: AxisSpec, number: int) -> Fraction:
+        """Pulses per unit of an axis; without any, those the controller is told."""
+        if spec.pulses_per_unit is not None:
+            return Fraction(spec.pulses_per_unit)
+        if spec.pitch is not None:
+            return Fraction(spec.pulses_per_rev) / Fraction(str(spec.pitch))
+        machine = self.plan.machines[spec.drive[0]]
+        if isinstance(machine, Mic488):
+            return Fraction(machine.axes[number - 1].gear)
+        return Fraction(spec.pulses_per_rev, 1 if spec.unit == "rev" else 360) if spec.kind == "rotary" else Fraction(1)
+
+    def _fit_encoder(self, spec: AxisSpec) -> None:
+        plan = self.plan
+        fitted = plan.axes.get(spec.name)
+        machine = plan.machines.get(spec.drive[0])
+        if fitted is None:
+            return
+        encoder, mechanism = spec.encoder, fitted.mechanism
+        if not isinstance(machine, Mic488):
+            if encoder is not None:
+                raise Misuse(f"encoder: {spec.drive[0]} is an M1486, which reads none")
+            return
+        now = fitted.kernel.now
+        if encoder is None:
+            if not mechanism.build.ideal:
+                mechanism.fit(EncoderBuild(machine, mechanism.number), now)
+            return
+        turned = fitted
+        if encoder.follows is not None:
+            other = plan.axes.get(encoder.follows)
+            if other is None:
+                raise Misuse(f"encoder: follows = {encoder.follows!r}: axes are {', '.join(plan.axes)}")
+            turned = other
+        counts: Fraction | None = None
+        if encoder.counts_per_unit is not None:
+            counts = Fraction(str(encoder.counts_per_unit)) / turned.pulses_per_unit
+        elif encoder.counts_per_rev is not None:
+            counts = Fraction(encoder.counts_per_rev, turned.spec.pulses_per_rev)
+        if encoder.slip:
+            if counts is None:
+                own = machine.axes[mechanism.number - 1].encoder
+                counts = Fraction(own.enc_resol, own.mot_resol)
+            counts *= 1 - Fraction(str(encoder.slip))
+        on_load = encoder.mount == "load" or encoder.follows is not None
+        numerator, denominator = (None, 1) if counts is None else (counts.numerator, counts.denominator)
+        turned.mechanism.fit(EncoderBuild(machine, mechanism.number, on_load, numerator, denominator), now)
+        if encoder.index:
+            low = fitted.pulses(encoder.offset)
+            period = spec.pulses_per_rev
+            target = self._input((spec.drive[0], f"IN{index_input(mechanism.number - 1) + 1}"), (*encoder.path, "index"))
+            zone = Zone(low, low + encoder.index_width - 1, 0, period)
+            fitted.kernel.add_part(Switch(fitted.kernel, RotorMark(turned.mechanism), zone, target))
+
+    # ------------------------------------------------------------------ wires, buttons, sources
+
+    def _input(self, name: tuple[str, str], path: Path) -> PinName:
+        """An input that nothing else drives."""
+        target = PinName(*name)
+        text = self.spec.text
+        if target in self._driven:
+            raise Misuse(f"{target} is driven already, from line {text.line(self._driven[target])}")
+        self.plan.kernel_of[target.machine].check(target)
+        self._driven[target] = path
+        return target
+
+    def _wire(self, source: tuple[str, str], target: tuple[str, str], path: Path, inverted: bool, delay: Nanos) -> None:
+        kernel = self.plan.kernel_of[source[0]]
+        kernel.connect(Wire(PinName(*source), self._input(target, path), inverted, delay))
+
+    def _button(self, spec: ButtonSpec) -> None:
+        kernel = self.plan.kernel_of[spec.target[0]]
+        target = self._input(spec.target, spec.path)
+        button = Button(
+            kernel,
+            target,
+            normally_closed=spec.contact == "NC",
+            bounce_ns=spec.bounce,
+            bounces=spec.bounces,
+            chance=Chance(self.spec.seed, f"bounce {target}"),
+        )
+        button.rest_at(spec.contact == "NC")
+        kernel.add_part(button)
+        self.plan.buttons[spec.name] = button, kernel
+
+    def _source(self, spec: SourceSpec) -> None:
+        kernel = self.plan.kernel_of[spec.target[0]]
+        kernel.add_part(AnalogSource(kernel, self._input(spec.target, spec.path), _waveform(spec), spec.period))
+
+
+def _record_event(record: Recorder, machine: str, event: object) -> None:
+    record(Record(event.time, machine, "event", event.code, event.text))  # type: ignore[attr-defined]
+
+
+def _nearest(scale: Fraction, units: float) -> int:
+    return floor(Fraction(str(units)) * scale + Fraction(1, 2))
+
+
+def _setup(config: ControllerConfig) -> Setup:
+    return Setup(
+        gears=tuple(axis.gear for axis in config.axes),
+        accelerations=tuple(axis.acc for axis in config.axes),
+        decelerations=tuple(axis.dec for axis in config.axes),
+        input_interrupts=tuple(settings.interrupt for settings in config.inputs),
+    )
+
+
+def _image(text: str, name: str, kind: Variant) -> bytes:
+    parsed = parse_m1486(text)
+    errors = [finding for finding in parsed.diagnostics if finding.severity is Severity.ERROR]
+    if errors:
+        raise Misuse(f"the program does not check:\n{render(Source(name, text), errors)}")
+    if kind.store is not Store.EEPROM:
+        raise Misuse(f"program: {kind.title} forgets its program when it is switched off; send it over the line")
+    return image_of(parsed.program, kind)
+
+
+def _motor(spec: AxisSpec, motor: MotorSpec, scale: Fraction) -> Motor:
+    """Torques at the motor; speeds and accelerations in pulses."""
+    per_rev = float(spec.pulses_per_rev)
+    arm = 0.0
+    if spec.kind == "linear" and (motor.mass or motor.force or motor.friction_force):
+        metres = METRES.get(spec.unit)
+        if metres is None:
+            raise Misuse(f"motor: mass and forces need a unit of {', '.join(METRES)}, not {spec.unit!r}")
+        # Metres per radian of the motor.
+        arm = per_rev / float(scale) * metres / (2.0 * PI)
+    inertia = motor.inertia + motor.mass * arm * arm
+    return Motor(
+        curve=tuple((speed / 60.0 * per_rev, torque) for speed, torque in motor.torque),
+        inertia=inertia * 2.0 * PI / per_rev,
+        friction=motor.friction + motor.friction_force * arm,
+        load=motor.load + motor.force * arm,
+        start_p=None if motor.start_speed is None else motor.start_speed / 60.0 * per_rev,
+        period_p=max(1, round(4 * per_rev / motor.full_steps)),
+    )
+
+
+def _waveform(spec: SourceSpec) -> Waveform:
+    repeat = None if spec.repeat is None else spec.repeat / 1e9
+    if spec.kind == "constant":
+        return Constant(spec.value)
+    if spec.kind == "sine":
+        return Sine(spec.value, spec.amplitude, spec.frequency, spec.phase)
+    if spec.kind == "ramp":
+        if spec.ramp_time <= 0:
+            raise Misuse("a ramp needs 'over': how long it takes")
+        return Table(((0.0, spec.begin), (spec.ramp_time / 1e9, spec.end)), repeat)
+    if not spec.points:
+        raise Misuse("a table needs points")
+    return Table(spec.points, repeat)

@@ -1,0 +1,246 @@
+"""Conditions over signals: ``table.IN3 and not x.position > 100``. Parsed, never evaluated as code.
+
+    condition   = conjunction { "or" conjunction }
+    conjunction = negation { "and" negation }
+    negation    = "not" negation | "(" condition ")" | comparison
+    comparison  = operand [ ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) operand ]
+    operand     = number | signal
+
+A signal alone is true where it is not 0. Names of signals are for `Signals` to know.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from operator import eq, ge, gt, le, lt, ne
+from typing import Protocol, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+
+FARTHEST_NS: Nanos = 1 << 55
+"""What lies more than a year ahead is never."""
+
+_COMPARE: dict[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][\w&-]*(?:\.[\w&-]+)*)|(?P<sign>[=!<>]=|[<>()-])|(?P<wrong>\S))"
+)
+
+
+class Signal(Protocol):
+    """A quantity of a world. ``continuous`` ones change between events too."""
+
+    @property
+    def continuous(self) -> bool: ...
+    def value(self, now: Nanos) -> float: ...
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        """Moments after ``now``, in order, between which (and after the last of which) the value goes one way only."""
+        ...
+
+
+Signals: TypeAlias = Callable[[str], Signal]
+"""The signal of a name. Raises `Misuse`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    left: Number | Name
+    sign: str
+    right: Number | Name
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    inner: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Both:
+    parts: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Either:
+    parts: tuple[Node, ...]
+
+
+Node: TypeAlias = Comparison | Not | Both | Either
+
+
+def parse(text: str) -> Node:
+    """Raises `Misuse` with the place, what was found and what was expected."""
+    return _Parser(text).whole()
+
+
+def names(node: Node) -> Iterator[str]:
+    """The signals of a condition."""
+    if isinstance(node, Comparison):
+        yield from (side.text for side in (node.left, node.right) if isinstance(side, Name))
+    elif isinstance(node, Not):
+        yield from names(node.inner)
+    else:
+        for part in node.parts:
+            yield from names(part)
+
+
+class _Parser:
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._tokens = [(m.lastgroup or "", m[m.lastgroup or 0], m.start(m.lastgroup or 0)) for m in _TOKEN.finditer(text)]
+        self._at = 0
+
+    def whole(self) -> Node:
+        node = self._condition()
+        if self._at < len(self._tokens):
+            raise self._wrong("the end, 'and' or 'or'")
+        return node
+
+    def _peek(self) -> str:
+        return self._tokens[self._at][1] if self._at < len(self._tokens) else ""
+
+    def _accept(self, word: str) -> bool:
+        if self._peek().lower() != word:
+            return False
+        self._at += 1
+        return True
+
+    def _wrong(self, expected: str) -> Misuse:
+        if self._at == len(self._tokens):
+            return Misuse(f"condition {self._text!r} ends too early: expected {expected}")
+        _, found, column = self._tokens[self._at]
+        return Misuse(f"condition {self._text!r}, column {column + 1}: found {found!r}, expected {expected}")
+
+    def _condition(self) -> Node:
+        parts = [self._conjunction()]
+        while self._accept("or"):
+            parts.append(self._conjunction())
+        return parts[0] if len(parts) == 1 else Either(tuple(parts))
+
+    def _conjunction(self) -> Node:
+        parts = [self._negation()]
+        while self._accept("and"):
+            parts.append(self._negation())
+        return parts[0] if len(parts) == 1 else Both(tuple(parts))
+
+    def _negation(self) -> Node:
+        if self._accept("not"):
+            return Not(self._negation())
+        if self._accept("("):
+            node = self._condition()
+            if not self._accept(")"):
+                raise self._wrong("')'")
+            return node
+        left = self._operand()
+        if self._peek() in _COMPARE:
+            sign = self._peek()
+            self._at += 1
+            return Comparison(left, sign, self._operand())
+        if isinstance(left, Number):
+            raise self._wrong(f"one of {' '.join(_COMPARE)}")
+        return Comparison(left, "!=", Number(0.0))
+
+    def _operand(self) -> Number | Name:
+        minus = self._accept("-")
+        if self._at < len(self._tokens):
+            kind, text, _ = self._tokens[self._at]
+            if kind == "number":
+                self._at += 1
+                return Number(-float(text) if minus else float(text))
+            if kind == "name" and not minus and text.lower() not in ("and", "or", "not"):
+                self._at += 1
+                return Name(text)
+        raise self._wrong("a number" if minus else "a signal or a number")
+
+
+class Condition:
+    """A condition with its signals."""
+
+    __slots__ = ("_comparisons", "_node", "_signals", "text")
+
+    def __init__(self, text: str, signals: Signals) -> None:
+        """Raises `Misuse` for text that is no condition, and where two signals are compared that change between events."""
+        self.text = text
+        self._node = parse(text)
+        self._signals = {name: signals(name) for name in names(self._node)}
+        self._comparisons = list(self._moving(self._node))
+
+    @property
+    def signals(self) -> list[str]:
+        return list(self._signals)
+
+    def holds(self, now: Nanos) -> bool:
+        return self._holds(self._node, now)
+
+    def _holds(self, node: Node, now: Nanos) -> bool:
+        if isinstance(node, Comparison):
+            return _COMPARE[node.sign](self._value(node.left, now), self._value(node.right, now))
+        if isinstance(node, Not):
+            return not self._holds(node.inner, now)
+        if isinstance(node, Both):
+            return all(self._holds(part, now) for part in node.parts)
+        return any(self._holds(part, now) for part in node.parts)
+
+    def _value(self, side: Number | Name, now: Nanos) -> float:
+        return side.value if isinstance(side, Number) else self._signals[side.text].value(now)
+
+    def _moving(self, node: Node) -> Iterator[tuple[Signal, Number | Name]]:
+        """Comparisons that may change between events: the signal, and what it is compared with."""
+        if isinstance(node, Not):
+            yield from self._moving(node.inner)
+        elif not isinstance(node, Comparison):
+            for part in node.parts:
+                yield from self._moving(part)
+        else:
+            moving = [side for side in (node.left, node.right) if isinstance(side, Name) and self._signals[side.text].continuous]
+            if len(moving) > 1:
+                raise Misuse(f"condition {self.text!r}: {moving[0].text} and {moving[1].text} both move: compare with a number")
+            if moving:
+                yield self._signals[moving[0].text], node.right if moving[0] is node.left else node.left
+
+    def due(self, now: Nanos) -> Nanos | None:
+        """When the condition may come true while no event happens: ``now`` where it does; None: not without one."""
+        if self.holds(now):
+            return now
+        dues = [due for signal, side in self._comparisons if (due := crossing(signal, self._value(side, now), now)) is not None]
+        return min(dues, default=None)
+
+
+def crossing(signal: Signal, level: float, now: Nanos) -> Nanos | None:
+    """First whole nanosecond after ``now`` at which the signal is on another side of ``level`` (below, at, above)."""
+    begin = now
+    for turn in signal.turns(now):
+        found = _first_other(signal, level, begin, turn)
+        if found is not None:
+            return found
+        begin = turn
+    return _first_other(signal, level, begin, now + FARTHEST_NS)
+
+
+def _side(value: float, level: float) -> int:
+    return (value > level) - (value < level)
+
+
+def _first_other(signal: Signal, level: float, begin: Nanos, end: Nanos) -> Nanos | None:
+    side = _side(signal.value(begin), level)
+    if _side(signal.value(end), level) == side:
+        return None
+    low, high = begin, end
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _side(signal.value(middle), level) == side:
+            low = middle
+        else:
+            high = middle
+    return high

@@ -1,0 +1,243 @@
+"""Lines of a world: controllers on a serial line or a network, and whoever talks to them.
+
+Each talker has a place on the line of its own. What comes back is fetched by the line as it comes, so that it has its moment.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486
+from steptwin.m1486.line import SerialChain
+from steptwin.machine import Nanos
+from steptwin.state import Plain, Stateful
+from steptwin.wire.line import SerialLine
+from steptwin.wire.rtu import BURSTY_GAP_NS
+from steptwin.wire.slave import Device, Direction, RtuSlavePort, TcpSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
+from steptwin.world.faults import Line as FaultLine
+from steptwin.world.kernel import Kernel
+from steptwin.world.trace import Record, Recorder
+
+SCRIPTS = "script"
+"""The place of the world's own scripts on every line."""
+
+
+class Place(Stateful):
+    """Where one program is connected. ``received`` is what has come and was not fetched, with its moments."""
+
+    __slots__ = ("inner", "kind", "on_output", "port", "received")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"inner", "kind", "on_output", "port"})
+
+    def __init__(self, kind: str, port: FaultyPort, inner: Any) -> None:
+        self.kind = kind
+        self.port = port
+        self.inner = inner
+        """The port behind the faults of the line."""
+        self.received: deque[tuple[Nanos, bytes]] = deque()
+        self.on_output: Callable[[], None] | None = None
+
+    def take(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        """What has come by ``now``."""
+        taken = []
+        while self.received and self.received[0][0] <= now:
+            taken.append(self.received.popleft())
+        return taken
+
+
+class Line(Stateful):
+    """Base of the lines; a part of its kernel."""
+
+    __slots__ = ("_faults", "_kernel", "_record", "name", "places")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_kernel", "_record", "name", "places"})
+
+    kinds: ClassVar[tuple[str, ...]]
+    """Kinds of places; the first is that of scripts."""
+    fault_kinds: ClassVar[Mapping[str, FaultLine]]
+
+    def __init__(self, kernel: Kernel, name: str, record: Recorder | None, faults: Faults) -> None:
+        self._kernel = kernel
+        self._record = record
+        self._faults = faults
+        self.name = name
+        self.places: dict[str, Place] = {}
+
+    # ------------------------------------------------------------------ what kinds of lines have of their own
+
+    def _port(self, place: str, kind: str) -> Any:
+        """A port for one more program."""
+        raise NotImplementedError
+
+    def _framed(self, port: Any) -> Any:
+        """What tells of frames in a port of `_port`."""
+        return None
+
+    @property
+    def units(self) -> tuple[int, ...]:
+        raise NotImplementedError
+
+    # ------------------------------------------------------------------ places
+
+    def connect(self, place: str, kind: str | None = None) -> Place:
+        """A place for a program; the same one again for the same name. `Misuse` for a kind the line does not have."""
+        found = self.places.get(place)
+        if found is not None:
+            return found
+        kind = self.kinds[0] if kind is None else kind
+        if kind not in self.kinds:
+            raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
+        port = self._port(place, kind)
+        if hasattr(port, "on_output"):
+            faulty: FaultyPort = FaultyTalkingPort(port, place, self._faults, self.fault_kinds[kind])
+            port.on_output = self._kernel.mark
+        else:
+            faulty = FaultyPort(port, place, self._faults, self.fault_kinds[kind], framed=self._framed(port), units=self.units)
+        found = self.places[place] = Place(kind, faulty, port)
+        return found
+
+    def leave(self, place: str) -> None:
+        """The program has gone."""
+        found = self.places.pop(place, None)
+        if found is not None:
+            found.port.close()
+
+    def receive(self, place: str, data: bytes, now: Nanos) -> None:
+        """Bytes of the program at ``place``; the kernel is at ``now``."""
+        found = self.connect(place)
+        answer = found.port.exchange(data, now)
+        if answer:
+            self._came(place, found, [(now, answer)])
+        self._kernel.mark()
+
+    def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
+        found.received.extend(pieces)
+        if found.on_output is not None:
+            found.on_output()
+
+    # ------------------------------------------------------------------ time
+
+    def look(self, now: Nanos) -> None:
+        for name, place in self.places.items():
+            pieces = place.port.to_send(now)
+            if pieces:
+                self._came(name, place, pieces)
+
+    def deadline(self) -> Nanos | None:
+        dues = [due for place in self.places.values() if (due := place.port.deadline()) is not None]
+        return min(dues, default=None)
+
+    def _tell(self, now: Nanos, place: str, direction: Direction, data: bytes) -> None:
+        if self._record is not None:
+            self._record(Record(now, self.name, "frame", f"{place}/{direction.value}", data))
+
+    # ------------------------------------------------------------------ snapshots
+
+    def copy_state(self) -> Plain:
+        places = tuple((name, place.kind, place.copy_state(), self._port_state(place)) for name, place in self.places.items())
+        return super().copy_state(), places
+
+    def set_state(self, plain: Plain) -> None:
+        own, places = plain
+        super().set_state(own)
+        kept = {name for name, *_ in places}
+        for name in [name for name in self.places if name not in kept]:
+            self.leave(name)
+        for name, kind, state, port_state in places:
+            place = self.connect(name, kind)
+            place.set_state(state)
+            self._set_port_state(place, port_state)
+
+    def _port_state(self, place: Place) -> Plain:
+        return place.inner.copy_state()
+
+    def _set_port_state(self, place: Place, state: Plain) -> None:
+        place.inner.set_state(state)
+
+
+class ModbusLine(Line):
+    """Controllers with different units on one line. With ``timing`` RTU takes the time a wire takes."""
+
+    __slots__ = ("devices", "timing")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"devices", "timing"}) | Line.FIXED
+
+    kinds = ("rtu", "tcp")
+    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"rtu": FaultLine.RTU, "tcp": FaultLine.TCP}
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        name: str,
+        record: Recorder | None,
+        faults: Faults,
+        *,
+        devices: Mapping[int, Device],
+        timing: LineTiming | None,
+    ) -> None:
+        super().__init__(kernel, name, record, faults)
+        self.devices = devices
+        self.timing = timing
+
+    @property
+    def units(self) -> tuple[int, ...]:
+        return tuple(self.devices)
+
+    def _port(self, place: str, kind: str) -> Any:
+        def observe(now: Nanos, direction: Direction, data: bytes) -> None:
+            self._tell(now, place, direction, data)
+
+        if kind == "tcp":
+            return TcpSlavePort(self.devices, on_frame=observe)
+        if self.timing is None:
+            return RtuSlavePort(self.devices, gap_ns=BURSTY_GAP_NS, on_frame=observe)
+        return TimedRtuSlavePort(self.devices, self.timing, gap_ns=BURSTY_GAP_NS, on_frame=observe)
+
+    def _framed(self, port: Any) -> Any:
+        return port
+
+
+class ChipLine(Line):
+    """M1486 chips on one serial line. All hear everybody, and everybody hears all chips."""
+
+    __slots__ = ("chain",)
+    FIXED: ClassVar[frozenset[str]] = Line.FIXED
+
+    kinds = ("raw",)
+    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}
+
+    def __init__(self, kernel: Kernel, name: str, record: Recorder | None, faults: Faults, chips: list[M1486]) -> None:
+        super().__init__(kernel, name, record, faults)
+        self.chain = SerialChain(chips)
+        self.connect(SCRIPTS)
+
+    @property
+    def units(self) -> tuple[int, ...]:
+        return ()
+
+    def _port(self, place: str, kind: str) -> Any:
+        return self.chain.port()
+
+    def receive(self, place: str, data: bytes, now: Nanos) -> None:
+        self._tell(now, place, Direction.IN, data)
+        super().receive(place, data, now)
+
+    def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
+        if place == SCRIPTS:  # every place hears the same
+            for moment, data in pieces:
+                self._tell(moment, "chips", Direction.OUT, data)
+        super()._came(place, found, pieces)
+
+    def _port_state(self, place: Place) -> Plain:
+        return self.chain.copy_state(), tuple(place.inner.pending)
+
+    def _set_port_state(self, place: Place, state: Plain) -> None:
+        chain, pending = state
+        self.chain.set_state(chain)
+        place.inner.pending = list(pending)
+
+
+def timing_of(baud: int) -> LineTiming:
+    return LineTiming(SerialLine(baud))

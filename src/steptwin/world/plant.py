@@ -1,0 +1,563 @@
+"""A world that runs: its kernels, each as far as somebody looked, and the scripts that act on them.
+
+Machines that share nothing are in kernels of their own. A kernel is brought to the present when somebody looks at it or does
+something to it; conditions keep the kernels they speak of up to date, event by event. So the order in which kernels are
+advanced never matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Any, NamedTuple, TypeAlias
+
+from steptwin.errors import Misuse, Runaway, TimeReversal
+from steptwin.m1486.chip import M1486
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488
+from steptwin.wbc.nearmiss import NearMiss
+from steptwin.world import script as do
+from steptwin.world.build import Files, Fitted, Plan, build
+from steptwin.world.expression import Condition
+from steptwin.world.faults import FaultyMachine, Mic488Body, rig
+from steptwin.world.faults.table import Layer
+from steptwin.world.kernel import Kernel, KernelState
+from steptwin.world.lines import SCRIPTS, Line
+from steptwin.world.signals import find_signal
+from steptwin.world.spec import ScriptSpec, WorldSpec
+from steptwin.world.trace import Mark, Record, Trace
+
+MOST_STEPS_PER_INSTANT = 10_000
+"""More steps of scripts at one moment are a runaway."""
+WORLD = "world"
+"""What happens to no machine happens to the world."""
+
+Encode: TypeAlias = Callable[[Mic488, str, float], bytes]
+"""The PDU of a request that writes a register by name."""
+
+
+class Bytes(NamedTuple):
+    """Bytes of a program outside at its place on a line."""
+
+    line: str
+    place: str
+    kind: str
+    data: bytes
+
+
+class Leave(NamedTuple):
+    """A program outside has gone."""
+
+    line: str
+    place: str
+
+
+Outside: TypeAlias = do.Step | Bytes | Leave
+"""What comes from outside a world. Recorded with its moment, it can be replayed."""
+
+
+class Given(NamedTuple):
+    """Something from outside, and when it came."""
+
+    time: Nanos
+    what: Outside
+
+
+@dataclass(slots=True)
+class _Waiting:
+    """What a script waits for. ``until`` is a moment; a condition or an answer may come before it."""
+
+    until: Nanos | None
+    condition: Condition | None = None
+    answer: Line | None = None
+
+
+class ScriptState(NamedTuple):
+    """What a script was sent so far, as (value, how often), and whether it has ended."""
+
+    sent: tuple[tuple[Any, int], ...]
+    until: Nanos | None
+    condition: str | None
+    answer: str | None
+    ended: bool
+
+
+class Script:
+    """A generator of steps in progress."""
+
+    __slots__ = ("ended", "make", "name", "number", "sent", "steps", "waiting")
+
+    def __init__(self, number: int, name: str, make: Callable[[], do.Steps]) -> None:
+        self.number = number
+        self.name = name
+        self.make = make
+        self.sent: list[tuple[Any, int]] = []
+        self.steps = make()
+        self.waiting: _Waiting | None = None
+        self.ended = False
+
+    def send(self, value: Any) -> do.Step | None:
+        if self.sent and self.sent[-1][0] is value:
+            self.sent[-1] = value, self.sent[-1][1] + 1
+        else:
+            self.sent.append((value, 1))
+        return self._next(value)
+
+    def _next(self, value: Any) -> do.Step | None:
+        try:
+            return self.steps.send(value)
+        except StopIteration:
+            self.ended = True
+            return None
+
+    def replay(self, sent: Iterable[tuple[Any, int]]) -> None:
+        """Bring a fresh generator to where it had been sent all this."""
+        self.steps.close()
+        self.steps = self.make()
+        self.sent = list(sent)
+        self.ended = False
+        for value, count in self.sent:
+            for _ in range(count):
+                self._next(value)
+
+
+@dataclass(frozen=True, slots=True)
+class PlantSnapshot:
+    """All state of a world at a moment."""
+
+    now: Nanos
+    kernels: tuple[KernelState, ...]
+    faults: Any
+    scripts: tuple[ScriptState, ...]
+    inputs: int
+    failures: int
+    trace: Mark
+
+
+class Plant:
+    """A world without files and clocks. ``encode`` makes the requests of `Write` steps."""
+
+    def __init__(self, spec: WorldSpec, files: Files, encode: Encode, *, keep_trace: bool = True) -> None:
+        names = [*(m.name for m in (*spec.mic488, *spec.m1486)), *(line.name for line in spec.lines), WORLD]
+        self.spec = spec
+        self.files = files
+        self.trace = Trace(names, keep=keep_trace)
+        self.plan: Plan = build(spec, files, self.trace.add)
+        self.now: Nanos = 0
+        self.stopped: str | None = None
+        """Why the run ended, where a script says so."""
+        self.failures: list[Record] = []
+        """Expectations that did not hold."""
+        self.inputs: list[Given] = []
+        """Everything from outside so far."""
+        self._encode = encode
+        self._scripts: list[Script] = []
+        self._timed: list[tuple[Nanos, int]] = []
+        self._watching: list[Script] = []
+        for fault in spec.faults:
+            self._set_fault(fault)
+        for line in spec.scripts:
+            self._begin(line)
+
+    # ------------------------------------------------------------------ what is in it
+
+    @property
+    def machines(self) -> Mapping[str, Mic488 | M1486]:
+        return self.plan.machines
+
+    @property
+    def lines(self) -> Mapping[str, Line]:
+        return self.plan.lines
+
+    @property
+    def axes(self) -> Mapping[str, Fitted]:
+        return self.plan.axes
+
+    @property
+    def kernels(self) -> list[Kernel]:
+        return self.plan.kernels
+
+    @property
+    def scripts(self) -> list[Script]:
+        """All scripts in their order: those of the description, then those started later."""
+        return self._scripts
+
+    def touch(self, name: str) -> Kernel:
+        """The kernel of a machine or line, brought to the present. `Misuse` with the names there are."""
+        kernel = self.plan.kernel_of.get(name)
+        if kernel is None:
+            raise self.unknown("machine or line", name, self.plan.kernel_of)
+        kernel.advance(self.now)
+        return kernel
+
+    @staticmethod
+    def unknown(what: str, name: str, known: Iterable[str]) -> Misuse:
+        near = NearMiss().of(name, known)
+        hint = "" if near is None else f"; did you mean {near!r}?"
+        return Misuse(f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
+
+    def condition(self, text: str) -> Condition:
+        """Raises `Misuse` for what is no condition, and for unknown signals."""
+        return Condition(text, lambda name: find_signal(self.plan, name))
+
+    def read(self, signal: str) -> float:
+        """The present value of a signal."""
+        found = find_signal(self.plan, signal)
+        for kernel in found.kernels:
+            kernel.advance(self.now)
+        return found.value(self.now)
+
+    # ------------------------------------------------------------------ scripts
+
+    def _begin(self, spec: ScriptSpec) -> None:
+        if spec.when is not None:
+            text, once = spec.when, spec.once
+            self.condition(text)
+            self.start(spec.name, lambda: do.run_when(spec.steps, text, once=once))
+        elif spec.every is not None:
+            period = spec.every
+            self.start(spec.name, lambda: do.run_every(spec.steps, period, 0))
+        else:
+            steps = (do.At(spec.at or 0), *spec.steps)
+            self.start(spec.name, lambda: do.run_through(steps, spec.repeat))
+
+    def start(self, name: str, make: Callable[[], do.Steps]) -> Script:
+        """Let a script run from now on. ``make`` makes its generator, again whenever a snapshot is restored."""
+        script = Script(len(self._scripts), name, make)
+        self._scripts.append(script)
+        heappush(self._timed, (self.now, script.number))
+        script.waiting = _Waiting(self.now)
+        return script
+
+    def _resume(self, script: Script, value: Any) -> None:
+        script.waiting = None
+        for _ in range(MOST_STEPS_PER_INSTANT):
+            step = script.send(value)
+            if step is None:
+                return
+            value = None
+            waiting = self._waits(step)
+            if waiting is not None:
+                script.waiting = waiting
+                if waiting.condition is None and waiting.answer is None and waiting.until is not None:
+                    heappush(self._timed, (waiting.until, script.number))
+                else:
+                    self._watching.append(script)
+                    self._watching.sort(key=lambda one: one.number)
+                return
+            value = self._gives(step, script)
+            if self.stopped is not None:
+                return
+        raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self.now} ns")
+
+    def _waits(self, step: do.Step) -> _Waiting | None:
+        if isinstance(step, do.Wait):
+            return _Waiting(self.now + step.duration) if step.duration > 0 else None
+        if isinstance(step, do.At):
+            return _Waiting(step.time) if step.time > self.now else None
+        if isinstance(step, do.Until):
+            return _Waiting(None if step.within is None else self.now + step.within, self.condition(step.condition))
+        if isinstance(step, do.Request):
+            from steptwin.wire.rtu import encode_frame
+
+            line = self._line(step.line)
+            self.touch(step.line)
+            line.connect(SCRIPTS).received.clear()
+            line.receive(SCRIPTS, encode_frame(step.unit, step.pdu), self.now)
+            return _Waiting(self.now + step.within, answer=line)
+        return None
+
+    def _gives(self, step: do.Step, script: Script) -> Any:
+        if isinstance(step, do.Wait | do.At):
+            return None  # its moment has come already
+        if isinstance(step, do.Read):
+            return self.read(step.signal)
+        if isinstance(step, do.Call):
+            step.function()
+        elif isinstance(step, do.Stop):
+            self.stopped = step.reason
+        elif isinstance(step, do.Expect):
+            condition = self.condition(step.condition)
+            self._bring(condition)
+            if not condition.holds(self.now):
+                self.failures.append(Record(self.now, WORLD, "event", "expectation", f"{script.name}: {step.condition}"))
+                self.trace.add(self.failures[-1])
+        else:
+            self.do(step)
+        return None
+
+    def _bring(self, condition: Condition) -> None:
+        for kernel in self._kernels_of(condition):
+            kernel.advance(self.now)
+
+    def _kernels_of(self, condition: Condition) -> list[Kernel]:
+        return [kernel for name in condition.signals for kernel in find_signal(self.plan, name).kernels]
+
+    # ------------------------------------------------------------------ what comes from outside
+
+    def outside(self, what: Outside) -> None:
+        """Something comes from outside now: it is done, and remembered for a replay."""
+        self.do(what)
+        self.inputs.append(Given(self.now, what))
+
+    def do(self, what: Outside) -> None:
+        """Do something at the present moment. Raises `Misuse` for what is not there."""
+        match what:
+            case do.Set(levels):
+                for name, pin, value in levels:
+                    self._machine(name)
+                    kernel = self.touch(name)
+                    kernel.machines[name].set_pin(pin, value, self.now)
+                    self.trace.add(Record(self.now, name, "edge", pin, value))
+                    kernel.settle()
+            case do.Press(name, duration):
+                self._press(name, True)
+                if duration is not None:
+                    release = (do.Wait(duration), do.Release(name))
+                    self.start(f"release {name}", lambda: do.run_through(release))
+            case do.Release(name):
+                self._press(name, False)
+            case do.Write(values):
+                for name, register, value in values:
+                    self._write(name, register, value)
+            case do.Send(name, data):
+                self._line(name)
+                kernel = self.touch(name)
+                self.lines[name].receive(SCRIPTS, data, self.now)
+                kernel.settle()
+            case Bytes(name, place, kind, data):
+                line = self._line(name)
+                kernel = self.touch(name)
+                line.connect(place, kind)
+                line.receive(place, data, self.now)
+                kernel.settle()
+            case Leave(name, place):
+                self._line(name).leave(place)
+            case do.PowerCycle(name):
+                machine = self._machine(name)
+                kernel = self.touch(name)
+                self._record_input(name, "power-cycle", "")
+                machine.power_cycle(self.now)
+                kernel.settle()
+            case do.Turn(name, axis, counts):
+                machine = self._machine(name)
+                if not isinstance(machine, Mic488):
+                    raise Misuse(f"turn: {name!r} has no encoder")
+                kernel = self.touch(name)
+                self._record_input(name, f"M{axis} turned", counts)
+                machine.turn_encoder(axis, counts, self.now)
+                kernel.settle()
+            case do.SetFault(fault):
+                self._set_fault(fault)
+            case do.ClearFault(name):
+                for kernel in self.kernels:
+                    kernel.advance(self.now)
+                self.plan.faults.remove(name, self.now)
+            case do.Note(text):
+                self.trace.add(Record(self.now, WORLD, "event", "note", text))
+            case _:
+                raise Misuse(f"{what}: this is for scripts")
+
+    def _record_input(self, machine: str, what: str, value: object) -> None:
+        self.trace.add(Record(self.now, machine, "input", what, value))
+
+    def _machine(self, name: str) -> Mic488 | M1486:
+        machine = self.machines.get(name)
+        if machine is None:
+            raise self.unknown("machine", name, self.machines)
+        return machine
+
+    def _line(self, name: str) -> Line:
+        line = self.lines.get(name)
+        if line is None:
+            raise self.unknown("line", name, self.lines)
+        return line
+
+    def _press(self, name: str, pressed: bool) -> None:
+        found = self.plan.buttons.get(name)
+        if found is None:
+            raise self.unknown("button", name, self.plan.buttons)
+        button, kernel = found
+        kernel.advance(self.now)
+        self._record_input(button.target.machine, name, "pressed" if pressed else "released")
+        button.press(pressed, self.now)
+        kernel.settle()
+
+    def _write(self, name: str, register: str, value: float) -> None:
+        machine = self._machine(name)
+        if not isinstance(machine, Mic488):
+            raise Misuse(f"write: {name!r} is an M1486, which has no registers")
+        pdu = self._encode(machine, register, value)
+        kernel = self.touch(name)
+        on = self.plan.line_of.get(name)
+        if on is not None:
+            from steptwin.wire.rtu import encode_frame
+
+            on[0].receive(SCRIPTS, encode_frame(on[1], pdu), self.now)
+            on[0].connect(SCRIPTS).received.clear()
+        else:
+            self._record_input(name, "request", pdu)
+            machine.execute(pdu, self.now)
+        kernel.settle()
+
+    def _set_fault(self, fault: Any) -> None:
+        for kernel in self.kernels:
+            kernel.advance(self.now)
+        if fault.kind.layer in (Layer.PHYSICS, Layer.PROTOCOL) or fault.kind.name == "no-answer":
+            for name in self.machines:
+                self._rig(name)
+        self.plan.faults.add(fault, self.now)
+
+    def _rig(self, name: str) -> FaultyMachine | None:
+        """Let a machine have faults."""
+        machine = self.machines[name]
+        if not isinstance(machine, Mic488):
+            return None
+        known = name in self.plan.faults.machines
+        unit = self.plan.line_of[name][1] if name in self.plan.line_of else 1
+        body = Mic488Body(machine, unit) if not known else None
+        if body is None:
+            return self.plan.faults.machines[name]
+        for axis in self.axes.values():
+            if axis.spec.drive[0] == name:
+                body.shafts[axis.mechanism.number - 1] = axis.mechanism  # type: ignore[call-overload]
+        return rig(self.plan.kernel_of[name], name, self.plan.faults, body)
+
+    # ------------------------------------------------------------------ time
+
+    def next(self) -> Nanos | None:
+        """When something happens to a script."""
+        due = self._timed[0][0] if self._timed else None
+        for script in self._watching:
+            waiting = script.waiting
+            if waiting is None:
+                continue
+            dues = [waiting.until]
+            if waiting.condition is not None:
+                self._bring(waiting.condition)
+                dues.append(waiting.condition.due(self.now))
+                dues += [kernel.deadline() for kernel in self._kernels_of(waiting.condition)]
+            if waiting.answer is not None:
+                kernel = self.touch(waiting.answer.name)
+                dues += [kernel.deadline(), self.now if waiting.answer.connect(SCRIPTS).received else None]
+            for one in dues:
+                if one is not None and (due is None or one < due):
+                    due = one
+        return due
+
+    def advance(self, now: Nanos) -> None:
+        """Bring the scripts, and the kernels they need, to ``now``, or to where a script stops the run."""
+        if now < self.now:
+            raise TimeReversal(self.now, now)
+        rounds, at = 0, -1
+        while self.stopped is None and (due := self.next()) is not None and due <= now:
+            self.now = max(due, self.now)
+            rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
+            if rounds > MOST_STEPS_PER_INSTANT:
+                raise Runaway(f"scripts go round for ever at {self.now} ns")
+            self._run_scripts()
+        if self.stopped is None:
+            self.now = now
+
+    def _run_scripts(self) -> None:
+        while self._timed and self._timed[0][0] <= self.now and self.stopped is None:
+            _, number = heappop(self._timed)
+            self._resume(self._scripts[number], None)
+        for script in [script for script in self._watching if script.waiting is not None]:
+            waiting = script.waiting
+            if self.stopped is not None or waiting is None:
+                return
+            found, value = self._come(waiting)
+            if found or (waiting.until is not None and waiting.until <= self.now):
+                self._watching.remove(script)
+                self._resume(script, value)
+
+    def _come(self, waiting: _Waiting) -> tuple[bool, Any]:
+        """Whether what a script waits for has come, and what it is sent."""
+        if waiting.answer is not None:
+            self.touch(waiting.answer.name)
+            answer = b"".join(data for _, data in waiting.answer.connect(SCRIPTS).take(self.now))
+            return bool(answer), answer[1:-2]
+        if waiting.condition is None:
+            return False, None
+        self._bring(waiting.condition)
+        holds = waiting.condition.holds(self.now)
+        return holds, holds
+
+    def settle_all(self) -> None:
+        """Bring every kernel to the present."""
+        for kernel in self.kernels:
+            kernel.advance(self.now)
+
+    def run(self, end: Nanos, until: str | None = None) -> str | None:
+        """Run to the moment ``end``, or until a condition is true; gives why it ended before ``end``, else None."""
+        self.stopped = None
+        watch = None
+        if until is not None:
+            steps = (do.Until(until), do.Stop(until))
+            watch = self.start("until", lambda: do.run_through(steps))
+        self.advance(end)
+        if watch is not None and not watch.ended:
+            self._forget(watch)
+        self.settle_all()
+        return self.stopped
+
+    def _forget(self, script: Script) -> None:
+        script.ended = True
+        script.waiting = None
+        self._watching = [one for one in self._watching if one is not script]
+        self._timed = [entry for entry in self._timed if entry[1] != script.number]
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> PlantSnapshot:
+        """Everything at the present moment."""
+        self.settle_all()
+        return PlantSnapshot(
+            self.now,
+            tuple(kernel.snapshot() for kernel in self.kernels),
+            self.plan.faults.copy_state(),
+            tuple(
+                ScriptState(
+                    tuple(script.sent),
+                    None if script.waiting is None else script.waiting.until,
+                    None if script.waiting is None or script.waiting.condition is None else script.waiting.condition.text,
+                    None if script.waiting is None or script.waiting.answer is None else script.waiting.answer.name,
+                    script.ended,
+                )
+                for script in self._scripts
+            ),
+            len(self.inputs),
+            len(self.failures),
+            self.trace.mark(),
+        )
+
+    def restore(self, snapshot: PlantSnapshot) -> None:
+        """Go on where a snapshot of this world, or of one with the same description and scripts, was taken.
+
+        Scripts that were started later are forgotten. Raises `Misuse` for a snapshot of another world.
+        """
+        if len(snapshot.kernels) != len(self.kernels) or len(snapshot.scripts) > len(self._scripts):
+            raise Misuse("the snapshot is of another world, or of one with other scripts")
+        self.now = snapshot.now
+        self.stopped = None
+        self.trace.rewind(snapshot.trace)
+        for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
+            kernel.restore(state)
+        self.plan.faults.set_state(snapshot.faults)
+        del self.inputs[snapshot.inputs :], self.failures[snapshot.failures :]
+        del self._scripts[len(snapshot.scripts) :]
+        self._timed, self._watching = [], []
+        for script, state in zip(self._scripts, snapshot.scripts, strict=True):
+            script.replay(state.sent)
+            script.ended = state.ended
+            script.waiting = None
+            if state.ended:
+                continue
+            condition = None if state.condition is None else self.condition(state.condition)
+            script.waiting = _Waiting(state.until, condition, None if state.answer is None else self.lines[state.answer])
+            if condition is None and state.answer is None and state.until is not None:
+                heappush(self._timed, (state.until, script.number))
+            else:
+                self._watching.append(script)

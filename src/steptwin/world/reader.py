@@ -1,0 +1,255 @@
+"""Reads tables of TOML against rows that say what is permitted. All problems are told at once, each with file, line and key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+from steptwin.diagnostics import Diagnostic, Severity, Source, Span, in_order, render
+from steptwin.errors import Misuse
+from steptwin.wbc.nearmiss import NearMiss
+from steptwin.world.durations import duration
+
+Path: TypeAlias = tuple[str | int, ...]
+"""Where a value is: names of tables and keys, numbers in arrays."""
+
+_MISSING: Any = object()
+_HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]]+?)\s*\]{1,2}\s*(?:#.*)?$")
+_KEY = re.compile(r"\s*([\w\"'.&-]+)\s*=")
+
+
+class WorldError(Misuse):
+    """A description of a world with errors; the text shows them all."""
+
+    def __init__(self, source: Source, findings: Sequence[Diagnostic]) -> None:
+        self.source = source
+        self.findings = in_order(findings)
+        super().__init__(render(source, self.findings))
+
+
+class Text:
+    """A TOML text that knows where its keys are, and collects what is wrong with them."""
+
+    def __init__(self, name: str, text: str) -> None:
+        """Raises `WorldError` for a text that is no TOML."""
+        self.source = Source(name, text)
+        self.findings: list[Diagnostic] = []
+        self._near = NearMiss()
+        try:
+            self.data: dict[str, Any] = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            place = re.search(r"line (\d+), column (\d+)", str(error))
+            start = len(text)
+            if place is not None:
+                lines = text.splitlines(keepends=True)
+                start = min(sum(map(len, lines[: int(place[1]) - 1])) + int(place[2]) - 1, len(text))
+            message = str(error).split(" (at ")[0]
+            self.wrong_at(Span(start, min(start + 1, len(text))), "D001", f"this is no TOML: {message}")
+            raise self.error() from None
+        self._spans = _spans(text)
+
+    def wrong_at(self, span: Span, code: str, message: str, hint: str | None = None) -> None:
+        self.findings.append(Diagnostic(code, Severity.ERROR, span, message, hint))
+
+    def wrong(self, path: Path, code: str, message: str, hint: str | None = None) -> None:
+        """Something is wrong with the value at ``path``, or with what holds it."""
+        while path and path not in self._spans:
+            path = path[:-1]
+        self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint)
+
+    def line(self, path: Path) -> int:
+        """The line (from 1) of a value, or of what holds it."""
+        while path and path not in self._spans:
+            path = path[:-1]
+        return self.source.position(self._spans[path].start)[0] if path else 1
+
+    def near(self, word: str, known: Iterable[str]) -> str:
+        found = self._near.of(word, known)
+        return "" if found is None else f"; did you mean {found!r}?"
+
+    def error(self) -> WorldError:
+        return WorldError(self.source, self.findings)
+
+    def check(self) -> None:
+        """`WorldError` if anything was wrong."""
+        if self.findings:
+            raise self.error()
+
+
+def _spans(text: str) -> dict[Path, Span]:
+    """Where tables and keys are. Keys of inline tables and what looks like keys in long strings are passed over."""
+    spans: dict[Path, Span] = {}
+    counts: dict[Path, int] = {}
+    current: Path = ()
+    offset = 0
+    for line in text.splitlines(keepends=True):
+        header, key = _HEADER.match(line), _KEY.match(line)
+        if header is not None:
+            current = _resolved(_parts(header[2]), counts, is_array=header[1] == "[[")
+            spans.setdefault(current, Span(offset + header.start(1), offset + len(line.rstrip())))
+        elif key is not None:
+            path = current
+            for part in _parts(key[1]):
+                path = (*path, part)
+                spans.setdefault(path, Span(offset + key.start(1), offset + len(line.split("#")[0].rstrip())))
+        offset += len(line)
+    return spans
+
+
+def _parts(dotted: str) -> list[str]:
+    return [part.strip().strip("\"'") for part in dotted.split(".")]
+
+
+def _resolved(parts: list[str], counts: dict[Path, int], *, is_array: bool) -> Path:
+    """A header with the numbers of the array tables it is in."""
+    path: Path = ()
+    for i, part in enumerate(parts):
+        path = (*path, part)
+        if is_array and i == len(parts) - 1:
+            counts[path] = counts.get(path, -1) + 1
+            for inner in [p for p in counts if len(p) > len(path) and p[: len(path)] == path and p[len(path)] == counts[path]]:
+                del counts[inner]
+        if path in counts:
+            path = (*path, counts[path])
+    return path
+
+
+# ---------------------------------------------------------------------- rows
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key of a table: how its value is read (raising `Misuse` with what is permitted), and what holds without it."""
+
+    name: str
+    read: Callable[[Any], Any]
+    meaning: str
+    default: Any = _MISSING
+    attribute: str = ""
+    """The attribute it becomes, where that is not its name."""
+
+    @property
+    def is_required(self) -> bool:
+        return self.default is _MISSING
+
+
+def read_table(text: Text, path: Path, value: object, keys: Sequence[Key], also: Iterable[str] = ()) -> dict[str, Any]:
+    """The values of a table by attribute; what is wrong is told to ``text``. Keys in ``also`` are read elsewhere."""
+    values: dict[str, Any] = {key.attribute or key.name: key.default for key in keys if not key.is_required}
+    what = _what(path)
+    if not isinstance(value, Mapping):
+        text.wrong(path, "D002", f"{what} is {value!r}", "expected a table")
+        return values
+    known = {key.name: key for key in keys}
+    permitted = [*known, *also]
+    for name, given in value.items():
+        key = known.get(name)
+        if key is not None:
+            try:
+                values[key.attribute or key.name] = key.read(given)
+            except Misuse as error:
+                text.wrong((*path, name), "D003", f"{what}: {name}: {error}", key.meaning)
+        elif name not in also:
+            near = text.near(name, permitted)
+            text.wrong((*path, name), "D004", f"{what} has no {name!r}{near}", f"permitted: {', '.join(permitted)}")
+    for key in keys:
+        if key.is_required and key.name not in value:
+            text.wrong(path, "D005", f"{what}: {key.name} is missing", key.meaning)
+    return values
+
+
+def _what(path: Path) -> str:
+    names = [str(part) for part in path if isinstance(part, str)]
+    return f"[{'.'.join(names)}]" if names else "the file"
+
+
+# ---------------------------------------------------------------------- kinds of values
+
+
+def text_value(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise Misuse(f"{value!r}: expected a text")
+    return value
+
+
+_NAME = re.compile(r"[A-Za-z_][\w-]*\Z")
+
+
+def name_value(value: Any) -> str:
+    if not isinstance(value, str) or not _NAME.match(value):
+        raise Misuse(f"{value!r} is no name: expected a letter, then letters, digits, '-' and '_'")
+    return value
+
+
+def flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise Misuse(f"{value!r}: expected true or false")
+    return value
+
+
+def number(least: float | None = None, most: float | None = None, *, above: bool = False) -> Callable[[Any], float]:
+    """A number from ``least`` (not itself with ``above``) to ``most``."""
+
+    def read(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
+            raise Misuse(f"{value!r}: expected a number")
+        low = least is not None and (value <= least if above else value < least)
+        if low or (most is not None and value > most):
+            bounds = (f"above {least:g}" if above else f"from {least:g}") if least is not None else ""
+            raise Misuse(f"{value!r}: permitted are numbers {bounds}{f' to {most:g}' if most is not None else ''}")
+        return float(value)
+
+    return read
+
+
+def whole(least: int, most: int) -> Callable[[Any], int]:
+    def read(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise Misuse(f"{value!r}: permitted are whole numbers from {least} to {most}")
+        return value
+
+    return read
+
+
+def word(*words: str) -> Callable[[Any], str]:
+    def read(value: Any) -> str:
+        if value not in words:
+            near = NearMiss().of(value, words) if isinstance(value, str) else None
+            raise Misuse(f"{value!r}: permitted are {', '.join(words)}{'' if near is None else f'; did you mean {near!r}?'}")
+        return value
+
+    return read
+
+
+def time_value(value: Any) -> int:
+    return duration(value)
+
+
+def pair(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise Misuse(f"{value!r}: expected [low, high]")
+    low, high = (number()(item) for item in value)
+    if low >= high:
+        raise Misuse(f"{value!r}: the first must be below the second")
+    return low, high
+
+
+def points(value: Any) -> tuple[tuple[float, float], ...]:
+    if not isinstance(value, list) or not value or any(not isinstance(item, list) or len(item) != 2 for item in value):
+        raise Misuse(f"{value!r}: expected [[x, y], [x, y], ...]")
+    found = tuple((number()(x), number()(y)) for x, y in value)
+    if any(a[0] >= b[0] for a, b in pairwise(found)):
+        raise Misuse(f"{value!r}: the first numbers must grow")
+    return found
+
+
+def pin_name(value: Any) -> tuple[str, str]:
+    """``MACHINE.PIN``."""
+    machine, dot, pin = value.partition(".") if isinstance(value, str) else ("", "", "")
+    if not dot or not machine or not pin:
+        raise Misuse(f"{value!r}: expected MACHINE.PIN, such as 'table.IN3'")
+    return machine, pin.upper()

@@ -1,0 +1,334 @@
+"""What operators do: steps, one after another. A script is a generator of steps, which are plain values.
+
+A generator is sent what a step gives: for `Read` a number, for `Request` the answer (bytes), for `Until` whether the condition
+came true in time. It touches nothing by itself, so that it can be restored by sending it the same again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.world.expression import parse
+from steptwin.world.faults import Fault
+from steptwin.world.faults import parse as parse_fault
+from steptwin.world.reader import (
+    Key,
+    Path,
+    Text,
+    name_value,
+    number,
+    pin_name,
+    read_table,
+    text_value,
+    time_value,
+    whole,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Nothing for so long."""
+
+    duration: Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class At:
+    """Nothing until that moment; nothing at all when it has passed."""
+
+    time: Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class Until:
+    """Nothing until a condition is true, at most for ``within``. Gives whether it is."""
+
+    condition: str
+    within: Nanos | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """Inputs take levels: 0, 1, volts."""
+
+    levels: tuple[tuple[str, str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """Press a button, for ``duration`` or until it is released."""
+
+    button: str
+    duration: Nanos | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    button: str
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """Registers of a MIC488 by name take values, in configured units, as a master writes them."""
+
+    values: tuple[tuple[str, str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Bytes go to a line."""
+
+    line: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A Modbus request on a line. Gives the PDU of the answer; nothing (b"") when none comes in time."""
+
+    line: str
+    unit: int
+    pdu: bytes
+    within: Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class PowerCycle:
+    machine: str
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Turn the encoder shaft of an axis of a MIC488 by counts."""
+
+    machine: str
+    axis: int
+    counts: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetFault:
+    fault: Fault
+
+
+@dataclass(frozen=True, slots=True)
+class ClearFault:
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Expect:
+    """Tell it where a condition does not hold; the run is not a good one then."""
+
+    condition: str
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A text for the trace."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """The run ends here."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """Gives the value of a signal."""
+
+    signal: str
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Call Python code, which may do anything with the world."""
+
+    function: Callable[[], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Repeat:
+    times: int
+    steps: tuple[Step, ...]
+
+
+Step: TypeAlias = (
+    Wait
+    | At
+    | Until
+    | Set
+    | Press
+    | Release
+    | Write
+    | Send
+    | Request
+    | PowerCycle
+    | Turn
+    | SetFault
+    | ClearFault
+    | Expect
+    | Note
+    | Stop
+    | Read
+    | Call
+    | Repeat
+)
+Steps: TypeAlias = Generator[Step, Any, None]
+
+
+def run_through(steps: Iterable[Step], times: int = 1) -> Steps:
+    """The steps in order, ``times`` times."""
+    done = 0
+    while done < times:
+        for step in steps:
+            if isinstance(step, Repeat):
+                yield from run_through(step.steps, step.times)
+            else:
+                yield step
+        done += 1
+
+
+def run_every(steps: tuple[Step, ...], period: Nanos, begin: Nanos) -> Steps:
+    """The steps at ``begin`` + ``period``, and again after each period."""
+    moment = begin
+    while True:
+        moment += period
+        yield At(moment)
+        yield from run_through(steps)
+
+
+def run_when(steps: tuple[Step, ...], condition: str, *, once: bool) -> Steps:
+    """The steps whenever the condition comes true."""
+    while True:
+        yield Until(condition)
+        yield from run_through(steps)
+        if once:
+            return
+        yield Until(f"not ({condition})")
+
+
+# ---------------------------------------------------------------------- steps in TOML
+
+
+def _condition(value: Any) -> str:
+    parse(text_value(value))
+    return value
+
+
+def _levels(value: Any) -> tuple[tuple[str, str, float], ...]:
+    if not isinstance(value, Mapping) or not value:
+        raise Misuse(f"{value!r}: expected {{ 'MACHINE.NAME' = NUMBER }}")
+    return tuple((*pin_name(name), float(level) if isinstance(level, bool) else number()(level)) for name, level in value.items())
+
+
+def _fault(value: Any) -> Fault:
+    if not isinstance(value, Mapping):
+        raise Misuse(f"{value!r}: expected {{ kind = ... }}")
+    return parse_fault(value)
+
+
+def _turned(value: Any) -> tuple[str, int]:
+    machine, axis = pin_name(value)
+    if not axis.startswith("M") or not axis[1:].isdecimal():
+        raise Misuse(f"{value!r}: expected MACHINE.M1 to M4")
+    return machine, int(axis[1:])
+
+
+def _send(line: str, text: str) -> Send:
+    return Send(line, text.encode("latin-1", "replace"))
+
+
+def _turn(axis: tuple[str, int], counts: int) -> Turn:
+    return Turn(*axis, counts)
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """A kind of step: its first key says which; ``make`` takes the values of all keys in their order."""
+
+    main: Key
+    others: tuple[Key, ...]
+    make: Callable[..., Step]
+
+
+def _action(main: Key, make: Callable[..., Step], *others: Key) -> tuple[str, Action]:
+    return main.name, Action(main, others, make)
+
+
+_WITHIN = Key("within", time_value, "for at most this time", None)
+
+ACTIONS: Mapping[str, Action] = dict(
+    (
+        _action(Key("wait", time_value, "a time such as '1 s'"), Wait),
+        _action(Key("at", time_value, "a moment such as '10 s'"), At),
+        _action(Key("until", _condition, "a condition"), Until, _WITHIN),
+        _action(Key("set", _levels, "{ 'MACHINE.PIN' = LEVEL }"), Set),
+        _action(
+            Key("press", name_value, "a button"),
+            Press,
+            Key("for", time_value, "how long", None, "duration"),
+        ),
+        _action(Key("release", name_value, "a button"), Release),
+        _action(Key("write", _levels, "{ 'MACHINE.REGISTER' = VALUE }"), Write),
+        _action(
+            Key("send", name_value, "a line of M1486 chips"),
+            _send,
+            Key("text", text_value, "characters; \\r ends a command line"),
+        ),
+        _action(Key("power_cycle", name_value, "a machine"), PowerCycle),
+        _action(
+            Key("turn", _turned, "MACHINE.M1 to M4"),
+            _turn,
+            Key("counts", whole(-(2**31), 2**31 - 1), "encoder counts"),
+        ),
+        _action(Key("fault", _fault, "{ kind = ... } as in [[fault]]"), SetFault),
+        _action(Key("clear_fault", text_value, "the name of a fault"), ClearFault),
+        _action(Key("expect", _condition, "a condition that must hold"), Expect),
+        _action(Key("note", text_value, "a text for the trace"), Note),
+        _action(Key("stop", text_value, "why the run ends"), Stop),
+    )
+)
+"""What steps can be, by their first key. ``repeat`` has steps of its own and stands beside it."""
+
+
+def read_steps(text: Text, path: Path, value: object) -> tuple[Step, ...]:
+    """Steps from a list of tables; what is wrong is told to ``text``."""
+    if not isinstance(value, list):
+        text.wrong(path, "D002", f"{path[-1]} is {value!r}", "expected a list of steps, such as [{ wait = '1 s' }]")
+        return ()
+    steps: list[Step] = []
+    for n, table in enumerate(value, start=1):
+        step = _step(text, path, n, table)
+        if step is not None:
+            steps.append(step)
+    return tuple(steps)
+
+
+def _step(text: Text, path: Path, n: int, table: object) -> Step | None:
+    if not isinstance(table, Mapping):
+        text.wrong(path, "D002", f"step {n} is {table!r}", "expected a table, such as { wait = '1 s' }")
+        return None
+    if "repeat" in table:
+        values = read_table(text, path, table, (Key("repeat", whole(1, 10**9), "how often"),), ("steps",))
+        return Repeat(values.get("repeat", 1), read_steps(text, path, table.get("steps", [])))
+    kinds = [key for key in table if key in ACTIONS]
+    if len(kinds) != 1:
+        near = "".join(text.near(key, ACTIONS) for key in table if key not in ACTIONS)
+        found = f"has {' and '.join(kinds)}" if kinds else f"has {', '.join(map(repr, table)) or 'nothing'}"
+        text.wrong(path, "D008", f"step {n} {found}{near}", f"expected one of {', '.join(ACTIONS)}, repeat")
+        return None
+    action = ACTIONS[kinds[0]]
+    before = len(text.findings)
+    values = read_table(text, path, table, (action.main, *action.others))
+    if len(text.findings) > before:
+        return None
+    return action.make(*(values[key.attribute or key.name] for key in (action.main, *action.others)))
