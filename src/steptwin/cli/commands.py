@@ -53,6 +53,11 @@ def commands(
         if firmware is not None:
             raise Misuse("--firmware is for the MIC488 only")
         sections = _m1486(variant)
+    show(sections, form)
+
+
+def show(sections: Sequence[Section], form: Format) -> None:
+    """Print tables."""
     if form is Format.JSON:
         data = {s.title: [dict(zip(s.columns, row, strict=True)) for row in s.rows] for s in sections}
         typer.echo(json.dumps(data, ensure_ascii=False, indent=2))

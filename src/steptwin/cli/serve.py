@@ -14,6 +14,12 @@ DEFAULT_RTU_TCP = "127.0.0.1:5021"
 DEFAULT_M1486_TCP = "127.0.0.1:5022"
 
 
+Fault = Annotated[
+    list[str] | None, typer.Option(help="Something that goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds.")
+]
+Seed = Annotated[int, typer.Option(help="Chance of faults: the same number, the same chance.")]
+
+
 @app.command()
 def mic488(
     firmware: Annotated[str, typer.Option(help="Register map: 1.23, 1.40 or 1.70.")] = "1.70",
@@ -46,6 +52,8 @@ def mic488(
     ] = False,
     name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "mic488",
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    fault: Fault = None,
+    seed: Seed = 0,
     demo: Annotated[bool, typer.Option("--demo", help="Four spindles in mm with a switch at each end.")] = False,
 ) -> None:
     """Serve virtual MIC488 controllers.
@@ -79,6 +87,8 @@ def mic488(
             log_frames=log_frames,
             name=name,
             listen_any=listen_any,
+            faults=tuple(fault or ()),
+            seed=seed,
             demo=demo,
         )
     )
@@ -107,6 +117,8 @@ def m1486(
     ] = False,
     name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "m1486",
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    fault: Fault = None,
+    seed: Seed = 0,
 ) -> None:
     """Serve virtual M1486 chips on one line; several programs may be connected to it.
 
@@ -135,5 +147,7 @@ def m1486(
             log_frames=log_frames,
             name=name,
             listen_any=listen_any,
+            faults=tuple(fault or ()),
+            seed=seed,
         )
     )

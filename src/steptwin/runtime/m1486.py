@@ -18,10 +18,13 @@ from steptwin.m1486.pins import known_pin
 from steptwin.m1486.variants import DEFAULT, Store, Variant
 from steptwin.machine import Nanos
 from steptwin.runtime.cell import Cell
+from steptwin.runtime.faults import FaultDesk
 from steptwin.runtime.lines import Happening
+from steptwin.runtime.links import Port
 from steptwin.runtime.m1486_characters import CharacterLog, LineSplitter
 from steptwin.runtime.m1486_state import state_of
 from steptwin.runtime.memory import StateDirectory
+from steptwin.world.faults import FaultyTalkingPort, Line, M1486Body
 from steptwin.world.kernel import Kernel, PinName, Wire
 
 _WIRE = re.compile(r"\s*([0-9A-Fa-f])\.([^.=]+)=\s*([0-9A-Fa-f])\.([^.=]+)\Z")
@@ -60,6 +63,8 @@ class M1486Line:
             self.kernel.add(chip_name(address), chip)
         for wire in options.wires:
             self.kernel.connect(wire)
+        self.faults = FaultDesk(self.kernel, {chip_name(a): partial(M1486Body, chip) for a, chip in self.chips.items()})
+        self.faults.lines = {Line.CHARACTERS}
         self.chain = SerialChain(self.chips.values())
         self.baud = next(iter(self.chips.values())).uart.baud
         names = ", ".join(map(chip_name, self.chips))
@@ -69,11 +74,12 @@ class M1486Line:
 
     # ------------------------------------------------------------------ ports
 
-    def port(self, link: str) -> ProgramPort:
+    def port(self, link: str) -> Port:
         """A place on the line for one more program."""
-        return ProgramPort(self.chain.port(), LineSplitter(self.frames, link) if self.options.is_written_down else None)
+        port = ProgramPort(self.chain.port(), LineSplitter(self.frames, link) if self.options.is_written_down else None)
+        return FaultyTalkingPort(port, link, self.faults.faults, Line.CHARACTERS)
 
-    def client_port(self) -> ProgramPort:
+    def client_port(self) -> Port:
         """A place on the line for one more client of raw TCP."""
         return self.port(f"tcp-{next(self._connections)}")
 
@@ -116,10 +122,19 @@ class M1486Line:
             return handle
 
         return {
-            "pin": acting(lambda request, now: _pin(self._chosen(request), request, now)),
+            "pin": acting(self._pin),
             "power-cycle": acting(self._power_cycle),
             "state": acting(lambda request, now: state_of(self._chosen(request), now)),
+            "fault": self.faults.handler(cell),
         }
+
+    def _pin(self, request: Mapping[str, Any], now: Nanos) -> object:
+        """All changes or none, then every pin. A hand reaches the pins before a switch that is stuck, not behind it."""
+        chip = self._chosen(request)
+        terminals = next(self.kernel.machines[chip_name(address)] for address, one in self.chips.items() if one is chip)
+        for pin, level in _pin_changes(request):
+            terminals.set_pin(pin, level, now)
+        return dict(chip.pins())
 
     def _power_cycle(self, request: Mapping[str, Any], now: Nanos) -> None:
         for chip in self.chips.values() if request.get("unit") is None else (self._chosen(request),):
@@ -229,14 +244,11 @@ def pin_change(pin: str, value: object) -> PinChange:
     return PinChange(name, int(value))
 
 
-def _pin(chip: M1486, request: Mapping[str, Any], now: Nanos) -> object:
-    """All changes or none, then every pin."""
+def _pin_changes(request: Mapping[str, Any]) -> list[PinChange]:
     wanted = request.get("set") or {}
     if not isinstance(wanted, dict):
         raise Misuse(f'"set" = {wanted!r}: expected {{NAME: VALUE, ...}}')
-    for pin, level in [pin_change(pin, value) for pin, value in wanted.items()]:
-        chip.set_pin(pin, level, now)
-    return dict(chip.pins())
+    return [pin_change(pin, value) for pin, value in wanted.items()]
 
 
 # ---------------------------------------------------------------------- places on the line

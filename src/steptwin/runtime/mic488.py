@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import SECOND, Nanos, PinMachine
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Event, Mic488, check_pin
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.demo import place_switches
+from steptwin.runtime.faults import FaultDesk
 from steptwin.runtime.frames import FrameLog, WatchedRtuPort
 from steptwin.runtime.lines import Happening
 from steptwin.runtime.links import Port
@@ -27,6 +28,7 @@ from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.world.faults import FaultyPort, Line, Mic488Body
 from steptwin.world.kernel import Kernel
 
 
@@ -69,16 +71,18 @@ class Mic488Line:
             if demo:
                 place_switches(self.kernel, str(unit))
         self.frames = FrameLog(self.devices)
+        self.faults = FaultDesk(self.kernel, {str(u): partial(Mic488Body, d, u) for u, d in self.devices.items()})
         numbers = ", ".join(map(str, units))
         self.title = f"MIC488 firmware {firmware}, unit{'s' if len(units) > 1 else ''} {numbers}"
         self._connections = count(1)
 
     # ------------------------------------------------------------------ ports
 
-    def tcp_port(self) -> TcpSlavePort:
+    def tcp_port(self) -> Port:
         """A port for one more client."""
         link = f"tcp-{next(self._connections)}"
-        return TcpSlavePort(self.devices, on_frame=self.frames.observer(link, tcp=True) if self.options.frames else None)
+        port = TcpSlavePort(self.devices, on_frame=self.frames.observer(link, tcp=True) if self.options.frames else None)
+        return FaultyPort(port, link, self.faults.faults, Line.TCP, framed=port, units=tuple(self.devices))
 
     def rtu_port(self, link: str, gap_ns: Nanos = BURSTY_GAP_NS) -> Port:
         """A port for one more program on the line, or client of it."""
@@ -89,7 +93,8 @@ class Mic488Line:
             port = TimedRtuSlavePort(self.devices, timing, gap_ns=gap_ns, on_frame=observer)
         else:
             port = RtuSlavePort(self.devices, gap_ns=gap_ns, on_frame=observer)
-        return WatchedRtuPort(port, self.frames, link) if self.options.frames else port
+        watched = WatchedRtuPort(port, self.frames, link) if self.options.frames else port
+        return FaultyPort(watched, link, self.faults.faults, Line.RTU, framed=port, units=tuple(self.devices))
 
     def rtu_client_port(self, gap_ns: Nanos = BURSTY_GAP_NS) -> Port:
         """A port for one more client of RTU over TCP."""
@@ -112,11 +117,16 @@ class Mic488Line:
             return handle
 
         return {
-            "pin": acting(_pin),
+            "pin": acting(lambda device, request, now: _pin(device, self._terminals(device), request, now)),
             "power-cycle": acting(lambda device, request, now: device.power_cycle(now)),
             "encoder": acting(_encoder),
             "state": acting(lambda device, request, now: state_of(device, now)),
+            "fault": self.faults.handler(cell),
         }
+
+    def _terminals(self, device: Mic488) -> PinMachine:
+        """Where a hand reaches the inputs of a controller: before a switch that is stuck, not behind it."""
+        return next(self.kernel.machines[str(unit)] for unit, served in self.devices.items() if served is device)
 
     def _chosen(self, unit: object) -> Mic488:
         if unit is None and len(self.devices) == 1:
@@ -153,7 +163,7 @@ def _changes(request: Mapping[str, Any]) -> Mapping[str, Any]:
     return changes
 
 
-def _pin(device: Mic488, request: Mapping[str, Any], now: Nanos) -> object:
+def _pin(device: Mic488, terminals: PinMachine, request: Mapping[str, Any], now: Nanos) -> object:
     """All changes or none, then every pin."""
     changes = _changes(request)
     for pin, value in changes.items():
@@ -161,7 +171,7 @@ def _pin(device: Mic488, request: Mapping[str, Any], now: Nanos) -> object:
             raise Misuse(f"{pin} = {value!r}: a pin takes a number")
         check_pin(pin, float(value))
     for pin, value in changes.items():
-        device.set_pin(pin, float(value), now)
+        terminals.set_pin(pin, float(value), now)
     return dict(device.pins())
 
 

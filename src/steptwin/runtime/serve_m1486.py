@@ -14,7 +14,7 @@ from steptwin.m1486.check import check
 from steptwin.m1486.chip import baud_pins
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.lines import interface
-from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
+from steptwin.m1486.variants import DEFAULT, Store, variant
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.lines import Face, Lines
@@ -49,6 +49,8 @@ class M1486Options:
     log_frames: bool = False
     name: str = "m1486"
     listen_any: bool = False
+    faults: tuple[str, ...] = ()
+    seed: int = 0
 
 
 def serve(options: M1486Options) -> None:
@@ -98,11 +100,12 @@ async def _serve(options: M1486Options, chain: ChainOptions, image: bytes | None
         cell = Cell(line.kernel, Clock())
         face = _live_view(line, cell, output) if live else Lines(line, output, frames=options.log_frames)
         server = Server(cell, face.notice)
+        line.faults.tell(face.notice)
         listening = line.listening_port()
         listener = Feed(cell, listening, listening) if chain.is_written_down else None
         try:
             await _open(server, line, options)
-            await face.show(server, _remarks(options, chain.variant))
+            await face.show(server, remarks_of(options))
         finally:
             if listener is not None:
                 listener.close()
@@ -116,6 +119,7 @@ def _live_view(line: M1486Line, cell: Cell, output: Output) -> Face:
 
 
 async def _open(server: Server, line: M1486Line, options: M1486Options) -> None:
+    line.faults.start(options.faults, options.seed)
     # First, for it tells who else has this name, and with it the pty of that name.
     await server.open_control(options.name, line.handlers(server.cell))
     if options.pty is not None:
@@ -128,8 +132,9 @@ async def _open(server: Server, line: M1486Line, options: M1486Options) -> None:
         server.write_ready_file(options.ready_file, options.name)
 
 
-def _remarks(options: M1486Options, kind: Variant) -> list[str]:
+def remarks_of(options: M1486Options) -> list[str]:
     """What the person who started this should know."""
+    kind = variant(options.variant)
     remarks = []
     if options.listen_any:
         remarks.append("the line has no authentication: whoever reaches these addresses moves the motors")

@@ -27,6 +27,7 @@ from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop
 from steptwin.runtime.tcp import parse_address
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
+from steptwin.world.faults import Line
 
 RTU = "Modbus RTU"
 TCP = "Modbus TCP"
@@ -56,6 +57,8 @@ class Mic488Options:
     name: str = "mic488"
     listen_any: bool = False
     demo: bool = False
+    faults: tuple[str, ...] = ()
+    seed: int = 0
 
 
 def serve(options: Mic488Options) -> None:
@@ -144,6 +147,7 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
         cell = Cell(line.kernel, Clock())
         face = _live_view(line, cell, output) if live else Lines(line, output, frames=options.log_frames)
         server = Server(cell, face.notice)
+        line.faults.tell(face.notice)
         try:
             await _open(server, line, options, baud)
             await face.show(server, _remarks(options))
@@ -158,6 +162,8 @@ def _live_view(line: Mic488Line, cell: Cell, output: Output) -> Face:
 
 
 async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: int) -> None:
+    line.faults.lines = _lines(options)
+    line.faults.start(options.faults, options.seed)
     gap: Nanos | None = None if options.gap_ms is None else round(options.gap_ms * MILLISECOND)
     bursty = BURSTY_GAP_NS if gap is None else gap
     # First, for it tells who else has this name, and with it the pty of that name.
@@ -174,6 +180,11 @@ async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: 
         await server.open_tcp("rtu-tcp", address, RTU_TCP, lambda: line.rtu_client_port(bursty))
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file, options.name)
+
+
+def _lines(options: Mic488Options) -> set[Line]:
+    serial = {Line.RTU} if options.pty or options.serial or options.rtu_tcp else set()
+    return serial | {Line.TCP} if options.tcp else serial
 
 
 def _remarks(options: Mic488Options) -> list[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
+from weakref import WeakSet
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
@@ -15,6 +15,7 @@ from steptwin.world.trace import Record, Recorder
 
 if TYPE_CHECKING:
     from steptwin.world.faults.machine import FaultyMachine
+    from steptwin.world.faults.port import FaultyPort
 
 _MULTIPLE = 0x10
 _LAST_WITH_COUNT = 4
@@ -140,8 +141,8 @@ class Faults(Stateful):
     same set of faults.
     """
 
-    __slots__ = ("_watchers", "active", "link", "machines", "seed", "sinks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_watchers", "link", "machines", "seed", "sinks"})
+    __slots__ = ("active", "link", "machines", "ports", "seed", "sinks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"link", "machines", "ports", "seed", "sinks"})
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
@@ -151,7 +152,8 @@ class Faults(Stateful):
         """Machines whose physics can go wrong."""
         self.link = ""
         """The link whose request is being served."""
-        self._watchers: list[Callable[[], None]] = []
+        self.ports: WeakSet[FaultyPort] = WeakSet()
+        """Ports that are in use: they come and go with programs and clients."""
 
     def add(self, fault: Fault, now: Nanos = 0) -> Active:
         """Set a fault at ``now``. `Misuse` for a name that is taken, a machine, pin or axis that is not there."""
@@ -223,17 +225,9 @@ class Faults(Stateful):
             if a.fault.kind.layer is Layer.PROTOCOL or (a.fault.kind.name == "no-answer" and a.fault.get("lost") == "request")
         ]
 
-    def watch(self, watcher: Callable[[], None]) -> None:
-        """Call ``watcher`` whenever faults are set or removed."""
-        self._watchers.append(watcher)
-
-    def unwatch(self, watcher: Callable[[], None]) -> None:
-        if watcher in self._watchers:
-            self._watchers.remove(watcher)
-
     def _changed(self) -> None:
-        for watcher in list(self._watchers):
-            watcher()
+        for port in list(self.ports):
+            port.choose()
 
     def tell(self, active: Active, place: str, now: Nanos, text: str) -> None:
         """A fault has happened to a machine or link."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
@@ -14,9 +14,9 @@ from steptwin.world.faults.machine import FaultyMachine, Shaft
 class M1486Body:
     """A file is of no use unless it is whole: one whose saving was cut off, or that meets a worn byte, is gone."""
 
-    def __init__(self, chip: M1486, shafts: Sequence[Shaft] = ()) -> None:
+    def __init__(self, chip: M1486, shafts: Iterable[Shaft] = ()) -> None:
         self._chip = chip
-        self.shafts = shafts
+        self.shafts = list(shafts)
 
     def watch(self, owner: FaultyMachine) -> None:
         chip = self._chip

@@ -36,7 +36,8 @@ class Shaft(Protocol):
 class Body(Protocol):
     """What a kind of machine has that can fail, beyond its pins."""
 
-    shafts: Sequence[Shaft]
+    shafts: list[Shaft]
+    """By axis. Mechanics put themselves in the place of what is there."""
 
     def watch(self, owner: FaultyMachine) -> None:
         """Have ``owner`` asked before requests are served (`FaultyMachine.refusal`) and memory is kept (`FaultyMachine.kept`)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488, Serving, check_pin
@@ -31,12 +31,12 @@ class EncoderShaft:
 
 
 class Mic488Body:
-    """``unit`` is the one under which the controller is served, ``shafts`` what its axes move: by default their encoders."""
+    """``unit`` is the one under which the controller is served. Without mechanics its encoders are all that its axes move."""
 
-    def __init__(self, device: Mic488, unit: int, shafts: Sequence[Shaft] | None = None) -> None:
+    def __init__(self, device: Mic488, unit: int) -> None:
         self._device = device
         self._unit = unit
-        self.shafts = [EncoderShaft(device, axis.number) for axis in device.axes] if shafts is None else shafts
+        self.shafts: list[Shaft] = [EncoderShaft(device, axis.number) for axis in device.axes]
 
     def watch(self, owner: FaultyMachine) -> None:
         device = self._device

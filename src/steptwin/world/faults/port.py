@@ -19,13 +19,31 @@ _ASKED = 64
 
 
 class InnerPort(Protocol):
-    """What stands behind a line; a port of the M1486 has ``on_output`` and ``close`` too."""
+    """What stands behind a line."""
 
     @property
     def broken(self) -> str | None: ...
     def exchange(self, data: bytes, now: Nanos) -> bytes: ...
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
     def deadline(self) -> Nanos | None: ...
+
+
+class InnerTalkingPort(InnerPort, Protocol):
+    """What sends without having been asked."""
+
+    @property
+    def on_output(self) -> Callable[[], None] | None: ...
+    @on_output.setter
+    def on_output(self, call: Callable[[], None] | None) -> None: ...
+    def close(self) -> None: ...
+
+
+class Exchanging(Protocol):
+    def __call__(self, data: bytes, now: Nanos) -> bytes: ...
+
+
+class Sending(Protocol):
+    def __call__(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
 
 
 class FramedPort(Protocol):
@@ -43,6 +61,7 @@ class FaultyPort(Stateful):
     """
 
     __slots__ = (
+        "__weakref__",
         "_arriving",
         "_asked",
         "_before",
@@ -60,11 +79,11 @@ class FaultyPort(Stateful):
         "to_send",
     )
     FIXED: ClassVar[frozenset[str]] = frozenset(
-        {"_before", "_faults", "_framed", "_line", "_units", "deadline", "exchange", "link", "to_send"}
+        {"__weakref__", "_before", "_faults", "_framed", "_line", "_units", "deadline", "exchange", "link", "to_send"}
     )
 
-    exchange: Callable[[bytes, Nanos], bytes]
-    to_send: Callable[[Nanos], list[tuple[Nanos, bytes]]]
+    exchange: Exchanging
+    to_send: Sending
     deadline: Callable[[], Nanos | None]
 
     def __init__(
@@ -90,21 +109,12 @@ class FaultyPort(Stateful):
         self._arriving: deque[tuple[Nanos, bytes]] = deque()
         self._leaving: deque[tuple[Nanos, bytes]] = deque()
         self._be_transparent()
-        faults.watch(self._choose)
-        self._choose()
+        faults.ports.add(self)
+        self.choose()
 
     @property
     def broken(self) -> str | None:
         return self._inner.broken
-
-    @property
-    def on_output(self) -> Callable[[], None] | None:
-        return getattr(self._inner, "on_output", None)
-
-    @on_output.setter
-    def on_output(self, hook: Callable[[], None] | None) -> None:
-        if hasattr(self._inner, "on_output"):
-            self._inner.on_output = hook  # type: ignore[attr-defined]
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """As `exchange`; what is to be answered waits for `to_send`."""
@@ -115,18 +125,15 @@ class FaultyPort(Stateful):
 
     def close(self) -> None:
         """Nobody is there any more."""
-        self._faults.unwatch(self._choose)
-        close = getattr(self._inner, "close", None)
-        if close is not None:
-            close()
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
-        self._choose()
+        self.choose()
 
     # ------------------------------------------------------------------ which way calls go
 
-    def _choose(self) -> None:
+    def choose(self) -> None:
+        """Which way calls go from now on."""
         if self._faults.active or self._arriving or self._leaving:
             self._be_faulty()
         else:
@@ -166,7 +173,7 @@ class FaultyPort(Stateful):
         while self._leaving and self._leaving[0][0] <= now:
             out.append(self._leaving.popleft())
         if not self._faults.active:
-            self._choose()
+            self.choose()
         return out
 
     def _deadline(self) -> Nanos | None:
@@ -249,3 +256,25 @@ class FaultyPort(Stateful):
 
     def _teller(self, now: Nanos, which: str) -> Callable[[Active, str], None]:
         return lambda active, text: self._faults.tell(active, self.link, now, f"{which}, {text}" if which else text)
+
+
+class FaultyTalkingPort(FaultyPort):
+    """Before a port that has something to send without having been asked."""
+
+    __slots__ = ("_talking",)
+    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_talking"}
+
+    def __init__(self, port: InnerTalkingPort, link: str, faults: Faults, line: Line) -> None:
+        super().__init__(port, link, faults, line)
+        self._talking = port
+
+    @property
+    def on_output(self) -> Callable[[], None] | None:
+        return self._talking.on_output
+
+    @on_output.setter
+    def on_output(self, hook: Callable[[], None] | None) -> None:
+        self._talking.on_output = hook
+
+    def close(self) -> None:
+        self._talking.close()

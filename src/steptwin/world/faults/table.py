@@ -376,3 +376,15 @@ KINDS = _checked(
 def rows(*layers: Layer) -> Iterator[Kind]:
     """The kinds of these layers, of all without any."""
     return (kind for kind in KINDS.values() if not layers or kind.layer in layers)
+
+
+def shared() -> list[tuple[Parameter, str]]:
+    """What kinds have in common: each parameter, and the layers or occasions that have it."""
+    found: dict[Parameter, list[str]] = {}
+    for layer, where in _WHERE.items():
+        for parameter in where:
+            found.setdefault(parameter, []).append(layer.value)
+    for occasion, when in _WHEN.items():
+        for parameter in when:
+            found.setdefault(parameter, []).append(f"each {occasion.value}" if occasion is not Occasion.ALWAYS else "stuck")
+    return [(parameter, ", ".join(of)) for parameter, of in found.items()]

@@ -1,0 +1,89 @@
+"""``steptwin fault``: what goes wrong with a running twin.
+
+From Python: `steptwin.world.faults`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from steptwin.cli.commands import Format, Section, show
+from steptwin.cli.twin import Json, Twin
+from steptwin.errors import Misuse
+
+if TYPE_CHECKING:
+    from steptwin.world.faults.table import Parameter
+
+
+def fault(
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[KIND [NAME=VALUE ...]]", help="crc nth=3; without any, those that are set are shown."),
+    ] = None,
+    clear: Annotated[list[str] | None, typer.Option(help="Remove the fault of this name; repeatable.")] = None,
+    clear_all: Annotated[bool, typer.Option("--clear-all", help="Remove all faults.")] = False,
+    kinds: Annotated[bool, typer.Option("--kinds", help="Show all kinds of faults and what they take.")] = False,
+    form: Annotated[Format, typer.Option("--format", help="How to print the kinds.")] = Format.TEXT,
+    twin: Twin = None,
+    json: Json = False,
+) -> None:
+    """Let something go wrong with a running twin, or show what is set to go wrong."""
+    if kinds:
+        show(sections(), form)
+        return
+    if clear and clear_all:
+        raise Misuse("--clear and --clear-all exclude each other")
+    from steptwin.runtime.control import ask
+
+    wanted = []
+    if words:
+        from steptwin.world.faults import read
+
+        wanted = [str(read(" ".join(words)))]
+    there = ask(twin, {"do": "fault", "set": wanted, "clear": True if clear_all else clear or []})
+    if json:
+        import json as json_
+
+        typer.echo(json_.dumps(there, indent=2))
+    elif there:
+        width = max(len(active["name"]) for active in there)
+        for active in there:
+            typer.echo(f"{active['name']:<{width}}  {active['fault']}  (happened {active['happened']} times)")
+    else:
+        typer.echo("no faults")
+
+
+def sections() -> list[Section]:
+    """The table of faults for people."""
+    from steptwin.world.faults.table import Layer, rows, shared
+
+    def described(parameter: Parameter) -> str:
+        default = "required" if parameter.is_required else _else(parameter)
+        return (
+            f"{parameter.name} ({parameter.permitted}; {'' if parameter.is_required else 'else '}{default}): {parameter.meaning}"
+        )
+
+    found = []
+    for layer in Layer:
+        table = [
+            (
+                kind.name,
+                kind.meaning,
+                ", ".join(line.value for line in kind.lines) or "machines",
+                kind.occasion.value,
+                " ".join(described(parameter) for parameter in kind.own),
+            )
+            for kind in rows(layer)
+        ]
+        found.append(Section(f"Faults of {layer.value}", ("kind", "what happens", "on", "at each", "its own parameters"), table))
+    common = [(parameter.name, parameter.meaning, parameter.permitted, _else(parameter), of) for parameter, of in shared()]
+    found.append(Section("Where and when", ("parameter", "meaning", "permitted", "else", "of"), common))
+    return found
+
+
+def _else(parameter: Parameter) -> str:
+    """What holds where it is not given."""
+    default = parameter.default
+    return parameter.otherwise or (f"{default:g}" if isinstance(default, float) else f"{default}")

@@ -1,0 +1,88 @@
+"""Faults of a served twin: given when it is started, set and removed while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.control import Handler
+from steptwin.world.faults import Active, Body, Fault, Faults, Layer, Line, read, rig
+from steptwin.world.kernel import Kernel
+from steptwin.world.trace import Record
+
+
+class FaultDesk:
+    """The faults of the machines of a kernel and of the ports that are made for them.
+
+    Until there is a fault, ports are served as they are and the machines stand alone. ``bodies`` makes what can fail of each
+    machine. `Misuse` for a fault that cannot be set.
+    """
+
+    def __init__(self, kernel: Kernel, bodies: Mapping[str, Callable[[], Body]]) -> None:
+        self.faults = Faults()
+        self.lines: set[Line] = set()
+        """What is served, where that is known."""
+        self._kernel = kernel
+        self._bodies = bodies
+
+    def start(self, lines: Sequence[str], seed: int) -> None:
+        """Set the faults that were given with the command."""
+        self.faults.seed = seed
+        for line in lines:
+            self._add(read(line), self._kernel.now)
+
+    def tell(self, notice: Callable[[str], None]) -> None:
+        """Let ``notice`` know in words what happens."""
+
+        def told(record: Record) -> None:
+            if record.kind == "fault":
+                notice(f"fault {record.subject}, {record.machine}: {record.value}")
+
+        self.faults.sinks.append(told)
+
+    def handler(self, cell: Cell) -> Handler:
+        """Request of the control endpoint: ``clear`` (names, or true for all), then ``set`` (lines); answers what is set."""
+
+        def handle(request: Mapping[str, Any]) -> object:
+            wanted, unwanted = request.get("set") or [], request.get("clear") or []
+            fresh = [read(line) for line in wanted]
+            now = cell.enter()
+            try:
+                if unwanted is True:
+                    self.faults.clear(now)
+                else:
+                    for name in unwanted:
+                        self.faults.remove(name, now)
+                for fault in fresh:
+                    self._add(fault, now)
+            finally:
+                cell.leave()
+            return [_shown(active) for active in self.faults.active]
+
+        return handle
+
+    def _add(self, fault: Fault, now: Nanos) -> None:
+        lines = fault.kind.lines
+        if lines and self.lines and not self.lines & set(lines):
+            raise Misuse(f"fault {fault.kind.name} happens on {_listed(lines)}: this twin serves {_listed(sorted(self.lines))}")
+        for name, body in self._bodies.items():
+            if name not in self.faults.machines:
+                rig(self._kernel, name, self.faults, body())
+        self._check_unit(fault)
+        self.faults.add(fault, now)
+
+    def _check_unit(self, fault: Fault) -> None:
+        unit = fault.get("unit")
+        if fault.kind.layer in (Layer.FRAMES, Layer.PROTOCOL) and unit is not None and str(unit) not in self._bodies:
+            raise Misuse(f"fault {fault.kind.name}: unit = {unit}: served are {', '.join(self._bodies)}")
+
+
+def _listed(lines: Sequence[Line]) -> str:
+    return " and ".join(line.value for line in lines)
+
+
+def _shown(active: Active) -> dict[str, object]:
+    return {"name": active.name, "fault": str(active.fault), "seen": active.seen, "happened": active.struck}
