@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from steptwin import __version__
-from steptwin.cli import build, check, commands, decompile, export, fmt, registers, run, serve, twin
+from steptwin.cli import build, check, commands, decompile, export, fault, fmt, registers, run, serve, twin
 from steptwin.errors import Misuse, SteptwinError
 
 app = typer.Typer(
@@ -30,6 +30,7 @@ app.command()(twin.pin)
 app.command()(twin.encoder)
 app.command("power-cycle")(twin.power_cycle)
 app.command()(twin.state)
+app.command()(fault.fault)
 
 
 def _show_version(wanted: bool) -> None:
