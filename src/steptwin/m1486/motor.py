@@ -82,7 +82,7 @@ class Motor(Stateful):
         self.look_at_limit()
 
     def _show_direction(self) -> None:
-        if self._chip.interface is STEP_DIRECTION:
+        if self._chip.interface == STEP_DIRECTION:
             self._chip.io.set_output("DIRECTION", int(self.drive.train.direction < 0))
 
     def show_runsign(self) -> None:

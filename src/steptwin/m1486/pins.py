@@ -49,8 +49,8 @@ class Pins(Stateful):
         #: In shutdown with function 45 OFF.
         self.tied_low = False
         self.others = dict.fromkeys((*CONTROL_PINS, *OUTPUT_PINS), 1)
-        self.others |= {"RST": 0, "DIRECTION": 0, "S&D": int(interface is not STEP_DIRECTION)}
-        self.others["DUAL"] = int(interface is not DUAL_DAC)
+        self.others |= {"RST": 0, "DIRECTION": 0, "S&D": int(interface != STEP_DIRECTION)}
+        self.others["DUAL"] = int(interface != DUAL_DAC)
         #: What can be read on a line.
         self.levels = list(self.external)
 

@@ -94,7 +94,6 @@ class Program(Stateful):
         self._linked: list[int] = []
         self._on_command: CommandHook | None = None
         self.statement_ns = statement_ns
-        self.ready: Nanos = 0
         self._burst = 0
         self._burst_at: Nanos = 0
         self.reset()
@@ -102,6 +101,8 @@ class Program(Stateful):
     def reset(self) -> None:
         """As after power-up, with an empty memory."""
         self.pc = 0
+        #: When the next command may be done; a wait that a reset cuts short is over.
+        self.ready: Nanos = self._chip.now
         self.is_killed = False
         self.is_limited = False
         self.is_halted = False
@@ -134,7 +135,9 @@ class Program(Stateful):
 
     def abandon(self) -> None:
         """Give up what has been stored so far; commands that come now are done (M-11)."""
-        self.pc = self._chip.memory.end
+        chip = self._chip
+        self.pc = chip.memory.end
+        self.ready = min(self.ready, chip.now + self.statement_ns)
         self._forget_nesting()
 
     def restart(self, begin: int | None) -> None:
