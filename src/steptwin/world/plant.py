@@ -17,10 +17,12 @@ from steptwin.m1486.chip import M1486
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.wbc.nearmiss import NearMiss
+from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
+from steptwin.world.actions import Outside, act
 from steptwin.world.build import Files, Fitted, Plan, build
 from steptwin.world.expression import Condition
-from steptwin.world.faults import FaultyMachine, Mic488Body, rig
+from steptwin.world.faults import Fault, M1486Body, Mic488Body, rig
 from steptwin.world.faults.table import Layer
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import SCRIPTS, Line
@@ -35,26 +37,6 @@ WORLD = "world"
 
 Encode: TypeAlias = Callable[[Mic488, str, float], bytes]
 """The PDU of a request that writes a register by name."""
-
-
-class Bytes(NamedTuple):
-    """Bytes of a program outside at its place on a line."""
-
-    line: str
-    place: str
-    kind: str
-    data: bytes
-
-
-class Leave(NamedTuple):
-    """A program outside has gone."""
-
-    line: str
-    place: str
-
-
-Outside: TypeAlias = do.Step | Bytes | Leave
-"""What comes from outside a world. Recorded with its moment, it can be replayed."""
 
 
 class Given(NamedTuple):
@@ -151,12 +133,12 @@ class Plant:
         """Expectations that did not hold."""
         self.inputs: list[Given] = []
         """Everything from outside so far."""
-        self._encode = encode
+        self.encode = encode
         self._scripts: list[Script] = []
         self._timed: list[tuple[Nanos, int]] = []
         self._watching: list[Script] = []
         for fault in spec.faults:
-            self._set_fault(fault)
+            self.put_fault(fault)
         for line in spec.scripts:
             self._begin(line)
 
@@ -259,9 +241,7 @@ class Plant:
         if isinstance(step, do.Until):
             return _Waiting(None if step.within is None else self.now + step.within, self.condition(step.condition))
         if isinstance(step, do.Request):
-            from steptwin.wire.rtu import encode_frame
-
-            line = self._line(step.line)
+            line = self.line_called(step.line)
             self.touch(step.line)
             line.connect(SCRIPTS).received.clear()
             line.receive(SCRIPTS, encode_frame(step.unit, step.pdu), self.now)
@@ -303,126 +283,51 @@ class Plant:
 
     def do(self, what: Outside) -> None:
         """Do something at the present moment. Raises `Misuse` for what is not there."""
-        match what:
-            case do.Set(levels):
-                for name, pin, value in levels:
-                    self._machine(name)
-                    kernel = self.touch(name)
-                    kernel.machines[name].set_pin(pin, value, self.now)
-                    self.trace.add(Record(self.now, name, "edge", pin, value))
-                    kernel.settle()
-            case do.Press(name, duration):
-                self._press(name, True)
-                if duration is not None:
-                    release = (do.Wait(duration), do.Release(name))
-                    self.start(f"release {name}", lambda: do.run_through(release))
-            case do.Release(name):
-                self._press(name, False)
-            case do.Write(values):
-                for name, register, value in values:
-                    self._write(name, register, value)
-            case do.Send(name, data):
-                self._line(name)
-                kernel = self.touch(name)
-                self.lines[name].receive(SCRIPTS, data, self.now)
-                kernel.settle()
-            case Bytes(name, place, kind, data):
-                line = self._line(name)
-                kernel = self.touch(name)
-                line.connect(place, kind)
-                line.receive(place, data, self.now)
-                kernel.settle()
-            case Leave(name, place):
-                self._line(name).leave(place)
-            case do.PowerCycle(name):
-                machine = self._machine(name)
-                kernel = self.touch(name)
-                self._record_input(name, "power-cycle", "")
-                machine.power_cycle(self.now)
-                kernel.settle()
-            case do.Turn(name, axis, counts):
-                machine = self._machine(name)
-                if not isinstance(machine, Mic488):
-                    raise Misuse(f"turn: {name!r} has no encoder")
-                kernel = self.touch(name)
-                self._record_input(name, f"M{axis} turned", counts)
-                machine.turn_encoder(axis, counts, self.now)
-                kernel.settle()
-            case do.SetFault(fault):
-                self._set_fault(fault)
-            case do.ClearFault(name):
-                for kernel in self.kernels:
-                    kernel.advance(self.now)
-                self.plan.faults.remove(name, self.now)
-            case do.Note(text):
-                self.trace.add(Record(self.now, WORLD, "event", "note", text))
-            case _:
-                raise Misuse(f"{what}: this is for scripts")
+        act(self, what)
 
-    def _record_input(self, machine: str, what: str, value: object) -> None:
-        self.trace.add(Record(self.now, machine, "input", what, value))
-
-    def _machine(self, name: str) -> Mic488 | M1486:
+    def machine(self, name: str) -> Mic488 | M1486:
+        """Raises `Misuse` with the machines there are."""
         machine = self.machines.get(name)
         if machine is None:
             raise self.unknown("machine", name, self.machines)
         return machine
 
-    def _line(self, name: str) -> Line:
+    def controller(self, name: str, what: str) -> Mic488:
+        """A MIC488. Raises `Misuse` for other machines, which do not have ``what``."""
+        machine = self.machine(name)
+        if not isinstance(machine, Mic488):
+            raise Misuse(f"{name!r} is an M1486, which has no {what}")
+        return machine
+
+    def line_called(self, name: str) -> Line:
+        """Raises `Misuse` with the lines there are."""
         line = self.lines.get(name)
         if line is None:
             raise self.unknown("line", name, self.lines)
         return line
 
-    def _press(self, name: str, pressed: bool) -> None:
-        found = self.plan.buttons.get(name)
-        if found is None:
-            raise self.unknown("button", name, self.plan.buttons)
-        button, kernel = found
-        kernel.advance(self.now)
-        self._record_input(button.target.machine, name, "pressed" if pressed else "released")
-        button.press(pressed, self.now)
-        kernel.settle()
-
-    def _write(self, name: str, register: str, value: float) -> None:
-        machine = self._machine(name)
-        if not isinstance(machine, Mic488):
-            raise Misuse(f"write: {name!r} is an M1486, which has no registers")
-        pdu = self._encode(machine, register, value)
-        kernel = self.touch(name)
-        on = self.plan.line_of.get(name)
-        if on is not None:
-            from steptwin.wire.rtu import encode_frame
-
-            on[0].receive(SCRIPTS, encode_frame(on[1], pdu), self.now)
-            on[0].connect(SCRIPTS).received.clear()
-        else:
-            self._record_input(name, "request", pdu)
-            machine.execute(pdu, self.now)
-        kernel.settle()
-
-    def _set_fault(self, fault: Any) -> None:
-        for kernel in self.kernels:
-            kernel.advance(self.now)
-        if fault.kind.layer in (Layer.PHYSICS, Layer.PROTOCOL) or fault.kind.name == "no-answer":
+    def put_fault(self, fault: Fault) -> None:
+        """Set a fault now."""
+        self.settle_all()
+        if fault.kind.layer not in (Layer.BYTES, Layer.FRAMES) or fault.kind.name == "no-answer":
             for name in self.machines:
                 self._rig(name)
         self.plan.faults.add(fault, self.now)
 
-    def _rig(self, name: str) -> FaultyMachine | None:
-        """Let a machine have faults."""
-        machine = self.machines[name]
-        if not isinstance(machine, Mic488):
-            return None
-        known = name in self.plan.faults.machines
-        unit = self.plan.line_of[name][1] if name in self.plan.line_of else 1
-        body = Mic488Body(machine, unit) if not known else None
-        if body is None:
-            return self.plan.faults.machines[name]
+    def _rig(self, name: str) -> None:
+        """Let a machine have faults; mechanics of its axes have them instead of the bare shafts."""
+        machine, faults = self.machines[name], self.plan.faults
+        if name in faults.machines:
+            return
+        body = Mic488Body(machine, self.unit_of(name)) if isinstance(machine, Mic488) else M1486Body(machine)
         for axis in self.axes.values():
-            if axis.spec.drive[0] == name:
-                body.shafts[axis.mechanism.number - 1] = axis.mechanism  # type: ignore[call-overload]
-        return rig(self.plan.kernel_of[name], name, self.plan.faults, body)
+            if axis.spec.drive[0] == name and isinstance(body, Mic488Body):
+                body.shafts[axis.mechanism.number - 1] = axis.mechanism
+        rig(self.plan.kernel_of[name], name, faults, body)
+
+    def unit_of(self, name: str) -> int:
+        """The unit under which a controller is on its line; 1 without a line."""
+        return self.plan.line_of[name][1] if name in self.plan.line_of else 1
 
     # ------------------------------------------------------------------ time
 

@@ -14,6 +14,7 @@ from steptwin.mic488.device import Mic488
 from steptwin.mic488.program import ProgramState
 from steptwin.mic488.status import Status
 from steptwin.world import script as do
+from steptwin.world.actions import Bytes
 from steptwin.world.build import Fitted
 
 if TYPE_CHECKING:
@@ -236,8 +237,6 @@ class LineView:
 
     def send(self, data: bytes, place: str = "python") -> None:
         """Put bytes on the line at the present moment."""
-        from steptwin.world.plant import Bytes
-
         line = self._plant.lines[self.name]
         self._plant.outside(Bytes(self.name, place, line.kinds[0], data))
 

@@ -1,0 +1,157 @@
+"""What steps and programs outside do to a world, each at the present moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.wire.rtu import encode_frame
+from steptwin.world import script as do
+from steptwin.world.lines import SCRIPTS
+from steptwin.world.trace import Record
+
+if TYPE_CHECKING:
+    from steptwin.world.plant import Plant
+
+
+class Bytes(NamedTuple):
+    """Bytes of a program outside at its place on a line."""
+
+    line: str
+    place: str
+    kind: str
+    data: bytes
+
+
+class Leave(NamedTuple):
+    """A program outside has gone."""
+
+    line: str
+    place: str
+
+
+Outside: TypeAlias = do.Step | Bytes | Leave
+"""What comes from outside a world. Recorded with its moment, it can be replayed."""
+
+
+def act(plant: Plant, what: Outside) -> None:
+    """Raises `Misuse` for what is not there, and for steps that only scripts can take."""
+    action = ACTIONS.get(type(what))
+    if action is None:
+        raise Misuse(f"{what}: this is for scripts")
+    action(plant, what)
+
+
+def _record(plant: Plant, machine: str, what: str, value: object) -> None:
+    plant.trace.add(Record(plant.now, machine, "input", what, value))
+
+
+def _set(plant: Plant, step: do.Set) -> None:
+    for name, pin, value in step.levels:
+        plant.machine(name)
+        kernel = plant.touch(name)
+        kernel.machines[name].set_pin(pin, value, plant.now)
+        plant.trace.add(Record(plant.now, name, "edge", pin, value))
+        kernel.settle()
+
+
+def _press(plant: Plant, step: do.Press) -> None:
+    _move_button(plant, step.button, pressed=True)
+    if step.duration is not None:
+        later = (do.Wait(step.duration), do.Release(step.button))
+        plant.start(f"release {step.button}", lambda: do.run_through(later))
+
+
+def _release(plant: Plant, step: do.Release) -> None:
+    _move_button(plant, step.button, pressed=False)
+
+
+def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
+    found = plant.plan.buttons.get(name)
+    if found is None:
+        raise plant.unknown("button", name, plant.plan.buttons)
+    button, kernel = found
+    kernel.advance(plant.now)
+    _record(plant, button.target.machine, name, "pressed" if pressed else "released")
+    button.press(pressed, plant.now)
+    kernel.settle()
+
+
+def _write(plant: Plant, step: do.Write) -> None:
+    for name, register, value in step.values:
+        device = plant.controller(name, "registers")
+        kernel = plant.touch(name)
+        pdu = plant.encode(device, register, value)
+        on = plant.plan.line_of.get(name)
+        if on is not None:
+            line, unit = on
+            line.receive(SCRIPTS, encode_frame(unit, pdu), plant.now)
+        else:
+            _record(plant, name, "request", pdu)
+            device.execute(pdu, plant.now)
+        kernel.settle()
+
+
+def _send(plant: Plant, step: do.Send) -> None:
+    line = plant.line_called(step.line)
+    kernel = plant.touch(step.line)
+    line.receive(SCRIPTS, step.data, plant.now)
+    kernel.settle()
+
+
+def _bytes(plant: Plant, given: Bytes) -> None:
+    line = plant.line_called(given.line)
+    kernel = plant.touch(given.line)
+    line.connect(given.place, given.kind)
+    line.receive(given.place, given.data, plant.now)
+    kernel.settle()
+
+
+def _leave(plant: Plant, given: Leave) -> None:
+    plant.line_called(given.line).leave(given.place)
+
+
+def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
+    machine = plant.machine(step.machine)
+    kernel = plant.touch(step.machine)
+    _record(plant, step.machine, "power-cycle", "")
+    machine.power_cycle(plant.now)
+    kernel.settle()
+
+
+def _turn(plant: Plant, step: do.Turn) -> None:
+    device = plant.controller(step.machine, "encoder")
+    kernel = plant.touch(step.machine)
+    _record(plant, step.machine, f"M{step.axis} turned", step.counts)
+    device.turn_encoder(step.axis, step.counts, plant.now)
+    kernel.settle()
+
+
+def _set_fault(plant: Plant, step: do.SetFault) -> None:
+    plant.put_fault(step.fault)
+
+
+def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
+    plant.settle_all()
+    plant.plan.faults.remove(step.name, plant.now)
+
+
+def _note(plant: Plant, step: do.Note) -> None:
+    plant.trace.add(Record(plant.now, "world", "event", "note", step.text))
+
+
+ACTIONS: dict[type, Callable[[Plant, Any], None]] = {
+    do.Set: _set,
+    do.Press: _press,
+    do.Release: _release,
+    do.Write: _write,
+    do.Send: _send,
+    do.PowerCycle: _power_cycle,
+    do.Turn: _turn,
+    do.SetFault: _set_fault,
+    do.ClearFault: _clear_fault,
+    do.Note: _note,
+    Bytes: _bytes,
+    Leave: _leave,
+}
