@@ -81,7 +81,7 @@ def test_the_internal_variable_out_of_range_is_wrong_data_when_the_command_is_do
             bench = Bench(v.name)
             bench.do(f":{number}", spec.key)
             assert len(bench.wrong) == 1
-            assert f"{spec.key} {number} is out of range" in bench.wrong[0]
+            assert f"{spec.key}{number} is out of range" in bench.wrong[0]
 
 
 @every_variant

@@ -78,7 +78,7 @@ def test_the_internal_variable_stands_for_a_number_left_out() -> None:
     bench = Bench()
     bench.file(":0", "l", "u20", "e")
     assert bench.finish() == b""
-    assert "L 0 is out of range" in bench.wrong[0]
+    assert "L0 is out of range" in bench.wrong[0]
 
 
 # ---------------------------------------------------------------------- time

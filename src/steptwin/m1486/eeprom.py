@@ -10,6 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.commands import When, when
 from steptwin.m1486.encoding import encode
 from steptwin.m1486.memory import Image
+from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import Program
 from steptwin.m1486.variants import Variant
 
@@ -42,7 +43,7 @@ def unpack(data: bytes, variant: Variant) -> Image | None:
 def image_of(program: Program, variant: Variant) -> bytes:
     """A program as the stored file that downloading it gives; with or without ``[ ]`` around it.
 
-    Raises `Misuse` for a program that is more than one file for one chip.
+    Raises `Misuse` for a program that is more than one file for one chip, or that the variant does not take.
     """
     commands = program.all_commands
     if len(commands) > 1 and (commands[0].key, commands[-1].key) == ("[", "]"):
@@ -50,10 +51,15 @@ def image_of(program: Program, variant: Variant) -> bytes:
     code = b""
     labels: dict[int, int] = {}
     for command in commands:
+        why = out_of_range(command, variant)
+        if why is not None:
+            raise Misuse(why)
         if command.key == "@":
             labels[command.number or 0] = len(code)
         elif when(command.key, command.number) is When.QUEUED:
             code += encode(command)
         else:
             raise Misuse(f"{command} cannot be stored: a program to switch on with is one file for one chip")
-    return pack(Image(code, labels))
+    image = pack(Image(code, labels))
+    unpack(image, variant)
+    return image

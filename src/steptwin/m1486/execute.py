@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from steptwin.m1486 import flow_effects, io_effects, motion_effects, numeric_effects
-from steptwin.m1486.commands import TABLE, When, find, permitted_text
+from steptwin.m1486.commands import TABLE, When, find
 from steptwin.m1486.effects import Effect, Making, WrongData, refusing
+from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import Command, Condition
 
 if TYPE_CHECKING:
@@ -28,14 +29,14 @@ def compile_command(chip: M1486, command: Command, place: int, following: int) -
     """The closure of a command that stands in the memory at ``place``."""
     if command.from_variable:
         return Code(_with_variable(chip, command.key, place, following), computes=False, is_linked=False)
+    why = out_of_range(command, chip.variant)
+    spec = find(command.key, command.number, chip.variant)
+    if why is not None or spec is None:
+        return Code(refusing(why or f"{command} is no command"), computes=True, is_linked=False)
     if isinstance(command.argument, Condition):
         return Code(*flow_effects.condition(chip, command.argument, following), is_linked=True)
-    number = command.argument
-    spec = find(command.key, number, chip.variant)
-    if spec is None:
-        return Code(refusing(_out_of_range(chip, command.key, number)), computes=True, is_linked=False)
     row = _MAKERS[spec.name]
-    return Code(row.make(chip, number or 0, place, following), row.computes, row.is_linked)
+    return Code(row.make(chip, command.argument or 0, place, following), row.computes, row.is_linked)
 
 
 def _with_variable(chip: M1486, key: str, place: int, following: int) -> Effect:
@@ -45,14 +46,10 @@ def _with_variable(chip: M1486, key: str, place: int, following: int) -> Effect:
         number = chip.unit.variable
         spec = find(key, number, chip.variant)
         if spec is None:
-            raise WrongData(f"the internal variable gives: {_out_of_range(chip, key, number)}")
+            raise WrongData(f"the internal variable gives: {out_of_range(Command(key, number), chip.variant)}")
         return _MAKERS[spec.name].make(chip, number, place, following)()
 
     return run
-
-
-def _out_of_range(chip: M1486, key: str, number: int | None) -> str:
-    return f"{key} {'' if number is None else number} is out of range: permitted is {permitted_text(key, chip.variant)}"
 
 
 _unmade = {spec.name for spec in TABLE if spec.when is When.QUEUED} - _MAKERS.keys() - {"If"}

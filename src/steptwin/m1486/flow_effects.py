@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from steptwin.m1486.commands import find, permitted_text
 from steptwin.m1486.effects import Effect, Makers, WrongData, refusing
 from steptwin.m1486.functions import CARRY, USER_FLAGS
 from steptwin.m1486.syntax import Condition
@@ -118,9 +117,6 @@ def _clear_kill(_chip: M1486, _number: int, _place: int, following: int) -> Effe
 def condition(chip: M1486, asked: Condition, following: int) -> tuple[Effect, bool]:
     """The closure of ``I``, and whether it only computes."""
     line, high, label = asked.line, asked.high, asked.label
-    if find("I", line, chip.variant) is None or find("J", label, chip.variant) is None:
-        text = f"I{line}{'H' if high else 'L'}{label}"
-        return refusing(f"{text} is out of range: permitted is {permitted_text('I', chip.variant)}"), True
     target = chip.memory.labels.get(label)
     # M-17: a missing label matters only when the condition holds.
     jump: Effect = refusing(f"there is no label {label}") if target is None else lambda: target

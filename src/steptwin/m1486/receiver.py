@@ -14,7 +14,8 @@ from steptwin.m1486.commands import CLEAR_KILL, When, find, permitted_text, when
 from steptwin.m1486.encoding import SIZES, encode
 from steptwin.m1486.functions import REPORT, RETURN
 from steptwin.m1486.memory import FileState
-from steptwin.m1486.syntax import Command, Condition, parse_line
+from steptwin.m1486.ranges import out_of_range
+from steptwin.m1486.syntax import Command, parse_line
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
@@ -235,7 +236,7 @@ class Receiver(Stateful):
             if isinstance(command, Command):
                 self._take(command)
             else:
-                self._chip.wrong_data_received(f"{text}: {command}")
+                self._chip.wrong_data_received(command)
 
     def _is_stopped_by_motor(self) -> bool:
         """Compression stands still while the motor runs, but not inside ``[ ]``."""
@@ -303,15 +304,10 @@ class Receiver(Stateful):
 
 @lru_cache(_LINES_KEPT)
 def _read(text: str, variant: Variant) -> Command | str:
-    """The command of a line, or what is wrong with it."""
+    """The command of a line, or what is wrong with the line."""
     line, found = parse_line(text)
     command = line.command
     if command is None:
-        return found[0].message if found else "no command"
-    number = command.number
-    argument = command.argument
-    if not command.from_variable and find(command.key, number, variant) is None:
-        return f"permitted is {permitted_text(command.key, variant)}"
-    if isinstance(argument, Condition) and find("J", argument.label, variant) is None:
-        return f"label {argument.label} is out of range: permitted is {permitted_text('J', variant)}"
-    return Command(command.key, argument)
+        return f"{text}: {found[0].message if found else 'no command'}"
+    # Where in the line it stood is no part of a command that may be kept.
+    return out_of_range(command, variant) or Command(command.key, command.argument)
