@@ -11,7 +11,23 @@ from typing import Annotated
 import typer
 
 from steptwin import __version__
-from steptwin.cli import build, check, commands, decompile, export, fault, fmt, registers, run, serve, twin
+from steptwin.cli import (
+    build,
+    check,
+    commands,
+    decompile,
+    export,
+    fault,
+    fmt,
+    get,
+    info,
+    move,
+    registers,
+    run,
+    serve,
+    twin,
+    watch,
+)
 from steptwin.errors import Misuse, SteptwinError
 
 app = typer.Typer(
@@ -31,6 +47,16 @@ app.command()(twin.encoder)
 app.command("power-cycle")(twin.power_cycle)
 app.command()(twin.state)
 app.command()(fault.fault)
+app.command()(info.info)
+app.command()(get.get)
+app.command("set")(get.set_)
+app.command()(watch.watch)
+app.command()(move.enable)
+app.command()(move.disable)
+app.command()(move.home)
+app.command()(move.move)
+app.command()(move.jog)
+app.command()(move.stop)
 
 
 def _show_version(wanted: bool) -> None:

@@ -36,7 +36,8 @@ async def firmware_of(line: Line[Query, bytes], unit: int, timeout_ns: Nanos) ->
     """The firmware whose addresses a controller has: ``1.70`` (which may be 1.40) or ``1.23``.
 
     A real controller may be silent where another refuses, so no answer is as good as a refusal as long as one address map is
-    answered. Raises `NoMic488` when neither is, or the `LineFailure` when nothing is answered at all.
+    answered. Raises `NoMic488` when neither is, the `LineFailure` when nothing is answered at all, `Refused` when a
+    gateway says that nobody does.
     """
     refusal: Refusal | None = None
     failure: LineFailure | None = None
@@ -49,6 +50,8 @@ async def firmware_of(line: Line[Query, bytes], unit: int, timeout_ns: Nanos) ->
             answer = await line.exchange(Job(query, timeout_ns, most=PROBE_TRIES))
         except pdu.ModbusException as exception:
             refusal = Refused(line.place, query, exception)
+            if exception.code in _GATEWAY_CODES:
+                raise refusal from None
         except LineLost:
             raise
         except LineFailure as error:

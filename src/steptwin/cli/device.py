@@ -1,0 +1,142 @@
+"""What the commands for devices have in common: which device is meant, values and names as people type and read them."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Generator, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from steptwin.errors import LineFailure, Misuse
+
+if TYPE_CHECKING:
+    from steptwin.host import Mic488
+
+Device = Annotated[
+    str | None,
+    typer.Option(
+        "--device",
+        "-d",
+        envvar="STEPTWIN_DEVICE",
+        metavar="ADDRESS",
+        help="/dev/ttyUSB0, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT; behind it ,unit=N ,baud=N ,config=FILE "
+        ",firmware=V ,timeout=S. Default: the twin on tcp://127.0.0.1:5020.",
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+LogFrames = Annotated[bool, typer.Option("--log-frames", help="Print every frame in words to the standard error.")]
+Axes = Annotated[list[str] | None, typer.Argument(metavar="[AXES]...", help="1 to 4, or M1 to M4. Default: all.")]
+TIED = "expected AXIS=NUMBER, such as 1=12.5 or M1=12.5"
+
+
+@contextlib.contextmanager
+def opened(device: str | None, *, observe: bool = True, log_frames: bool = False) -> Generator[Mic488]:
+    """The controller meant. ``observe``: DATA_TYPE is left as it is."""
+    from steptwin.host import LineLost, Mic488
+    from steptwin.host.address import DEFAULT, parse_device
+
+    address = parse_device(device or DEFAULT)
+    mic = Mic488(
+        address.place,
+        address.unit,
+        baud=address.baud,
+        firmware=address.firmware,
+        config=address.config,
+        timeout_s=address.timeout,
+        observe=observe,
+        log=complain if log_frames else None,
+    )
+    try:
+        mic.open()
+    except LineLost as error:
+        if device is None:
+            raise LineFailure(
+                f"{error}. That is where a twin would be: start one with 'steptwin serve mic488 --demo', or name a device with "
+                "--device or STEPTWIN_DEVICE"
+            ) from error
+        raise
+    with mic:
+        yield mic
+
+
+def complain(text: str) -> None:
+    """Say something beside the results."""
+    print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+
+# ---------------------------------------------------------------------- what people type
+
+
+def axis_of(text: str) -> int:
+    """``1`` or ``M1``. Raises `Misuse`."""
+    number = text.strip().upper().removeprefix("M")
+    if number not in ("1", "2", "3", "4"):
+        raise Misuse(f"{text!r} is no axis: axes are 1 to 4, or M1 to M4")
+    return int(number)
+
+
+def axes_of(texts: Sequence[str] | None) -> list[int]:
+    return [axis_of(part) for text in texts or [] for part in text.split(",")]
+
+
+def tied(texts: Sequence[str]) -> dict[int, float]:
+    """``1=12.5 M2=-3`` as numbers by axis. Raises `Misuse`."""
+    values: dict[int, float] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise Misuse(f"{text!r}: {TIED}")
+        axis = axis_of(name)
+        if axis in values:
+            raise Misuse(f"{text!r}: M{axis} is given twice")
+        values[axis] = number_of(value, text)
+    return values
+
+
+def number_of(value: str, whole: str) -> float:
+    """A number with a point or a comma, or hexadecimal. Raises `Misuse`."""
+    value = value.strip()
+    try:
+        return int(value, 16) if value.lower().startswith("0x") else float(value.replace(",", "."))
+    except ValueError:
+        raise Misuse(f"{whole!r}: {value!r} is no number") from None
+
+
+# ---------------------------------------------------------------------- what people read
+
+
+def shown(value: object) -> str:
+    if isinstance(value, bool):
+        return "ON" if value else "OFF"
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
+    """Columns below each other; a column of numbers is set to the right."""
+    lines = [tuple(head), *map(tuple, rows)] if head else [tuple(row) for row in rows]
+    if not lines:
+        return ""
+    columns = list(zip(*lines, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    right = [all(_is_number(cell) for cell in column[bool(head) :]) for column in columns]
+    cells = [
+        [cell.rjust(width) if to_right else cell.ljust(width) for cell, width, to_right in zip(line, widths, right, strict=True)]
+        for line in lines
+    ]
+    return "\n".join("  ".join(line).rstrip() for line in cells)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return cell in ("ON", "OFF")
+    return True
+
+
+def print_json(value: Any) -> None:
+    import json
+
+    typer.echo(json.dumps(value, ensure_ascii=False, indent=2))

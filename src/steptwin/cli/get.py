@@ -1,0 +1,148 @@
+"""``steptwin get``, ``set``: registers by name.
+
+From Python: `steptwin.host.Mic488.get_shown` and `set`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from steptwin.cli.device import Device, Json, LogFrames, number_of, opened, print_json, shown, table
+from steptwin.errors import Misuse
+
+if TYPE_CHECKING:
+    from steptwin.host import Mic488
+    from steptwin.mic488.registermap import Register, RegisterMap
+
+_RUN = re.compile(r"(?P<head>\w+\[)(?P<first>\d+)-(?P<last>\d+)(?P<tail>\].*)")
+_SWITCHES = {"ON": 1.0, "TRUE": 1.0, "OFF": 0.0, "FALSE": 0.0}
+
+
+def names_from(incomplete: str) -> list[str]:
+    """For the shell: names of registers that begin like this."""
+    from steptwin.mic488.registers import register_map
+
+    return [r.name for r in register_map() if r.name.startswith(incomplete.upper())]
+
+
+def get(
+    names: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="NAME...",
+            help="M1_POS_ACT, OUT3, 'M*_ACC', USER_REGISTER[100-109], USER_REGISTER[4]:real",
+            autocompletion=names_from,
+        ),
+    ],
+    device: Device = None,
+    json: Json = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Read registers by name. 'steptwin registers mic488' lists them."""
+    with opened(device, log_frames=log_frames) as mic:
+        registers = map_of(mic)
+        wanted = expanded(registers, names)
+        values = mic.get_shown(*wanted)
+    if json:
+        print_json(as_data(registers, values))
+    else:
+        typer.echo(table([_row(registers, name, value, unit) for name, (value, unit) in values.items()]))
+
+
+def set_(
+    changes: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="NAME=VALUE...", help="M1_ACC=50 OUT3=on DATA_TYPE=REAL USER_REGISTER[4]=7", autocompletion=names_from
+        ),
+    ],
+    device: Device = None,
+    json: Json = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Write registers by name, one after the other. A motion register moves at once.
+
+    A register that repeats would act twice on is sent once only; where its answer is lost, the message says so.
+    """
+    given = [_change(change) for change in changes]
+    with opened(device, log_frames=log_frames) as mic:
+        registers = map_of(mic)
+        wanted = {name: value_of(registers.named(name.partition("[")[0]), text, change) for name, text, change in given}
+        for name, value in wanted.items():
+            mic.set(name, value)
+        kept = [name for name in wanted if _holds(registers.named(name.partition("[")[0]))]
+        values = mic.get_shown(*kept) if kept else {}
+    if json:
+        print_json(as_data(registers, values))
+    elif values:
+        typer.echo(table([_row(registers, name, value, unit) for name, (value, unit) in values.items()]))
+
+
+def map_of(mic: Mic488) -> RegisterMap:
+    from steptwin.mic488.registers import register_map
+
+    return register_map(mic.firmware)
+
+
+def expanded(registers: RegisterMap, names: Sequence[str]) -> list[str]:
+    """Names with ``*`` and ``?``, and runs of user registers, as all they stand for. Raises `Misuse` for one without any."""
+    found: dict[str, None] = {}
+    for name in names:
+        run = _RUN.fullmatch(name)
+        if run is not None:
+            first, last = int(run["first"]), int(run["last"])
+            step = 2 if run["tail"].lower().endswith((":dint", ":real")) else 1
+            members = [f"{run['head']}{number}{run['tail']}" for number in range(first, last + 1, step)]
+        elif "*" in name or "?" in name:
+            members = [r.name for r in registers if r.reads and r.cells == 1 and fnmatchcase(r.name, name.upper())]
+        else:
+            members = [name]
+        if not members:
+            raise Misuse(f"{name!r} stands for no register that can be read; 'steptwin registers mic488' lists them")
+        found |= dict.fromkeys(members)
+    return list(found)
+
+
+def _change(text: str) -> tuple[str, str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise Misuse(f"{text!r}: expected NAME=VALUE, such as M1_ACC=50")
+    return name.strip(), value.strip(), text
+
+
+def value_of(register: Register, value: str, whole: str) -> float:
+    """A value as typed: a number, ON or OFF, or the text of an enumerated value. Raises `Misuse`."""
+    if value.upper() in _SWITCHES:
+        return _SWITCHES[value.upper()]
+    for number, text in register.values.items():
+        if text.lower() == value.lower():
+            return number
+    return number_of(value, whole)
+
+
+def _holds(register: Register) -> bool:
+    from steptwin.mic488.registermap import Effect
+
+    return bool(register.reads) and register.effect is Effect.STORE
+
+
+def _meaning(registers: RegisterMap, name: str, value: Any) -> str:
+    register = registers.named(re.split(r"[\[:]", name)[0])
+    return register.values.get(int(value), "") if register.values else ""
+
+
+def _row(registers: RegisterMap, name: str, value: Any, unit: str) -> tuple[str, ...]:
+    return name, shown(value), unit or _meaning(registers, name, value)
+
+
+def as_data(registers: RegisterMap, values: dict[str, tuple[Any, str]]) -> dict[str, Any]:
+    data: dict[str, Any] = {}
+    for name, (value, unit) in values.items():
+        meaning = _meaning(registers, name, value)
+        data[name] = {"value": value, **({"unit": unit} if unit else {}), **({"meaning": meaning} if meaning else {})}
+    return data

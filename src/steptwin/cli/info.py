@@ -1,0 +1,72 @@
+"""``steptwin info``: a controller at a glance.
+
+From Python: `steptwin.host.Mic488.status`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, shown, table
+
+if TYPE_CHECKING:
+    from steptwin.host import Mic488, Mic488Status
+
+_PROGRAM = {0: "stopped", 1: "running", 2: "paused"}
+
+
+def info(device: Device = None, json: Json = False, log_frames: LogFrames = False) -> None:
+    """Show what a controller is and what it is doing."""
+    with opened(device, log_frames=log_frames) as mic:
+        status = mic.status()
+        data_type = mic.get("DATA_TYPE")["DATA_TYPE"]
+    if json:
+        print_json(_data(mic, status))
+    else:
+        typer.echo("\n".join(_lines(mic, status, "DINT" if data_type else "REAL")))
+
+
+def _data(mic: Mic488, status: Mic488Status) -> dict[str, Any]:
+    from steptwin.host.mic488.motion import status_text
+
+    axes = [
+        {"axis": number, "position": position, "velocity": velocity, "unit": unit, "status": code, "meaning": status_text(code)}
+        for number, position, velocity, unit, code in zip(
+            range(1, 5), status.positions, status.velocities, status.units, status.axes, strict=True
+        )
+    ]
+    return {
+        "device": mic.place,
+        "unit": mic.unit,
+        "firmware": mic.firmware,
+        "status": status.controller,
+        "program": _PROGRAM.get(status.program, str(status.program)),
+        "axes": axes,
+        "inputs": list(status.inputs),
+        "outputs": list(status.outputs),
+    }
+
+
+def _lines(mic: Mic488, status: Mic488Status, data_type: str) -> list[str]:
+    from steptwin.mic488.registers import CONTROLLER_STATUS_TEXTS
+
+    data = _data(mic, status)
+    firmware = "1.70 or 1.40" if mic.firmware == "1.70" and not status.controller else mic.firmware
+    state = "" if status.controller is None else f", {CONTROLLER_STATUS_TEXTS.get(status.controller, status.controller)}"
+    rows = [
+        (f"M{a['axis']}", shown(a["position"]), a["unit"], shown(a["velocity"]), f"{a['unit']}/s", str(a["status"]), a["meaning"])
+        for a in data["axes"]
+    ]
+    return [
+        f"MIC488, unit {mic.unit} at {mic.place}, firmware {firmware}{state}",
+        f"program {data['program']}, values travel as {data_type}",
+        table(rows),
+        f"inputs on:  {_on('IN', status.inputs)}",
+        f"outputs on: {_on('OUT', status.outputs)}",
+    ]
+
+
+def _on(name: str, states: tuple[bool, ...]) -> str:
+    return " ".join(f"{name}{number}" for number, on in enumerate(states, start=1) if on) or "none"

@@ -1,0 +1,212 @@
+"""``steptwin enable``, ``disable``, ``home``, ``move``, ``jog``, ``stop``: axes from the command line.
+
+From Python: `steptwin.host.Mic488` and its axes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import signal
+import sys
+import time
+from collections.abc import Callable, Generator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from steptwin.cli.device import Axes, Device, Json, LogFrames, axes_of, complain, opened, print_json, tied
+from steptwin.errors import Misuse, Refusal
+
+if TYPE_CHECKING:
+    from steptwin.host import Mic488, MoveEnd
+
+Wait = Annotated[bool, typer.Option("--wait/--no-wait", help="Wait for the end, and stop at Ctrl-C.")]
+Timeout = Annotated[float | None, typer.Option(help="Seconds to wait at most. Default: computed from the motion.")]
+
+
+def enable(axes: Axes = None, device: Device = None, log_frames: LogFrames = False) -> None:
+    """Switch drives on."""
+    with opened(device, log_frames=log_frames) as mic:
+        mic.enable(*axes_of(axes))
+
+
+def disable(axes: Axes = None, device: Device = None, log_frames: LogFrames = False) -> None:
+    """Switch drives off. Pulses end at once."""
+    with opened(device, log_frames=log_frames) as mic:
+        mic.disable(*axes_of(axes))
+
+
+def stop(
+    axes: Axes = None,
+    device: Device = None,
+    program: Annotated[
+        bool, typer.Option("--program", help="End the program too, which switches drives and outputs off.")
+    ] = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Stop axes at once, without ramp. A program that runs may move them again: see --program."""
+    with opened(device, log_frames=log_frames) as mic:
+        mic.stop(*axes_of(axes))
+        if program:
+            mic.program.stop()
+        elif mic.program.state() == 1:
+            complain("the program in the controller runs on and may move the axes again: --program ends it")
+
+
+def move(
+    targets: Annotated[list[str], typer.Argument(metavar="AXIS=POSITION...", help="1=100 2=-12.5, in the configured units.")],
+    device: Device = None,
+    by: Annotated[bool, typer.Option("--by", help="The numbers are distances.")] = False,
+    velocity: Annotated[float | None, typer.Option(help="Set VMAX first.")] = None,
+    wait: Wait = True,
+    timeout: Timeout = None,
+    json: Json = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Move axes; several begin in the same instant. Exit code 1 when one does not arrive."""
+    values = tied(targets)
+
+    def begin(mic: Mic488, begun: set[int]) -> None:
+        if velocity is not None:
+            for axis in values:
+                mic.axis(axis).set_ramp(velocity=velocity)
+        if len(values) > 1:
+            (mic.move_together_by if by else mic.move_together)(values)
+        else:
+            ((axis, value),) = values.items()
+            (mic.axis(axis).move_by if by else mic.axis(axis).move_to)(value)
+        begun.update(values)
+
+    _do(device, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+
+
+def home(
+    velocities: Annotated[list[str], typer.Argument(metavar="AXIS=VELOCITY...", help="1=-20: towards KL; positive: towards KR.")],
+    device: Device = None,
+    wait: Wait = True,
+    timeout: Timeout = None,
+    json: Json = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Home axes, at the velocities given. Exit code 1 when one does not arrive."""
+    values = tied(velocities)
+
+    def begin(mic: Mic488, begun: set[int]) -> None:
+        for axis, velocity in values.items():
+            mic.axis(axis).home(velocity)
+            begun.add(axis)
+
+    _do(device, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+
+
+def _do(
+    device: str | None,
+    values: Mapping[int, float],
+    begin: Callable[[Mic488, set[int]], None],
+    *,
+    wait: bool,
+    timeout: float | None,
+    json: bool,
+    log_frames: bool,
+) -> None:
+    with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible():
+        begun: set[int] = set()
+        try:
+            begin(mic, begun)
+            if not wait:
+                return
+            ends = mic.wait(*values, timeout_s=timeout, check=False)
+        except (Misuse, Refusal):
+            if begun:
+                mic.stop(*begun)
+            raise
+        except BaseException:
+            mic.stop(*values)
+            complain(f"stopped: {' '.join(f'M{axis}' for axis in values)}")
+            raise
+        if any(end.reason.name == "OVERDUE" for end in ends.values()):
+            mic.stop(*values)
+            complain("stopped, because the time is over")
+    if json:
+        print_json([_data(end) for end in ends.values()])
+    else:
+        typer.echo("\n".join(map(str, ends.values())))
+    if not all(end.ok for end in ends.values()):
+        raise typer.Exit(1)
+
+
+def _data(end: MoveEnd) -> dict[str, Any]:
+    return {
+        "axis": end.axis,
+        "ok": end.ok,
+        "reason": end.reason.value,
+        "position": end.position_u,
+        "unit": end.unit,
+        "after_s": round(end.after_s, 3),
+        **({"detail": end.detail} if end.detail else {}),
+    }
+
+
+def jog(
+    velocity: Annotated[str, typer.Argument(metavar="AXIS=VELOCITY", help="1=5, in the configured unit per second.")],
+    device: Device = None,
+    seconds: Annotated[float | None, typer.Option(help="End after so long. Needed where there is no terminal.")] = None,
+    hold: Annotated[float, typer.Option(help="Seconds the axis runs on when this command is killed, 0.2 to 2.")] = 0.4,
+    json: Json = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Run an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself."""
+    values = tied([velocity])
+    ((axis, speed),) = values.items()
+    if seconds is None and not sys.stdin.isatty():
+        raise Misuse("without a terminal nobody can press a key: give the time, --seconds")
+    with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible(), _keys() as pressed:
+        held = mic.axis(axis).jog(speed, hold_s=hold)
+        try:
+            with held:
+                if seconds is None:
+                    complain(f"M{axis} runs at {speed:g} {mic.axis(axis).unit}/s; any key stops it")
+                end_at = None if seconds is None else time.monotonic() + seconds
+                while not pressed() and (end_at is None or time.monotonic() < end_at) and held.hold():
+                    pass
+        except KeyboardInterrupt:
+            complain("released")
+        end = held.end
+        rest = mic.axis(axis).wait(check=False)
+    told = rest if end is None else dataclasses.replace(end, position_u=rest.position_u)
+    if json:
+        print_json(_data(told))
+    else:
+        typer.echo(str(told))
+    if not told.ok:
+        raise typer.Exit(1)
+
+
+@contextlib.contextmanager
+def _interruptible() -> Generator[None]:
+    """SIGTERM and a closed terminal end a motion as Ctrl-C does."""
+    kept = {number: signal.signal(number, signal.default_int_handler) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def _keys() -> Generator[Callable[[], bool]]:
+    """Whether a key was pressed."""
+    if not sys.stdin.isatty():
+        yield lambda: False
+        return
+    import select
+    import termios
+    import tty
+
+    kept = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        yield lambda: bool(select.select([sys.stdin], [], [], 0)[0])
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, kept)

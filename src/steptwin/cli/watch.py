@@ -1,0 +1,92 @@
+"""``steptwin watch``: registers again and again, until Ctrl-C.
+
+From Python: `steptwin.host.Mic488.get_shown` in a loop.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from steptwin.cli.device import Device, LogFrames, opened, shown, table
+from steptwin.cli.get import expanded, map_of, names_from
+from steptwin.errors import Misuse
+
+if TYPE_CHECKING:
+    from steptwin.host import Mic488
+
+DEFAULT_NAMES = ("M?_POS_ACT", "M?_VEL_ACT", "M?_STATUS")
+MOST_HZ = 50.0
+
+
+def watch(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="As of get. Default: what the axes do.", autocompletion=names_from),
+    ] = None,
+    device: Device = None,
+    hz: Annotated[float, typer.Option(help="How often a second, up to 50; the device may be slower.")] = 5.0,
+    count: Annotated[int | None, typer.Option(help="End after so many looks.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each look.")] = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Read registers again and again. In a terminal a live table, else a line for each look with tabs between."""
+    if not 0.0 < hz <= MOST_HZ:
+        raise Misuse(f"--hz {hz:g}: permitted are more than 0 and at most {MOST_HZ:g}")
+    if count is not None and count < 1:
+        raise Misuse(f"--count {count}: permitted are 1 and more")
+    with opened(device, log_frames=log_frames) as mic:
+        wanted = expanded(map_of(mic), names or DEFAULT_NAMES)
+        looks = _looks(mic, wanted, hz, count)
+        try:
+            if json:
+                _print_json(looks)
+            elif sys.stdout.isatty():
+                _draw(looks)
+            else:
+                _print_lines(looks)
+        except KeyboardInterrupt:
+            pass
+
+
+def _looks(mic: Mic488, names: list[str], hz: float, count: int | None) -> Iterator[tuple[float, dict[str, tuple[Any, str]]]]:
+    """Seconds since the first look, and the values."""
+    begin = time.monotonic()
+    number = 0
+    while count is None or number < count:
+        yield time.monotonic() - begin, mic.get_shown(*names)
+        number += 1
+        # A look that is late is left out, so that a slow line is not asked without a pause.
+        number_due = (time.monotonic() - begin) * hz
+        if count is None or number < count:
+            time.sleep((1.0 - number_due % 1.0) / hz)
+
+
+def _print_json(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> None:
+    import json
+
+    for at, values in looks:
+        typer.echo(json.dumps({"time_s": round(at, 3)} | {name: value for name, (value, _) in values.items()}))
+
+
+def _print_lines(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> None:
+    headed = False
+    for at, values in looks:
+        if not headed:
+            typer.echo("\t".join(["time_s", *(f"{name} {unit}".rstrip() for name, (_, unit) in values.items())]))
+            headed = True
+        typer.echo("\t".join([f"{at:.3f}", *(shown(value) for value, _ in values.values())]))
+
+
+def _draw(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> None:
+    from rich.live import Live
+    from rich.text import Text
+
+    with Live(auto_refresh=False) as live:
+        for at, values in looks:
+            rows = [(name, shown(value), unit) for name, (value, unit) in values.items()]
+            live.update(Text(f"{table(rows)}\n{at:.1f} s, Ctrl-C ends", no_wrap=True), refresh=True)

@@ -1,0 +1,190 @@
+"""The commands for devices, against a served twin, as people type them."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from steptwin.cli import main
+from steptwin.cli.device import table, tied
+from steptwin.errors import Misuse
+from steptwin.host import Mic488
+from steptwin.host.address import DeviceAddress, parse_device
+
+STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
+
+
+class Shell:
+    """Runs the command line in this process. What it printed, what it complained about, and its exit code."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        self._monkeypatch = monkeypatch
+        self._capsys = capsys
+        self.errors = ""
+        self.code = 0
+
+    def __call__(self, *arguments: str) -> str:
+        self._monkeypatch.setattr("sys.argv", ["steptwin", *arguments])
+        self._capsys.readouterr()
+        self.code = 0
+        try:
+            main()
+        except SystemExit as end:
+            self.code = end.code if isinstance(end.code, int) else 0
+        out, self.errors = self._capsys.readouterr()
+        return out
+
+
+@pytest.fixture
+def shell(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Shell:
+    monkeypatch.delenv("STEPTWIN_DEVICE", raising=False)
+    return Shell(monkeypatch, capsys)
+
+
+@pytest.fixture
+def twin(serve: Callable[..., Any], shell: Shell, monkeypatch: pytest.MonkeyPatch) -> Any:
+    twin = serve("--demo")
+    monkeypatch.setenv("STEPTWIN_DEVICE", f"tcp://127.0.0.1:{twin.tcp_port},timeout=5")
+    return twin
+
+
+def test_a_session(twin: Any, shell: Shell) -> None:
+    assert shell("enable", "1", "M2") == ""
+    assert shell("set", "M1_ACC=2000", "M1_DEC=2000", "out3=on", "DATA_TYPE=real").splitlines() == [
+        "M1_ACC     2000  u/s²",
+        "M1_DEC     2000  u/s²",
+        "out3         ON",
+        "DATA_TYPE     0  REAL",
+    ]
+    assert shell("move", "1=3", "--velocity", "200") == "M1: target reached at 3 u\n"
+    assert shell("move", "M1=-1", "2=0.5", "--by").splitlines()[0] == "M1: target reached at 2 u"
+    assert shell("move", "1=-100") == "M1: stopped at limit L at -10 u\n"
+    assert shell.code == 1
+    assert json.loads(shell("home", "1=-50", "--json"))[0]["reason"] == "target reached"
+    assert "released at" in shell("jog", "2=5", "--seconds", "0.2")
+    assert shell.code == 0
+    assert shell("get", "M1_POS_ACT", "OUT3", "M1_STATUS").splitlines() == [
+        "M1_POS_ACT   0  u",
+        "OUT3        ON",
+        "M1_STATUS    4  position reached",
+    ]
+    assert shell("stop") == shell("disable") == ""
+    lines = shell("info").splitlines()
+    assert lines[0].startswith("MIC488, unit 1 at tcp://127.0.0.1:")
+    assert lines[-1] == "outputs on: OUT3"
+    data = json.loads(shell("info", "--json"))
+    assert (data["firmware"], data["program"], data["axes"][0]["meaning"], data["outputs"][2]) == ("1.70", "stopped", "off", True)
+
+
+def test_reading(twin: Any, shell: Shell) -> None:
+    assert shell("get", "USER_REGISTER[0-2]", "USER_REGISTER[10-13]:real").count("\n") == 5
+    assert json.loads(shell("get", "m1_acc", "M1_STATUS", "--json")) == {
+        "m1_acc": {"value": 50.0, "unit": "u/s²"},
+        "M1_STATUS": {"value": 0, "meaning": "off"},
+    }
+    looks = shell("watch", "M1_ACC", "OUT1", "--count", "2", "--hz", "50").splitlines()
+    assert looks[0] == "time_s\tM1_ACC u/s²\tOUT1"
+    assert [look.split("\t")[1:] for look in looks[1:]] == [["50", "OFF"]] * 2
+    assert [json.loads(line)["M4_STATUS"] for line in shell("watch", "--json", "--count", "2").splitlines()] == [0, 0]
+    shell("get", "M1_ACC", "--log-frames")
+    assert "unit 1: read M1_ACC = 50 u/s²" in shell.errors
+
+
+MISTAKES: list[tuple[list[str], int, str]] = [
+    (["get", "M1_POS_AKT"], 2, "did you mean M1_POS_ACT"),
+    (["get", "X*"], 2, "'X*' stands for no register"),
+    (["set", "M1_ACC"], 2, "expected NAME=VALUE"),
+    (["set", "M1_ACC=much"], 2, "'much' is no number"),
+    (["set", "IN3=1"], 2, "IN3 can only be read"),
+    (["move", "5=1"], 2, "'5' is no axis"),
+    (["move", "1=1", "M1=2"], 2, "M1 is given twice"),
+    (["move", "1"], 2, "expected AXIS=NUMBER"),
+    (["move", "1=5"], 1, "M1 of unit 1 is switched off: enable it first"),
+    (["jog", "1=5"], 2, "without a terminal nobody can press a key"),
+    (["watch", "--hz", "0"], 2, "--hz 0: permitted are more than 0"),
+    (["watch", "--count", "0"], 2, "--count 0: permitted"),
+]
+
+
+def test_what_is_told_of_mistakes(twin: Any, shell: Shell) -> None:
+    for arguments, code, text in MISTAKES:
+        shell(*arguments)
+        assert text in shell.errors
+        assert shell.code == code
+
+
+def test_who_does_not_answer(twin: Any, shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell("info", "--device", f"tcp://127.0.0.1:{twin.tcp_port},unit=9")
+    assert "gateway target failed to respond" in shell.errors
+    shell("info", "--device", f"rtu-tcp://127.0.0.1:{twin.rtu_tcp_port},unit=9,timeout=0.01")
+    assert "no answer to 'unit 9: read the control registers of firmware" in shell.errors
+    monkeypatch.delenv("STEPTWIN_DEVICE")
+    monkeypatch.setattr("steptwin.host.address.DEFAULT", "tcp://127.0.0.1:1")
+    shell("info")
+    assert (shell.code, "start one with 'steptwin serve mic488 --demo', or name a device" in shell.errors) == (1, True)
+
+
+def test_an_interrupted_command_stops_the_axis(twin: Any) -> None:
+    place = f"tcp://127.0.0.1:{twin.tcp_port}"
+    with Mic488(place, timeout_s=5.0) as mic:
+        mic.enable(1)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with subprocess.Popen([STEPTWIN, "move", "1=200", "-d", place], stderr=subprocess.PIPE, text=True) as command:
+                while mic.axis(1).status() != 3:
+                    assert command.poll() is None
+                command.send_signal(number)
+                assert command.stderr is not None
+                assert "stopped: M1" in command.stderr.read()
+            assert command.returncode != 0
+            assert mic.axis(1).status() == 1
+        check_that_a_key_ends_a_jog(place)
+
+
+def check_that_a_key_ends_a_jog(place: str) -> None:
+    master, slave = pty.openpty()
+    arguments = [STEPTWIN, "jog", "1=5", "--hold", "2", "-d", place]
+    with subprocess.Popen(arguments, stdin=slave, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as command:
+        assert command.stderr is not None
+        assert command.stdout is not None
+        assert command.stderr.readline() == "M1 runs at 5 u/s; any key stops it\n"
+        os.write(master, b" ")
+        assert command.stdout.read().startswith("M1: released at ")
+    assert command.returncode == 0
+    os.close(master)
+    os.close(slave)
+
+
+# ---------------------------------------------------------------------- without a device
+
+
+def test_addresses() -> None:
+    assert parse_device("/dev/ttyUSB0") == DeviceAddress("/dev/ttyUSB0")
+    address = parse_device("tcp://h:1, unit=3,baud=9600,firmware=1.23,config=a b.cfg,timeout=2.5")
+    assert address == DeviceAddress("tcp://h:1", 3, 9600, "1.23", "a b.cfg", 2.5)
+    assert str(address) == "tcp://h:1,unit=3"
+
+
+@pytest.mark.parametrize("text", ["", ",unit=1", "x,units=1", "x,unit=", "x,unit=a", "x,unit=1,unit=2", "x,unit"])
+def test_what_is_no_address(text: str) -> None:
+    with pytest.raises(Misuse, match=r"has no address|is none of|is no number"):
+        parse_device(text)
+
+
+def test_numbers_tied_to_axes() -> None:
+    assert tied(["1=12,5", "m2=-3", "3=0x10"]) == {1: 12.5, 2: -3.0, 3: 16.0}
+
+
+def test_tables() -> None:
+    assert table([("a", "1", "mm"), ("bb", "-12.5", "")], ("name", "value", "unit")) == (
+        "name  value  unit\na         1  mm\nbb    -12.5"
+    )
+    assert table([]) == ""
