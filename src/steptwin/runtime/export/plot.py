@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.pulses import Reals
@@ -33,6 +33,7 @@ _LEFT_IN, _RIGHT_IN, _TOP_IN, _BOTTOM_IN = 1.5, 0.3, 0.55, 0.55
 _MOTION_IN, _ROW_IN, _GAP_IN = 0.78, 0.24, 0.1
 _COLUMNS = 1500
 """Of pixels across the picture: more points than a few in each are not seen."""
+_CLOCK_STEPS_S = (30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200, 86400)
 
 _INK, _FAINT = "#22262b", "#c9ced6"
 _POSITION, _VELOCITY, _LEVEL, _ANALOG, _FRAME, _EVENT, _FAULT = (
@@ -130,9 +131,12 @@ def _figure(recording: Recording, heights: list[float]) -> tuple[Figure, list[Ax
 
 def _dress(panel: Axes, recording: Recording) -> None:
     panel.set_xlim(recording.begin / SECOND, max(recording.until, recording.begin + 1) / SECOND)
-    panel.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 1.2, 1.5, 2, 3, 5, 6, 10]))
     if _in_clock_time(recording):
+        span = (recording.until - recording.begin) / SECOND
+        panel.xaxis.set_major_locator(MultipleLocator(next((s for s in _CLOCK_STEPS_S if 12 * s >= span), span)))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda seconds, _: _clock(seconds)))
+    else:
+        panel.xaxis.set_major_locator(MaxNLocator(12, steps=[1, 2, 5, 10]))
     panel.tick_params(axis="x", labelbottom=False, length=0)
     panel.tick_params(axis="y", length=0, labelsize=7.5)
     panel.grid(axis="x", color=_FAINT, linewidth=0.5)

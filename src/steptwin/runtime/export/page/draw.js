@@ -118,10 +118,14 @@ function drawPulses(pen, lane, top, bottom) {
   c.fillRect(0, middle, pen.width, 1);
   c.globalAlpha = 1;
   const wide = Math.max(1, 5000 / pen.perPixel);
+  const drawn = { 1: -1, "-1": -1 };
   for (let i = motion.at(pen.from); i < motion.size && motion.begin(i) <= pen.to; i++) {
     const direction = motion.direction(i);
     if (direction === 0) continue;
     const a = Math.max(motion.begin(i), pen.from), b = Math.min(motion.end(i), pen.to);
+    // Many motions within a pixel are one line.
+    if (pen.x(b) < drawn[direction]) continue;
+    drawn[direction] = Math.floor(pen.x(b)) + 1;
     const first = motion.given(i, a) + 1, last = motion.given(i, b);
     if (last < first) continue;
     const high = direction > 0 ? top : middle, tall = middle - top + 1;

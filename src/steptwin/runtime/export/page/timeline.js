@@ -3,7 +3,7 @@
 const $ = (id) => document.getElementById(id);
 const plot = $("plot"), ruler = $("ruler"), overview = $("overview"), lanesElement = $("lanes");
 const view = { from: 0, to: SPAN, scaled: false };
-let cursor = 0, mark = null, hover = null, chosen = 0, dirty = false, overviewImage = null;
+let cursor = 0, mark = null, hover = null, chosen = 0, dirty = false, overviewImage = null, lanesKey = "", layout = 0;
 const LEAST_VIEW = 200;
 
 const machines = DATA.machines.map((name) => ({ name, lanes: null, open: DATA.machines.length <= 8 }));
@@ -11,6 +11,7 @@ machines[0] && (machines[0].open = true);
 let lanes = [];
 
 function layOut() {
+  layout += 1;
   lanes = [];
   for (const machine of machines) {
     if (machines.length > 1) lanes.push({ kind: "group", name: machine.name, group: machine, height: HEIGHTS.group });
@@ -89,7 +90,7 @@ function zoomToMark() {
 const styles = getComputedStyle(document.documentElement);
 let palette = new Map();
 const color = (name) => palette.get(name) ?? (palette.set(name, styles.getPropertyValue(name).trim()), palette.get(name));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { palette = new Map(); overviewImage = null; redraw(); });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { palette = new Map(); overviewImage = null; lanesKey = ""; redraw(); });
 
 function redraw() {
   if (dirty) return;
@@ -110,9 +111,38 @@ function prepare(canvas) {
   return [context, width, height];
 }
 
+// Lanes are drawn anew when something about them has changed; for cursors alone their picture is good enough.
+const lanesImage = document.createElement("canvas");
+
 function paint() {
-  const [c, width, height] = prepare(plot);
-  const pen = new Pen(c, view, width, color), scroll = lanesElement.scrollTop;
+  const [c, width, height] = prepare(plot), scroll = lanesElement.scrollTop;
+  const key = [view.from, view.to, view.scaled, scroll, chosen, layout, plot.width, plot.height].join();
+  const pen = new Pen(c, view, width, color);
+  if (key !== lanesKey) {
+    paintLanes(pen, scroll, width, height);
+    lanesImage.width = plot.width;
+    lanesImage.height = plot.height;
+    lanesImage.getContext("2d").drawImage(plot, 0, 0);
+    lanesKey = key;
+  } else c.drawImage(lanesImage, 0, 0, width, height);
+  for (const [t, name] of [[mark, "--mark"], [cursor, "--cursor"]]) {
+    if (t === null || t < view.from || t > view.to) continue;
+    c.fillStyle = color(name);
+    c.fillRect(Math.round(pen.x(t)), 0, 1, height);
+  }
+  if (hover !== null) {
+    c.fillStyle = color("--dim");
+    c.globalAlpha = 0.6;
+    c.fillRect(Math.round(pen.x(hover)), 0, 1, height);
+    c.globalAlpha = 1;
+  }
+  paintRuler();
+  paintOverview();
+  tell();
+}
+
+function paintLanes(pen, scroll, width, height) {
+  const c = pen.context;
   drawGrid(pen, view, height);
   // Outside the run nothing is known.
   c.fillStyle = color("--panel");
@@ -136,20 +166,6 @@ function paint() {
     c.fillStyle = color(lanes[i + 1]?.first ? "--rule-strong" : "--rule");
     c.fillRect(0, y + lane.height - 1, width, 1);
   });
-  for (const [t, name] of [[mark, "--mark"], [cursor, "--cursor"]]) {
-    if (t === null || t < view.from || t > view.to) continue;
-    c.fillStyle = color(name);
-    c.fillRect(Math.round(pen.x(t)), 0, 1, height);
-  }
-  if (hover !== null) {
-    c.fillStyle = color("--dim");
-    c.globalAlpha = 0.6;
-    c.fillRect(Math.round(pen.x(hover)), 0, 1, height);
-    c.globalAlpha = 1;
-  }
-  paintRuler();
-  paintOverview();
-  tell();
 }
 
 function paintRuler() {
