@@ -421,6 +421,9 @@ def test_a_stored_file_runs_when_the_next_twin_is_switched_on(tmp_path: Path) ->
         served = e_chip(state)
         later(served, 1)
         assert served.chips[1].drive.true_u(served.kernel.now) == 6400
+        events: list[str] = []
+        served.watch_events(lambda address, event: events.append(event.code))
+        assert events == ["moves", "stands"]
         type_to(served, "\\")
         later(served, 2)
     with StateDirectory(tmp_path) as state:

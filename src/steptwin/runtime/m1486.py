@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from itertools import count
 from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486, OPEN_ADDRESS, Event
+from steptwin.m1486.chip import EVENTS_KEPT, M1486, OPEN_ADDRESS, Event
 from steptwin.m1486.line import LinePort, SerialChain
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.pins import known_pin
@@ -56,6 +57,8 @@ class M1486Line:
         self.variant = variant = options.variant
         self.frames = CharacterLog(variant)
         self._sinks: list[Callable[[int, Event], None]] = []
+        self._untold: deque[tuple[int, Event]] = deque(maxlen=EVENTS_KEPT)
+        """What happened before there was a sink: a stored file runs as soon as there is power."""
         self.kernel = Kernel()
         self.chips = make_chips(options, state, image)
         for address, chip in self.chips.items():
@@ -92,12 +95,17 @@ class M1486Line:
     def _happened(self, address: int, event: Event) -> None:
         if event.code == "upload" and self.options.is_written_down:
             self.frames.upload(event)
+        if not self._sinks:
+            self._untold.append((address, event))
         for sink in self._sinks:
             sink(address, event)
 
     def watch_events(self, sink: Callable[[int, Event], None]) -> None:
-        """Tell ``sink`` address and event."""
+        """Tell ``sink`` address and event; the first one also what happened before."""
         self._sinks.append(sink)
+        for address, event in self._untold:
+            sink(address, event)
+        self._untold.clear()
 
     def told(self, unit: int, event: Happening) -> str:
         """An event in words; the chip is named where there are several."""

@@ -12,7 +12,6 @@ from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.syntax import Command
 from steptwin.machine import SECOND, Nanos
 
-
 _MOTIONS = {Motion.MOVE: "move", Motion.ENDLESS: "endless move", Motion.SEEK: "seek"}
 
 

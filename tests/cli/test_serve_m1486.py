@@ -1,0 +1,164 @@
+"""`steptwin serve m1486` as a user starts it, and a hand at the chips."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.runtime.serve_m1486 import M1486Options, remarks_of, serve
+
+Serve = Callable[..., Any]
+
+
+class Host:
+    """A program on the raw TCP end of the line."""
+
+    def __init__(self, port: int) -> None:
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=10)
+
+    def ask(self, text: str, count: int) -> bytes:
+        """Type lines; ``count`` bytes of what the chips say."""
+        self.socket.sendall(text.replace("\n", "\r").encode())
+        return self.hear(count)
+
+    def hear(self, count: int) -> bytes:
+        data = b""
+        while len(data) < count:
+            data += self.socket.recv(count - len(data))
+        return data
+
+    def close(self) -> None:
+        self.socket.close()
+
+
+def test_programs_on_tcp_and_pty_share_the_line(serve_m1486: Serve) -> None:
+    twin = serve_m1486("--variant", "B", "--chain", "0,7", "--log-frames")
+    two = Host(twin.tcp_port)
+    assert two.ask("x7\nu16\n", 1) == b"\x01"  # it is there
+    one = Host(twin.tcp_port)
+    pty = os.open(twin.pty, os.O_RDWR | os.O_NOCTTY)
+    try:
+        assert one.ask("x7\nu20\n", 1) == b"B"
+        assert two.hear(1) == b"B"
+        assert os.read(pty, 1) == b"B"
+        os.write(pty, b"u16\r")
+        assert [one.hear(1), two.hear(1), os.read(pty, 1)] == [b"\x01"] * 3
+    finally:
+        os.close(pty)
+        one.close()
+        two.close()
+    said = "\n".join(twin.lines)
+    assert "M1486B, Step & Direction, addresses 0, 7, 4800 bit/s" in said
+    assert "78 37 0d  X7  indeX 7" in said
+    assert "U20 type letter in ASCII = 66" in said
+
+
+def test_what_is_said_to_nobody_is_lost(serve_m1486: Serve) -> None:
+    """As on a wire: who opens the port later does not find it."""
+    twin = serve_m1486("--variant", "B")
+    host = Host(twin.tcp_port)
+    assert host.ask("u20\nu20\n", 2) == b"BB"
+    pty = os.open(twin.pty, os.O_RDWR | os.O_NOCTTY)
+    try:
+        assert host.ask("u16\n", 1) == b"\x01"
+        assert os.read(pty, 10) == b"\x01"
+    finally:
+        os.close(pty)
+        host.close()
+
+
+def test_a_hand_at_the_chips(serve_m1486: Serve) -> None:
+    twin = serve_m1486("--variant", "B", "--chain", "0,A", "--wire", "0.B1=A.B3")
+    host = Host(twin.tcp_port)
+    assert host.ask("xA\nz3\nu20\nx0\nu16\n", 1) == b"\x01"
+    assert "waits until B3 is low" in twin.command("state", "--unit", "A").stdout
+    assert twin.command("pin", "--unit", "A", "B3=0").returncode == 0
+    assert host.hear(1) == b"B"
+    shown = twin.command("pin", "--unit", "a").stdout
+    assert "B3     0" in shown.splitlines()
+    assert host.ask("x0\nc1\nu20\n", 1) == b"B"
+
+    assert twin.command("power-cycle").returncode == 0
+    lines = twin.command("state", "--unit", "0").stdout.splitlines()
+    assert lines[0].startswith("M1486B at address 0, 4800 bit/s, ")
+    assert lines[1:3] == ["program  has nothing to do", "memory   0 of 2032 bits, input buffer 0 of 32 characters"]
+    refused = twin.command("pin", "B1=0")
+    assert (refused.returncode, refused.stderr) == (1, "steptwin: several chips are served: choose one with --unit: 0, A\n")
+    cannot = twin.command("encoder", "M1+1")
+    assert cannot.returncode == 1
+    assert "this twin cannot do 'encoder': it can pin, power-cycle, state" in cannot.stderr
+    host.close()
+
+
+def test_what_was_stored_is_there_after_kill_9(serve_m1486: Serve, tmp_path: Path) -> None:
+    options = ("--variant", "E1", "--chain", "1", "--state", str(tmp_path / "state"))
+    first = serve_m1486(*options)
+    host = Host(first.tcp_port)
+    assert host.ask("[\nu20\n]\n", 1) == b"E"
+    first.process.send_signal(signal.SIGKILL)
+    first.process.wait()
+    host.close()
+    second = serve_m1486(*options)
+    deadline = time.monotonic() + 10
+    while not any("U20 sends 45H" in line for line in second.lines):
+        assert time.monotonic() < deadline, second.lines
+        time.sleep(0.01)
+
+
+def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None:
+    (tmp_path / "p.m1486").write_text("[\nz3\nu20\n]\n")
+    twin = serve_m1486("--variant", "B", "--program", str(tmp_path / "p.m1486"))
+    host = Host(twin.tcp_port)
+    twin.command("pin", "B3=0")
+    assert host.hear(1) == b"B"
+    host.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"variant": "D"}, "no M1486 variant is called 'D'; there are A, B, C, E1, E2"),
+        ({"variant": "B", "baud": 9600}, "9600 bit/s: M1486B has 300, 1200, 2400, 4800"),
+        ({"chain": "0,G"}, "--chain 0,G: 'G' is no address"),
+        ({"variant": "E1", "chain": "0"}, "address 0: M1486E1 takes 1 to F"),
+        ({"interface": "dac"}, "no driver interface is called 'dac'; there are sd, dual, two"),
+        ({"line_timing": "fast"}, "--line-timing fast: permitted are 'real' and 'off'"),
+        ({"wires": ("B1=B3",)}, "--wire B1=B3: expected FROM=TO"),
+        ({"name": "a b"}, "--name 'a b': permitted are"),
+        ({"tcp": "0.0.0.0:0"}, "0.0.0.0 is not a loopback address"),
+        ({"program": Path("nowhere.m1486")}, "cannot read nowhere.m1486: No such file or directory"),
+    ],
+)
+def test_wrong_options_are_said(options: dict[str, Any], text: str) -> None:
+    with pytest.raises(Misuse) as refusal:
+        serve(M1486Options(**options))
+    assert str(refusal.value).startswith(text)
+
+
+def test_a_program_with_errors_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "p.m1486"
+    path.write_text("f640\nj3\n")
+    with pytest.raises(Misuse) as refusal:
+        serve(M1486Options(program=path))
+    assert str(refusal.value).startswith(f"{path} is no program to switch on with:\n{path}:2:")
+
+
+@pytest.mark.parametrize(
+    ("variant", "state", "remarks"),
+    [
+        ("B", None, []),
+        ("B", Path("here"), ["M1486B keeps its program in RAM: nothing goes into here"]),
+        ("E1", None, ["the EEPROM ends with this process (--state DIR keeps it)"]),
+        ("E1", Path("here"), []),
+    ],
+)
+def test_what_one_should_know(variant: str, state: Path | None, remarks: list[str]) -> None:
+    assert remarks_of(M1486Options(variant=variant, state=state)) == remarks
