@@ -23,9 +23,11 @@ from steptwin.cli import (
     info,
     move,
     registers,
+    replay,
     run,
     serve,
     twin,
+    up,
     watch,
 )
 from steptwin.errors import Misuse, SteptwinError
@@ -41,6 +43,8 @@ app.command()(fmt.fmt)
 app.command()(build.build)
 app.command()(decompile.decompile)
 app.command()(run.run)
+app.command()(up.up)
+app.command()(replay.replay)
 app.command()(export.export)
 app.command()(twin.pin)
 app.command()(twin.encoder)

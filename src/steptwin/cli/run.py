@@ -24,7 +24,7 @@ class Options:
     """What was asked for on the command line; None where nothing was said."""
 
     limit: Nanos | None
-    until_idle: bool
+    until: str | None
     inputs: list[TimedInput]
     trace: Path | None
     as_json: bool
@@ -37,6 +37,10 @@ class Options:
     travel: list[str] | None = None
     statement_time: str | None = None
 
+    @property
+    def until_idle(self) -> bool:
+        return self.until == "idle"
+
     def refuse(self, files: str, *names: str) -> None:
         """Raises `Misuse` when one of these options was given, which mean nothing for such files."""
         for name in names:
@@ -45,12 +49,15 @@ class Options:
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="What to run; its suffix says what it is: .prg or .m1486.")],
+    file: Annotated[Path, typer.Argument(help="What to run; its suffix says what it is: .prg, .m1486 or .toml.")],
     duration: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until idle.")
     ] = None,
     until: Annotated[
-        str | None, typer.Option(metavar="idle", help="'idle': ends also where nothing would happen any more without input.")
+        str | None,
+        typer.Option(
+            metavar="idle", help="'idle': ends also where nothing would happen any more without input. A world: any condition."
+        ),
     ] = None,
     inputs: Annotated[
         list[str] | None,
@@ -82,14 +89,14 @@ def run(
     runner = _RUNNERS.get(file.suffix.lower())
     if runner is None:
         raise Misuse(f"{file}: what is to be run is told by its suffix: {', '.join(_RUNNERS)}")
-    if until not in (None, "idle"):
+    if until not in (None, "idle") and runner is not _run_world:
         raise Misuse(f"--until {until}: permitted is 'idle'")
     limit = None if duration is None else parse_duration(duration, "--for")
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
     options = Options(
         limit=limit,
-        until_idle=until == "idle",
+        until=until,
         inputs=parse_inputs(",".join(inputs or [])),
         trace=trace,
         as_json=as_json,
@@ -150,5 +157,22 @@ def _run_wbc(file: Path, options: Options) -> bool:
     return run_program(wanted, typer.echo, lambda text: typer.echo(text, err=True))
 
 
+def _run_world(file: Path, options: Options) -> bool:
+    from steptwin.runtime.run_world import WorldRun
+    from steptwin.runtime.run_world import run as run_world
+
+    mechanics = ("positions", "config", "firmware", "travel", "statement_time", "variant", "interface", "wire")
+    options.refuse("worlds, whose file says all that", *mechanics)
+    wanted = WorldRun(
+        world=file,
+        limit=options.limit,
+        until=options.until,
+        inputs=tuple(options.inputs),
+        trace=options.trace,
+        as_json=options.as_json,
+    )
+    return run_world(wanted, typer.echo)
+
+
 #: What runs each kind of file; True when nothing went wrong.
-_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {".m1486": _run_m1486, ".prg": _run_wbc}
+_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {".m1486": _run_m1486, ".prg": _run_wbc, ".toml": _run_world}

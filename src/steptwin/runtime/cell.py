@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from typing import Protocol
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.runtime.clock import Clock
-from steptwin.world.kernel import Kernel
 
 LONGEST_WAIT_S = 3600.0
 """Event loops take no arbitrarily distant timer; a longer wait is waited in parts."""
 
 LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 """Something due that is done later than this has not jittered: the process was stopped or cannot keep up."""
+
+
+class Advancing(Protocol):
+    """What a cell keeps up with real time: a kernel, or a whole world. As `Kernel` says."""
+
+    stale: bool
+
+    @property
+    def now(self) -> Nanos: ...
+    def advance(self, now: Nanos) -> None: ...
+    def deadline(self) -> Nanos | None: ...
 
 
 class Cell:
@@ -25,7 +36,7 @@ class Cell:
 
     __slots__ = ("_armed_for", "_loop", "_timer", "clock", "kernel", "on_lag")
 
-    def __init__(self, kernel: Kernel, clock: Clock) -> None:
+    def __init__(self, kernel: Advancing, clock: Clock) -> None:
         self.kernel = kernel
         self.clock = clock
         self.on_lag: Callable[[Nanos], None] | None = None

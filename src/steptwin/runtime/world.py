@@ -127,19 +127,19 @@ class World(Plant):
     def at(self, time: Duration, reaction: Reaction, name: str = "at") -> Script:
         """Do something at a moment; when it has passed, now."""
         moment = duration(time)
-        return self.start(name, lambda: do.run_through((do.At(moment), *_steps(reaction))))
+        return self.start(name, lambda: do.run_through((do.At(moment), *_steps(reaction))), is_outside=True)
 
     def when(self, condition: str, reaction: Reaction, *, once: bool = False, name: str = "when") -> Script:
         """Do something whenever a condition comes true, or only the first time. Raises `Misuse`."""
         self.condition(condition)
-        return self.start(name, lambda: do.run_when(_steps(reaction), condition, once=once))
+        return self.start(name, lambda: do.run_when(_steps(reaction), condition, once=once), is_outside=True)
 
     def script(self, operator: Callable[[], do.Steps], name: str | None = None) -> Script:
         """Let an operator work from now on: a function that yields steps (`steptwin.world.script`) and is sent what they give.
 
         It touches the world by its steps only; so it can be brought back to any moment.
         """
-        return self.start(name or getattr(operator, "__name__", "script"), operator)
+        return self.start(name or getattr(operator, "__name__", "script"), operator, is_outside=True)
 
     def press(self, button: str, for_: Duration | None = None) -> None:
         """Press a button, until it is released or for a time."""
@@ -160,7 +160,7 @@ class World(Plant):
         """Take the state and the past of another world of the same description."""
         snapshot = other.snapshot() if snapshot is None else snapshot
         for script in other.scripts[len(self.scripts) :]:
-            self.start(script.name, script.make)
+            self.start(script.name, script.make, is_outside=script.is_outside)
         self.inputs[:] = other.inputs
         self.failures[:] = other.failures
         self.trace.copy_from(other.trace)

@@ -137,6 +137,10 @@ def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
     plant.plan.faults.remove(step.name, plant.now)
 
 
+def _expect(plant: Plant, step: do.Expect) -> None:
+    plant.expect(step.condition)
+
+
 def _note(plant: Plant, step: do.Note) -> None:
     plant.trace.add(Record(plant.now, "world", "event", "note", step.text))
 
@@ -151,6 +155,7 @@ ACTIONS: dict[type, Callable[[Plant, Any], None]] = {
     do.Turn: _turn,
     do.SetFault: _set_fault,
     do.ClearFault: _clear_fault,
+    do.Expect: _expect,
     do.Note: _note,
     Bytes: _bytes,
     Leave: _leave,

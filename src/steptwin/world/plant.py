@@ -68,12 +68,14 @@ class ScriptState(NamedTuple):
 class Script:
     """A generator of steps in progress."""
 
-    __slots__ = ("ended", "make", "name", "number", "sent", "steps", "waiting")
+    __slots__ = ("ended", "is_outside", "make", "name", "number", "sent", "steps", "waiting")
 
-    def __init__(self, number: int, name: str, make: Callable[[], do.Steps]) -> None:
+    def __init__(self, number: int, name: str, make: Callable[[], do.Steps], *, is_outside: bool) -> None:
         self.number = number
         self.name = name
         self.make = make
+        self.is_outside = is_outside
+        """Whether it is no part of the description: what it does comes from outside."""
         self.sent: list[tuple[Any, int]] = []
         self.steps = make()
         self.waiting: _Waiting | None = None
@@ -204,9 +206,9 @@ class Plant:
             steps = (do.At(spec.at or 0), *spec.steps)
             self.start(spec.name, lambda: do.run_through(steps, spec.repeat))
 
-    def start(self, name: str, make: Callable[[], do.Steps]) -> Script:
+    def start(self, name: str, make: Callable[[], do.Steps], *, is_outside: bool = False) -> Script:
         """Let a script run from now on. ``make`` makes its generator, again whenever a snapshot is restored."""
-        script = Script(len(self._scripts), name, make)
+        script = Script(len(self._scripts), name, make, is_outside=is_outside)
         self._scripts.append(script)
         heappush(self._timed, (self.now, script.number))
         script.waiting = _Waiting(self.now)
@@ -257,15 +259,19 @@ class Plant:
             step.function()
         elif isinstance(step, do.Stop):
             self.stopped = step.reason
-        elif isinstance(step, do.Expect):
-            condition = self.condition(step.condition)
-            self._bring(condition)
-            if not condition.holds(self.now):
-                self.failures.append(Record(self.now, WORLD, "event", "expectation", f"{script.name}: {step.condition}"))
-                self.trace.add(self.failures[-1])
+        elif script.is_outside:
+            self.outside(step)
         else:
             self.do(step)
         return None
+
+    def expect(self, text: str) -> None:
+        """Tell it where a condition does not hold."""
+        condition = self.condition(text)
+        self._bring(condition)
+        if not condition.holds(self.now):
+            self.failures.append(Record(self.now, WORLD, "event", "expectation", text))
+            self.trace.add(self.failures[-1])
 
     def _bring(self, condition: Condition) -> None:
         for kernel in self._kernels_of(condition):

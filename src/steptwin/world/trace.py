@@ -56,6 +56,8 @@ class Trace:
     def __init__(self, machines: Iterable[str] = (), *, keep: bool = True) -> None:
         self._keep = keep
         self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
+        self.watchers: list[Recorder] = []
+        """Told of every record as it is taken."""
 
     @property
     def machines(self) -> list[str]:
@@ -77,6 +79,8 @@ class Trace:
             stream.records.append(record)
         else:
             stream.hash.update(encode(record))
+        for watcher in self.watchers:
+            watcher(record)
 
     def __len__(self) -> int:
         """How many records were taken, kept or not."""

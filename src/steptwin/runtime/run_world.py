@@ -1,0 +1,170 @@
+"""`steptwin run MACHINE.toml` and `steptwin replay FILE`: a world in virtual time, and what happened in it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.runtime import session as sessions
+from steptwin.runtime.export import axis_views, bar, write_trace
+from steptwin.runtime.timedinputs import TimedInput
+from steptwin.runtime.world import World
+from steptwin.world import script as do
+from steptwin.world.faults import read as read_fault
+from steptwin.world.trace import Record
+
+USUAL_LIMIT_NS: Nanos = 60 * SECOND
+SESSION = "session.json"
+JSON_VERSION = 1
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldRun:
+    """What is to be run. ``until`` is a condition; ``limit`` ends the run where that does not come true."""
+
+    world: Path
+    limit: Nanos | None = None
+    until: str | None = None
+    inputs: Sequence[TimedInput] = ()
+    faults: Sequence[str] = ()
+    trace: Path | None = None
+    session: Path | None = None
+    as_json: bool = False
+
+
+def run(options: WorldRun, say: Say) -> bool:
+    """Run a world and say what happened; whether all expectations held. Raises `Misuse` for what cannot be run."""
+    world = World.load(options.world, keep_trace=options.trace is not None or not options.as_json)
+    _arrange(world, options)
+    limit = options.limit if options.limit is not None else USUAL_LIMIT_NS
+    begin = time.perf_counter()
+    with bar(f"running {world.spec.name}", 0, limit) as progress:
+        reason = world.run(until=options.until, for_=limit / SECOND, watch=progress)
+    wall_s = time.perf_counter() - begin
+    written = _write(world, options)
+    session = sessions.session_of(world)
+    if options.session is not None:
+        sessions.save(session, options.session)
+        written.append(options.session)
+    outcome = Outcome(reason, wall_s, session.digest, written)
+    report = _json if options.as_json else _lines
+    report(world, outcome, say)
+    return not world.failures
+
+
+class Outcome(NamedTuple):
+    """How a run ended; ``reason`` is why before its time."""
+
+    reason: str | None
+    wall_s: float
+    digest: str
+    written: list[Path]
+
+
+def _arrange(world: World, options: WorldRun) -> None:
+    """Inputs and faults of the command line."""
+    for fault in options.faults:
+        world.outside(do.SetFault(read_fault(fault)))
+    for given in options.inputs:
+        machine, dot, pin = given.pin.rpartition(".")
+        names = {name.upper(): name for name in world.machines}
+        if not dot and len(names) == 1:
+            machine = next(iter(names))
+        if machine.upper() not in names:
+            raise Misuse(f"--input {given.pin}: expected MACHINE.PIN; machines are {', '.join(world.machines)}")
+        name = names[machine.upper()]
+        world.at(given.time / SECOND, do.Set(((name, pin.upper(), given.value),)), name=f"--input {given.pin}")
+    if options.until is not None:
+        world.condition(options.until)
+
+
+def _write(world: World, options: WorldRun) -> list[Path]:
+    if options.trace is None:
+        return []
+    written = write_trace(world.trace, options.trace, views=axis_views(world.machines), until=world.now, watch=bar)
+    if options.trace.is_dir():
+        where = options.trace / SESSION
+        sessions.save(sessions.session_of(world), where)
+        written.append(where)
+    return written
+
+
+# ---------------------------------------------------------------------- what is said
+
+
+def describe(record: Record) -> str:
+    """What happened, in one line."""
+    what = f"{record.subject}: " if record.kind != "event" or record.subject in ("note", "expectation") else ""
+    value = record.value.hex(" ") if isinstance(record.value, bytes) else record.value
+    return f"{record.time / SECOND:12.6f} s  {record.machine:<10} {what}{value}".rstrip()
+
+
+def _lines(world: World, outcome: Outcome, say: Say) -> None:
+    for record in world.trace.of("event", "fault", "input"):
+        what = f"{record.subject}:" if record.kind != "event" or record.subject in ("note", "expectation") else ""
+        say(f"{record.time / SECOND:12.6f} s  {record.machine:<10} {what}{' ' if what else ''}{record.value}".rstrip())
+    say("")
+    for name, axis in world.axis.items():
+        lost = f"   {axis.lost} pulses lost" if axis.lost else ""
+        say(f"{name:<10} {axis.position:12.4f} {axis.unit}{lost}")
+    for name, view in world.mic488.items():
+        free = [n for n in view.axis if not any(fitted.spec.drive == (name, f"M{n}") for fitted in world.axes.values())]
+        for number in free:
+            axis_view = view.axis[number]
+            if axis_view.position or axis_view.enabled:
+                say(f"{name + f'.M{number}':<10} {axis_view.position:12.4f} {axis_view.unit}")
+    for name, chip in world.m1486.items():
+        say(f"{name:<10} {chip.position:12d} minimum microsteps")
+    ended = "" if outcome.reason is None else f", ended by: {outcome.reason}"
+    say(f"{world.time:g} s of {world.spec.name} in {outcome.wall_s:.2f} s{ended}")
+    for failure in world.failures:
+        say(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
+    for path in outcome.written:
+        say(f"wrote {path}")
+    say(f"digest {outcome.digest}")
+
+
+def _json(world: World, outcome: Outcome, say: Say) -> None:
+    data: dict[str, Any] = {
+        "version": JSON_VERSION,
+        "world": world.spec.name,
+        "time_s": world.time,
+        "wall_s": round(outcome.wall_s, 3),
+        "ended_by": outcome.reason,
+        "failures": [{"time_s": f.time / SECOND, "condition": f.value} for f in world.failures],
+        "axes": {
+            name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}
+            for name, axis in world.axis.items()
+        },
+        "controllers": {
+            name: {"status": view.status, "positions": [axis.position for axis in view.axis.values()]}
+            for name, view in world.mic488.items()
+        },
+        "chips": {name: {"position": chip.position, "counter": chip.counter} for name, chip in world.m1486.items()},
+        "files": [str(path) for path in outcome.written],
+        "digest": outcome.digest,
+    }
+    say(json.dumps(data, ensure_ascii=False, indent=2))
+
+
+def replay(path: Path, trace: Path | None, say: Say, warn: Say) -> bool:
+    """Run a session again; whether the same happened. Raises `Misuse` for what is no session."""
+    session = sessions.load(path)
+    world = session.replay()
+    digest = world.trace.digest()
+    if trace is not None:
+        for written in write_trace(world.trace, trace, views=axis_views(world.machines), until=world.now, watch=bar):
+            say(f"wrote {written}")
+    if digest == session.digest:
+        say(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")
+        return True
+    warn(f"{path}: another thing happened: digest {digest}, the session has {session.digest} (steptwin {session.version})")
+    return False

@@ -1,0 +1,338 @@
+"""`steptwin up MACHINE.toml`: a world in real time, whose lines other programs can talk on."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.device import Mic488
+from steptwin.runtime import session as sessions
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.clock import Clock
+from steptwin.runtime.control import Handler
+from steptwin.runtime.m1486_state import state_of as state_of_chip
+from steptwin.runtime.mic488 import state_of
+from steptwin.runtime.output import Output
+from steptwin.runtime.run_world import describe
+from steptwin.runtime.server import Server, clear_ready_file
+from steptwin.runtime.serving import check_name, fastest_loop
+from steptwin.runtime.tcp import parse_address
+from steptwin.runtime.world import World
+from steptwin.world import script as do
+from steptwin.world.actions import Bytes, Leave
+from steptwin.world.lines import Place
+from steptwin.world.spec import LineSpec
+from steptwin.world.trace import Record
+
+SHOWN = ("event", "fault", "input")
+"""Kinds of records that are told as they come."""
+SLICE_NS: Nanos = 10 * SECOND
+"""Without a clock a world runs this much at a time, so that it can be ended."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UpOptions:
+    """The command's options as given; see ``steptwin up --help``."""
+
+    world: Path
+    speed: str = "1"
+    name: str | None = None
+    session: Path | None = None
+    trace: Path | None = None
+    ready_file: Path | None = None
+    listen_any: bool = False
+
+
+class LiveWorld:
+    """A world as a `Cell` keeps it up with real time."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.stale = True
+        """Something was done to it since somebody asked for the deadline."""
+
+    @property
+    def now(self) -> Nanos:
+        return self.world.now
+
+    def advance(self, now: Nanos) -> None:
+        world = self.world
+        while (due := self.deadline()) is not None and due <= now:
+            world.advance(due)
+            for kernel in world.kernels:
+                at = kernel.deadline()
+                if at is not None and at <= due:
+                    kernel.advance(due)
+        world.advance(now)
+
+    def deadline(self) -> Nanos | None:
+        self.stale = False
+        dues = [due for kernel in self.world.kernels if (due := kernel.deadline()) is not None]
+        own = self.world.next()
+        return min(dues if own is None else [*dues, own], default=None)
+
+
+class PlacePort:
+    """A place on a line for a program outside; everything it sends goes into the session."""
+
+    broken: str | None = None
+
+    def __init__(self, live: LiveWorld, line: str, place: str, kind: str) -> None:
+        self._live = live
+        self._line = line
+        self._name = place
+        self._kind = kind
+        self.on_output: Callable[[], None] | None = None
+
+    def _place(self) -> Place:
+        place = self._live.world.lines[self._line].connect(self._name, self._kind)
+        place.on_output = self._came
+        return place
+
+    def _came(self) -> None:
+        if self.on_output is not None:
+            self.on_output()
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        world = self._live.world
+        place = self._place()
+        place.on_output = None  # what comes at once is given back at once
+        world.outside(Bytes(self._line, self._name, self._kind, data))
+        self._live.stale = True
+        answer = b"".join(piece for _, piece in place.take(now))
+        place.on_output = self._came
+        self.broken = place.port.broken
+        return answer
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        self._live.world.touch(self._line)
+        return self._place().take(now)
+
+    def deadline(self) -> Nanos | None:
+        """Nothing to be asked for: ``on_output`` tells when there is something."""
+        return None
+
+    def close(self) -> None:
+        self._live.world.outside(Leave(self._line, self._name))
+
+
+def up(options: UpOptions) -> bool:
+    """Run a world until SIGINT, SIGTERM or SIGHUP, or until a script stops it; whether all expectations held.
+
+    Raises `Misuse` or another `SteptwinError` with a text for the user.
+    """
+    name = options.name or options.world.stem
+    check_name(name)
+    world = World.load(options.world, keep_trace=options.trace is not None)
+    speed = _speed(options.speed)
+    outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
+    if speed is None and outside:
+        raise Misuse(f"--speed max: line {outside[0].name!r} has clients outside, which need a clock; use 'steptwin run'")
+    for line in world.spec.lines:
+        for address in (line.tcp, line.rtu_tcp):
+            if address is not None:
+                parse_address(address, listen_any=options.listen_any)
+    if options.ready_file is not None:
+        clear_ready_file(options.ready_file)
+    with asyncio.Runner(loop_factory=fastest_loop()) as runner:
+        runner.run(_serve(options, world, speed, name))
+    return not world.failures
+
+
+def _speed(text: str) -> float | None:
+    """How many virtual seconds a second has; None: as many as there can be."""
+    if text == "max":
+        return None
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not 0.001 <= speed <= 1000.0:
+        raise Misuse(f"--speed {text}: permitted are 0.001 to 1000, and 'max'")
+    return speed
+
+
+async def _serve(options: UpOptions, world: World, speed: float | None, name: str) -> None:
+    with ExitStack() as stack:
+        output = Output(sys.stdout)
+        stack.callback(output.close)
+        live = LiveWorld(world)
+        server = Server(Cell(live, Clock(speed or 1.0)), output.line)
+        try:
+            await _open(server, live, options, name)
+            _greet(output, server, world, speed)
+            world.trace.watchers.append(lambda record: _tell(output, record))
+            if speed is None:
+                await _run_freely(server, world)
+            else:
+                server.cell.enter()
+                server.cell.leave()
+                await server.until_ended()
+        finally:
+            await server.close()
+            for text in _keep(options, world):
+                output.line(text)
+
+
+def _greet(output: Output, server: Server, world: World, speed: float | None) -> None:
+    output.line(f"{world.spec.name}: {', '.join(world.machines)}")
+    for end_point in server.end_points:
+        output.line(f"  {end_point.protocol:<24} {end_point.place}")
+    if speed != 1.0:
+        output.line("  as fast as it goes" if speed is None else f"  {speed:g} virtual seconds a second")
+    output.line("Ctrl-C ends")
+
+
+def _tell(output: Output, record: Record) -> None:
+    if record.kind in SHOWN:
+        output.line(describe(record))
+
+
+async def _run_freely(server: Server, world: World) -> None:
+    """Without a clock, in slices."""
+    ending = asyncio.ensure_future(server.until_ended())
+    while not ending.done() and world.stopped is None:
+        world.run(for_=SLICE_NS / SECOND)
+        await asyncio.sleep(0)
+    ending.cancel()
+
+
+def _keep(options: UpOptions, world: World) -> list[str]:
+    """Write what was asked for when it is over."""
+    told: list[str] = []
+    session = sessions.session_of(world)
+    if options.trace is not None:
+        from steptwin.runtime.export import axis_views, write_trace
+
+        written = write_trace(world.trace, options.trace, views=axis_views(world.machines), until=world.now)
+        told += [f"wrote {path}" for path in written]
+    if options.session is not None:
+        sessions.save(session, options.session)
+        told.append(f"wrote {options.session}")
+    return [*told, f"{world.time:.3f} s, {len(session.inputs)} inputs, digest {session.digest}"]
+
+
+# ---------------------------------------------------------------------- links
+
+
+async def _open(server: Server, live: LiveWorld, options: UpOptions, name: str) -> None:
+    await server.open_control(name, _handlers(server.cell, live))
+    for line in live.world.spec.lines:
+        await _open_line(server, live, line, options)
+    if options.ready_file is not None:
+        server.write_ready_file(options.ready_file, name)
+
+
+async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: UpOptions) -> None:
+    number = count(1)
+    serial_kind = "rtu" if line.kind == "modbus" else "raw"
+    what = f"Modbus RTU, {line.name}" if line.kind == "modbus" else f"M1486 line, {line.name}"
+
+    def maker(link: str, kind: str, *, several: bool) -> Callable[[], PlacePort]:
+        return lambda: PlacePort(live, line.name, f"{link}-{next(number)}" if several else link, kind)
+
+    if line.pty is not None:
+        await server.open_pty(Path(line.pty), what, maker("pty", serial_kind, several=False))
+    if line.serial is not None:
+        baud = line.baud or 38400
+        await server.open_serial(line.serial, baud, what, maker("serial", serial_kind, several=False))
+    if line.tcp is not None:
+        address = parse_address(line.tcp, listen_any=options.listen_any)
+        kind = "tcp" if line.kind == "modbus" else "raw"
+        protocol = f"Modbus TCP, {line.name}" if line.kind == "modbus" else what
+        await server.open_tcp("tcp", address, protocol, maker("tcp", kind, several=True))
+    if line.rtu_tcp is not None:
+        if line.kind != "modbus":
+            raise Misuse(f"line {line.name!r}: rtu_tcp is for Modbus lines; use tcp")
+        address = parse_address(line.rtu_tcp, listen_any=options.listen_any)
+        await server.open_tcp("rtu-tcp", address, f"RTU over TCP, {line.name}", maker("rtu", "rtu", several=True))
+
+
+# ---------------------------------------------------------------------- a hand at the machine
+
+
+def _handlers(cell: Cell, live: LiveWorld) -> dict[str, Handler]:
+    """Requests of the control endpoint. ``unit`` is the name of a machine; pins are ``MACHINE.PIN``, buttons their names."""
+    world = live.world
+
+    def acting(action: Callable[[Mapping[str, Any]], object]) -> Handler:
+        def handle(request: Mapping[str, Any]) -> object:
+            cell.enter()
+            try:
+                return action(request)
+            finally:
+                live.stale = True
+                cell.leave()
+
+        return handle
+
+    def chosen(request: Mapping[str, Any]) -> str:
+        wanted = str(request.get("unit") or (next(iter(world.machines)) if len(world.machines) == 1 else ""))
+        for name in world.machines:
+            if name.upper() == wanted.upper():
+                return name
+        raise Misuse(f"choose a machine with --unit: {', '.join(world.machines)}")
+
+    def pin(request: Mapping[str, Any]) -> object:
+        for name, value in (request.get("set") or {}).items():
+            if not isinstance(value, int | float):
+                raise Misuse(f"{name} = {value!r}: a pin takes a number")
+            button = next((b for b in world.plan.buttons if b.upper() == name.upper()), None)
+            if button is not None:
+                world.outside(do.Press(button) if value else do.Release(button))
+                continue
+            owner, dot, rest = name.rpartition(".")
+            machine = chosen({"unit": owner} if dot else request)
+            world.outside(do.Set(((machine, rest.upper(), float(value)),)))
+        shown = list(world.machines) if request.get("unit") is None else [chosen(request)]
+        return {f"{name}.{pin}": value for name in shown for pin, value in world.machines[name].pins().items()}
+
+    def state(request: Mapping[str, Any]) -> object:
+        name = chosen(request)
+        world.touch(name)
+        machine = world.machines[name]
+        return state_of(machine, world.now) if isinstance(machine, Mic488) else state_of_chip(machine, world.now)
+
+    def power_cycle(request: Mapping[str, Any]) -> object:
+        world.outside(do.PowerCycle(chosen(request)))
+        return None
+
+    def encoder(request: Mapping[str, Any]) -> object:
+        name = chosen(request)
+        device = world.controller(name, "encoder")
+        for number, change in (request.get("set") or {}).items():
+            if not isinstance(change, int):
+                raise Misuse("what turns a shaft is said in the world's file: an encoder is turned by +N or -N counts")
+            world.outside(do.Turn(name, int(number), change))
+        world.touch(name)
+        return [
+            {"axis": a.number, "counts": a.encoder_counts(world.now), "turned_by": a.encoder.coupling.value} for a in device.axes
+        ]
+
+    return {
+        "pin": acting(pin),
+        "state": acting(state),
+        "power-cycle": acting(power_cycle),
+        "encoder": acting(encoder),
+        "fault": acting(lambda request: _fault(world, request)),
+    }
+
+
+def _fault(world: World, request: Mapping[str, Any]) -> object:
+    from steptwin.world.faults import read
+
+    faults = world.plan.faults
+    unwanted = request.get("clear") or []
+    for name in [active.name for active in faults.active] if unwanted is True else unwanted:
+        world.outside(do.ClearFault(name))
+    for line in request.get("set") or []:
+        world.outside(do.SetFault(read(line)))
+    return [{"name": a.name, "fault": str(a.fault), "happened": a.struck} for a in faults.active]
