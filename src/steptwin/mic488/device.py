@@ -21,6 +21,7 @@ from steptwin.mic488.program import LoadedProgram, ProgramControl
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
 from steptwin.mic488.slave import slave
 from steptwin.mic488.status import ControllerStatus, Status
+from steptwin.mic488.vision import Record
 from steptwin.state import Plain, Stateful
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable
@@ -99,6 +100,7 @@ class Mic488(Stateful):
     __slots__ = (
         "_due",
         "_edges",
+        "_others",
         "analog_v",
         "axes",
         "changed",
@@ -150,6 +152,8 @@ class Mic488(Stateful):
         self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._edges: list[Edge] = []
         self._due: Nanos | None = None
+        self._others: Nanos | None = None
+        """When something is due next, and of that when anything but the program is."""
         self.inputs = Inputs(config.inputs)
         self.analog_v = [0.0] * ANALOG_INPUTS
         self.outputs = [False] * OUTPUTS
@@ -207,28 +211,38 @@ class Mic488(Stateful):
         """Run everything due at ``at``; a program that concerns nothing else may go on up to ``until``."""
         self.now = at
         for _ in range(MAX_EVENTS_PER_INSTANT):
-            happened = False
-            changed: list[int] = []
-            due = self.inputs.deadline()
-            if due is not None and due <= at:
-                changed = self.inputs.settle(at)
-                happened = True
-            for axis in self.axes:
-                due = axis.deadline()
-                if due is not None and due <= at:
-                    axis.advance(at)
-                    happened = True
+            others = self._others
+            happened = others is not None and others <= at
             if happened:
-                self.program.disturbed(at, inside=True)
-                self.program.inputs_changed(changed, at)
-            due = self.program.deadline()
-            if due is not None and due <= at:
+                self._run_others(at)
                 others = self._due_without_program()
-                self.program.advance(at, until if others is None else min(until, others - 1))
-            self._find_due()
+            due = self.program.deadline()
+            acted = False
+            if due is not None and due <= at:
+                acted = self.program.advance(at, until if others is None else min(until, others - 1))
+            if acted or happened:
+                self._find_due()
+            else:
+                # The program concerned only itself: nothing else is due at another time than before.
+                due = self.program.deadline()
+                self._due = others if due is None or (others is not None and others < due) else due
+                self.changed()
             if self._due is None or self._due > at:
                 return
         raise Runaway(f"more than {MAX_EVENTS_PER_INSTANT} events of one MIC488 at {at} ns")
+
+    def _run_others(self, at: Nanos) -> None:
+        """Inputs, then axes; then the program is told, before its statement of this moment."""
+        changed: list[int] = []
+        due = self.inputs.deadline()
+        if due is not None and due <= at:
+            changed = self.inputs.settle(at)
+        for axis in self.axes:
+            due = axis.deadline()
+            if due is not None and due <= at:
+                axis.advance(at)
+        self.program.disturbed(at, inside=True)
+        self.program.inputs_changed(changed, at)
 
     def deadline(self) -> Nanos | None:
         return self._due
@@ -247,7 +261,7 @@ class Mic488(Stateful):
         return due
 
     def _find_due(self) -> None:
-        due = self._due_without_program()
+        self._others = due = self._due_without_program()
         at = self.program.deadline()
         if at is not None and (due is None or at < due):
             due = at
@@ -316,6 +330,14 @@ class Mic488(Stateful):
         """Analog input ``number`` (from 0) scaled by LoVal…HiVal."""
         scale = self.config.analog[number]
         return scale.lo_val + (scale.hi_val - scale.lo_val) * self.analog_v[number] / 10.0
+
+    # ------------------------------------------------------------------ the vision system on COM1
+
+    def see(self, record: Record, now: Nanos) -> None:
+        """A record of the vision system has come: it is in the registers Vision… of programs."""
+        self.advance(now)
+        self.program.registers.take_record(record)
+        self.touch()
 
     # ------------------------------------------------------------------ a hand on the shaft
 

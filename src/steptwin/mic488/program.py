@@ -286,31 +286,45 @@ class ProgramControl(Stateful):
                 due = at
         return due
 
-    def advance(self, now: Nanos, until: Nanos) -> None:
-        """Run what is due at ``now``, and of the program alone what follows up to ``until``."""
-        for number in sorted(number for number, at in self._pulses.items() if at <= now):
+    def advance(self, now: Nanos, until: Nanos) -> bool:
+        """Run what is due at ``now``, and of the program alone what follows up to ``until``. True: it acted on anything else."""
+        machine = self.machine
+        acted = bool(self._pulses) and self._invert(now)
+        if self.state is not ProgramState.RUNNING:
+            return acted
+        code = self._code()
+        ticks = self.registers.ticks
+        if ticks:
+            for event in sorted(event for event, at in ticks.items() if at <= now):
+                ticks[event] += EVENTS[event].period
+                machine.happen(code, event, now, now)
+        if machine.due is None or machine.due > now:
+            return acted
+        for at in (*ticks.values(), *self._pulses.values()):
+            until = min(until, at - 1)
+        machine.acted = False
+        try:
+            machine.run(code, max(until, now))
+        except ProgramFault as fault:
+            self._fail(str(fault))
+        if machine.acted:
+            self._look_at_drives(machine.now, machine.after(machine.now))
+            return True
+        return acted
+
+    def _invert(self, now: Nanos) -> bool:
+        """What PULSE has begun ends."""
+        over = sorted(number for number, at in self._pulses.items() if at <= now)
+        for number in over:
             del self._pulses[number]
             self.device.set_output(number, not self.device.outputs[number])
             self.machine.disturb(now)
-        if self.state is not ProgramState.RUNNING:
-            return
-        ticks = self.registers.ticks
-        for event in sorted(event for event, at in ticks.items() if at <= now):
-            ticks[event] += EVENTS[event].period
-            self.machine.happen(self._code(), event, now, now)
-        if self.machine.due is None or self.machine.due > now:
-            return
-        for at in (*ticks.values(), *self._pulses.values()):
-            until = min(until, at - 1)
-        try:
-            self.machine.run(self._code(), max(until, now))
-        except ProgramFault as fault:
-            self._fail(str(fault))
-        self._look_at_drives(self.machine.now, self.machine.after(self.machine.now))
+        return bool(over)
 
     def _fail(self, text: str) -> None:
         """WBC-5."""
-        now = self.now = self.machine.now
+        now = self.machine.now
+        self.machine.present()
         span = self._span(self.machine.pc)
         self.fault = Fault(span, text)
         self._stop()

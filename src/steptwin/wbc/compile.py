@@ -180,31 +180,33 @@ class _Compiler:
     def _branch(self, condition: s.Comparison, inside: int, outside: int) -> StepCode:
         a, b = self._cell(condition.left), self._cell(condition.right)
         if a is not None and b is not None:
-            compares = COMPARISONS[condition.sign]
-            return lambda m, cells: inside if compares(cells[a], cells[b]) else outside
+            return _BRANCHES[condition.sign](a, b, inside, outside)
         test = self._test(condition)
         return lambda m, cells: inside if test(m, cells) else outside
 
     def _set(self, step: s.Set, following: int) -> StepCode:
         if isinstance(step.target, s.Register):
-            return self._set_register(step.target, self._calculated(step.value), following)
+            calculated = isinstance(step.value, s.Operation | s.Function)
+            return self._set_register(step.target, self._calculated(step.value), following, calculated=calculated)
         target, value = step.target.index, step.value
         if isinstance(value, s.Operation):
             a, b = self._cell(value.left), self._cell(value.right)
             if a is not None and b is not None:
+                if value.operator in _ARITHMETIC:
+                    return _ARITHMETIC[value.operator](target, a, b, following)
                 return _set_cell_of_cells(target, OPERATIONS[value.operator], (a, b), following)
         return _set_cell(target, self._calculated(value), following)
 
-    def _set_register(self, register: s.Register, value: Value, following: int) -> StepCode:
+    def _set_register(self, register: s.Register, value: Value, following: int, *, calculated: bool) -> StepCode:
         access = self._registers[register.row.key]
         if access.write is None:
             raise ValueError(f"{register.name} cannot be written")
         write = access.write(register.number)
-        taken = _taken(register.row, register.name)
+        taken = _taken(register.row, register.name, calculated=calculated)
         if access.quiet:
 
             def set_quietly(m: Machine, cells: Cells) -> int:
-                if write(m.controller, taken(real(value(m, cells))), m.now):
+                if write(m.controller, taken(value(m, cells)), m.now):
                     m.effects += 1
                 return following
 
@@ -213,7 +215,7 @@ class _Compiler:
         around = ~following
 
         def set_register(m: Machine, cells: Cells) -> int:
-            number = taken(real(value(m, cells)))
+            number = taken(value(m, cells))
             if not write(m.present(), number, m.now):
                 return following
             m.effects += 1
@@ -262,14 +264,18 @@ def _side(left: Seen, right: Seen) -> Seen:
     return side
 
 
-def _taken(row: RegisterRow, name: str) -> Callable[[float], float]:
-    """What a register makes of a REAL: rounded where it is whole; out of range the nearest (WBC-14) or a program error."""
+def _taken(row: RegisterRow, name: str, *, calculated: bool) -> Callable[[float], float]:
+    """What a register makes of a value: rounded where it is whole; out of range the nearest (WBC-14) or a program error.
+
+    ``calculated``: it is the result of an operation, and not yet a REAL.
+    """
     domain = row.writes
     if domain is None or domain == REAL:
-        return lambda value: value
+        return real if calculated else lambda value: value
     low, high = domain.low, domain.high
 
     def taken(value: float) -> float:
+        value = real(value)
         if row.saturates:
             value = min(max(value, low), high)
         if domain.whole:
@@ -305,6 +311,44 @@ def _set_cell_of_cells(
         return following
 
     return step
+
+
+def _sum(target: int, a: int, b: int, following: int) -> StepCode:
+    def step(m: Machine, cells: Cells) -> int:
+        x = cells[a] + cells[b]
+        cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
+        return following
+
+    return step
+
+
+def _difference(target: int, a: int, b: int, following: int) -> StepCode:
+    def step(m: Machine, cells: Cells) -> int:
+        x = cells[a] - cells[b]
+        cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
+        return following
+
+    return step
+
+
+def _product(target: int, a: int, b: int, following: int) -> StepCode:
+    def step(m: Machine, cells: Cells) -> int:
+        x = cells[a] * cells[b]
+        cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
+        return following
+
+    return step
+
+
+_ARITHMETIC: Mapping[str, Callable[[int, int, int, int], StepCode]] = {"+": _sum, "-": _difference, "*": _product}
+
+_BRANCHES: Mapping[str, Callable[[int, int, int, int], StepCode]] = {
+    "=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] == cells[b] else outside,
+    "<": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] < cells[b] else outside,
+    ">": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] > cells[b] else outside,
+    "<=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] <= cells[b] else outside,
+    ">=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] >= cells[b] else outside,
+}
 
 
 def _wait(holds: Callable[[Machine, Cells], bool], number: int) -> StepCode:

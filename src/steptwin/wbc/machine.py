@@ -34,9 +34,10 @@ RETURNS = 16
 
 # WBC-24
 STATEMENTS_AT_ONCE = 1000
+STATEMENTS_OF_AN_ACTION = 20
 BREATH: Nanos = MILLISECOND
-"""With a statement time of 0: so many statements take no time, then as long passes. What waits looks at this interval, and
-whenever something happens."""
+"""With a statement time of 0: so many statements take no time (one that acts on the controller counts as several), then as long
+passes. What waits looks at this interval, and whenever something happens."""
 
 LONGEST_LOOP = 512
 """Statements of a loop that can rest."""
@@ -69,9 +70,6 @@ class Machine(Stateful):
     All state is plain data: a snapshot in the middle of a program is complete but for the program itself.
     """
 
-    rests = True
-    """Off, every look is taken: what tests compare with."""
-
     __slots__ = (
         "_base",
         "_loop",
@@ -82,6 +80,7 @@ class Machine(Stateful):
         "_spent",
         "_trail",
         "_unmarked",
+        "acted",
         "cells",
         "controller",
         "due",
@@ -92,18 +91,21 @@ class Machine(Stateful):
         "paused_at",
         "pc",
         "pending",
+        "rests",
         "running",
         "stack",
         "statement_time",
         "waiting",
     )
-    FIXED = frozenset({"controller", "statement_time"})
+    FIXED = frozenset({"controller", "rests", "statement_time"})
 
     def __init__(self, controller: Controller, statement_time: Nanos = STATEMENT_TIME) -> None:
         if statement_time and not SHORTEST_STATEMENT_TIME <= statement_time <= LONGEST_STATEMENT_TIME:
             permitted = f"0 and {SHORTEST_STATEMENT_TIME / MILLISECOND:g} to {LONGEST_STATEMENT_TIME / MILLISECOND:g} ms"
             raise Misuse(f"statement time = {statement_time / MILLISECOND:g} ms: permitted are {permitted}")
         self.controller = controller
+        self.rests = True
+        """Off, every look is taken: what tests compare with."""
         self.statement_time = statement_time
         self.cells = array("f")
         self.now: Nanos = 0
@@ -112,8 +114,13 @@ class Machine(Stateful):
         """When the next statement is executed; None: nothing but an event will have one executed."""
         self.running = False
         self.paused_at: Nanos | None = None
+        self.acted = False
+        """The controller has been asked for something since somebody set this to False."""
         self.effects = 0
         """How often the program has changed something outside its cells since the mark."""
+        self._moment: Nanos = -1
+        self._spent = 0
+        """Statements executed at that moment; a program that starts itself again has no more of them."""
         self.clear()
 
     def clear(self) -> None:
@@ -128,8 +135,6 @@ class Machine(Stateful):
         self.waiting = False
         """The statement at ``pc`` is in progress: its last look failed."""
         self.not_before: Nanos = 0
-        self._moment: Nanos = 0
-        self._spent = 0
         self._marks = 0
         self._unmarked = 0
         self._forget()
@@ -235,6 +240,7 @@ class Machine(Stateful):
 
     def present(self) -> Controller:
         """The controller at the moment of the statement in execution."""
+        self.acted = True
         self.controller.now = self.now
         return self.controller
 
@@ -260,6 +266,9 @@ class Machine(Stateful):
         if now != self._moment:
             self._moment = now
             self._spent = 0
+        if self.statement_time == 0:
+            self._dash_at_once(code)
+            return
         while True:
             if self._trail is None:
                 if not self._dash(code, until):
@@ -271,12 +280,11 @@ class Machine(Stateful):
         """Execute until something has to be looked at. True: go on, now recording."""
         steps, cells, pause = code.steps, self.cells, self.statement_time
         pc, now, unmarked = self.pc, self.now, self._unmarked
-        marks = self.rests and pause > 0
+        marks = self.rests
         self.waiting = False
         self.not_before = 0
-        executed = 0
         try:
-            for executed in range(1, STATEMENTS_AT_ONCE - self._spent + 1):  # noqa: B007
+            while True:
                 following = steps[pc](self, cells)
                 if following < 0:
                     pc = ~following
@@ -299,12 +307,25 @@ class Machine(Stateful):
         finally:
             self.pc = pc
             self._unmarked = unmarked
-            self._spent += executed
-        if pause:
-            self._spent = 0
-            return True
-        self.due = now + BREATH
-        return False
+
+    def _dash_at_once(self, code: Code) -> None:
+        """`_dash` without time: up to `STATEMENTS_AT_ONCE` statements at this moment, then a breath."""
+        steps, cells = code.steps, self.cells
+        pc, executed, acted = self.pc, self._spent, 0
+        self.waiting = False
+        self.not_before = 0
+        try:
+            for executed in range(self._spent + 1, STATEMENTS_AT_ONCE + 1):  # noqa: B007
+                pc = steps[pc](self, cells)
+                if pc < 0:
+                    pc = self.pc = ~pc
+                    self._look_around(code)
+                    acted = STATEMENTS_OF_AN_ACTION - 1
+                    return
+            self.due = self.now + BREATH
+        finally:
+            self.pc = pc
+            self._spent = executed + acted
 
     def _look_around(self, code: Code) -> None:
         """A statement acted on the controller, waits, or lets interrupts in."""
@@ -326,6 +347,7 @@ class Machine(Stateful):
     def _wait(self, code: Code) -> None:
         """A look failed: rest until the next one that can succeed."""
         self._trail = None
+        self._marks = self._unmarked = 0
         period = self.statement_time or BREATH
         self.due = self.now + period
         if self.rests:
@@ -353,10 +375,12 @@ class Machine(Stateful):
         while len(trail) < LONGEST_LOOP:
             now = self.now
             visit = self._visit(now - self._mark)
-            if trail and visit.step == trail[0].step:
-                if visit._replace(offset=0) == trail[0] and self.effects == 0 and self._rest(code, tuple(trail), visit.offset):
-                    return False
-                break
+            if trail and visit.step <= trail[-1].step:
+                again = next((i for i, earlier in enumerate(trail) if earlier.step == visit.step), None)
+                if again is not None:
+                    if self.effects == 0 and self._rest(code, trail[again:], visit):
+                        return False
+                    break
             trail.append(visit)
             self.waiting = False
             self.not_before = 0
@@ -374,14 +398,19 @@ class Machine(Stateful):
         self._marks += 1
         return True
 
-    def _rest(self, code: Code, loop: tuple[Visit, ...], period: Nanos) -> bool:
-        """Rest in a loop that has come round; False when it cannot be foreseen."""
-        self._loop, self._base, self._period = loop, self._mark, period
+    def _rest(self, code: Code, loop: list[Visit], again: Visit) -> bool:
+        """Rest in a loop that has come round to ``again``; False when it has not, or cannot be foreseen."""
+        begin = loop[0].offset
+        if again._replace(offset=begin) != loop[0]:
+            return False
+        self._loop = tuple(visit._replace(offset=visit.offset - begin) for visit in loop)
+        self._base, self._period = self._mark + begin, again.offset - begin
         foreseen = self._foresee(code)
         if foreseen is None:
             self._loop = ()
             return False
         self._trail = None
+        self._marks = 0
         self.due = foreseen if foreseen >= 0 else None
         return True
 

@@ -1,0 +1,95 @@
+"""Records of a vision system on COM1 (WBC registers Vision…): ASCII ``N3 X12.5 Y-7 A90`` and a line end (WBC-27).
+
+COM1 carries Modbus too: what forms a record outside a Modbus frame is taken as one (WBC-15).
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+from steptwin.wire.slave import Direction, RtuSlavePort
+
+if TYPE_CHECKING:
+    from steptwin.mic488.device import Mic488
+
+LONGEST_RECORD = 80
+"""Characters; of more that comes without a line end the last ones are kept."""
+
+_LINE_END = re.compile(rb"[\r\n]+")
+_NUMBER = rb"\s*([+-]?\d{1,9}(?:[.,]\d{1,9})?)\s*"
+_RECORD = re.compile(rb"N" + _NUMBER + rb"X" + _NUMBER + rb"Y" + _NUMBER + rb"A" + _NUMBER + rb"\Z", re.ASCII | re.IGNORECASE)
+
+
+class Record(NamedTuple):
+    """``n`` goes to VisionNo."""
+
+    n: float
+    x: float
+    y: float
+    a: float
+
+
+class VisionReceiver(Stateful):
+    """Cuts records out of what comes, in pieces of any size. A line that is no record is passed over."""
+
+    __slots__ = ("_line",)
+
+    def __init__(self) -> None:
+        self._line = b""
+
+    def feed(self, data: bytes) -> list[Record]:
+        """The records completed by ``data``."""
+        *lines, rest = _LINE_END.split(self._line + data)
+        self._line = rest[-LONGEST_RECORD:]
+        found = (_RECORD.search(line[-LONGEST_RECORD:]) for line in lines)
+        return [Record(*(float(number.replace(b",", b".")) for number in match.groups())) for match in found if match]
+
+    def forget(self) -> None:
+        """What has come of the present line is no part of a record."""
+        self._line = b""
+
+
+class Com1Port(Stateful):
+    """COM1 of one controller as a `steptwin.machine.WirePort`: Modbus RTU through ``modbus``, if it is given, and records."""
+
+    __slots__ = ("_device", "_frames", "_receiver", "modbus")
+    FIXED = frozenset({"_device", "_frames", "modbus"})
+
+    def __init__(self, device: Mic488, modbus: RtuSlavePort | None = None) -> None:
+        self._device = device
+        self._receiver = VisionReceiver()
+        self.modbus = modbus
+        self._frames: list[bytes] = []
+        if modbus is not None:
+            told = modbus.on_frame
+
+            def note(now: Nanos, direction: Direction, frame: bytes) -> None:
+                if direction is Direction.IN:
+                    self._frames.append(frame)
+                if told is not None:
+                    told(now, direction, frame)
+
+            modbus.on_frame = note
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        if self.modbus is not None:
+            self.modbus.receive(data, now)
+            for frame in self._frames:
+                if frame in data:
+                    data = data.replace(frame, b"\n", 1)
+                else:
+                    # It began in an earlier piece and ends in this one.
+                    self._receiver.forget()
+                    data = b""
+            self._frames.clear()
+        for record in self._receiver.feed(data):
+            self._device.see(record, now)
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        return [] if self.modbus is None else self.modbus.to_send(now)
+
+    def deadline(self) -> Nanos | None:
+        return None if self.modbus is None else self.modbus.deadline()

@@ -1,0 +1,174 @@
+"""What holds for every program: it is deterministic, resting and looking change nothing, snapshots are complete."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from steptwin.machine import MILLISECOND, SECOND, Edge, Nanos
+from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
+from steptwin.mic488.device import Mic488
+from steptwin.mic488.program import LoadedProgram, load
+from steptwin.wbc.check import check
+from steptwin.wbc.positions import PositionTable, parse_positions
+
+AXES = (
+    AxisConfig(gear=10.0, acc=500.0, dec=800.0, vel=60.0, in_kl=0, limit_mode=1),
+    AxisConfig(gear=10.0, acc=500.0, dec=500.0, vel=60.0),
+    AxisConfig(gear=3.0, acc=50.0, dec=20.0, vel=90.0, pos_ctrl_mode=1, err_ctrl_mode=1),
+    AxisConfig(),
+)
+CONFIG = replace(ControllerConfig(), axes=AXES, inputs=(InputConfig(), *(InputConfig(interrupt=1),) * 19))
+
+Act = tuple[Nanos, str, Any]
+_WRITE = bytes.fromhex("10 0000 0002 04")
+
+
+def acts() -> SearchStrategy[list[Act]]:
+    """What happens to a controller meanwhile: pins, writes of a master, pauses."""
+    pin = st.tuples(st.just("pin"), st.tuples(st.integers(1, 20), st.booleans()))
+    write = st.tuples(st.just("write"), st.binary(min_size=4, max_size=4))
+    control = st.tuples(st.just("control"), st.sampled_from((1, 2, 2, 1)))
+    volts = st.tuples(st.just("volts"), st.integers(0, 10))
+    moment = st.one_of(st.integers(0, 3000).map(lambda ms: ms * MILLISECOND), st.integers(0, 3 * SECOND))
+    act = st.tuples(moment, st.one_of(pin, pin, write, control, volts)).map(lambda a: (a[0], *a[1]))
+    return st.lists(act, max_size=12).map(lambda found: sorted(found, key=lambda a: a[0]))
+
+
+def ready(text: str, rows: str) -> tuple[LoadedProgram, PositionTable]:
+    table, _ = parse_positions(rows)
+    return load(check(text, table)), table
+
+
+def started(loaded: tuple[LoadedProgram, PositionTable], statement_time: Nanos = MILLISECOND, *, rests: bool = True) -> Mic488:
+    program, table = loaded
+    device = Mic488(CONFIG, programs={0: program}, positions={0: table}, statement_time=statement_time)
+    device.program.machine.rests = rests
+    device.program.command(1, 0)
+    device.touch()
+    return device
+
+
+def act(device: Mic488, one: Act) -> None:
+    now, what, value = one
+    if what == "pin":
+        device.set_pin(f"IN{value[0]}", float(value[1]), now)
+    elif what == "write":
+        device.execute(_WRITE + value, now)
+    elif what == "volts":
+        device.set_pin("AIN1", float(value), now)
+    else:
+        device.advance(now)
+        device.program.command(value, now)
+        device.touch()
+
+
+Seen = tuple[list[Edge], Any, bytes, list[tuple[int, int, float]], list[Any]]
+
+
+def seen(device: Mic488) -> Seen:
+    control, now = device.program, device.now
+    axes = [(axis.status, axis.coordinate_p(now), axis.profile.velocity(now)) for axis in device.axes]
+    events = [(event.time, event.code, event.text) for event in device.events]
+    return device.take_edges(), (control.state, control.statement, control.fault), device.user.tobytes(), axes, events
+
+
+END = 4 * SECOND
+STATEMENT_TIMES = (MILLISECOND, 700_001, 13 * MILLISECOND)
+
+
+@pytest.fixture(scope="module")
+def cases(programs: SearchStrategy[Any]) -> SearchStrategy[Any]:
+    return st.tuples(programs, acts(), st.sampled_from(STATEMENT_TIMES))
+
+
+few = settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
+
+
+@few
+@given(data=st.data())
+def test_wbc_18_resting_changes_nothing(data: st.DataObject, cases: SearchStrategy[Any]) -> None:
+    program, happening, statement_time = data.draw(cases)
+    loaded = ready(program.text, program.positions)
+    resting, looking = (started(loaded, statement_time, rests=rests) for rests in (True, False))
+    for one in happening:
+        act(resting, one)
+        act(looking, one)
+    resting.advance(END)
+    looking.advance(END)
+    assert seen(resting) == seen(looking)
+
+
+@few
+@given(data=st.data())
+def test_one_jump_is_many_steps(data: st.DataObject, cases: SearchStrategy[Any]) -> None:
+    program, happening, statement_time = data.draw(cases)
+    loaded = ready(program.text, program.positions)
+    jumping, stepping = started(loaded, statement_time), started(loaded, statement_time)
+    looks = data.draw(st.lists(st.integers(0, END), max_size=30))
+    for moment, one in sorted([*((one[0], one) for one in happening), *((look, None) for look in looks)], key=lambda a: a[0]):
+        stepping.advance(moment)
+        assert stepping.deadline() is None or stepping.deadline() > moment  # type: ignore[operator]
+        _ = stepping.program.statement
+        if one is not None:
+            act(stepping, one)
+            act(jumping, one)
+    jumping.advance(END)
+    stepping.advance(END)
+    assert seen(jumping) == seen(stepping)
+
+
+@few
+@given(data=st.data())
+def test_a_snapshot_at_any_moment_is_complete(data: st.DataObject, cases: SearchStrategy[Any]) -> None:
+    program, happening, statement_time = data.draw(cases)
+    loaded = ready(program.text, program.positions)
+    one = started(loaded, statement_time)
+    moment = data.draw(st.integers(0, END))
+    for what in happening:
+        if what[0] <= moment:
+            act(one, what)
+    one.advance(moment)
+    one.take_edges()
+    snapshot = pickle.loads(pickle.dumps(one.snapshot()))
+    other = started(loaded, statement_time)
+    other.restore(snapshot)
+    for what in happening:
+        if what[0] > moment:
+            act(one, what)
+            act(other, what)
+    one.advance(END)
+    other.advance(END)
+    ends = seen(one)
+    assert ends == seen(other)
+    one.restore(snapshot)
+    for what in happening:
+        if what[0] > moment:
+            act(one, what)
+    one.advance(END)
+    assert seen(one) == ends
+
+
+@few
+@given(data=st.data())
+def test_wbc_24_without_statement_time_every_program_comes_to_an_end_of_each_moment(
+    data: st.DataObject, cases: SearchStrategy[Any]
+) -> None:
+    program, happening, _ = data.draw(cases)
+    loaded = ready(program.text, program.positions)
+    one, other = started(loaded, 0), started(loaded, 0)
+    for moment, *what in happening:
+        one_tenth = (moment // 10, *what)
+        act(one, one_tenth)
+        other.advance(max(other.now, moment // 20))
+        act(other, one_tenth)
+    end = max(one.now, other.now) + 50 * MILLISECOND
+    one.advance(end)
+    other.advance(end)
+    assert seen(one) == seen(other)
