@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
@@ -18,7 +18,7 @@ Serve = Callable[..., Any]
 
 
 @contextmanager
-def opened(twin: Any, baud: int) -> Iterator[serial.Serial]:
+def opened(twin: Any, baud: int) -> Generator[serial.Serial]:
     with serial.Serial(str(twin.pty), baudrate=baud, timeout=20) as port:
         yield port
 
