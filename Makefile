@@ -17,7 +17,7 @@ export UV_PYTHON_DOWNLOADS := never
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 
-PEER_PACKAGES := mbpoll libmodbus-dev gcc libc6-dev pkg-config make
+PEER_PACKAGES := mbpoll libmodbus-dev gcc libc6-dev pkg-config make ser2net
 
 .DEFAULT_GOAL := help
 .PHONY: help run test lint format types imports bench docs peers lock clean

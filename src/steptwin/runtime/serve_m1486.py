@@ -22,6 +22,7 @@ from steptwin.runtime.links import Feed
 from steptwin.runtime.m1486 import ChainOptions, M1486Line, parse_addresses, parse_wire
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.output import Output
+from steptwin.runtime.rfc2217 import over_network
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop, shows_live_view
 from steptwin.runtime.tcp import parse_address
@@ -42,6 +43,7 @@ class M1486Options:
     serial: str | None = None
     baud: int | None = None
     tcp: str | None = None
+    rfc2217: str | None = None
     state: Path | None = None
     program: Path | None = None
     line_timing: str = "off"
@@ -59,8 +61,9 @@ def serve(options: M1486Options) -> None:
     check_name(options.name)
     kind = variant(options.variant)
     baud_pins(kind, options.baud)
-    if options.tcp is not None:
-        parse_address(options.tcp, listen_any=options.listen_any)
+    for address in (options.tcp, options.rfc2217):
+        if address is not None:
+            parse_address(address, listen_any=options.listen_any)
     chain = ChainOptions(
         variant=kind,
         addresses=parse_addresses(options.chain),
@@ -128,6 +131,9 @@ async def _open(server: Server, line: M1486Line, options: M1486Options) -> None:
         await server.open_serial(options.serial, line.baud, CHARACTERS, lambda: line.port("serial"))
     if options.tcp is not None:
         await server.open_tcp("tcp", parse_address(options.tcp, listen_any=options.listen_any), CHARACTERS, line.client_port)
+    if options.rfc2217 is not None:
+        address = parse_address(options.rfc2217, listen_any=options.listen_any)
+        await server.open_tcp("rfc2217", address, CHARACTERS, lambda: over_network(line.client_port()))
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file, options.name)
 
