@@ -89,7 +89,7 @@ function drawCurve(pen, lane, top, bottom) {
     }
   }
   line.stroke();
-  drawBounds(pen, least, most, top, bottom);
+  if (!lane.thin) drawBounds(pen, least, most, top, bottom);
 }
 
 function drawBounds(pen, least, most, top, bottom) {
@@ -308,8 +308,9 @@ function drawGrid(pen, view, height) {
 }
 
 // The whole run: how fast the axes are, and where something happened.
-function drawOverview(pen, axes, height) {
-  const c = pen.context, bands = axes.slice(0, 8), tall = (height - 14) / Math.max(bands.length, 1);
+function drawOverview(pen, height) {
+  const c = pen.context, motions = DATA.axes.slice(0, 64).map((axis) => new Motion(axis)).filter((motion) => motion.moves());
+  const bands = motions.slice(0, 8).map((motion) => ({ motion, range: motion.range(true, 0, SPAN) })), tall = (height - 14) / Math.max(bands.length, 1);
   bands.forEach(({ motion, range }, row) => {
     const fastest = Math.max(Math.abs(range[0]), Math.abs(range[1])) || 1, bottom = 4 + (row + 1) * tall;
     c.fillStyle = pen.color("--velocity");

@@ -38,6 +38,10 @@ class Motion {
     const o = i * PIECE;
     return this.pieces[o + 4] !== 0 || (!velocity && this.pieces[o + 3] !== 0);
   }
+  moves() {
+    for (let i = 0; i < this.size; i++) if (this.direction(i) !== 0) return true;
+    return false;
+  }
   direction(i) { return this.pieces[i * PIECE + 6]; }
   grid(i) { return this.pieces[i * PIECE + 7]; }
   // STEP pulses given within piece i up to t.
@@ -121,7 +125,9 @@ function lanesOf(machine) {
   for (const axis of DATA.axes.filter((axis) => axis.machine === machine)) {
     const motion = new Motion(axis);
     const common = { machine, motion, unit: axis.unit };
-    lanes.push({ ...common, kind: "position", name: `${axis.name} position`, first: true, range: motion.range(false, 0, SPAN) });
+    const moves = motion.moves();
+    lanes.push({ ...common, kind: "position", name: `${axis.name} position`, first: true, range: motion.range(false, 0, SPAN), thin: !moves });
+    if (!moves) continue;
     lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, range: motion.range(true, 0, SPAN) });
     lanes.push({ ...common, kind: "step", name: `${axis.name} pulses` });
   }
@@ -145,7 +151,7 @@ function lanesOf(machine) {
   });
   lanes.push(...groups.values());
   for (const lane of lanes) {
-    lane.height = HEIGHTS[lane.kind];
+    lane.height = lane.thin ? HEIGHTS.level : HEIGHTS[lane.kind];
     lane.color = COLORS[lane.kind] ?? MARK_COLORS[lane.mark];
   }
   return lanes;

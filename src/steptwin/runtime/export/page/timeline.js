@@ -191,8 +191,7 @@ function paintOverview() {
   const [c, width, height] = prepare(overview);
   const whole = { from: 0, to: SPAN, scaled: false }, pen = new Pen(c, whole, width, color);
   if (overviewImage === null) {
-    const axes = (machines.find((m) => m.lanes)?.lanes ?? []).filter((lane) => lane.kind === "velocity");
-    drawOverview(pen, axes, height);
+    drawOverview(pen, height);
     overviewImage = document.createElement("canvas");
     overviewImage.width = overview.width;
     overviewImage.height = overview.height;
