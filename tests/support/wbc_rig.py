@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
-from mic488_rig import Rig
+from mic488_rig import Rig, controller
 
 from steptwin.machine import SECOND
-from steptwin.mic488.config import ControllerConfig, read_config
+from steptwin.mic488.config import AxisConfig, ControllerConfig, read_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.program import LoadedProgram, load
 from steptwin.wbc.check import check
@@ -17,6 +18,8 @@ from steptwin.wbc.positions import PositionTable, parse_positions
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "mic488"
 STOPPED, RUNNING, PAUSED = 0, 1, 2
+MM = AxisConfig(unit=3, gear=100.0, acc=200.0, dec=200.0, vel=50.0)
+"""A spindle."""
 
 
 def loaded(text: str, rows: str = "", firmware: str = "1.70") -> tuple[LoadedProgram, PositionTable]:
@@ -30,7 +33,7 @@ class ProgramRig(Rig):
     """Bank 0 holds the program of ``text`` and the position table of ``rows``, checked without errors."""
 
     def __init__(
-        self, text: str, rows: str = "", config: ControllerConfig | None = None, firmware: str = "1.70", **options: object
+        self, text: str, rows: str = "", config: ControllerConfig | None = None, firmware: str = "1.70", **options: Any
     ) -> None:
         program, table = loaded(text, rows, firmware)
         super().__init__(config, firmware, programs={0: program}, positions={0: table}, **options)
@@ -96,6 +99,13 @@ class ProgramRig(Rig):
     def changes(self, pin: str) -> list[tuple[float, float]]:
         """(seconds, level) of every change of an output pin so far."""
         return [(edge.time / SECOND, edge.value) for edge in self.edges if edge.pin == pin]
+
+
+def started(text: str, rows: str = "", axes: int = 2, **options: Any) -> ProgramRig:
+    """A running program; the first ``axes`` are spindles."""
+    rig = ProgramRig(text, rows, controller(*[MM] * axes), **options)
+    rig.start()
+    return rig
 
 
 def example(name: str) -> ProgramRig:

@@ -1,0 +1,166 @@
+"""Registers, motion statements and position tables as a running program and a master see them."""
+
+from __future__ import annotations
+
+import pytest
+from mic488_rig import controller
+from wbc_rig import MM, RUNNING, STOPPED, ProgramRig, started
+
+# ---------------------------------------------------------------------- registers
+
+
+def test_user_registers_are_one_memory_with_the_low_word_first() -> None:
+    rig = ProgramRig("$D10 = $R20 + 0\n$R30 = $I40\n$I50 = $D60\n$I51 = $I41\nWAIT IN9 = ON\n")
+    rig.r(20, 70000.4)
+    rig.i(40, -5)
+    rig.write_words(60, 0x2345, 0x0001)
+    rig.start()
+    rig.wait(0.1)
+    assert rig.read_words(10, 2) == [70000 & 0xFFFF, 1]
+    assert rig.r(30) == -5.0
+    assert rig.i(50) == 32767  # WBC-14: the nearest it can hold
+
+
+def test_wbc_14_whole_registers_take_the_nearest_number() -> None:
+    rig = ProgramRig("$I0 = $R20\n$D2 = $R20\nOUTPUTS = $R20\n$I1 = OUTPUTS\nWAIT IN9 = ON\n")
+    for value, word, dint, bits in [
+        (2.5, 2, 2, 2), (3.5, 4, 4, 4), (-0.4, 0, 0, 0), (40000.0, 32767, 40000, 0x40), (-1e20, -32768, -(2**31), 0),
+    ]:  # fmt: skip
+        rig.r(20, value)
+        rig.start()
+        rig.wait(0.1)
+        assert (rig.i(0), rig.d(2), rig.i(1)) == (word, dint, bits), value
+        rig.halt()
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("7 / 2", 3.5), ("7 % 4", 3.0), ("-7 % 4", -3.0), ("6 & 3", 2.0), ("6 | 3", 7.0), ("2 && 0", 0.0), ("2 && -1", 1.0),
+        ("0 || 0", 0.0), ("0.4 || 0", 0.0), ("3 << 4", 48.0), ("-16 >> 2", -4.0), ("5.6 & 7", 6.0), ("1 << 31", -(2.0**31)),
+        ("sin(30)", 0.5), ("cos(60)", 0.5), ("tg(45)", 1.0), ("ctg(45)", 1.0), ("asin(1)", 90.0), ("acos(0)", 90.0),
+        ("sqrt(2,25)", 1.5), ("min(2, -3)", -3.0), ("max(2, -3)", 2.0), ("16777216 + 1", 16777216.0),
+        ("1 - 0.9", 0.10000002384185791),
+    ],
+)  # fmt: skip
+def test_calculations_in_single_precision(expression: str, expected: float) -> None:
+    rig = started(f"$R0 = {expression}\nWAIT IN9 = ON\n")
+    rig.wait(0.1)
+    assert rig.r(0) == pytest.approx(expected, rel=2e-7)
+
+
+def test_timers_count_up_and_stop_at_999999() -> None:
+    rig = started("TIMA3 = 100\nTIMB16 = 999998\nMAIN:\n$D0 = TIMA3\n$D2 = TIMB16\n$D4 = TIMA1\nDELAY 0.01\nJUMP MAIN\n")
+    rig.wait(1.5)
+    assert rig.d(0) in (248, 249)
+    assert rig.d(2) == 999999
+    assert rig.d(4) in (148, 149)
+    rig.wait(10.0)
+    assert rig.d(2) == 999999
+
+
+def test_pulse_inverts_without_blocking() -> None:
+    rig = started("OUT2 = ON\nPULSE(OUT1, 0.5)\nPULSE(OUT2, 0.25)\nOUT3 = ON\nWAIT IN9 = ON\n")
+    rig.wait(2.0)
+    assert rig.changes("OUT3") == [(0.004, 1.0)]
+    assert rig.changes("OUT1") == [(0.502, 1.0)]
+    assert rig.changes("OUT2") == [(0.001, 1.0), (0.253, 0.0)]
+
+
+def test_drive_registers_as_the_master_sees_them() -> None:
+    text = (
+        "M1 = ON\nAccM1 = 500\nDecM1 = 250\nVmaxM1 = 20\nLimRM1 = 30\nPABS M1 100\n$I0 = M1\nWAIT M1 = OFF\n"
+        "$I1 = M1\n$I2 = StatM1\n$R4 = PosM1\nPosM1 = 7,5\nENC1 = 1234\n$D6 = ENC1\nWAIT IN9 = ON\n"
+    )
+    rig = started(text)
+    rig.wait(5.0)
+    assert (rig.get("ACC"), rig.get("DEC"), rig.get("VMAX"), rig.get("POSLIM_R")) == (500.0, 250.0, 20.0, 30.0)
+    assert (rig.i(0), rig.i(1), rig.i(2), rig.r(4), rig.d(6)) == (1, 0, 10, 30.0, 1234)
+    assert (rig.position(), rig.get("ENC_IMP")) == (7.5, 1234)
+
+
+def test_status_register_of_the_generations() -> None:
+    text = "M1 = ON\nWAIT IN9 = ON\n$I0 = STATUS + 100\nWAIT IN10 = ON\n"
+    rig = started(text)
+    rig.wait(0.1)
+    rig.pin("IN9", 1.0)
+    rig.wait(0.1)
+    assert rig.i(0) == 100
+    assert started(text, firmware="1.40").state == RUNNING
+
+
+def test_analog_inputs_are_scaled() -> None:
+    rig = started("MAIN:\n$R0 = AIN1\n$R2 = AIN2\nDELAY 0.05\nJUMP MAIN\n")
+    rig.pin("AIN1", 2.5)
+    rig.pin("AIN2", 10.0)
+    rig.wait(0.1)
+    assert (rig.r(0), rig.r(2)) == (2.5, 10.0)
+
+
+# ---------------------------------------------------------------------- motion statements
+
+ROWS = "here;10;x;x;x\nboth;30;20;x;x\nline;40;0;25;x\ncircle;50;0;10;360\narc;20;40;10;0\nnothing;x;x;x;x\n"
+
+
+def test_moveptp_starts_all_axes_in_the_same_instant() -> None:
+    rig = started("M1 = ON\nM2 = ON\nMOVEPTP @both\nWAITPOS\nOUT1 = ON\nWAIT IN9 = ON\n", ROWS)
+    rig.wait(0.1)
+    assert [axis.profile.start for axis in rig.device.axes[:2]] == [3_000_000] * 2
+    rig.wait(5.0)
+    assert (rig.position(1), rig.position(2), rig.out(1)) == (30.0, 20.0, True)
+
+
+def test_wbc_8_waitpos_skips_drives_that_are_off_and_never_ends_in_velocity_mode() -> None:
+    rig = started("M1 = ON\nPABS M1 10\nPABS M2 50\nWAITPOS\nOUT1 = ON\nVABS M1 5\nWAITPOS\nOUT2 = ON\n")
+    rig.wait(60.0)
+    assert (rig.out(1), rig.out(2)) == (True, False)
+    rig.stop()
+    rig.wait(0.01)
+    assert rig.out(2) or rig.state == STOPPED
+
+
+def test_waitpos_passes_at_a_limit() -> None:
+    rig = started("M1 = ON\nLimRM1 = 15\nPABS M1 100\nWAITPOS\n$R0 = PosM1\n$I2 = StatM1\nWAIT IN9 = ON\n")
+    rig.wait(5.0)
+    assert (rig.r(0), rig.i(2)) == (15.0, 10)
+
+
+def test_brake_ramps_and_stop_does_not() -> None:
+    rig = started("M1 = ON\nM2 = ON\nVABS M1 40\nVABS M2 40\nDELAY 1\nBRAKE M1\nSTOP M2\nWAIT IN9 = ON\n")
+    rig.wait(1.06)
+    assert 0.0 < rig.velocity(1) < 40.0
+    assert rig.velocity(2) == 0.0
+    rig.wait(1.0)
+    assert rig.velocity(1) == 0.0
+
+
+def test_a_line_from_the_registers_of_row_0() -> None:
+    rows = "scratch;x;x;x;x\n"
+    rig = started("M1 = ON\nM2 = ON\nLinX = 30\nLinY = 40\nLinVel = 25\nMOVELIN 0\nWAITPOS\nOUT1 = ON\nWAIT IN9 = ON\n", rows)
+    rig.wait(1.0)
+    # WBC-16: what was left alone counts now; WBC-11: speed along the line.
+    assert (rig.velocity(1), rig.velocity(2)) == (pytest.approx(15.0), pytest.approx(20.0))
+    rig.pin_until("OUT1", 1.0)
+    assert (rig.position(1), rig.position(2)) == (30.0, 40.0)
+    # 50 mm at 25 mm/s with ramps of 200 mm/s².
+    assert rig.now / 1e9 == pytest.approx(0.006 + 50 / 25 + 25 / 200, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("statement", "rows", "problem"),
+    [
+        ("MOVEPTP $I0", ROWS, "row"),
+        ("DOARC @far", "far;500;500;10;0\n", "arc"),
+        ("DOCIRC @circle", ROWS, "begins at"),
+        ("CircR = 0\nMOVETOCIRC 0", "c;10;10;5;360\n", "radius"),
+        ("LinVel = 0\nMOVELIN 0", "c;10;10;5;x\n", "velocity"),
+    ],
+)
+def test_paths_that_cannot_be_run_are_program_errors(statement: str, rows: str, problem: str) -> None:
+    rig = ProgramRig(f"M1 = ON\nM2 = ON\n{statement}\nWAIT IN9 = ON\n", rows, controller(MM, MM))
+    rig.i(0, 99)
+    rig.start()
+    rig.wait(0.1)
+    assert (rig.state, rig.m_status) == (STOPPED, 2)
+    (error,) = rig.events("program-error")
+    assert problem in error.text.lower()
