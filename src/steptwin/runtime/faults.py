@@ -44,25 +44,36 @@ class FaultDesk:
         self.faults.sinks.append(told)
 
     def handler(self, cell: Cell) -> Handler:
-        """Request of the control endpoint: ``clear`` (names, or true for all), then ``set`` (lines); answers what is set."""
+        """Request of the control endpoint: ``set`` (lines) and ``clear`` (names, or true for all there were), all of it or
+        nothing; answers what is set then."""
 
         def handle(request: Mapping[str, Any]) -> object:
-            wanted, unwanted = request.get("set") or [], request.get("clear") or []
-            fresh = [read(line) for line in wanted]
+            wanted, unwanted = _texts(request, "set"), request.get("clear")
+            there = [active.name for active in self.faults.active]
+            names = there if unwanted is True else _texts(request, "clear")
+            for name in names:
+                if name not in there:
+                    raise Misuse(f"no fault {name!r}: set are {', '.join(there) or 'none'}")
             now = cell.enter()
             try:
-                if unwanted is True:
-                    self.faults.clear(now)
-                else:
-                    for name in unwanted:
-                        self.faults.remove(name, now)
-                for fault in fresh:
-                    self._add(fault, now)
+                self._add_all([read(line) for line in wanted], now)
+                for name in names:
+                    self.faults.remove(name, now)
             finally:
                 cell.leave()
             return [_shown(active) for active in self.faults.active]
 
         return handle
+
+    def _add_all(self, faults: Sequence[Fault], now: Nanos) -> None:
+        before = len(self.faults.active)
+        try:
+            for fault in faults:
+                self._add(fault, now)
+        except Misuse:
+            for active in self.faults.active[before:]:
+                self.faults.remove(active.name, now)
+            raise
 
     def _add(self, fault: Fault, now: Nanos) -> None:
         lines = fault.kind.lines
@@ -86,3 +97,10 @@ def _listed(lines: Sequence[Line]) -> str:
 
 def _shown(active: Active) -> dict[str, object]:
     return {"name": active.name, "fault": str(active.fault), "seen": active.seen, "happened": active.struck}
+
+
+def _texts(request: Mapping[str, Any], key: str) -> list[str]:
+    texts = request.get(key) or []
+    if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
+        raise Misuse(f'"{key}" = {texts!r}: expected a list of texts')
+    return texts

@@ -126,7 +126,7 @@ def test_the_table_checks_itself() -> None:
         _checked((replace(crc, own=(Parameter("x", Form.WHOLE, "", 0, 5, default=9),)),))
     with pytest.raises(Misuse, match="parameter x: a default, what holds otherwise, or required"):
         _checked((replace(crc, own=(Parameter("x", Form.WHOLE, ""),)),))
-    with pytest.raises(Misuse, match="lines belong to faults of bytes and frames"):
+    with pytest.raises(Misuse, match="lines belong to all faults but those of physics"):
         _checked((Kind("x", Layer.PHYSICS, Occasion.MOMENT, "", (), crc.lines),))
 
 

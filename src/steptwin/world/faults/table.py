@@ -39,7 +39,7 @@ class Occasion(enum.StrEnum):
 
 
 class Line(enum.StrEnum):
-    """What a fault of bytes or frames can happen on."""
+    """What faults but those of physics can happen on."""
 
     RTU = "Modbus RTU"
     TCP = "Modbus TCP"
@@ -86,7 +86,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A row. ``own`` are the parameters of this kind alone, ``lines`` what it can happen on (bytes and frames)."""
+    """A row. ``own`` are the parameters of this kind alone, ``lines`` what it can happen on."""
 
     name: str
     layer: Layer
@@ -176,8 +176,8 @@ def _checked(kinds: Sequence[Kind]) -> dict[str, Kind]:
         names = [parameter.name for parameter in kind.parameters]
         if len(set(names)) < len(names) or {"kind", "name"} & set(names):
             raise Misuse(f"fault {kind.name}: a parameter is given twice: {', '.join(names)}")
-        if bool(kind.lines) != (kind.layer in (Layer.BYTES, Layer.FRAMES)):
-            raise Misuse(f"fault {kind.name}: lines belong to faults of bytes and frames")
+        if bool(kind.lines) == (kind.layer is Layer.PHYSICS):
+            raise Misuse(f"fault {kind.name}: lines belong to all faults but those of physics")
         for parameter in kind.parameters:
             where = f"fault {kind.name}, parameter {parameter.name}"
             if (parameter.default is None) == (not parameter.otherwise and not parameter.is_required):
@@ -305,9 +305,15 @@ KINDS = _checked(
             Occasion.REQUEST,
             "The request is refused and not carried out.",
             (_whole("code", "The exception code.", 1, 255, default=4),),
+            _MODBUS,
         ),
         Kind(
-            "busy", Layer.PROTOCOL, Occasion.REQUEST, "The request is refused with exception 6, device busy, and not carried out."
+            "busy",
+            Layer.PROTOCOL,
+            Occasion.REQUEST,
+            "The request is refused with exception 6, device busy, and not carried out.",
+            (),
+            _MODBUS,
         ),
         Kind(
             "stall",
