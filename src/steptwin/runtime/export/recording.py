@@ -40,12 +40,10 @@ class AxisTrack:
 
     def stretches(self, after: Nanos, until: Nanos) -> Iterator[tuple[Plan, Nanos, Nanos]]:
         """(plan, after, until) of every plan in force between; pulses at ``until`` belong to the plan before it."""
-        i = max(bisect_right(self.times, after) - 1, 0)
-        for plan in self.plans[i:]:
-            i += 1
-            end = min(self.times[i], until) if i < len(self.times) else until
+        for i in range(max(bisect_right(self.times, after) - 1, 0), len(self.plans)):
+            end = min(self.times[i + 1], until) if i + 1 < len(self.times) else until
             if after < end:
-                yield plan, after, end
+                yield self.plans[i], after, end
             after = max(after, end)
             if after >= until:
                 return
@@ -127,13 +125,14 @@ def sort_out(
     if unknown:
         raise Misuse(f"no machine {unknown[0]!r} in the trace: there are {', '.join(trace.machines) or 'none'}")
     chosen = [name for name in trace.machines if machines is None or name in machines]
+    order = {name: i for i, name in enumerate(chosen)}
     axes: dict[tuple[str, str], AxisTrack] = {}
     pins: dict[tuple[str, str], PinTrack] = {}
     marks: list[Record] = []
     last = begin
     for record in trace:
         time, machine, kind, subject, value = record
-        if machine not in chosen:
+        if machine not in order:
             continue
         if until is not None and time > until:
             break
@@ -151,7 +150,6 @@ def sort_out(
     end = last if until is None else until
     if end < begin:
         raise Misuse(f"the window of time ends at {end} ns and begins at {begin} ns: it must not end before it begins")
-    order = {name: i for i, name in enumerate(chosen)}
     for track in axes.values():
         _stand_before(track, begin)
     return Recording(
