@@ -137,7 +137,10 @@ class Line(Stateful):
     # ------------------------------------------------------------------ snapshots
 
     def copy_state(self) -> Plain:
-        places = tuple((name, place.kind, place.copy_state(), self._port_state(place)) for name, place in self.places.items())
+        places = tuple(
+            (name, place.kind, place.copy_state(), place.port.copy_state(), self._port_state(place))
+            for name, place in self.places.items()
+        )
         return super().copy_state(), places
 
     def set_state(self, plain: Plain) -> None:
@@ -146,9 +149,10 @@ class Line(Stateful):
         kept = {name for name, *_ in places}
         for name in [name for name in self.places if name not in kept]:
             self.leave(name)
-        for name, kind, state, port_state in places:
+        for name, kind, state, faulty, port_state in places:
             place = self.connect(name, kind)
             place.set_state(state)
+            place.port.set_state(faulty)
             self._set_port_state(place, port_state)
 
     def _port_state(self, place: Place) -> Plain:

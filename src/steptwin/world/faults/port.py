@@ -79,7 +79,7 @@ class FaultyPort(Stateful):
         "to_send",
     )
     FIXED: ClassVar[frozenset[str]] = frozenset(
-        {"__weakref__", "_before", "_faults", "_framed", "_line", "_units", "deadline", "exchange", "link", "to_send"}
+        {"__weakref__", "_before", "_faults", "_framed", "_inner", "_line", "_units", "deadline", "exchange", "link", "to_send"}
     )
 
     exchange: Exchanging
