@@ -41,10 +41,10 @@ class Host:
 
 def test_programs_on_tcp_and_pty_share_the_line(serve_m1486: Serve) -> None:
     twin = serve_m1486("--variant", "B", "--chain", "0,7", "--log-frames")
-    two = Host(twin.tcp_port)
-    assert two.ask("x7\nu16\n", 1) == b"\x01"  # it is there
-    one = Host(twin.tcp_port)
     pty = os.open(twin.pty, os.O_RDWR | os.O_NOCTTY)
+    two = Host(twin.tcp_port)
+    assert two.ask("x7\nu16\n", 1) == os.read(pty, 1) == b"\x01"  # both are there
+    one = Host(twin.tcp_port)
     try:
         assert one.ask("x7\nu20\n", 1) == b"B"
         assert two.hear(1) == b"B"
