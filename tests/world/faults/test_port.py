@@ -13,6 +13,7 @@ from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND
 from steptwin.wire.slave import Direction, RtuSlavePort
 from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort, Line, read
+from steptwin.world.trace import Trace
 
 WRITE = bytes.fromhex("06 00 64 00 07")
 
@@ -395,3 +396,13 @@ def test_state_taken_out_and_put_back_changes_nothing() -> None:
     rig.now = now
     del rig.records[told:]
     assert go_on(rig) == first
+
+
+def test_records_keep_their_order_where_answers_are_fetched_late() -> None:
+    rig = FaultRig("crc", "flip direction=in nth=9 bit=0", is_timed=True)
+    trace = Trace()
+    rig.faults.sinks.append(trace.add)
+    rig.send(REQUEST)
+    rig.now += 500 * MILLISECOND
+    rig.send(REQUEST)
+    assert [record.subject for record in trace] == ["flip", "crc"]

@@ -72,6 +72,7 @@ class FaultyPort(Stateful):
         "_inner",
         "_leaving",
         "_line",
+        "_now",
         "_units",
         "deadline",
         "exchange",
@@ -79,7 +80,20 @@ class FaultyPort(Stateful):
         "to_send",
     )
     FIXED: ClassVar[frozenset[str]] = frozenset(
-        {"__weakref__", "_before", "_faults", "_framed", "_inner", "_line", "_units", "deadline", "exchange", "link", "to_send"}
+        {
+            "__weakref__",
+            "_before",
+            "_faults",
+            "_framed",
+            "_inner",
+            "_line",
+            "_now",
+            "_units",
+            "deadline",
+            "exchange",
+            "link",
+            "to_send",
+        }
     )
 
     exchange: Exchanging
@@ -103,6 +117,7 @@ class FaultyPort(Stateful):
         self._units = units
         self.link = link
         self._before: FrameObserver | None = None
+        self._now: Nanos = 0  # of the present call: an answer may have left before it
         self._asked: deque[bytes] = deque(maxlen=_ASKED)
         self._fresh: list[tuple[Nanos, Nanos, bytes]] = []  # moment, delay, bytes: as the faults of frames leave them
         self._held = b""  # answers that come with the next one
@@ -160,7 +175,7 @@ class FaultyPort(Stateful):
 
     def _exchange(self, data: bytes, now: Nanos) -> bytes:
         self._deliver(now)
-        for delay, piece in spoil(data, self._bytewise("in"), now, self._teller(now, "towards the twin")):
+        for delay, piece in spoil(data, self._bytewise("in"), now, self._teller("towards the twin")):
             # A line keeps the order of its bytes.
             at = max(now + delay, self._arriving[-1][0] if self._arriving else now)
             self._arriving.append((at, piece))
@@ -182,6 +197,7 @@ class FaultyPort(Stateful):
         return min((moment for moment in moments if moment is not None), default=None)
 
     def _deliver(self, now: Nanos) -> None:
+        self._now = now
         while self._arriving and self._arriving[0][0] <= now:
             _, piece = self._arriving.popleft()
             self._faults.link = self.link
@@ -197,7 +213,7 @@ class FaultyPort(Stateful):
             fresh, self._fresh = self._fresh, []
         outgoing = self._bytewise("out")
         for moment, delay, data in fresh:
-            for more, piece in spoil(data, outgoing, now, self._teller(now, "from the twin")):
+            for more, piece in spoil(data, outgoing, now, self._teller("from the twin")):
                 at = moment + delay + more
                 self._leaving.append((max(at, self._leaving[-1][0]) if self._leaving else at, piece))
 
@@ -220,7 +236,7 @@ class FaultyPort(Stateful):
             if a.fault.kind.layer is Layer.FRAMES and self._is_for(a) and a.fault.get("lost") != "request"
         ]
         exchange = Exchange(self._line, request, raw)
-        sent = spoil_answer(exchange, self._addressed(exchange.unit), faults, moment, self._teller(moment, ""))
+        sent = spoil_answer(exchange, self._addressed(exchange.unit), faults, moment, self._teller(""))
         if sent.before:
             self._fresh.append((moment, 0, sent.before))
         if sent.later:
@@ -254,8 +270,8 @@ class FaultyPort(Stateful):
     def _is_for(self, active: Active) -> bool:
         return self._line in active.fault.kind.lines and active.is_on(self.link)
 
-    def _teller(self, now: Nanos, which: str) -> Callable[[Active, str], None]:
-        return lambda active, text: self._faults.tell(active, self.link, now, f"{which}, {text}" if which else text)
+    def _teller(self, which: str) -> Callable[[Active, str], None]:
+        return lambda active, text: self._faults.tell(active, self.link, self._now, f"{which}, {text}" if which else text)
 
 
 class FaultyTalkingPort(FaultyPort):
