@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 from steptwin.errors import Misuse
@@ -78,7 +80,7 @@ def test_a_run_of_characters_does_not_collide_with_itself(baud: int) -> None:
     answers = port.to_send(20 * SECOND)
     assert [data for _, data in answers] == [b"\x42"] * 40
     assert line.collisions == 0
-    assert all(b - a >= 10 * SECOND // baud for (a, _), (b, _) in zip(answers, answers[1:], strict=False))
+    assert all(b - a >= 10 * SECOND // baud for (a, _), (b, _) in itertools.pairwise(answers))
 
 
 def test_every_port_hears_the_chips() -> None:

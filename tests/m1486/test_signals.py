@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -46,7 +48,7 @@ def test_windows_of_pulses_make_the_whole(mq: tuple[int, int], steps: int, forwa
     train = bench.chip.drive.train
     times = step_pulses(train, 0, bench.now).tolist()
     edges = [0, *sorted(round(cut * bench.now) for cut in cuts), bench.now]
-    parts = [t for a, b in zip(edges, edges[1:], strict=False) for t in step_pulses(train, a, b).tolist()]
+    parts = [t for a, b in itertools.pairwise(edges) for t in step_pulses(train, a, b).tolist()]
     assert parts == times
     assert [train.count(t) for t in times][-1] == (distance if forward else -distance)
 

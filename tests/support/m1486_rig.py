@@ -97,11 +97,20 @@ class Bench:
 
     def sum_of_pulses(self) -> int:
         """Where all pulses given so far lead, in minimum microsteps: from the trains, pulse by pulse."""
-        total = 0
-        for index, (begin, train) in enumerate(self.trains):
-            end = self.trains[index + 1][0] if index + 1 < len(self.trains) else self.now
-            total += sum(train.count(moment) - train.count(moment - 1) for moment in set(step_times(train, begin, end).tolist()))
-        return total
+        ends = [begin for begin, _ in self.trains[1:]] + [self.now]
+        return sum(way_u(train, begin, end) for (begin, train), end in zip(self.trains, ends, strict=False))
+
+
+def way_u(train: StepTrain, after: int, until: int) -> int:
+    """Where the pulses of a train with ``after`` < time <= ``until`` lead: their number in each division by its grid."""
+    times = step_times(train, after, until)
+    total = done = 0
+    for begin, end, grid in train.stretches():
+        change = None if end is None or end == begin else train.pulse_time(end, train.profile.start)
+        upto = len(times) if end is None else done if change is None else int((times <= change).sum())
+        total += (upto - done) * grid
+        done = upto
+    return total * train.direction
 
 
 def seconds(events: list[Event]) -> list[float]:
