@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from steptwin.machine import MILLISECOND, SECOND, Edge, Nanos
+from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.program import LoadedProgram, load
@@ -30,7 +30,7 @@ Act = tuple[Nanos, str, Any]
 _WRITE = bytes.fromhex("10 0000 0002 04")
 
 
-def acts() -> SearchStrategy[list[Act]]:
+def acts() -> SearchStrategy[list[Any]]:
     """What happens to a controller meanwhile: pins, writes of a master, pauses."""
     pin = st.tuples(st.just("pin"), st.tuples(st.integers(1, 20), st.booleans()))
     write = st.tuples(st.just("write"), st.binary(min_size=4, max_size=4))
@@ -69,10 +69,8 @@ def act(device: Mic488, one: Act) -> None:
         device.touch()
 
 
-Seen = tuple[list[Edge], Any, bytes, list[tuple[int, int, float]], list[Any]]
-
-
-def seen(device: Mic488) -> Seen:
+def seen(device: Mic488) -> tuple[Any, ...]:
+    """What there is to see of a controller, inside and outside."""
     control, now = device.program, device.now
     axes = [(axis.status, axis.coordinate_p(now), axis.profile.velocity(now)) for axis in device.axes]
     events = [(event.time, event.code, event.text) for event in device.events]
