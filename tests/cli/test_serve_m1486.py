@@ -66,6 +66,7 @@ def test_what_is_said_to_nobody_is_lost(serve_m1486: Serve) -> None:
     twin = serve_m1486("--variant", "B")
     host = Host(twin.tcp_port)
     assert host.ask("u20\nu20\n", 2) == b"BB"
+    twin.state()  # by now everybody has been told
     pty = os.open(twin.pty, os.O_RDWR | os.O_NOCTTY)
     try:
         assert host.ask("u16\n", 1) == b"\x01"
