@@ -177,10 +177,8 @@ def test_writes_of_a_master_to_user_registers() -> None:
 
 
 def test_changes_of_a_drives_state() -> None:
-    config = controller(AxisConfig())
-    rig = started(
-        f"CFGINT_M2 = INT_HIGH\nM1 = ON\nPABS M1 10\nM2 = ON\nDELAY 0.1\nPABS M2 50\nWAIT 1 = 2\nINT_M2:\n{COUNTING}", config
-    )
+    main = "CFGINT_M2 = INT_HIGH\nM1 = ON\nPABS M1 10\nM2 = ON\nDELAY 0.1\nPABS M2 50\nWAIT 1 = 2\n"
+    rig = started(f"{main}INT_M2:\n{COUNTING}")
     rig.wait(0.05)
     assert rig.i(0) == 1
     rig.wait(5)
