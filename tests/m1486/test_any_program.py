@@ -36,7 +36,7 @@ def test_any_program_runs_and_every_pulse_counts(v: Variant, permitted_programs:
     bench = Bench(v.name, interface=interface, statement_ns=statement_ns)
     # Wrong data are dropped, and the program goes on.
     bench.do("t44")
-    bench.raw((f"[\r{text}]\r" if in_file else text).encode())
+    bench.raw((f"[\r{text}]\r" if in_file else text).encode(errors="replace"))
     for moment, what in happens:
         bench.chip.advance(max(bench.now, round(moment * SECOND)))
         if isinstance(what, str):

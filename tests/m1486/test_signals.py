@@ -72,6 +72,24 @@ def test_dual_dac_latches_both_phases_for_each_step(characteristic: int) -> None
     assert signed == [value for k in range(1, 17) for value in currents(characteristic, 16 * k)]
 
 
+@pytest.mark.parametrize("direction", ["f", "b"])
+def test_converter_data_follow_the_division_in_flight(direction: str) -> None:
+    # From any moment on: 64 microsteps below 187.5 step/s, 1 above.
+    bench = Bench(interface=DUAL_DAC)
+    bench.do("m64", "q1", "s50", "a900", "v600", f"{direction}64000", "r")
+    train = bench.chip.drive.train
+    assert len(train.divisions) == 3
+    whole = list(strobes(train, 1, 0, bench.now))
+    for strobe in whole:
+        first, second = currents(1, train.count(strobe.time))
+        assert (-strobe.magnitude if strobe.phase else strobe.magnitude) == (first if strobe.channel == 1 else second)
+    for share in (0.1, 0.4, 0.95):
+        after = round(bench.now * share)
+        assert list(strobes(train, 1, after, bench.now)) == [
+            s for s in whole if s.time - (2 * s.channel - 1) * DATA_VALID_NS > after
+        ]
+
+
 def test_two_dacs_show_the_present_currents() -> None:
     bench = Bench(interface=TWO_DACS)
     for position in range(16, 16 * 17, 16):

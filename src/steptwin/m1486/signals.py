@@ -40,9 +40,14 @@ def step_pulses(train: StepTrain, after: Nanos, until: Nanos) -> Times:
 
 def strobes(train: StepTrain, characteristic: int, after: Nanos, until: Nanos) -> Iterator[Strobe]:
     """What the Dual DAC interface gives for the steps with ``after`` < time <= ``until``: both channels for each, in turn."""
+    position = train.count(after)
+    stretches = train.stretches()
+    _, end, grid = next(stretches)
     for moment in step_pulses(train, after, until).tolist():
-        values = currents(characteristic, train.count(moment))
-        for channel, current in enumerate(values, start=1):
+        while end is not None and (end - position) * train.direction <= 0:
+            _, end, grid = next(stretches)
+        position += grid * train.direction
+        for channel, current in enumerate(currents(characteristic, position), start=1):
             yield Strobe(moment + (2 * channel - 1) * DATA_VALID_NS, channel, abs(current), phase_level(current))
 
 
