@@ -39,6 +39,14 @@ class Host:
         self.socket.close()
 
 
+def wait_for_line(twin: Any, text: str) -> None:
+    """The twin says ``text``; a thread of its own prints it."""
+    deadline = time.monotonic() + 30
+    while not any(text in line for line in twin.lines):
+        assert time.monotonic() < deadline, twin.lines
+        time.sleep(0.01)
+
+
 def test_programs_on_tcp_and_pty_share_the_line(serve_m1486: Serve) -> None:
     twin = serve_m1486("--variant", "B", "--chain", "0,7", "--log-frames")
     pty = os.open(twin.pty, os.O_RDWR | os.O_NOCTTY)
@@ -55,10 +63,12 @@ def test_programs_on_tcp_and_pty_share_the_line(serve_m1486: Serve) -> None:
         os.close(pty)
         one.close()
         two.close()
-    said = "\n".join(twin.lines)
-    assert "M1486B, Step & Direction, addresses 0, 7, 4800 bit/s" in said
-    assert "78 37 0d  X7  indeX 7" in said
-    assert "U20 type letter in ASCII = 66" in said
+    for text in (
+        "M1486B, Step & Direction, addresses 0, 7, 4800 bit/s",
+        "78 37 0d  X7  indeX 7",
+        "U20 type letter in ASCII = 66",
+    ):
+        wait_for_line(twin, text)
 
 
 def test_what_is_said_to_nobody_is_lost(serve_m1486: Serve) -> None:
@@ -108,10 +118,7 @@ def test_what_was_stored_is_there_after_kill_9(serve_m1486: Serve, tmp_path: Pat
     first.process.wait()
     host.close()
     second = serve_m1486(*options)
-    deadline = time.monotonic() + 10
-    while not any("U20 sends 45H" in line for line in second.lines):
-        assert time.monotonic() < deadline, second.lines
-        time.sleep(0.01)
+    wait_for_line(second, "U20 sends 45H")
 
 
 def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def times(twin: Any, pattern: str) -> list[float]:
 
 def moments(twin: Any, pattern: str, count: int) -> list[float]:
     """The same, when there are so many: text comes a little after what it tells of."""
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 30
     while len(found := times(twin, pattern)) < count:
         assert time.monotonic() < deadline, twin.lines
         time.sleep(0.01)
@@ -79,7 +79,7 @@ def test_a_full_buffer_is_answered(serve_m1486: Serve) -> None:
     twin = serve_m1486("--variant", "B")
     with opened(twin, 4800) as port:
         port.write(b"g+\rr\r")
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 30
         while not times(twin, "moves on"):
             assert time.monotonic() < deadline
             time.sleep(0.01)
