@@ -21,10 +21,10 @@ from steptwin.mic488.device import Mic488
 from steptwin.mic488.registermap import DataType
 from steptwin.runtime.export.progress import Progress, silent
 from steptwin.runtime.textfiles import read_bytes, read_text
-from steptwin.wire.pdu import encode_request
+from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegisters, encode_request
 from steptwin.world import script as do
 from steptwin.world.durations import duration
-from steptwin.world.plant import Plant, PlantSnapshot, Script
+from steptwin.world.plant import Plant, PlantSnapshot, Script, Values
 from steptwin.world.spec import WorldSpec, read_world
 from steptwin.world.views import AxisView, LineView, M1486View, Mic488View, Views
 
@@ -72,9 +72,11 @@ class World(Plant):
         return cls(spec, files, keep_trace=keep_trace)
 
     @classmethod
-    def from_toml(cls, text: str, files: Mapping[str, bytes] | None = None, *, name: str = "world.toml") -> Self:
+    def from_toml(
+        cls, text: str, files: Mapping[str, bytes] | None = None, *, name: str = "world.toml", keep_trace: bool = True
+    ) -> Self:
         """The world described by a text. ``files`` are the contents of the files it names. Raises `WorldError`."""
-        return cls(read_world(name, text), files)
+        return cls(read_world(name, text), files, keep_trace=keep_trace)
 
     def __enter__(self) -> Self:
         return self
@@ -173,9 +175,22 @@ def _steps(reaction: Reaction) -> tuple[do.Step, ...]:
     return (do.Call(partial(reaction)),) if callable(reaction) else (reaction,)
 
 
-def encode_write(device: Mic488, register: str, value: float) -> bytes:
-    """The request that writes a register by name. Raises `Misuse` for what it does not take."""
-    item = named(device.registers, register)
-    axis = item.register.axis
-    unit = "u" if axis is None else device.config.axes[axis - 1].unit_name
-    return encode_request(encoded(item, value, DataType(device.data_type), unit))
+def encode_write(device: Mic488, values: Values) -> tuple[bytes, ...]:
+    """The requests that write registers by name; neighbours go together. Raises `Misuse` for what one does not take."""
+    requests: list[Request] = []
+    for register, value in values:
+        item = named(device.registers, register)
+        axis = item.register.axis
+        unit = "u" if axis is None else device.config.axes[axis - 1].unit_name
+        request = encoded(item, value, DataType(device.data_type), unit)
+        last = requests[-1] if requests else None
+        if (
+            isinstance(request, WriteRegisters)
+            and isinstance(last, WriteRegisters)
+            and last.address + len(last.values) == request.address
+            and len(last.values) + len(request.values) <= MAX_WRITTEN_REGISTERS
+        ):
+            requests[-1] = WriteRegisters(last.address, (*last.values, *request.values))
+        else:
+            requests.append(request)
+    return tuple(map(encode_request, requests))

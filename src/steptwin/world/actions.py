@@ -79,17 +79,17 @@ def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
 
 
 def _write(plant: Plant, step: do.Write) -> None:
-    for name, register, value in step.values:
+    for name, values in plant.by_machine(step):
         device = plant.controller(name, "registers")
         kernel = plant.touch(name)
-        pdu = plant.encode(device, register, value)
         on = plant.plan.line_of.get(name)
-        if on is not None:
-            line, unit = on
-            line.receive(SCRIPTS, encode_frame(unit, pdu), plant.now)
-        else:
-            _record(plant, name, "request", pdu)
-            device.execute(pdu, plant.now)
+        for pdu in plant.requests(device, values):
+            if on is not None:
+                line, unit = on
+                line.receive(SCRIPTS, encode_frame(unit, pdu), plant.now)
+            else:
+                _record(plant, name, "request", pdu)
+                device.execute(pdu, plant.now)
         kernel.settle()
 
 

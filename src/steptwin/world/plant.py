@@ -7,9 +7,11 @@ advanced never matters.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from heapq import heappop, heappush
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
@@ -35,8 +37,12 @@ MOST_STEPS_PER_INSTANT = 10_000
 WORLD = "world"
 """What happens to no machine happens to the world."""
 
-Encode: TypeAlias = Callable[[Mic488, str, float], bytes]
-"""The PDU of a request that writes a register by name."""
+Values: TypeAlias = tuple[tuple[str, float], ...]
+"""Registers by name, and what they are to take."""
+Encode: TypeAlias = Callable[[Mic488, Values], tuple[bytes, ...]]
+"""The PDUs of the requests that write registers by name, in order; as few as may be."""
+MOST_ENCODED = 10_000
+"""Requests are remembered, for scripts write the same again and again; not more than these."""
 
 
 class Given(NamedTuple):
@@ -136,6 +142,7 @@ class Plant:
         self.inputs: list[Given] = []
         """Everything from outside so far."""
         self.encode = encode
+        self._encoded: dict[object, tuple[bytes, ...]] = {}
         self._scripts: list[Script] = []
         self._timed: list[tuple[Nanos, int]] = []
         self._watching: list[Script] = []
@@ -304,6 +311,22 @@ class Plant:
         if not isinstance(machine, Mic488):
             raise Misuse(f"{name!r} is an M1486, which has no {what}")
         return machine
+
+    @staticmethod
+    def by_machine(step: do.Write) -> Iterator[tuple[str, Values]]:
+        """What a step writes to one machine after the other."""
+        for name, group in groupby(step.values, key=itemgetter(0)):
+            yield name, tuple((register, value) for _, register, value in group)
+
+    def requests(self, device: Mic488, values: Values) -> tuple[bytes, ...]:
+        """The PDUs that write ``values``. Raises `Misuse` for what a register does not take."""
+        key = (device.firmware.name, device.data_type, values)
+        found = self._encoded.get(key)
+        if found is None:
+            if len(self._encoded) >= MOST_ENCODED:
+                self._encoded.clear()
+            found = self._encoded[key] = self.encode(device, values)
+        return found
 
     def line_called(self, name: str) -> Line:
         """Raises `Misuse` with the lines there are."""

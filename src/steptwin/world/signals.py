@@ -73,12 +73,12 @@ def is_idle(machine: Mic488 | M1486, now: Nanos) -> bool:
     return not running and not any(axis.profile.moving(now) for axis in machine.axes)
 
 
-def _chosen(known: Mapping[str, SignalOf], rest: str, name: str) -> SignalOf:
+def _chosen(known: Mapping[str, SignalOf], rest: str, name: str, others: str = "") -> SignalOf:
     found = known.get(rest.lower())
     if found is None:
         near = NearMiss().of(rest, known)
         hint = f"; did you mean {near!r}?" if near else ""
-        raise Misuse(f"no signal {name!r}{hint}; there are {', '.join(known)}, and pins")
+        raise Misuse(f"no signal {name!r}{hint}; there are {', '.join(known)}{others}")
     return found
 
 
@@ -101,7 +101,7 @@ def _of_mic488(device: Mic488, kernel: Kernel, rest: str, name: str) -> SignalOf
         "status": SignalOf((kernel,), lambda now: float(device.status())),
         "program": SignalOf((kernel,), lambda now: float(device.program.state)),
     }
-    return _chosen(known, rest, name)
+    return _chosen(known, rest, name, ", M1.position and so on, and pins")
 
 
 def _mic488_axis(axis: Axis, kernel: Kernel) -> dict[str, SignalOf]:
@@ -128,7 +128,7 @@ def _of_m1486(chip: M1486, kernel: Kernel, rest: str, name: str) -> SignalOf:
         "moving": SignalOf((kernel,), lambda now: float(chip.drive.is_busy)),
         "variable": SignalOf((kernel,), lambda now: float(chip.unit.variable)),
     }
-    return _chosen(known, rest, name)
+    return _chosen(known, rest, name, ", and pins")
 
 
 def _of_axis(axis: Fitted, rest: str, name: str) -> SignalOf:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache
 from hashlib import blake2b
 from heapq import merge
 from itertools import islice
@@ -200,8 +201,14 @@ _ARC = struct.Struct("<6dqb")
 
 def encode(record: Record) -> bytes:
     """The same bytes for the same record everywhere: floats by their IEEE bytes, integers exactly."""
-    body = _value(record.kind) + _value(record.subject) + _value(record.value)
-    return _HEAD.pack(record.time, len(body)) + body
+    time, _, kind, subject, value = record
+    body = _names(kind, subject) + (_profile(value) if type(value) is Profile else _value(value))
+    return _HEAD.pack(time, len(body)) + body
+
+
+@lru_cache(4096)
+def _names(kind: str, subject: str) -> bytes:
+    return _value(kind) + _value(subject)
 
 
 def _value(value: object) -> bytes:

@@ -6,7 +6,7 @@ Positions in the units of the axis, times in seconds, torques in N·m.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from steptwin.m1486.chip import M1486
 from steptwin.mic488.axis import Axis
@@ -24,7 +24,7 @@ View = TypeVar("View")
 
 
 class Views(Mapping[str, View], Generic[View]):
-    """Views by name. A name that is not there raises `Misuse` (a `KeyError` for ``in`` and ``get``) with those that are."""
+    """Views by name. A name that is not there raises `Misuse` with those that are."""
 
     def __init__(self, plant: Plant, what: str, views: Mapping[str, View]) -> None:
         self._plant = plant
@@ -35,6 +35,9 @@ class Views(Mapping[str, View], Generic[View]):
         if name not in self._views:
             raise self._plant.unknown(self._what, name, self._views)
         return self._views[name]
+
+    def get(self, name: str, default: Any = None) -> Any:
+        return self._views.get(name, default)
 
     def __contains__(self, name: object) -> bool:
         return name in self._views

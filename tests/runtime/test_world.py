@@ -1,0 +1,368 @@
+"""Worlds as people use them: from TOML and Python, in virtual time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse, Runaway
+from steptwin.machine import SECOND
+from steptwin.mic488.status import Status
+from steptwin.runtime.world import World
+from steptwin.world import script as do
+from steptwin.world.script import Steps
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "worlds").glob("*.toml"))
+
+SMALL = """
+    [world]
+    seed = 3
+    [[mic488]]
+    name = "a"
+    [mic488.M1]
+    unit = "mm"
+    gear = 100.0
+    acc = 100.0
+    dec = 100.0
+    vel = 40.0
+    in_kl = "IN1"
+    home_mode = "HOME1"
+    limit_mode = "KL"
+    [[mic488]]
+    name = "b"
+    [[mic488]]
+    name = "c"
+    [[axis]]
+    name = "x"
+    drive = "a.M1"
+    travel = [-1.0, 101.0]
+    start = 50.0
+    [[axis.switch]]
+    below = 0.0
+    to = "a.IN1"
+    hysteresis = 0.2
+    [[wire]]
+    from = "a.OUT1"
+    to = "b.IN3"
+    delay = "20 ms"
+    [[button]]
+    name = "go"
+    to = "b.IN4"
+"""
+
+
+def small(more: str = "") -> World:
+    return World.from_toml(dedent(SMALL) + dedent(more))
+
+
+def moved(world: World, position: float) -> World:
+    axis = world.mic488["a"].axis[1]
+    axis.enable()
+    axis.move_to(position)
+    return world
+
+
+# ---------------------------------------------------------------------- the interface
+
+
+def test_positions_are_those_of_register_and_mechanics() -> None:
+    world = moved(small(), 25.0)
+    assert world.run(until="a.M1.status == 4") == "a.M1.status == 4"
+    axis = world.mic488["a"].axis[1]
+    assert (axis.position, axis.velocity, axis.status, axis.unit) == (25.0, 0.0, Status.REACHED, "mm")
+    assert (world.axis["x"].position, world.axis["x"].lost) == (75.0, 0)
+
+
+def test_a_move_into_a_stop_loses_what_the_stop_holds() -> None:
+    world = moved(small(), 60.0)
+    world.run(for_="10 s")
+    assert world.mic488["a"].axis[1].position == 60.0
+    assert (world.axis["x"].position, world.axis["x"].lost) == (101.0, 900)
+    assert world.mic488["a"].axis[1].encoder < 60 * 100 * 400 // 3200  # the default encoder sits on the motor
+
+
+def test_homing_finds_the_switch() -> None:
+    world = small()
+    world.mic488["a"].axis[1].enable()
+    world.mic488["a"].axis[1].home(-20.0)
+    world.run(until="a.M1.status == 4 or a.M1.status == 5", for_="20 s")
+    assert world.mic488["a"].axis[1].position == 0.0
+    assert world.axis["x"].position == pytest.approx(0.21)
+
+
+def test_a_run_ends_at_a_moment_a_duration_or_a_condition() -> None:
+    world = small()
+    assert world.run(until=2.5) is None
+    assert world.run(for_="1 min") is None
+    assert world.time == 62.5
+    moved(world, 10.0)
+    assert world.run(until="x.position >= 55", for_=30) == "x.position >= 55"
+    assert world.axis["x"].position == 55.0
+    assert world.run(until="idle") == "idle"
+    assert world.axis["x"].position == 60.0
+    assert world.run(until="b.IN3", for_=5) is None
+    with pytest.raises(Misuse, match="run needs until or for_"):
+        world.run()
+
+
+def test_until_the_moment_is_exact() -> None:
+    world = moved(small(), 10.0)
+    world.run(until="x.position >= 55")
+    profile = world.mic488["a"].device.axes[0].profile
+    assert world.now == profile.pulse_time(500, 0)
+
+
+def test_a_delayed_wire_and_a_button() -> None:
+    world = small()
+    world.mic488["a"].write("OUT1", 1)
+    world.run(for_="19 ms")
+    assert world.mic488["b"].pins["IN3"] == 0.0
+    world.run(for_="1 ms")
+    assert world.mic488["b"].pins["IN3"] == 1.0
+    world.press("go", "50 ms")
+    assert world.mic488["b"].pins["IN4"] == 1.0
+    world.run(for_="1 s")
+    assert world.mic488["b"].pins["IN4"] == 0.0
+
+
+def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:
+    world = small()
+    with pytest.raises(Misuse, match="no MIC488 is called 'd'; there are a, b, c"):
+        world.mic488["d"]
+    with pytest.raises(Misuse, match=r"nothing is called 'z'.* there are a, b, c, x, go, time, idle"):
+        world.run(until="z.position > 1")
+    with pytest.raises(Misuse, match=r"no signal 'x\.speed'; there are position, lost, stalled$"):
+        world.read("x.speed")
+    with pytest.raises(Misuse, match="no button is called 'stop'; there are go"):
+        world.press("stop")
+    with pytest.raises(Misuse, match="M1_POS_AB"):
+        world.mic488["a"].write("M1_POS_AB", 1.0)
+    assert "d" not in world.mic488
+    assert world.mic488.get("d") is None
+    assert [*world.mic488] == ["a", "b", "c"]
+
+
+# ---------------------------------------------------------------------- islands
+
+
+def test_machines_that_share_nothing_are_advanced_when_somebody_looks() -> None:
+    world = small()
+    assert [list(kernel.machines) for kernel in world.kernels] == [["a", "b"], ["c"]]
+    world.at(3.0, do.Set((("a", "IN5", 1.0),)))
+    world.advance(5 * SECOND)
+    assert [kernel.now for kernel in world.kernels] == [3 * SECOND, 0]
+    assert world.mic488["c"].status == 0
+    assert [kernel.now for kernel in world.kernels] == [3 * SECOND, 5 * SECOND]
+
+
+# ---------------------------------------------------------------------- scripts
+
+
+def test_events_act_once_again_and_again_or_when_a_condition_comes_true() -> None:
+    world = small(
+        """
+        [[event]]
+        at = "1 s"
+        do = [{ write = { "a.M1_EN" = 1, "a.M1_POS_ABS" = 20.0 } }]
+        [[event]]
+        name = "clock"
+        every = "2 s"
+        do = [{ note = "tick" }]
+        [[event]]
+        when = "x.position > 60"
+        do = [{ set = { "b.IN9" = 1 } }, { stop = "far enough" }]
+        """
+    )
+    assert world.run(for_="1 min") == "far enough"
+    assert world.axis["x"].position == 60.01
+    assert world.mic488["b"].pins["IN9"] == 1.0
+    assert world.run(until=9.0) is None
+    assert [r.time // SECOND for r in world.trace.events("world")] == [2, 4, 6, 8]
+
+
+def test_a_condition_that_comes_true_again_acts_again() -> None:
+    world = small('[[event]]\nwhen = "b.IN4"\ndo = [{ note = "pressed" }]\n')
+    for _ in range(3):
+        world.press("go", 0.1)
+        world.run(for_=1)
+    assert len(list(world.trace.events("world"))) == 3
+
+
+def test_expectations_that_do_not_hold_are_told() -> None:
+    world = small(
+        '[[script]]\nname = "s"\nsteps = [{ expect = "x.position > 49" }, { wait = "1 s" }, { expect = "x.position < 49" }]\n'
+    )
+    world.run(for_=2)
+    assert [(f.time, f.value) for f in world.failures] == [(SECOND, "x.position < 49")]
+
+
+def test_operators_in_python_yield_steps_and_are_sent_what_they_give() -> None:
+    seen: list[object] = []
+
+    def operator() -> Steps:
+        yield do.Wait(SECOND)
+        yield do.Write((("a", "M1_EN", 1.0), ("a", "M1_POS_ABS", 10.0)))
+        seen.append((yield do.Until("x.position > 70", within=5 * SECOND)))
+        seen.append((yield do.Until("idle")))
+        seen.append((yield do.Read("x.position")))
+        yield do.Stop("done")
+
+    world = small()
+    world.script(operator)
+    assert world.run(for_=60) == "done"
+    assert seen == [False, True, 60.0]
+
+
+def test_at_and_when_call_functions() -> None:
+    world = small()
+    seen: list[tuple[float, float]] = []
+    world.at(2, lambda: moved(world, 5.0))
+    world.when("x.position >= 52", lambda: seen.append((world.time, world.axis["x"].position)), once=True)
+    world.run(for_=10)
+    assert [position for _, position in seen] == [52.0]
+
+
+def test_scripts_that_take_no_time_for_ever_are_a_runaway() -> None:
+    def forever() -> Steps:
+        while True:
+            yield do.Note("again")
+
+    world = small()
+    world.script(forever)
+    with pytest.raises(Runaway, match="script 'forever': more than 10000 steps at 0 ns"):
+        world.run(for_=1)
+
+
+def test_a_request_gives_its_answer_in_the_time_of_the_line() -> None:
+    world = World.from_toml('[[line]]\nname = "bus"\ntiming = "real"\n[[mic488]]\nname = "a"\nline = "bus"\nunit = 5\n')
+    seen: list[object] = []
+
+    def master() -> Steps:
+        seen.append((yield do.Request("bus", 5, bytes.fromhex("03 2719 0001"), SECOND)))
+        seen.append((yield do.Read("time")))
+        seen.append((yield do.Request("bus", 6, bytes.fromhex("03 2719 0001"), SECOND)))
+        seen.append((yield do.Read("time")))
+
+    world.script(master)
+    world.run(for_=5)
+    assert seen[0] == bytes.fromhex("03 02 0000")
+    assert seen[1] == pytest.approx(15 * 10 / 38400 + 0.00075, abs=1e-6)
+    assert seen[2] == b""
+    assert seen[3] == pytest.approx(seen[1] + 1.0)
+
+
+# ---------------------------------------------------------------------- snapshots and branches
+
+
+def test_a_snapshot_is_gone_back_to_with_its_scripts() -> None:
+    world = small(
+        '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1 } }, { repeat = 9, steps = ['
+        '{ write = { "a.M1_POS_REL" = 7.0 } }, { until = "idle" }, { wait = "300 ms" }, { write = { "a.M1_POS_REL" = -6.0 } }, '
+        '{ until = "idle" }] }]\n'
+    )
+    world.run(for_=2.9)
+    snapshot = world.snapshot()
+    before = (world.trace.digest(), world.axis["x"].position)
+    world.run(for_=10)
+    after = (world.trace.digest(), world.axis["x"].position)
+    world.restore(snapshot)
+    assert (world.trace.digest(), world.axis["x"].position) == before
+    world.run(for_=10)
+    assert (world.trace.digest(), world.axis["x"].position) == after
+
+
+def test_a_branch_goes_its_own_way() -> None:
+    world = moved(small(), 30.0)
+    world.run(for_=0.5)
+    other = world.branch()
+    other.mic488["a"].axis[1].stop()
+    assert other.run(until="idle") == world.run(until="idle") == "idle"
+    assert world.axis["x"].position == 80.0
+    assert 50.0 < other.axis["x"].position < 80.0
+    assert world.trace.digest() != other.trace.digest()
+
+
+def test_python_operators_are_brought_back_by_what_they_were_sent() -> None:
+    def operator() -> Steps:
+        for target in (5.0, 15.0, 25.0):
+            position = yield do.Read("x.position")
+            yield do.Write((("a", "M1_EN", 1.0), ("a", "M1_POS_ABS", target + position / 100)))
+            yield do.Until("idle")
+
+    world = small()
+    world.script(operator)
+    world.run(for_=1.0)
+    snapshot = world.snapshot()
+    world.run(for_=20)
+    digest = world.trace.digest()
+    other = world.branch()
+    world.restore(snapshot)
+    world.run(for_=20)
+    assert world.trace.digest() == other.trace.digest() == digest
+
+
+# ---------------------------------------------------------------------- random worlds
+
+MOVES = st.lists(
+    st.tuples(
+        st.sampled_from("abc"), st.sampled_from(["POS_ABS", "POS_REL", "VEL_ABS"]), st.integers(-80, 80), st.integers(0, 2000)
+    ),
+    max_size=8,
+)
+PARTS = st.lists(
+    st.sampled_from(
+        [
+            '[[wire]]\nfrom = "a.OUT2"\nto = "c.IN7"\ninverted = true\n',
+            '[[wire]]\nfrom = "c.M1_EN"\nto = "b.IN5"\ndelay = "3 ms"\n',
+            '[[axis]]\nname = "y"\ndrive = "b.M1"\nbacklash = 3.0\ntravel = [-50.0, 60.0]\npulses_per_unit = 1.0\n',
+            (
+                '[[axis]]\nname = "z"\ndrive = "c.M1"\npulses_per_unit = 1.0\ninverted = true\n'
+                '[[axis.switch]]\nposition = 10.0\nwidth = 5.0\nto = "c.IN2"\nbounce = "4 ms"\n'
+            ),
+            '[[source]]\nto = "b.AIN1"\nkind = "sine"\nvalue = 5.0\namplitude = 3.0\n',
+            '[[event]]\nwhen = "x.position > 60"\ndo = [{ press = "go", for = "100 ms" }, { write = { "a.OUT1" = 1 } }]\n',
+            '[[event]]\nevery = "700 ms"\ndo = [{ write = { "b.M1_EN" = 1, "b.M1_POS_REL" = 13.0 } }]\n',
+        ]
+    ),
+    unique=True,
+)
+
+
+def acted(world: World, moves: list) -> World:
+    for name, register, value, pause in moves:
+        world.mic488[name].write("M1_EN", 1)
+        world.mic488[name].write(f"M1_{register}", float(value))
+        world.run(for_=pause / 1000)
+    return world
+
+
+@settings(max_examples=15, deadline=None)
+@given(parts=PARTS, moves=MOVES, cuts=st.lists(st.integers(1, 3000), max_size=4))
+def test_random_worlds_do_the_same_again_in_pieces_and_from_a_snapshot(parts: list[str], moves: list, cuts: list[int]) -> None:
+    text = dedent(SMALL) + "".join(parts)
+    first = acted(World.from_toml(text), moves)
+    snapshot = first.snapshot()
+    first.run(for_=12)
+    second = acted(World.from_toml(text), moves)
+    for cut in cuts:
+        second.run(for_=cut / 1000)
+        second.restore(second.snapshot())
+        second.settle_all()
+    second.run(until=first.time)
+    assert second.trace.digest() == first.trace.digest()
+    third = World.from_toml(text)
+    third.take_over(first, snapshot)
+    third.run(for_=12)
+    assert third.trace.digest() == first.trace.digest()
+    assert list(third.trace) == list(first.trace)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_run_as_their_scripts_expect(path: Path) -> None:
+    world = World.load(path)
+    world.run(for_="30 s")
+    assert world.failures == []

@@ -1,0 +1,99 @@
+"""Zones of switches, and contacts that bounce."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mic488_rig import controller
+
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND, Edge
+from steptwin.mic488.config import AxisConfig
+from steptwin.mic488.device import Mic488
+from steptwin.world.chance import Chance
+from steptwin.world.contacts import Button, CountedPosition, Switch, Zone
+from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.trace import Record
+
+LIMITS = st.one_of(st.none(), st.integers(-30, 30))
+
+
+def zones() -> st.SearchStrategy[Zone]:
+    def made(low: int | None, width: int | None, hysteresis: int, repeated: bool) -> Zone:
+        high = None if width is None or low is None else low + width
+        period = None if not repeated or low is None or high is None else high - low + 2 * hysteresis + 7
+        return Zone(low, high, hysteresis, period)
+
+    return st.builds(made, LIMITS, st.one_of(st.none(), st.integers(0, 12)), st.integers(0, 4), st.booleans())
+
+
+@given(zone=zones(), steps=st.lists(st.sampled_from([1, -1]), min_size=30, max_size=120), start=st.integers(-40, 40))
+def test_the_predicted_edge_is_where_the_state_changes(zone: Zone, steps: list[int], start: int) -> None:
+    """Pulse by pulse: the state changes exactly at the position that was predicted for that direction."""
+    on = zone.on(start, was_on=False)
+    below, above = zone.edges(start, is_on=on)
+    place = start
+    for step in steps:
+        place += step
+        now_on = zone.on(place, was_on=on)
+        assert (now_on is not on) is (place == (above if step > 0 else below))
+        if now_on is not on:
+            on = now_on
+        below, above = zone.edges(place, is_on=on)
+
+
+def test_hysteresis_keeps_a_switch_on() -> None:
+    zone = Zone(10, 20, 3)
+    assert [zone.on(p, was_on=False) for p in (9, 10, 20, 21)] == [False, True, True, False]
+    assert [zone.on(p, was_on=True) for p in (6, 7, 23, 24)] == [False, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [((5, 4), "low 5 imp is above high 4 imp"), ((0, 1, -1), "hysteresis of -1"), ((0, 10, 0, 10), "shorter than that")],
+)
+def test_zones_that_cannot_be_are_misuse(arguments: tuple, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        Zone(*arguments)
+
+
+def test_a_bouncing_switch_comes_to_rest_within_its_time_and_the_same_way_again() -> None:
+    def run(seed: int) -> list[tuple[int, float]]:
+        edges: list[Record] = []
+        kernel = Kernel(record=edges.append)
+        device = Mic488(controller(AxisConfig(acc=1e4, vel=1e4)))
+        kernel.add("m", device)
+        target = PinName("m", "IN1")
+        chance = Chance(seed, "x")
+        kernel.add_part(
+            Switch(
+                kernel, CountedPosition(device.axes[0]), Zone(100, None), target, bounce_ns=MILLISECOND, bounces=3, chance=chance
+            )
+        )
+        device.execute(bytes.fromhex("06 271E 0001"), 0)
+        device.execute(bytes.fromhex("10 2764 0002 04 0000 4348"), 0)  # POS_ABS M1 = 200
+        kernel.advance(SECOND)
+        return [(r.time, float(r.value)) for r in edges if r.subject == "IN1"][1:]  # type: ignore[arg-type]
+
+    first = run(1)
+    assert len(first) == 7
+    assert [level for _, level in first] == [1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]
+    assert first[-1][0] - first[0][0] <= MILLISECOND
+    assert run(1) == first
+    assert run(2) != first
+    assert run(2)[0] == first[0]
+
+
+def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
+    kernel = Kernel()
+    device = Mic488(controller())
+    kernel.add("m", device)
+    seen: list[Edge] = []
+    kernel.observers.append(lambda name, edge: seen.append(edge))
+    button = Button(kernel, PinName("m", "IN3"), normally_closed=True, bounce_ns=0, bounces=0, chance=Chance(0, "b"))
+    button.rest_at(True)
+    kernel.add_part(button)
+    assert (device.pins()["IN3"], button.pressed) == (1.0, False)
+    button.press(True, 0)
+    assert (device.pins()["IN3"], button.pressed) == (0.0, True)

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import MotionState, plan_position
+from steptwin.world.expression import Condition, crossing, names, parse
+
+
+class Level:
+    def __init__(self, value: float) -> None:
+        self.level = value
+        self.continuous = False
+
+    def value(self, now: Nanos) -> float:
+        return self.level
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        return iter(())
+
+
+class Moving:
+    """The count or velocity of a profile that goes there and back."""
+
+    continuous = True
+
+    def __init__(self, *, velocity: bool = False) -> None:
+        out = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 200.0, 300.0, 80.0)
+        self.profile = plan_position(MotionState.of(out, SECOND // 2), -40, 200.0, 300.0, 80.0)
+        self.velocity = velocity
+
+    def value(self, now: Nanos) -> float:
+        return self.profile.velocity(now) if self.velocity else float(self.profile.count(now))
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        return (self.profile.start + int(end) for end in self.profile.ends if self.profile.start + end > now)
+
+
+SIGNALS = {
+    "a": Level(1.0),
+    "b": Level(0.0),
+    "m.M1.position": Level(42.0),
+    "x.position": Moving(),
+    "x.velocity": Moving(velocity=True),
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "truth"),
+    [
+        ("a", True),
+        ("b", False),
+        ("not b", True),
+        ("a and b", False),
+        ("a or b and b", True),
+        ("(a or b) and b", False),
+        ("m.M1.position == 42", True),
+        ("m.M1.position >= 42.0 and m.M1.position<=42", True),
+        ("-1 < b", True),
+        ("m.M1.position > -4.2e1", True),
+        ("a != b", True),
+        ("NOT b AND a", True),
+    ],
+)
+def test_conditions(text: str, truth: bool) -> None:
+    assert Condition(text, SIGNALS.__getitem__).holds(0) is truth
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "ends too early: expected a signal or a number"),
+        ("a and", "ends too early: expected a signal or a number"),
+        ("a b", "column 3: found 'b', expected the end, 'and' or 'or'"),
+        ("(a", r"ends too early: expected '\)'"),
+        ("3", "expected one of == != <= >= < >"),
+        ("a = 3", "column 3: found '=', expected the end"),
+        ("a + 3", r"column 3: found '\+', expected the end"),
+        ("__import__('os')", r"found '\(', expected"),
+        ("not", "ends too early"),
+        ("a < and", "found 'and', expected a signal or a number"),
+        ("- a", "found 'a', expected a number"),
+    ],
+)
+def test_what_is_no_condition_is_misuse(text: str, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        parse(text)
+
+
+def test_two_moving_signals_cannot_be_compared() -> None:
+    with pytest.raises(Misuse, match=r"x\.position and x\.velocity both move: compare with a number"):
+        Condition("x.position > x.velocity", SIGNALS.__getitem__)
+
+
+def test_the_signals_of_a_condition_are_known() -> None:
+    assert list(names(parse("a and not (b or x.position > 3)"))) == ["a", "b", "x.position"]
+
+
+@given(level=st.integers(-60, 110), now=st.integers(SECOND // 2, 4 * SECOND), velocity=st.booleans())
+def test_a_crossing_is_the_first_moment_on_another_side(level: int, now: Nanos, velocity: bool) -> None:
+    signal = Moving(velocity=velocity)
+
+    def side(moment: Nanos) -> int:
+        value = signal.value(moment)
+        return (value > level) - (value < level)
+
+    found = crossing(signal, float(level), now)
+    if found is None:
+        assert {side(now + n * SECOND // 200) for n in range(1, 1000)} == {side(now)}
+    else:
+        assert side(found) != side(now)
+        assert side(found - 1) == side(now)
+        earlier = range(now, found, max(1, (found - now) // 300))
+        assert {side(moment) for moment in earlier} == {side(now)}
+
+
+def test_a_condition_says_when_it_may_come_true() -> None:
+    moving = Condition("x.position < 0 and a", SIGNALS.__getitem__)
+    profile = Moving().profile
+    at_zero = moving.due(SECOND // 2)
+    assert at_zero == profile.pulse_time(0, 0)
+    below = moving.due(at_zero)
+    assert below == profile.pulse_time(-1, 0)
+    assert moving.due(below) == below
+    assert Condition("b", SIGNALS.__getitem__).due(5) is None

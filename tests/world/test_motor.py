@@ -1,0 +1,191 @@
+"""The torque of a motor: thresholds against the analytic values, moments against a walk through time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import inf, pi
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND
+from steptwin.motion import MotionState, Profile, plan_position, plan_velocity
+from steptwin.motion.ramps import SpeedCurve, plan_endless
+from steptwin.world.course import Build, Course, Standing
+from steptwin.world.motor import Motor
+
+PER_REV = 3200
+INERTIA = 1e-4 * 2 * pi / PER_REV
+"""1e-4 kg·m², in N·m per pulse/s²."""
+LINEAR = ((0.0, 1.0), (32_000.0, 0.2))
+"""1 N·m at standstill, 0.2 at 10 rev/s."""
+
+
+def motor(curve=LINEAR, *, inertia=INERTIA, friction=0.0, load=0.0, start=None) -> Motor:
+    return Motor(curve, inertia, friction, load, start, 64)
+
+
+def final(build: Build, plan: Profile) -> Standing:
+    return Course(build, plan, plan.start, Standing(0, 0)).at(1000 * SECOND)
+
+
+def accelerated(rate: float, speed: float = 30_000.0) -> Profile:
+    return plan_position(MotionState(0, 0, 0.0, 0.0), 200_000, rate, 1000.0, speed)
+
+
+# ---------------------------------------------------------------------- thresholds
+
+
+def test_the_acceleration_from_which_steps_are_lost_is_that_of_the_torque() -> None:
+    """From rest to v: J a = T(v) at the end of the ramp. With T(v) = 1 − 0.8 v / 32000 and v = 16000, T = 0.6 N·m."""
+    limit = 0.6 / INERTIA
+    build = Build(motor=motor())
+    below, above = accelerated(limit * 0.9999, 16_000.0), accelerated(limit * 1.0001, 16_000.0)
+    assert final(build, below) == Standing(200_000, 200_000)
+    assert final(build, above).rotor < 200_000
+
+
+def test_the_speed_at_which_steps_are_lost_is_where_the_curve_meets_the_need() -> None:
+    """Half the standstill torque is needed for the ramp: lost at T(v) = 0.5, v = 20000 pulses/s."""
+    rate = 0.5 / INERTIA
+    plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 30_000.0, rate, rate)
+    lost = motor().loses(plan.segments[0], 0.0, plan.segments[0].end_s, 1)
+    assert lost == pytest.approx(20_000.0 / rate, rel=1e-12)
+    course = Course(Build(motor=motor()), plan, 0, Standing(0, 0))
+    moment = round(20_000.0 / rate * SECOND)
+    assert not course.at(moment - 10).stalled
+    assert course.at(moment + 10).stalled
+
+
+def test_friction_is_needed_at_speed_and_helps_to_brake() -> None:
+    build = Build(motor=motor(((0.0, 0.5), (32_000.0, 0.5)), friction=0.2))
+    up = 0.3 / INERTIA
+    down = 0.7 / INERTIA
+    fine = plan_position(MotionState(0, 0, 0.0, 0.0), 50_000, up * 0.999, down * 0.999, 20_000.0)
+    assert final(build, fine).rotor == 50_000
+    hard_up = plan_position(MotionState(0, 0, 0.0, 0.0), 50_000, up * 1.001, down * 0.999, 20_000.0)
+    assert final(build, hard_up).rotor < 50_000
+    hard_down = plan_position(MotionState(0, 0, 0.0, 0.0), 50_000, up * 0.999, down * 1.001, 20_000.0)
+    assert final(build, hard_down).rotor < 50_000
+
+
+def test_a_load_that_pulls_down_makes_the_way_up_harder() -> None:
+    build = Build(motor=motor(((0.0, 0.5), (32_000.0, 0.5)), load=0.3))
+    rate = 0.4 / INERTIA
+    up = plan_position(MotionState(0, 0, 0.0, 0.0), 5000, rate, rate * 0.1, 20_000.0)
+    down = plan_position(MotionState(0, 0, 0.0, 0.0), -5000, rate, rate * 0.1, 20_000.0)
+    assert final(build, up).rotor < 5000
+    assert final(build, down).rotor == -5000
+    assert final(Build(sign=-1, motor=build.motor), up).rotor == -5000
+
+
+def test_a_start_above_the_start_speed_is_not_followed() -> None:
+    """The M1486 begins at its start/stop speed at once."""
+    plan = plan_endless(0, 0, 1, SpeedCurve(500.0, 1000.0, 2000.0, 2000.0))
+    for start, follows in ((499.0, False), (500.0, True), (None, True)):
+        build = Build(motor=motor(inertia=0.0, start=start))
+        course = Course(build, plan, 0, Standing(0, 0), jump=500.0)
+        assert (course.at(SECOND).rotor > 0) is follows
+
+
+def test_what_is_lost_is_a_whole_number_of_electrical_periods() -> None:
+    standing = final(Build(motor=motor()), accelerated(0.9 / INERTIA))
+    assert 200_000 - standing.rotor > 0
+    assert (200_000 - standing.rotor) % 64 == 0
+    assert not standing.stalled
+
+
+def test_a_stalled_rotor_is_caught_below_the_start_speed() -> None:
+    slow, fast = Build(motor=motor(start=2000.0)), Build(motor=motor())
+    plan = accelerated(0.9 / INERTIA)
+    assert final(slow, plan).rotor > final(fast, plan).rotor
+    course = Course(slow, plan, 0, Standing(0, 0))
+    end = plan.end or 0
+    caught = end - round(2000.0 / 1000.0 * SECOND)
+    assert course.at(caught - 1000).stalled
+    assert not course.at(caught + 1000).stalled
+
+
+def test_a_motor_too_weak_for_its_load_never_catches_it() -> None:
+    build = Build(motor=motor(load=2.0))
+    standing = final(build, accelerated(1000.0))
+    assert standing.stalled
+    assert standing.rotor == 0
+
+
+# ---------------------------------------------------------------------- against a walk through time
+
+CURVES = st.lists(st.floats(0.05, 1.5), min_size=2, max_size=5).map(
+    lambda torques: tuple((7000.0 * n, torque) for n, torque in enumerate(torques))
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    curve=CURVES,
+    rate=st.floats(2000.0, 400_000.0),
+    speed=st.floats(500.0, 25_000.0),
+    friction=st.floats(0.0, 0.3),
+    load=st.floats(-0.3, 0.3),
+    parabolic=st.booleans(),
+)
+def test_the_moment_is_the_first_at_which_a_walk_finds_too_little_torque(  # noqa: PLR0917
+    curve: tuple, rate: float, speed: float, friction: float, load: float, parabolic: bool
+) -> None:
+    """Velocity and acceleration by differences of the position, every 100 µs."""
+    if parabolic:
+        knee = speed * 0.5
+        plan = plan_endless(0, 0, 1, SpeedCurve(knee * 0.1, rate, knee, speed))
+    else:
+        plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), speed, rate, rate)
+    drive = motor(curve, friction=friction, load=load)
+    step = 100e-6
+    for s, begin in zip(plan.segments, [0.0, *(s.end_s for s in plan.segments)], strict=False):
+        if s.end_s == inf or s.end_s - begin < 20 * step:
+            continue
+        found = drive.loses(s, begin, s.end_s, 1)
+        walked = None
+        t = begin + step
+        while t < s.end_s - step:
+            velocity = (s.position(t + step) - s.position(t - step)) / (2 * step)
+            slope = (s.velocity(t + step) - s.velocity(t - step)) / (2 * step)
+            torque = at_speed(curve, velocity)
+            if abs(INERTIA * slope + friction + load) > torque * (1 + 1e-9) + 1e-9:
+                walked = t
+                break
+            t += step
+        if walked is None:
+            assert found is None or found > s.end_s - 3 * step or is_close(drive, s, found)
+        else:
+            assert found is not None
+            assert found <= walked + step
+            assert found >= walked - 2 * step or is_close(drive, s, found)
+
+
+def is_close(drive: Motor, s, t: float) -> bool:
+    """What is needed and what is there differ by so little at ``t`` that the walk may step over it."""
+    torque = at_speed(drive.curve, abs(s.velocity(t)))
+    need = drive.inertia * (2 * s.c2 + 6 * s.c3 * (t - s.anchor_s)) + drive.friction + drive.load
+    return abs(abs(need) - torque) < 1e-3
+
+
+def at_speed(curve: tuple, speed: float) -> float:
+    """The curve, looked up in the plainest way."""
+    for (s0, t0), (s1, t1) in pairwise(curve):
+        if s0 <= speed <= s1:
+            return t0 + (t1 - t0) * (speed - s0) / (s1 - s0)
+    return curve[0][1] if speed < 0 else -1.0
+
+
+@pytest.mark.parametrize("curve", [(), ((1.0, 1.0),), ((0.0, 1.0), (0.0, 2.0)), ((0.0, -1.0),)])
+def test_curves_that_are_none_are_misuse(curve: tuple) -> None:
+    with pytest.raises(Misuse, match="curve"):
+        motor(curve)
+
+
+def test_at_standstill_the_first_torque_holds() -> None:
+    assert motor(load=1.0).holds()
+    assert not motor(load=1.0001).holds()
+    assert motor().torque(32_001.0) < 0.0

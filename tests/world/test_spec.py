@@ -1,0 +1,104 @@
+"""Descriptions of worlds: what they may say, and what is told where they are wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.runtime.world import World
+from steptwin.world.durations import duration
+from steptwin.world.reader import Text, WorldError
+from steptwin.world.spec import read_world
+
+TABLE = '[[mic488]]\nname = "table"\n'
+AXIS = TABLE + '[[axis]]\nname = "x"\ndrive = "table.M1"\n'
+
+
+def wrong(text: str) -> str:
+    with pytest.raises(WorldError) as caught:
+        World.from_toml(text, name="w.toml")
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[world\n", "w.toml:1:7: error D001: this is no TOML"),
+        ("[worlds]\n", "w.toml:1:1: error D004: the file has no [worlds]; did you mean 'world'?"),
+        ("world = 3\n", "w.toml:1:1: error D002: [world] is 3"),
+        ("[mic488]\nname = 't'\n", "w.toml:1:1: error D002: [mic488] stands once"),
+        ("[[mic488]]\nunit = 3\n", "w.toml:1:1: error D005: [mic488]: name is missing"),
+        (TABLE + "unti = 3\n", "w.toml:3:1: error D004: [mic488] has no 'unti'; did you mean 'unit'?"),
+        (TABLE + "unit = 300\n", "w.toml:3:1: error D003: [mic488]: unit: 300: permitted are whole numbers from 1 to 247"),
+        (TABLE + 'firmware = "1.7"\n', "firmware: '1.7': permitted are 1.23, 1.40, 1.70"),
+        (TABLE + TABLE, "w.toml:4:1: error D006: there is a [[mic488]] named 'table' already"),
+        (TABLE + "[mic488.M1]\nacc = -1\n", "w.toml:4:1: error D003: [mic488.M1]: acc: -1 is not permitted"),
+        (TABLE + '[mic488.M1]\nhome_mode = "HOME9"\n', "permitted are HOME0, HOME1, HOME2, HOME3, HOME4"),
+        (
+            TABLE + '[[wire]]\nfrom = "table"\nto = "table.IN1"\n',
+            "w.toml:4:1: error D003: [wire]: from: 'table': expected MACHINE.PIN",
+        ),
+        (
+            TABLE + '[[wire]]\nfrom = "tabel.OUT1"\nto = "table.IN1"\n',
+            "w.toml:3:1: error D009: nothing is called 'tabel'; did you mean 'table'?",
+        ),
+        (TABLE + '[[wire]]\nfrom = "table.OUT9"\nto = "table.IN1"\n', "'table' has no pin 'OUT9': pins are IN1"),
+        (AXIS + "travel = [3, 1]\n", "w.toml:6:1: error D003: [axis]: travel: [3, 1]: the first must be below the second"),
+        (AXIS + "travel = [1, 3]\n", "start = 0 is outside travel = [1.0, 3.0]"),
+        (AXIS.replace("M1", "M5"), "drive = 'table.M5': table has M1, M2, M3, M4"),
+        (AXIS + AXIS.removeprefix(TABLE).replace('"x"', '"y"'), "moves 'x' already"),
+        (AXIS + '[[axis.switch]]\nto = "table.IN1"\n', "w.toml:6:1: error D007: a switch needs one of below, above and position"),
+        (
+            AXIS + '[[axis.switch]]\nto = "table.IN1"\nbelow = 0\n[[button]]\nname = "b"\nto = "table.IN1"\n',
+            "table.IN1 is driven already, from line 7",
+        ),
+        (AXIS + "[axis.motor]\ntorque = [[1, 1]]\n", "w.toml:7:1: error D003: a torque curve begins at 0 rev/min"),
+        (AXIS + 'unit = "degree"\n[axis.motor]\nmass = 1\ntorque = [[0, 1]]\n', "mass and forces need a unit of mm, cm, m"),
+        (TABLE + "[[event]]\ndo = []\n", "an event needs one of at, every and when"),
+        (TABLE + '[[event]]\nat = "5 sec"\ndo = []\n', "w.toml:4:1: error D003: [event]: at: '5 sec' is no time"),
+        (TABLE + "[[event]]\nat = 1\ndo = [{ wiat = 1 }]\n", "step 1 has 'wiat'; did you mean 'wait'?"),
+        (TABLE + "[[event]]\nat = 1\ndo = [{ until = 'a >' }]\n", "condition 'a >' ends too early"),
+        (TABLE + '[[line]]\nname = "bus"\n', "w.toml:3:1: error D009: nothing is on this line"),
+        (TABLE + 'line = "bus"\n[[line]]\nname = "bus"\nkind = "m1486"\n', "'table' cannot be on a line of kind m1486"),
+        ("[[fault]]\nkind = 'crcc'\n", "kind = 'crcc': permitted are"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:
+    assert message in wrong(text)
+
+
+def test_all_problems_are_told_at_once_in_order() -> None:
+    told = wrong(TABLE + "unit = 0\nlenient = 1\n[[wire]]\n")
+    assert [line.split(": ")[0] for line in told.splitlines() if "error" in line] == [
+        "w.toml:3:1", "w.toml:4:1", "w.toml:5:1", "w.toml:5:1"
+    ]  # fmt: skip
+
+
+def test_keys_of_nested_tables_have_their_lines() -> None:
+    text = Text("t", "[[a]]\nx = 1\n[[a]]\ny = 2\n[[a.b]]\nz = 3\n[[a.b]]\nz = 4\n[a.c]\nq.r = 5\n")
+    paths = {("a", 0, "x"): 2, ("a", 1, "y"): 4, ("a", 1, "b", 0, "z"): 6, ("a", 1, "b", 1, "z"): 8, ("a", 1, "c", "q", "r"): 10}
+    assert {path: text.line(path) for path in paths} == paths
+    assert text.line(("a", 1, "b", 1, "no", "such")) == 7
+    assert text.line(("nothing",)) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "nanoseconds"),
+    [("5 ms", 5 * MILLISECOND), ("1.5s", SECOND * 3 // 2), (2, 2 * SECOND), (0.25, SECOND // 4), ("10 min", 600 * SECOND)],
+)
+def test_durations(value: object, nanoseconds: int) -> None:
+    assert duration(value) == nanoseconds
+
+
+@pytest.mark.parametrize("value", ["", "ms", "5 parsec", "-1 s", True, None, "9999 h", [1]])
+def test_what_is_no_duration_is_misuse(value: object) -> None:
+    with pytest.raises(ValueError, match=r"is no time|is too long"):
+        duration(value)
+
+
+def test_the_configuration_of_a_controller_takes_words_and_numbers() -> None:
+    spec = read_world(
+        "w", TABLE + '[mic488.M2]\nunit = "mm"\ngear = 100.0\nin_kl = "IN3"\nlimit_mode = "KL+KR"\n[mic488.IN3]\nlevel = 1\n'
+    )
+    assert spec.mic488[0].axes == {2: {"unit": 3, "gear": 100.0, "in_kl": 2, "limit_mode": 3}}
+    assert spec.mic488[0].inputs == {3: {"level": 1}}
