@@ -185,7 +185,7 @@ def test_run_plays_a_program(run: Run, file: File) -> None:
     assert "the program has ended" in out
     code, out, _ = run(*arguments, "--json", "--for", "50ms", "--statement-time", "10ms")
     data = json.loads(out)
-    assert (code, data["ended"], data["virtual_s"], data["line"]) == (0, "limit", 0.05, 3)
+    assert (code, data["ended"], data["virtual_s"], data["state"]["program"]["line"]) == (0, "limit", 0.05, 3)
 
 
 def test_run_says_what_is_wrong(run: Run, file: File) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rich.console import Console, Group
+from wbc_rig import loaded
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
@@ -16,6 +17,7 @@ from steptwin.runtime.demo import demo_config
 from steptwin.runtime.lines import banner
 from steptwin.runtime.mic488 import LineOptions, Mic488Line
 from steptwin.runtime.output import Output
+from steptwin.runtime.programbanks import Banks
 from steptwin.runtime.server import EndPoint
 from steptwin.runtime.view import Mic488View, page
 
@@ -128,3 +130,12 @@ def test_notices_are_among_the_events(run: Run) -> None:
 
     shown = [line.partition(" s  ")[2] for line in run(scene()) if "notice" in line]
     assert shown == [f"notice {number}" for number in range(4, 9)]
+
+
+def test_the_program_and_where_it_is(run: Run) -> None:
+    program, _ = loaded("OUT1 = ON\nWAIT IN1 = ON\n")
+    line = Mic488Line(ControllerConfig(), [1], "1.70", Banks({0: program}))
+    assert "program stopped" in screen(run, line, 80, 24)
+    line = Mic488Line(ControllerConfig(), [1], "1.70", Banks({0: program}))
+    start = bytes.fromhex("0001 0000 0006 01 06 2713 0001")
+    assert "program running, program:2  WAIT IN1 = ON" in screen(run, line, 80, 24, requests=(start,))

@@ -31,11 +31,15 @@ def mic488(
     baud: Annotated[int | None, typer.Option(help="Baud rate. Default: that of the configuration, or 38400.")] = None,
     tcp: Annotated[str | None, typer.Option(help="Modbus TCP on HOST:PORT; port 0 takes a free one.")] = None,
     rtu_tcp: Annotated[str | None, typer.Option(help="RTU frames over TCP on HOST:PORT.")] = None,
+    rfc2217: Annotated[str | None, typer.Option(help="A network serial port (RFC 2217) with Modbus RTU on HOST:PORT.")] = None,
     config: Annotated[Path | None, typer.Option(help="The vendor tool's .cfg file.")] = None,
     program: Annotated[
         list[str] | None, typer.Option(help="WBC program (.prg) for a bank: BANK=FILE; repeatable. FILE alone is for bank 0.")
     ] = None,
     positions: Annotated[list[str] | None, typer.Option(help="Position table (.csv) for a bank: BANK=FILE; repeatable.")] = None,
+    vision: Annotated[
+        str | None, typer.Option(help="Records of a vision system ('N1 X12.5 Y-3 A90' and a line end) on HOST:PORT.")
+    ] = None,
     state: Annotated[
         Path | None, typer.Option(help="Directory of the non-volatile memory. Without it, memory ends with the twin.")
     ] = None,
@@ -58,12 +62,12 @@ def mic488(
 ) -> None:
     """Serve virtual MIC488 controllers.
 
-    Without any of --pty, --serial, --tcp and --rtu-tcp it listens on a pty, on 127.0.0.1:5020 (Modbus TCP) and on
+    Without any of --pty, --serial, --tcp, --rtu-tcp and --rfc2217 it listens on a pty, on 127.0.0.1:5020 (Modbus TCP) and on
     127.0.0.1:5021 (RTU over TCP).
     """
     from steptwin.runtime.serve_mic488 import Mic488Options, serve
 
-    if not (pty or serial or tcp or rtu_tcp):
+    if not (pty or serial or tcp or rtu_tcp or rfc2217):
         from steptwin.runtime.control import runtime_directory
 
         pty, tcp, rtu_tcp = runtime_directory() / name, DEFAULT_TCP, DEFAULT_RTU_TCP
@@ -76,9 +80,11 @@ def mic488(
             baud=baud,
             tcp=tcp,
             rtu_tcp=rtu_tcp,
+            rfc2217=rfc2217,
             config=config,
             programs=tuple(program or ()),
             positions=tuple(positions or ()),
+            vision=vision,
             state=state,
             lenient=lenient,
             line_timing=line_timing,
@@ -106,6 +112,7 @@ def m1486(
     serial: Annotated[str | None, typer.Option(help="The line on a real serial port, 8N1.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate the BR pins choose. Default: the highest of the type.")] = None,
     tcp: Annotated[str | None, typer.Option(help="The line as raw TCP on HOST:PORT; port 0 takes a free one.")] = None,
+    rfc2217: Annotated[str | None, typer.Option(help="The line as a network serial port (RFC 2217) on HOST:PORT.")] = None,
     state: Annotated[
         Path | None, typer.Option(help="Directory of the EEPROMs of E types. Without it they end with the twin.")
     ] = None,
@@ -122,11 +129,11 @@ def m1486(
 ) -> None:
     """Serve virtual M1486 chips on one line; several programs may be connected to it.
 
-    Without any of --pty, --serial and --tcp it listens on a pty and on 127.0.0.1:5022 (raw TCP).
+    Without any of --pty, --serial, --tcp and --rfc2217 it listens on a pty and on 127.0.0.1:5022 (raw TCP).
     """
     from steptwin.runtime.serve_m1486 import M1486Options, serve
 
-    if not (pty or serial or tcp):
+    if not (pty or serial or tcp or rfc2217):
         from steptwin.runtime.control import runtime_directory
 
         pty, tcp = runtime_directory() / name, DEFAULT_M1486_TCP
@@ -140,6 +147,7 @@ def m1486(
             serial=serial,
             baud=baud,
             tcp=tcp,
+            rfc2217=rfc2217,
             state=state,
             program=program,
             line_timing=line_timing,

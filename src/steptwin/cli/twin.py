@@ -74,7 +74,9 @@ def state(twin: Twin = None, unit: Unit = None, json: Json = False) -> None:
     if shown.get("controller") == "M1486":
         typer.echo("\n".join(_m1486_lines(shown)))
         return
-    typer.echo(f"firmware {shown['firmware']}, {shown['time_s']:.1f} s after power-on, program {shown['program']['state']}")
+    typer.echo(
+        f"firmware {shown['firmware']}, {shown['time_s']:.1f} s after power-on, program {_program_words(shown['program'])}"
+    )
     for axis in shown["axes"]:
         unit_name = axis["unit"]
         typer.echo(
@@ -83,6 +85,10 @@ def state(twin: Twin = None, unit: Unit = None, json: Json = False) -> None:
         )
     on = [name for name, value in shown["pins"].items() if value and not name.startswith("AIN")]
     typer.echo(f"on: {', '.join(on) or 'nothing'}")
+
+
+def _program_words(program: dict[str, Any]) -> str:
+    return f"{program['state']} at line {program['line']}: {program['text']}" if "line" in program else program["state"]
 
 
 def _m1486_lines(shown: dict[str, Any]) -> list[str]:

@@ -260,6 +260,11 @@ class ProgramControl(Stateful):
     # ------------------------------------------------------------------ where it stands
 
     @property
+    def running(self) -> LoadedProgram | None:
+        """The program that runs or is paused, whatever bank is selected."""
+        return None if self.state is ProgramState.STOPPED else self.programs[self._program]
+
+    @property
     def statement(self) -> Span | None:
         """Place, in the source, of the statement in execution or executed next; None when nothing runs."""
         if self.state is ProgramState.STOPPED:

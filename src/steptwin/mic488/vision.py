@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.wire.slave import Direction, RtuSlavePort
+from steptwin.wire.timed import TimedRtuSlavePort
 
 if TYPE_CHECKING:
     from steptwin.mic488.device import Mic488
@@ -58,7 +59,7 @@ class Com1Port(Stateful):
     __slots__ = ("_device", "_frames", "_receiver", "modbus")
     FIXED = frozenset({"_device", "_frames", "modbus"})
 
-    def __init__(self, device: Mic488, modbus: RtuSlavePort | None = None) -> None:
+    def __init__(self, device: Mic488, modbus: RtuSlavePort | TimedRtuSlavePort | None = None) -> None:
         self._device = device
         self._receiver = VisionReceiver()
         self.modbus = modbus
@@ -76,6 +77,8 @@ class Com1Port(Stateful):
 
     def receive(self, data: bytes, now: Nanos) -> None:
         if self.modbus is not None:
+            # With line timing frames of earlier pieces are told of while nothing comes.
+            self._frames.clear()
             self.modbus.receive(data, now)
             for frame in self._frames:
                 if frame in data:

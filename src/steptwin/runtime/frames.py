@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.describe import Scale, Wording
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.registermap import DataType
 from steptwin.wire.rtu import BROADCAST
-from steptwin.wire.slave import Direction, FrameObserver, RtuSlavePort
-from steptwin.wire.timed import TimedRtuSlavePort
+from steptwin.wire.slave import Direction, FrameObserver
 
 ONE_DEVICE_UNITS = (0, 255)
 """MIC-23: on TCP these address the only device too."""
@@ -80,12 +79,22 @@ class FrameLog:
         return whose + wording.request(pdu)
 
 
+class RtuPort(Protocol):
+    """A port that counts what belongs to no frame."""
+
+    @property
+    def rubbish(self) -> int: ...
+    def exchange(self, data: bytes, now: Nanos) -> bytes: ...
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
+    def deadline(self) -> Nanos | None: ...
+
+
 class WatchedRtuPort:
     """An RTU port that tells of rubbish too: a wrong CRC, another protocol, another baud rate look like that."""
 
     broken = None
 
-    def __init__(self, port: RtuSlavePort | TimedRtuSlavePort, log: FrameLog, link: str) -> None:
+    def __init__(self, port: RtuPort, log: FrameLog, link: str) -> None:
         self._port = port
         self._log = log
         self._link = link

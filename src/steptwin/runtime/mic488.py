@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos, PinMachine
@@ -16,6 +16,7 @@ from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Event, Mic488, check_pin
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
+from steptwin.mic488.vision import Com1Port
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.demo import place_switches
 from steptwin.runtime.faults import FaultDesk
@@ -24,6 +25,7 @@ from steptwin.runtime.lines import Happening
 from steptwin.runtime.links import Port
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.programbanks import Banks
+from steptwin.runtime.vision import Com1Link, uses_vision
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
@@ -75,6 +77,8 @@ class Mic488Line:
         numbers = ", ".join(map(str, units))
         self.title = f"MIC488 firmware {firmware}, unit{'s' if len(units) > 1 else ''} {numbers}"
         self._connections = count(1)
+        # WBC-15; nobody else pays for it.
+        self._hears_records = len(units) == 1 and any(map(uses_vision, banks.programs.values()))
 
     # ------------------------------------------------------------------ ports
 
@@ -93,12 +97,22 @@ class Mic488Line:
             port = TimedRtuSlavePort(self.devices, timing, gap_ns=gap_ns, on_frame=observer)
         else:
             port = RtuSlavePort(self.devices, gap_ns=gap_ns, on_frame=observer)
-        watched = WatchedRtuPort(port, self.frames, link) if self.options.frames else port
+        shared = Com1Link(Com1Port(self._only_device(), port)) if self._hears_records else port
+        watched = WatchedRtuPort(shared, self.frames, link) if self.options.frames else shared
         return FaultyPort(watched, link, self.faults.faults, Line.RTU, framed=port, units=tuple(self.devices))
 
     def rtu_client_port(self, gap_ns: Nanos = BURSTY_GAP_NS) -> Port:
         """A port for one more client of RTU over TCP."""
         return self.rtu_port(f"rtu-{next(self._connections)}", gap_ns)
+
+    def vision_port(self) -> Port:
+        """A port for a vision system on a connection of its own."""
+        return Com1Link(Com1Port(self._only_device()))
+
+    def _only_device(self) -> Mic488:
+        if len(self.devices) > 1:
+            raise Misuse("a vision system belongs to one controller: serve a single unit")
+        return next(iter(self.devices.values()))
 
     # ------------------------------------------------------------------ what a hand at the machine does
 
@@ -202,6 +216,28 @@ def _coupling(axis: int, word: object) -> Coupling:
         raise Misuse(f"M{axis} = {word!r}: an encoder is turned by {permitted}, or by +N or -N counts") from None
 
 
+class Place(NamedTuple):
+    """A statement of a program's text."""
+
+    file: str
+    line: int
+    text: str
+
+
+def place_of(device: Mic488) -> Place | None:
+    """The statement that the running or paused program is at; None when there is none."""
+    running, span = device.program.running, device.program.statement
+    if running is None or span is None:
+        return None
+    source = running.source
+    return Place(source.name, source.position(span.start)[0], source.text[span.start : span.end].strip() or "its end")
+
+
+def _program_place(device: Mic488) -> dict[str, object]:
+    place = place_of(device)
+    return {} if place is None else place._asdict()
+
+
 def state_of(device: Mic488, now: Nanos) -> dict[str, object]:
     """Everything a person asks for, as plain data; positions in configured units."""
     return {
@@ -212,6 +248,7 @@ def state_of(device: Mic488, now: Nanos) -> dict[str, object]:
             "state": device.program.state.name.lower(),
             "program_bank": device.program.program_bank,
             "position_bank": device.program.position_bank,
+            **_program_place(device),
         },
         "data_type": "DINT" if device.data_type else "REAL",
         "axis_control_mode": "TRIGGER" if device.trigger_mode else "DIRECT",

@@ -13,8 +13,7 @@ from steptwin.diagnostics import Severity, render
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import check_pin
-from steptwin.mic488.program import ProgramState
-from steptwin.runtime.mic488 import state_of
+from steptwin.runtime.mic488 import place_of, state_of
 from steptwin.runtime.programbanks import Findings, ProgramErrors, read_banks
 from steptwin.runtime.serve_mic488 import load_config
 from steptwin.runtime.timedinputs import TimedInput
@@ -152,24 +151,22 @@ def _statement(bench: Bench, step: int) -> str:
 
 
 def _ending(bench: Bench, ending: Ending) -> str:
-    program, source = bench.device.program, bench.program.source
-    if program.fault is not None:
-        return f"an error has stopped the program in line {source.position(program.fault.span.start)[0]}: {program.fault.text}"
+    fault = bench.device.program.fault
+    if fault is not None:
+        line, _ = bench.program.source.position(fault.span.start)
+        return f"an error has stopped the program in line {line}: {fault.text}"
     if ending.why == "ended":
         return "the program has ended"
-    span = program.statement
-    if span is None:
+    place = place_of(bench.device)
+    if place is None:
         return "ended by the limit of time"
-    where = f"line {source.position(span.start)[0]}: {source.text[span.start : span.end].strip()}"
     if ending.why == "waiting":
-        return f"it waits for ever in {where}"
-    return f"ended by the limit of time (--for takes a longer one) in {where}"
+        return f"it waits for ever in line {place.line}: {place.text}"
+    return f"ended by the limit of time (--for takes a longer one) in line {place.line}: {place.text}"
 
 
 def _data(bench: Bench, outcome: Outcome, *, wrong: bool) -> dict[str, object]:
     options = outcome.options
-    program, source = bench.device.program, bench.program.source
-    span = program.statement
     return {
         "version": JSON_VERSION,
         "file": str(options.program),
@@ -180,7 +177,6 @@ def _data(bench: Bench, outcome: Outcome, *, wrong: bool) -> dict[str, object]:
         "virtual_s": outcome.virtual_s,
         "wall_s": outcome.wall_s,
         "ratio": outcome.ratio,
-        "line": None if span is None or program.state is ProgramState.STOPPED else source.position(span.start)[0],
         "assumed": bench.assumed,
         "state": state_of(bench.device, bench.now),
         "events": [_event_data(bench, happening) for happening in bench.happened],

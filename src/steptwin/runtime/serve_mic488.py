@@ -22,6 +22,7 @@ from steptwin.runtime.links import where
 from steptwin.runtime.mic488 import LineOptions, Mic488Line, open_state
 from steptwin.runtime.output import Output
 from steptwin.runtime.programbanks import Banks, Findings, ProgramErrors, parse_banks, read_banks
+from steptwin.runtime.rfc2217 import over_network
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop, shows_live_view
 from steptwin.runtime.tcp import parse_address
@@ -32,6 +33,8 @@ from steptwin.world.faults import Line
 RTU = "Modbus RTU"
 TCP = "Modbus TCP"
 RTU_TCP = "RTU over TCP"
+RFC2217 = "network port"
+VISION = "vision records"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,9 +48,11 @@ class Mic488Options:
     baud: int | None = None
     tcp: str | None = None
     rtu_tcp: str | None = None
+    rfc2217: str | None = None
     config: Path | None = None
     programs: tuple[str, ...] = ()
     positions: tuple[str, ...] = ()
+    vision: str | None = None
     state: Path | None = None
     lenient: bool = False
     line_timing: str = "off"
@@ -70,7 +75,7 @@ def serve(options: Mic488Options) -> None:
         raise Misuse(f"--gap {options.gap_ms:g}: permitted are more than 0 and at most 10000 ms")
     check_name(options.name)
     known_firmware(options.firmware)
-    for address in (options.tcp, options.rtu_tcp):
+    for address in (options.tcp, options.rtu_tcp, options.rfc2217, options.vision):
         if address is not None:
             parse_address(address, listen_any=options.listen_any)
     if options.config is not None:
@@ -78,6 +83,8 @@ def serve(options: Mic488Options) -> None:
     else:
         config = demo_config() if options.demo else ControllerConfig()
     units = parse_units(options.units) if options.units is not None else [config.address]
+    if options.vision is not None and len(units) > 1:
+        raise Misuse("--vision is for a single unit: a vision system belongs to one controller")
     banks = _load_banks(options, config)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
@@ -178,12 +185,18 @@ async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: 
     if options.rtu_tcp is not None:
         address = parse_address(options.rtu_tcp, listen_any=options.listen_any)
         await server.open_tcp("rtu-tcp", address, RTU_TCP, lambda: line.rtu_client_port(bursty))
+    if options.rfc2217 is not None:
+        address = parse_address(options.rfc2217, listen_any=options.listen_any)
+        await server.open_tcp("rfc2217", address, RFC2217, lambda: over_network(line.rtu_client_port(bursty)))
+    if options.vision is not None:
+        address = parse_address(options.vision, listen_any=options.listen_any)
+        await server.open_tcp("vision", address, VISION, line.vision_port)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file, options.name)
 
 
 def _lines(options: Mic488Options) -> set[Line]:
-    serial = {Line.RTU} if options.pty or options.serial or options.rtu_tcp else set()
+    serial = {Line.RTU} if options.pty or options.serial or options.rtu_tcp or options.rfc2217 else set()
     return serial | {Line.TCP} if options.tcp else serial
 
 

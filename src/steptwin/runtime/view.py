@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable, Sequence
 from math import ceil, log10
+from pathlib import Path
 
 from rich.console import Console
 from rich.live import Live
@@ -20,7 +21,7 @@ from steptwin.mic488.status import ControllerStatus, Status
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.frames import FrameLine
 from steptwin.runtime.lines import Happening, ServedLine, banner
-from steptwin.runtime.mic488 import Mic488Line
+from steptwin.runtime.mic488 import Mic488Line, place_of
 from steptwin.runtime.output import Output
 from steptwin.runtime.server import Server
 from steptwin.wire.slave import Direction
@@ -147,7 +148,17 @@ def _controller(unit: int, device: Mic488, now: Nanos, width: int) -> list[Text]
     title.append(CONTROLLER_STATUS_TEXTS[status], style="green" if status is ControllerStatus.OK else "bold red")
     heads = ["position", "velocity", "encoder"][: _columns(width)]
     head = Text("   " + "".join(f" {text:>15}" for text in heads) + "   status", style="dim")
-    return [title, head, *(_axis(axis, now, width) for axis in device.axes), *_pins(device)]
+    return [title, *_program(device), head, *(_axis(axis, now, width) for axis in device.axes), *_pins(device)]
+
+
+def _program(device: Mic488) -> list[Text]:
+    """What the program is at; nothing for a controller without any."""
+    place = place_of(device)
+    if place is None:
+        return [Text("program stopped", style="dim")] if device.program.programs else []
+    return [
+        Text(f"program {device.program.state.name.lower()}, {Path(place.file).name}:{place.line}  {place.text}", style="cyan")
+    ]
 
 
 def _columns(width: int) -> int:
