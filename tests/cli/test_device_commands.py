@@ -19,6 +19,7 @@ from steptwin.cli.device import table, tied
 from steptwin.errors import Misuse
 from steptwin.host import Mic488
 from steptwin.host.address import DeviceAddress, parse_device
+from steptwin.runtime.ports import Place
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
@@ -188,3 +189,73 @@ def test_tables() -> None:
         "name  value  unit\na         1  mm\nbb    -12.5"
     )
     assert table([]) == ""
+
+
+# ---------------------------------------------------------------------- looking for devices, sessions
+
+
+def test_scanning(twin: Any, shell: Shell) -> None:
+    pty_path, tcp = str(twin.pty), f"tcp://127.0.0.1:{twin.tcp_port}"
+    found = json.loads(shell("scan", pty_path, tcp, "--units", "1-2", "--baud", "9600,38400", "--json"))
+    assert [(f["address"], f["baud"], f["unit"], f["firmware"]) for f in found] == [
+        (pty_path, 9600, 1, "1.70"),
+        (tcp, None, 1, "1.70"),
+    ]
+    assert shell("scan", tcp, "--units", "1").split() == [tcp, "unit", "1", "MIC488,", "firmware", "1.70"]
+    shell("scan", tcp, "--units", "2,3")
+    assert (shell.code, shell.errors) == (1, f"nobody answers on {tcp}\n")
+    shell("scan", "/dev/none")
+    assert (shell.code, "cannot open serial port /dev/none" in shell.errors) == (1, True)
+    for units in ("0", "5-2", "x", "1-300"):
+        shell("scan", tcp, "--units", units)
+        assert (shell.code, f"--units {units}" in shell.errors) == (2, True)
+
+
+def test_ports(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("steptwin.runtime.ports.serial_ports", lambda: [Place("/dev/ttyUSB7", "FTDI (0403:6001)")])
+    monkeypatch.setattr("steptwin.runtime.ports.twin_ports", lambda: [Place("/run/mic488", "twin mic488")])
+    assert shell("ports").splitlines() == ["/dev/ttyUSB7  FTDI (0403:6001)", "/run/mic488   twin mic488"]
+    assert json.loads(shell("ports", "--json"))[0] == {"address": "/dev/ttyUSB7", "what": "FTDI (0403:6001)"}
+
+
+def test_the_ports_of_this_system_can_be_listed(shell: Shell) -> None:
+    shell("ports", "--json")
+    assert shell.code == 0
+
+
+def test_a_terminal_on_a_pipe(twin: Any) -> None:
+    lines = "M1_EN = on\nM1_ACC=1000  # fast\nM1_POS_ABS=2\nwait 1\n\nM1_POS_ACT OUT1\nraw 03 27 24 00 02\nhelp\nstop\nquit\nM9\n"
+    place = f"tcp://127.0.0.1:{twin.tcp_port},timeout=5"
+    run = subprocess.run([STEPTWIN, "terminal", "-d", place], input=lines, capture_output=True, text=True, check=False)
+    assert run.stdout.splitlines()[:4] == ["M1: target reached, 2", "M1_POS_ACT = 2 u", "OUT1 = OFF", "answer: 03 04 00 00 40 00"]
+    assert (run.stderr, run.returncode) == ("", 0)
+    run = subprocess.run([STEPTWIN, "terminal", "-d", place], input="M9\nM1_ACC\n", capture_output=True, text=True, check=False)
+    assert (run.stdout, run.returncode, "named 'M9'" in run.stderr) == ("", 2, True)
+
+
+def test_recording_and_comparing(twin: Any, shell: Shell, tmp_path: Path) -> None:
+    session, one, two = tmp_path / "s.txt", str(tmp_path / "one.jsonl"), str(tmp_path / "two.jsonl")
+    session.write_text("set M1_EN=1\nset M1_ACC=1000\nset M1_POS_ABS=1\nwait 1\nget M2_ACC\n")
+    shell("record", str(session), "-o", one)
+    shell("set", "M2_ACC=7")
+    Path(two).write_text(shell("record", str(session)))
+    assert shell("diff", one, two) == "step 5, get M2_ACC: M2_ACC: 50.0 | 7.0\n"
+    assert shell.code == 1
+    assert shell("diff", one, two, "--tolerance", "50") == ""
+    assert shell.code == 0
+    assert json.loads(shell("diff", one, two, "--json")) == [
+        {"step": 5, "line": "get M2_ACC", "what": "M2_ACC", "one": 50.0, "two": 7.0}
+    ]
+    session.write_text("set M1_VEL_ABS=5\nget M1_NONE\n")
+    shell("record", str(session))
+    assert (shell.code, "all axes were stopped" in shell.errors) == (2, True)
+    assert shell("get", "M1_VEL_ACT").split()[1] == "0"
+    shell("diff", one, str(tmp_path / "none"))
+    assert (shell.code, "cannot read" in shell.errors) == (2, True)
+
+
+def test_what_cannot_be_downloaded(shell: Shell) -> None:
+    shell("send", "machine.prg")
+    assert shell.code == 1
+    assert "documented nowhere" in shell.errors
+    assert "steptwin build" in shell.errors

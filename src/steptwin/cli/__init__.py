@@ -22,10 +22,15 @@ from steptwin.cli import (
     get,
     info,
     move,
+    record,
     registers,
     replay,
     run,
+    scan,
+    send,
     serve,
+    sniff,
+    terminal,
     twin,
     up,
     watch,
@@ -61,6 +66,13 @@ app.command()(move.home)
 app.command()(move.move)
 app.command()(move.jog)
 app.command()(move.stop)
+app.command()(scan.ports)
+app.command()(scan.scan)
+app.command()(send.send)
+app.command()(sniff.sniff)
+app.command()(terminal.terminal)
+app.command()(record.record)
+app.command()(record.diff)
 
 
 def _show_version(wanted: bool) -> None:

@@ -57,8 +57,10 @@ def opened(device: str | None, *, observe: bool = True, log_frames: bool = False
                 "--device or STEPTWIN_DEVICE"
             ) from error
         raise
-    with mic:
+    try:
         yield mic
+    finally:
+        mic.close()
 
 
 def complain(text: str) -> None:

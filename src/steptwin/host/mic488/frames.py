@@ -24,7 +24,8 @@ class Heard(NamedTuple):
 
     def __str__(self) -> str:
         arrow = "?" if self.direction is None else "→" if self.direction is Direction.IN else "←"
-        return f"{self.time / SECOND:12.6f} s  {arrow} {self.raw.hex(' ')}  {self.meaning}"
+        raw = f"{self.raw.hex(' ')}  " if self.raw else ""
+        return f"{self.time / SECOND:12.6f} s  {arrow} {raw}{self.meaning}"
 
 
 class FrameWords:
@@ -50,6 +51,10 @@ class FrameWords:
 
     def rubbish(self, now: Nanos, raw: bytes) -> None:
         self._tell(Heard(now, None, None, raw, "no frame"))
+
+    def lost(self, now: Nanos, count: int) -> None:
+        """Bytes between frames that belong to none."""
+        self._tell(Heard(now, None, None, b"", f"no frame: {count} byte{'' if count == 1 else 's'}"))
 
     def _tell(self, heard: Heard) -> None:
         for sink in self.sinks:

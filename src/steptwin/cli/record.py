@@ -1,0 +1,85 @@
+"""``steptwin record``, ``diff``: the same session with a twin and with the device, and where they differ.
+
+From Python: `steptwin.runtime.devicesession`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from steptwin.cli.device import Device, Json, LogFrames, complain, opened, print_json
+from steptwin.errors import LineFailure, Misuse
+
+
+def record(
+    session: Annotated[
+        Path, typer.Argument(help="The session: get NAME..., set NAME=VALUE, wait AXIS..., sleep SECONDS, raw HEX.")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Where the recording goes. Default: it is printed.")
+    ] = None,
+    device: Device = None,
+    log_frames: LogFrames = False,
+) -> None:
+    """Carry a session out on a controller and keep what came of it. On Ctrl-C and on failures all axes are stopped."""
+    from steptwin.runtime.devicesession import carry_out, steps_of, to_text
+
+    lines = steps_of(_read(session))
+    with opened(device, observe=False, log_frames=log_frames) as mic:
+        about = {"device": mic.place, "unit": mic.unit, "firmware": mic.firmware, "session": session.name}
+        kept: list[str] = []
+        try:
+            for text in to_text(carry_out(mic, lines), about):
+                kept.append(text)
+                if output is None:
+                    typer.echo(text)
+        except BaseException:
+            mic.stop_all()
+            complain("all axes were stopped")
+            raise
+        finally:
+            if output is not None:
+                _write(output, kept)
+
+
+def diff(
+    one: Annotated[Path, typer.Argument(help="A recording, of a twin for example.")],
+    two: Annotated[Path, typer.Argument(help="Another of the same session, of the device.")],
+    tolerance: Annotated[float, typer.Option(help="How far numbers may be apart.")] = 0.0,
+    time: Annotated[
+        float | None, typer.Option(help="How far moments may be apart, in seconds. Default: they do not matter.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Report where two recordings of the same session differ. Exit code 1 if they do."""
+    from steptwin.runtime.devicesession import differences, from_text
+
+    found = differences(from_text(_read(one), str(one)), from_text(_read(two), str(two)), tolerance=tolerance, time_s=time)
+    if json:
+        print_json([_data(d.step, d.line, d.what, d.one, d.two) for d in found])
+    elif found:
+        typer.echo("\n".join(map(str, found)))
+    if found:
+        raise typer.Exit(1)
+
+
+def _data(step: int, line: str, what: str, one: Any, two: Any) -> dict[str, Any]:
+    return {"step": step, "line": line, "what": what, "one": one, "two": two}
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no UTF-8 text"
+        raise Misuse(f"cannot read {path}: {(why or str(error)).lower()}") from error
+
+
+def _write(path: Path, lines: list[str]) -> None:
+    try:
+        path.write_text("\n".join(lines) + "\n", "utf-8")
+    except OSError as error:
+        raise LineFailure(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error

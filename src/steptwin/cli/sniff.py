@@ -1,0 +1,84 @@
+"""``steptwin sniff``: what two others say to each other, in words, until Ctrl-C.
+
+From Python: `steptwin.runtime.sniff.sniff`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from steptwin.cli.device import complain
+
+if TYPE_CHECKING:
+    from steptwin.runtime.frames import FrameLine
+
+
+class Language(enum.StrEnum):
+    MODBUS = "modbus"
+    M1486 = "m1486"
+
+
+def sniff(
+    address: Annotated[str, typer.Argument(metavar="ADDRESS", help="The line, or the device to pass everything on to.")],
+    listen: Annotated[str | None, typer.Option(help="Stand in the line: programs connect to HOST:PORT instead.")] = None,
+    pty: Annotated[Path | None, typer.Option(help="Stand in the line: programs open the pseudo terminal PATH instead.")] = None,
+    language: Annotated[Language, typer.Option(help="What is spoken.")] = Language.MODBUS,
+    baud: Annotated[int, typer.Option(help="Baud rate of a serial port.")] = 38400,
+    firmware: Annotated[str, typer.Option(help="Register map of the MIC488.")] = "1.70",
+    variant: Annotated[str, typer.Option(help="Type of the M1486.")] = "A",
+    json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each frame.")] = False,
+) -> None:
+    """Put a line between two others into words.
+
+    Without --listen and --pty it only listens: on RS-485 it hears both. With one of them it stands between a program and the
+    device and passes everything on, so it works on RS-232, on Modbus TCP and for the M1486 too.
+    """
+    import asyncio
+
+    from steptwin.host.place import parse_place
+    from steptwin.runtime.sniff import Decoder, M1486Decoder, ModbusDecoder
+    from steptwin.runtime.sniff import sniff as run
+    from steptwin.runtime.tcp import parse_address
+
+    place = parse_place(address, baud)
+    where = None if listen is None else parse_address(listen, listen_any=False)
+    show = _print_json if json else _print
+    decoder: Decoder
+    if language is Language.M1486:
+        decoder = M1486Decoder(show, variant)
+    else:
+        decoder = ModbusDecoder(show, firmware, tcp=place.framed)
+
+    async def main() -> None:
+        await run(place, decoder, listen=where, pty=pty, ready=complain)
+
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(main())
+
+
+def _print(frame: FrameLine) -> None:
+    from steptwin.machine import SECOND
+    from steptwin.runtime.sniff import ARROWS
+
+    arrow = ARROWS[frame.direction] if frame.raw else "?"
+    raw = f"{frame.raw.hex(' ')}  " if frame.raw else ""
+    typer.echo(f"{frame.time / SECOND:12.6f} s  {arrow} {raw}{frame.meaning}")
+
+
+def _print_json(frame: FrameLine) -> None:
+    import json
+
+    from steptwin.machine import SECOND
+
+    data = {
+        "time_s": frame.time / SECOND,
+        "direction": frame.direction.value,
+        "bytes": frame.raw.hex(" "),
+        "meaning": frame.meaning,
+    }
+    typer.echo(json.dumps(data, ensure_ascii=False))
