@@ -42,7 +42,7 @@ def file(tmp_path: Path) -> Callable[[str, str | bytes], Path]:
 
 
 File = Callable[[str, "str | bytes"], Path]
-NAMES = ("pick_and_place", "feeder", "xy_plot", "press", "slave")
+NAMES = ("pick_and_place", "feeder", "xy_plot", "press", "slave", "gate")
 
 
 @pytest.mark.parametrize("name", NAMES)
