@@ -100,6 +100,11 @@ def _write(world: World, options: WorldRun) -> list[Path]:
 # ---------------------------------------------------------------------- what is said
 
 
+def is_told(record: Record) -> bool:
+    """Whether people want to know: requests are as frequent as frames."""
+    return record.kind in ("event", "fault", "input") and record.subject != "request"
+
+
 def describe(record: Record) -> str:
     """What happened, in one line."""
     what = f"{record.subject}: " if record.kind != "event" or record.subject in ("note", "expectation") else ""
@@ -108,7 +113,7 @@ def describe(record: Record) -> str:
 
 
 def _lines(world: World, outcome: Outcome, say: Say) -> None:
-    for record in world.trace.of("event", "fault", "input"):
+    for record in filter(is_told, world.trace):
         what = f"{record.subject}:" if record.kind != "event" or record.subject in ("note", "expectation") else ""
         say(f"{record.time / SECOND:12.6f} s  {record.machine:<10} {what}{' ' if what else ''}{record.value}".rstrip())
     say("")

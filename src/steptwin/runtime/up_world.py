@@ -21,7 +21,7 @@ from steptwin.runtime.control import Handler
 from steptwin.runtime.m1486_state import state_of as state_of_chip
 from steptwin.runtime.mic488 import state_of
 from steptwin.runtime.output import Output
-from steptwin.runtime.run_world import describe
+from steptwin.runtime.run_world import describe, is_told
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_name, fastest_loop
 from steptwin.runtime.tcp import parse_address
@@ -32,8 +32,6 @@ from steptwin.world.lines import Place
 from steptwin.world.spec import LineSpec
 from steptwin.world.trace import Record
 
-SHOWN = ("event", "fault", "input")
-"""Kinds of records that are told as they come."""
 SLICE_NS: Nanos = 10 * SECOND
 """Without a clock a world runs this much at a time, so that it can be ended."""
 
@@ -192,7 +190,7 @@ def _greet(output: Output, server: Server, world: World, speed: float | None) ->
 
 
 def _tell(output: Output, record: Record) -> None:
-    if record.kind in SHOWN:
+    if is_told(record):
         output.line(describe(record))
 
 
@@ -224,7 +222,7 @@ def _keep(options: UpOptions, world: World) -> list[str]:
 
 
 async def _open(server: Server, live: LiveWorld, options: UpOptions, name: str) -> None:
-    await server.open_control(name, _handlers(server.cell, live))
+    await server.open_control(name, handlers_of(server.cell, live))
     for line in live.world.spec.lines:
         await _open_line(server, live, line, options)
     if options.ready_file is not None:
@@ -259,7 +257,7 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
 # ---------------------------------------------------------------------- a hand at the machine
 
 
-def _handlers(cell: Cell, live: LiveWorld) -> dict[str, Handler]:
+def handlers_of(cell: Cell, live: LiveWorld) -> dict[str, Handler]:
     """Requests of the control endpoint. ``unit`` is the name of a machine; pins are ``MACHINE.PIN``, buttons their names."""
     world = live.world
 

@@ -10,11 +10,14 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.state import Plain, Stateful
 from steptwin.world.course import Build, Course, Standing, plan_of, profile_of
 from steptwin.world.kernel import Drive, Kernel
+
+FOLLOW_NS: Nanos = 10 * MILLISECOND
+"""A controller that follows an encoder looks at it this often while it turns, so it is told so."""
 
 
 class Shaft(NamedTuple):
@@ -51,6 +54,7 @@ class Mechanism(Stateful):
         "_changes",
         "_coupled",
         "_course",
+        "_due",
         "_encoders",
         "_kernel",
         "_lost",
@@ -70,6 +74,8 @@ class Mechanism(Stateful):
         self._encoders: list[EncoderBuild] = []
         self._coupled = False
         """Whether encoders have been told that they are not simply turned by the drive."""
+        self._due: Nanos | None = None
+        """When controllers that follow are told next that their encoder turns."""
         self._lost = 0
         self._blocked = False
         self._changes = 0
@@ -119,10 +125,12 @@ class Mechanism(Stateful):
             drive = self._drive
             if drive.revision != self._revision:
                 self._renew(drive, now)
+            elif self._due is not None and self._due <= now:
+                self._turn_encoders(now)
 
     def deadline(self) -> Nanos | None:
-        """Courses are laid out ahead: nothing is left to be done."""
-        return None
+        """Courses are laid out ahead: only who follows the axis is to be told again and again."""
+        return self._due
 
     def _renew(self, drive: Drive, now: Nanos, standing: Standing | None = None) -> None:
         """The drive follows another plan, or something has changed in the mechanics."""
@@ -147,20 +155,26 @@ class Mechanism(Stateful):
         self._encoders.append(encoder)
         if encoder.counts is not None:
             encoder.device.gear_encoder(encoder.axis, encoder.counts, encoder.pulses, now)
+        if not self._is_own(encoder):
+            self._simple = False
         self._turn_encoders(now)
 
     def _turn_encoders(self, now: Nanos) -> None:
         course = self._course
+        self._due = None
         for encoder in self._encoders:
-            own = encoder.device is self._own_device() and encoder.axis == self.number
+            own = self._is_own(encoder)
             exact = own and course.is_exact and not (encoder.on_load and self.build.play)
             if not exact or self._coupled:
                 self._coupled = True
                 encoder.device.follow_shaft(encoder.axis, Shaft(course, encoder.on_load), now)
+            if not own and profile_of(course.plan).moving(now):
+                self._due = now + FOLLOW_NS
 
-    def _own_device(self) -> object:
+    def _is_own(self, encoder: EncoderBuild) -> bool:
+        """Whether the axis turns an encoder of its own controller's axis."""
         machine = self._kernel.machines[self.machine]
-        return getattr(machine, "inner", machine)
+        return encoder.device is getattr(machine, "inner", machine) and encoder.axis == self.number
 
     # ------------------------------------------------------------------ what can go wrong
 

@@ -1,0 +1,59 @@
+"""The commands of worlds: run, replay."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from steptwin.cli import app
+from steptwin.errors import Misuse
+
+FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
+runner = CliRunner()
+
+
+def invoke(*arguments: str, code: int = 0) -> str:
+    result = runner.invoke(app, list(arguments), catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def test_run_writes_a_trace_and_a_session_that_replays(tmp_path: Path) -> None:
+    told = invoke("run", str(FEEDER), "--for", "10s", "--trace", str(tmp_path / "out"), "--input", "table.IN8=1@2s")
+    assert "M1 is at its home position" in told
+    assert "x              149.9797 mm" in told
+    digest = told.splitlines()[-1].removeprefix("digest ")
+    assert {"trace.jsonl", "session.json"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    told = invoke("replay", str(tmp_path / "out" / "session.json"))
+    assert told == f"10 s of bar feeder, 1 inputs: the same, digest {digest}\n"
+
+
+def test_a_replay_that_differs_says_so(tmp_path: Path) -> None:
+    invoke("run", str(FEEDER), "--for", "3s", "--trace", str(tmp_path))
+    session = tmp_path / "session.json"
+    data = json.loads(session.read_text())
+    session.write_text(json.dumps(data | {"digest": "0" * 32}))
+    assert "another thing happened" in invoke("replay", str(session), code=1)
+
+
+def test_run_ends_on_a_condition_and_tells_it_as_json() -> None:
+    told = json.loads(invoke("run", str(FEEDER), "--until", "x.position <= 100", "--json"))
+    assert told["ended_by"] == "x.position <= 100"
+    assert told["axes"]["x"]["position"] == 100.0
+    assert told["failures"] == []
+
+
+def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:
+    world = tmp_path / "w.toml"
+    world.write_text('[[mic488]]\nname = "a"\n[[event]]\nat = 1\ndo = [{ expect = "a.M1.position > 3" }]\n')
+    assert "expectation failed at 1 s: a.M1.position > 3" in invoke("run", str(world), "--for", "2s", code=1)
+
+
+def test_options_for_programs_are_refused() -> None:
+    with pytest.raises(Misuse, match="--firmware is not for worlds, whose file says all that"):
+        invoke("run", str(FEEDER), "--firmware", "1.70")
+    with pytest.raises(Misuse, match=r"--input IN1: expected MACHINE\.PIN; machines are table, drum"):
+        invoke("run", str(FEEDER), "--input", "IN1=1@2s")

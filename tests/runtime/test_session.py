@@ -1,0 +1,109 @@
+"""Sessions: what came from outside, replayed, gives the same digest - here and on other versions of Python."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND
+from steptwin.runtime.session import load, save, session_of
+from steptwin.runtime.world import World
+from steptwin.world import script as do
+from steptwin.world.faults import read
+from steptwin.world.script import Steps
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+GOLDEN = json.loads((Path(__file__).parent / "world_digests.json").read_text())
+"""Digests of 30 s of the examples, and of `busy`. Written on 3.11; every version must agree."""
+
+
+def busy() -> World:
+    """A world to which everything happens that can come from outside."""
+    world = World.load(EXAMPLES / "feeder.toml")
+    world.outside(do.SetFault(read("delay unit=1 for_ms=40 nth=3 name=slow")))
+    world.run(for_=0.5)
+    world.mic488["table"].write("M2_EN", 1)
+    world.mic488["table"].write("M2_VEL_ABS", 400.0)
+    world.mic488["table"].set_pin("IN9", 1)
+    world.press("start", 0.3)
+    world.run(for_=1.25)
+    world.line["bus"].send(bytes.fromhex("01 03 27 24 00 02 8e b4"))
+    world.outside(do.Turn("table", 3, -25))
+    world.run(for_=0.5)
+    assert len(world.line["bus"].received()) == 9
+    world.line["chips"].send(b"x3\rf6400\rr\r")
+    world.m1486["drum"].set_pin("B5", 0)
+    world.run(for_=6)
+    world.outside(do.ClearFault("slow"))
+    world.mic488["table"].power_cycle()
+    world.run(for_=2)
+    return world
+
+
+def test_a_session_replays_from_its_file_alone(tmp_path: Path) -> None:
+    world = busy()
+    session = session_of(world)
+    save(session, tmp_path / "s.json")
+    loaded = load(tmp_path / "s.json")
+    assert loaded == session
+    assert loaded.firmware == {"table": "1.70"}
+    again = loaded.replay()
+    assert again.trace.digest() == session.digest
+    assert list(again.trace) == list(world.trace)
+    assert session_of(again) == session
+
+
+def test_what_python_code_did_is_in_the_session_and_the_code_is_not(tmp_path: Path) -> None:
+    def operator() -> Steps:
+        yield do.Wait(SECOND)
+        yield do.Press("start")
+        position = yield do.Read("x.position")
+        yield do.Write((("table", "M3_EN", 1.0), ("table", "M3_POS_ABS", round(position))))
+
+    world = World.load(EXAMPLES / "feeder.toml")
+    world.script(operator)
+    world.at(2.5, lambda: world.release("start"))
+    world.when("table.M3.position > 20", do.Set((("table", "IN8", 1.0),)))
+    world.run(for_=20)
+    session = session_of(world)
+    assert len(session.inputs) == 4
+    assert session.replay().trace.digest() == session.digest
+
+
+def test_another_run_has_another_digest() -> None:
+    session = session_of(busy())
+    world = session.world()
+    for time, what in session.inputs[:-1]:
+        world.advance(time)
+        world.outside(what)
+    world.run(until=session.until / SECOND)
+    assert world.trace.digest() != session.digest
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "is no session of a world"),
+        ("[]", "is no session of a world"),
+        ('{"steptwin_session": 99}', "is a session of format 99: this version reads 1"),
+        ('{"steptwin_session": 1}', "is no session of a world"),
+    ],
+)
+def test_what_is_no_session_is_misuse(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "s.json"
+    path.write_text(text)
+    with pytest.raises(Misuse, match=message):
+        load(path)
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_digests_are_the_same_everywhere(name: str) -> None:
+    if name == "busy":
+        world = busy()
+    else:
+        world = World.load(EXAMPLES / f"{name}.toml")
+        world.run(for_=30)
+    assert world.trace.digest() == GOLDEN[name]

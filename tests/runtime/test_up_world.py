@@ -1,0 +1,132 @@
+"""A world kept up with a clock does what the same world does in virtual time with the same inputs."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.clock import Clock
+from steptwin.runtime.links import Feed
+from steptwin.runtime.session import session_of
+from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, handlers_of, up
+from steptwin.runtime.world import World
+from steptwin.wire.crc import with_crc
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+READ_POSITION = bytes.fromhex("01 03 27 24 00 02 8e b4")
+
+
+class Wall:
+    """A clock that stands until it is set."""
+
+    def __init__(self) -> None:
+        self.now: Nanos = 0
+
+    def __call__(self) -> Nanos:
+        return self.now
+
+
+class Client:
+    """The other end of a link."""
+
+    def __init__(self) -> None:
+        self.heard = b""
+
+    def write(self, data: bytes) -> None:
+        self.heard += data
+
+
+def started(wall: Wall, speed: float = 1.0) -> tuple[World, LiveWorld, Cell]:
+    live = LiveWorld(World.load(EXAMPLES / "feeder.toml"))
+    return live.world, live, Cell(live, Clock(speed, wall))
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    looks=st.lists(st.tuples(st.integers(1, 900), st.sampled_from(["look", "bus", "chips", "press", "pin"])), max_size=12),
+    speed=st.sampled_from([0.5, 1.0, 10.0]),
+)
+def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], speed: float) -> None:
+    async def run() -> World:
+        wall = Wall()
+        world, live, cell = started(wall, speed)
+        bus, chips = PlacePort(live, "bus", "tcp-1", "rtu"), PlacePort(live, "chips", "raw-1", "raw")
+        hand = handlers_of(cell, live)
+        for pause, what in looks:
+            # Less than what counts as held up: nothing here runs the loop between.
+            for _ in range(pause // 100 + 1):
+                wall.now += 100 * MILLISECOND
+                now = cell.enter()
+                cell.leave()
+            if what == "bus":
+                bus.exchange(READ_POSITION, now)
+            elif what == "chips":
+                chips.exchange(b"x3\rf640\rr\r", now)
+            elif what == "press":
+                hand["pin"]({"set": {"START": 1}})
+            elif what == "pin":
+                hand["pin"]({"set": {"TABLE.IN8": pause % 2}})
+        cell.close()
+        return world
+
+    world = asyncio.run(run())
+    session = session_of(world)
+    again = session.replay()
+    assert again.trace.digest() == session.digest
+    assert list(again.trace) == list(world.trace)
+
+
+def test_answers_come_to_the_client_when_the_line_has_carried_them() -> None:
+    async def run() -> None:
+        wall = Wall()
+        world, live, cell = started(wall)
+        client, port = Client(), PlacePort(live, "bus", "rtu-1", "rtu")
+        feed = Feed(cell, port, client)
+        wall.now = 20 * SECOND
+        cell.enter()
+        feed.take(READ_POSITION)
+        assert client.heard == b""
+        wall.now += 10 * MILLISECOND
+        cell.enter()
+        await asyncio.sleep(0)
+        assert client.heard == with_crc(bytes.fromhex("01 03 04 00 00 43 16"))
+        feed.close()
+        cell.close()
+        assert [type(given.what).__name__ for given in world.inputs] == ["Bytes", "Leave"]
+
+    asyncio.run(run())
+
+
+def test_requests_of_the_control_endpoint() -> None:
+    async def run() -> None:
+        wall = Wall()
+        world, live, cell = started(wall)
+        hand = handlers_of(cell, live)
+        assert hand["pin"]({"unit": "table", "set": {"IN7": 1}})["table.IN7"] == 1.0  # type: ignore[index]
+        assert hand["state"]({"unit": "DRUM"})["controller"] == "M1486"  # type: ignore[index]
+        assert hand["encoder"]({"unit": "table", "set": {"2": 12}})[1]["counts"] == 12  # type: ignore[index]
+        hand["power-cycle"]({"unit": "table"})
+        assert hand["fault"]({"set": ["busy unit=1"]})[0]["name"] == "busy"  # type: ignore[index]
+        assert hand["fault"]({"clear": True}) == []
+        with pytest.raises(Misuse, match="choose a machine with --unit: table, drum"):
+            hand["state"]({})
+        cell.close()
+        assert len(world.inputs) == 5
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("speed", "message"),
+    [("0", "permitted are 0.001 to 1000"), ("fast", "permitted are 0.001"), ("max", "line 'bus' has clients outside")],
+)
+def test_speeds_that_cannot_be_are_misuse(speed: str, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        up(UpOptions(world=EXAMPLES / "feeder.toml", speed=speed))
