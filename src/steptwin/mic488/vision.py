@@ -92,7 +92,14 @@ class Com1Port(Stateful):
             self._device.see(record, now)
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        return [] if self.modbus is None else self.modbus.to_send(now)
+        if self.modbus is None:
+            return []
+        sent = self.modbus.to_send(now)
+        if self._frames:
+            # Found only when the line fell silent.
+            self._frames.clear()
+            self._receiver.forget()
+        return sent
 
     def deadline(self) -> Nanos | None:
         return None if self.modbus is None else self.modbus.deadline()

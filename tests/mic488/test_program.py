@@ -1,0 +1,300 @@
+"""Programs in a controller: banks, PROGRAM_CTRL, power-on, snapshots, wires."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import pytest
+from mic488_rig import Rig
+from wbc_rig import PAUSED, RUNNING, STOPPED, ProgramRig, loaded
+
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND, Edge
+from steptwin.mic488.config import ControllerConfig, ProgramConfig
+from steptwin.mic488.device import Mic488
+from steptwin.mic488.program import load
+from steptwin.wbc.check import check
+from steptwin.wbc.positions import parse_positions
+from steptwin.world.kernel import Kernel, PinName, Wire
+
+COUNTER = "n = n + 1\n$R0 = n\nWAIT 1 = 2\n"
+
+
+# ---------------------------------------------------------------------- banks
+
+
+@pytest.mark.parametrize(("firmware", "last"), [("1.23", 7), ("1.40", 7), ("1.70", 5)])
+def test_mic_28_banks_of_the_firmware(firmware: str, last: int) -> None:
+    rig = ProgramRig("OUT1 = ON\nWAIT 1 = 2\n", "", None, firmware)
+    rig.load("MOVEPTP @A\nOUT2 = ON\nWAIT 1 = 2\n", "A;1;2;3;4\n", bank=last)
+    program, table = loaded("END\n", "A;1;2;3;4\n", firmware)
+    with pytest.raises(Misuse, match=rf"program bank {last + 1}: permitted are 0…{last}"):
+        rig.device.load_program(last + 1, program)
+    with pytest.raises(Misuse, match=rf"position bank -1: permitted are 0…{last}"):
+        rig.device.load_positions(-1, table)
+    rig.word("PROG_BANK_SEL", last)
+    rig.word("POS_BANK_SEL", last)
+    rig.start()
+    rig.wait(0.1)
+    assert (rig.out(1), rig.out(2)) == (False, True)
+
+
+def test_mic_31_a_bank_chosen_counts_from_the_next_start() -> None:
+    rig = ProgramRig("OUT1 = ON\nWAIT 1 = 2\n")
+    rig.load("OUT2 = ON\nWAIT 1 = 2\n", bank=1)
+    rig.start()
+    rig.word("PROG_BANK_SEL", 1)
+    rig.wait(0.1)
+    rig.pause()
+    rig.start()
+    rig.wait(0.1)
+    assert (rig.out(1), rig.out(2)) == (True, False)
+    rig.halt()
+    rig.start()
+    rig.wait(0.1)
+    assert (rig.out(1), rig.out(2)) == (False, True)
+
+
+def test_a_bank_in_use_cannot_be_loaded() -> None:
+    rig = ProgramRig(COUNTER)
+    rig.start()
+    with pytest.raises(Misuse, match="program bank 0 is in use: stop the program first"):
+        rig.load("END\n")
+    rig.pause()
+    with pytest.raises(Misuse, match="program bank 0 is in use"):
+        rig.load("END\n")
+    rig.load("END\n", bank=1)
+    rig.halt()
+    rig.load("END\n")
+
+
+def test_a_program_with_errors_cannot_be_loaded() -> None:
+    with pytest.raises(Misuse, match=r"pick\.prg cannot run: unknown variable y"):
+        load(check("x = y\n"), "pick.prg")
+    with pytest.raises(Misuse, match="cannot run: its positions are not known without a table"):
+        load(check("MOVEPTP @A\n"))
+
+
+def test_a_program_longer_than_the_firmware_holds_is_refused() -> None:
+    long = "OUT1 = ON\n" * 1001
+    device = Mic488(ControllerConfig(), "1.40")
+    with pytest.raises(Misuse, match=r"long\.prg: 1001 executable lines, firmware 1\.40 holds 1000"):
+        device.load_program(0, load(check(long), "long.prg"))
+    Mic488(ControllerConfig(), "1.70").load_program(0, load(check(long)))
+
+
+@pytest.mark.parametrize("rows", ["", None])
+def test_wbc_25_a_program_that_uses_positions_needs_a_position_bank(rows: str | None) -> None:
+    table, _ = parse_positions("A;1;2;3;4\n")
+    for line in ("MOVEPTP @A", "$R0 = LinX", "PTPM2 = 3"):
+        rig = Rig(programs={0: load(check(f"{line}\nEND\n", table))})
+        if rows is not None:
+            rig.device.load_positions(0, parse_positions(rows)[0])
+        rig.word("PROGRAM_CTRL", 1)
+        rig.wait(0.1)
+        assert (rig.word("PROGRAM_CTRL"), rig.word("M_STATUS"), rig.pins()["ERR"]) == (0, 2, 1.0)
+        assert [event.text for event in rig.events("program-error")] == ["position bank 0 is empty"]
+    rig = Rig(programs={0: load(check("OUT1 = ON\nWAIT 1 = 2\n"))})
+    rig.word("PROGRAM_CTRL", 1)
+    rig.wait(0.1)
+    assert rig.word("PROGRAM_CTRL") == 1
+
+
+def test_positions_of_an_image_replace_rows_of_the_table() -> None:
+    record = "0005" + "0000803f" + "00004040" + "0000a040" + "0000e040"
+    moves = "M1 = ON\nM2 = ON\nM3 = ON\nMOVEPTP 1\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\n"
+    rig = ProgramRig(f"//!position 1 {record}\n{moves}", "A;1;2;3;4\nB;9;9;9;9\n")
+    rig.start()
+    rig.pin_until("OUT1", 1.0)
+    # 1 and 5 for M1 and M3: the mask is 0101.
+    assert [rig.position(axis) for axis in (1, 2, 3)] == [1, 0, 5]
+
+
+# ---------------------------------------------------------------------- control
+
+
+def test_mic_22_the_state_is_read() -> None:
+    rig = ProgramRig("WAIT IN1 = ON\nEND\n")
+    assert rig.state == STOPPED
+    rig.start()
+    assert rig.state == RUNNING
+    rig.pause()
+    assert rig.state == PAUSED
+    rig.start()
+    rig.pin("IN1", 1)
+    rig.wait(1)
+    assert rig.state == STOPPED
+
+
+def test_mic_31_starting_a_running_program_changes_nothing() -> None:
+    rig = ProgramRig(COUNTER)
+    rig.start()
+    rig.wait(1)
+    rig.start()
+    rig.wait(1)
+    assert rig.r(0) == 1
+
+
+def test_mic_31_program_and_master_command_the_same_axis_and_the_last_wins() -> None:
+    rig = ProgramRig("M1 = ON\nPABS M1 5000\nDELAY 2\nPABS M1 100\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig.start()
+    rig.wait(1)
+    rig.set("VEL_ABS", -300.0)
+    rig.wait(0.5)
+    assert rig.status(1) == 2
+    rig.pin_until("OUT1", 1.0)
+    assert (rig.position(1), rig.status(1)) == (100, 4)
+
+
+def test_user_registers_are_shared_with_the_master() -> None:
+    rig = ProgramRig("WAIT $I10 = 7\n$D12 = $I10 * -100000\n$R14 = $D12 / 3\nWAIT 1 = 2\n")
+    rig.start()
+    rig.wait(100)
+    rig.i(10, 7)
+    rig.wait(0.1)
+    assert (rig.d(12), rig.r(14)) == (-700_000, pytest.approx(-233333.33, rel=1e-6))
+
+
+def test_registers_of_axes_and_inputs_as_a_program_sees_them() -> None:
+    rig = ProgramRig(
+        "M1 = ON\nAccM1 = 250\nDecM1 = 500\nVmaxM1 = 40\nLimLM1 = -7\nLimRM1 = 90\nPosM1 = 10\nENC1 = 55\n"
+        "$I0 = StatM1\n$I1 = M1\nPREL M1 20\n$I2 = StatM1\n$I3 = M1\nWAITPOS\n"
+        "$R10 = PosM1\n$R12 = VactM1\n$D14 = ENC1\n$R16 = AIN1\n$I18 = INPUTS\n"
+        "$I19 = IN3\n$I20 = OUTPUTS\n$I21 = STATUS\nWAIT 1 = 2\n"
+    )
+    rig.pin("IN3", 1)
+    rig.pin("AIN1", 2.5)
+    rig.wait(0.1)
+    rig.start()
+    rig.wait(5)
+    assert [rig.i(n) for n in (0, 1, 2, 3, 18, 19, 20, 21)] == [1, 0, 3, 1, 4, 1, 0, 0]
+    assert [rig.get(key) for key in ("ACC", "DEC", "VMAX", "POSLIM_L", "POSLIM_R")] == [250, 500, 40, -7, 90]
+    assert (rig.r(10), rig.r(12), rig.r(16), rig.position(1)) == (30, 0, 2.5, 30)
+
+
+@pytest.mark.parametrize(("firmware", "status"), [("1.23", 0), ("1.40", 0), ("1.70", 1)])
+def test_status_is_that_of_the_controller_from_1_70_on(firmware: str, status: int) -> None:
+    rig = ProgramRig("WAIT IN1 = ON\n$I0 = STATUS\nWAIT 1 = 2\n", "", None, firmware)
+    rig.start()
+    rig.wait(0.1)
+    for axis in rig.device.axes[:1]:
+        axis.position_lost(rig.now)
+    rig.device.touch()
+    rig.start()
+    rig.pin("IN1", 1)
+    rig.wait(0.1)
+    assert rig.i(0) == status
+
+
+# ---------------------------------------------------------------------- power
+
+AT_POWER_ON = replace(ControllerConfig(), program=ProgramConfig(activate=1, prog_bank=2, pos_bank=3))
+
+
+def test_the_configuration_starts_a_program_at_power_on() -> None:
+    program, table = loaded("M1 = ON\nMOVEPTP @A\nOUT1 = ON\nWAIT 1 = 2\n", "A;10;x;x;x\n")
+    rig = Rig(AT_POWER_ON, programs={2: program}, positions={3: table})
+    rig.wait(5)
+    assert (rig.word("PROGRAM_CTRL"), rig.position(1), rig.word("M_STATUS")) == (1, 10, 0)
+    rig.device.power_cycle(rig.now)
+    assert [(edge.pin, edge.value) for edge in rig.device.take_edges()] == [("OUT1", 0.0), ("M1_EN", 0.0)]
+    rig.wait(5)
+    assert (rig.word("PROGRAM_CTRL"), rig.position(1), rig.pins()["OUT1"]) == (1, 10, 1.0)
+    assert rig.device.axes[0].profile.count(rig.now) == 20
+
+
+def test_power_off_ends_a_program_that_nothing_starts_again() -> None:
+    rig = ProgramRig("TIMB1 = 7\nOUT1 = ON\nPULSE(OUT2, 1)\nWAIT 1 = 2\n")
+    rig.start()
+    rig.wait(0.5)
+    rig.device.power_cycle(rig.now)
+    rig.wait(5)
+    assert (rig.state, rig.out(1), rig.out(2), rig.device.deadline()) == (STOPPED, False, False, None)
+
+
+# ---------------------------------------------------------------------- snapshots, sharing, wires
+
+BUSY = "M1 = ON\nL:\nPREL M1 30\nWAITPOS\nDELAY 0.1\nn = n + 1\n$R0 = n\nWHILE TIMA1 < 50\nENDWHILE\nTIMA1 = 0\nJUMP L\n"
+
+
+def test_a_snapshot_in_the_middle_of_any_statement_goes_on_elsewhere() -> None:
+    program, table = loaded(BUSY)
+
+    def new() -> Mic488:
+        return Mic488(ControllerConfig(), programs={0: program}, positions={0: table})
+
+    one = new()
+    one.program.command(1, 0)
+    one.touch()
+    for step in range(60):
+        one.advance(step * 17 * MILLISECOND)
+        other = new()
+        other.restore(pickle.loads(pickle.dumps(one.snapshot())))
+        assert other.program.statement == one.program.statement
+        end = one.now + 2 * SECOND
+        ahead = new()
+        ahead.restore(one.snapshot())
+        other.advance(end)
+        ahead.advance(end)
+        assert other.take_edges() == ahead.take_edges()
+        assert other.user == ahead.user
+        assert other.axes[0].coordinate_p(end) == ahead.axes[0].coordinate_p(end)
+
+
+def test_a_snapshot_belongs_to_the_contents_of_the_banks() -> None:
+    rig = ProgramRig(BUSY)
+    rig.start()
+    snapshot = rig.device.snapshot()
+    other = ProgramRig(COUNTER)
+    with pytest.raises(Misuse, match="other programs or positions in its banks"):
+        other.device.restore(snapshot)
+    other.load(BUSY)
+    other.device.restore(snapshot)
+
+
+def test_controllers_share_a_program_and_nothing_else() -> None:
+    program, table = loaded("L:\nn = n + AIN1\n$R0 = n\nDELAY 1\nJUMP L\n")
+    rigs = [Rig(programs={0: program}, positions={0: table}) for _ in range(3)]
+    for volts, rig in enumerate(rigs):
+        rig.pin("AIN1", float(volts))
+        rig.word("PROGRAM_CTRL", 1)
+    for rig in rigs:
+        rig.wait(5.5)
+    assert [rig.device.program.machine.cells[0] for rig in rigs] == [0, 6, 12]
+
+
+def test_outputs_of_programs_travel_over_wires_and_back_in_one_world() -> None:
+    ping, table = loaded("L:\nOUT1 = ON\nWAIT IN1 = ON\nOUT1 = OFF\nWAIT IN1 = OFF\nn = n + 1\n$R0 = n\nJUMP L\n")
+    pong, _ = loaded("L:\nWAIT IN1 = ON\nOUT1 = ON\nWAIT IN1 = OFF\nOUT1 = OFF\nJUMP L\n")
+    kernel = Kernel()
+    one, other = (Mic488(ControllerConfig(), programs={0: program}, positions={0: table}) for program in (ping, pong))
+    kernel.add("one", one)
+    kernel.add("other", other)
+    kernel.connect(Wire(PinName("one", "OUT1"), PinName("other", "IN1")))
+    kernel.connect(Wire(PinName("other", "OUT1"), PinName("one", "IN1")))
+    seen: list[Edge] = []
+    kernel.observers.append(lambda name, edge: seen.append(edge))
+    for device in (one, other):
+        device.program.command(1, 0)
+        device.touch()
+    kernel.advance(SECOND)
+    rounds = one.program.machine.cells[0]
+    # Every way takes the filter of the input and a statement or two.
+    assert 18 <= rounds <= 22
+    assert [edge.time for edge in seen] == sorted(edge.time for edge in seen)
+    assert len(seen) == pytest.approx(4 * rounds, abs=4)
+
+
+def test_a_program_without_any_wait_does_not_hang_and_lets_others_work() -> None:
+    for statement_time in (0, MILLISECOND):
+        rig = ProgramRig("L:\nn = n + 1\n$R0 = n\nJUMP L\n", statement_time=statement_time)
+        rig.start()
+        for step in range(1, 100):
+            rig.wait(0.01)
+            due = rig.device.deadline()
+            assert due is not None
+            assert rig.now < due <= rig.now + MILLISECOND
+            rig.i(7, step)
+            assert rig.i(7) == step
+        assert rig.r(0) > 300

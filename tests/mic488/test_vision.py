@@ -1,0 +1,97 @@
+"""Records of a vision system on COM1, alone and between Modbus frames."""
+
+from __future__ import annotations
+
+import pytest
+from mic488_rig import read_pdu
+from wbc_rig import ProgramRig
+
+from steptwin.mic488.vision import Com1Port, Record, VisionReceiver
+from steptwin.wire.rtu import encode_frame
+from steptwin.wire.slave import Direction, RtuSlavePort
+
+RECORDS = [
+    (b"N1 X2 Y3 A4\r", Record(1, 2, 3, 4)),
+    (b"N12 X-2.5 Y+3,25 A-180\r\n", Record(12, -2.5, 3.25, -180)),
+    (b"n7x1y2a3\n", Record(7, 1, 2, 3)),
+    (b"rubbish N7 X1 Y2 A3\n", Record(7, 1, 2, 3)),
+]
+
+
+@pytest.mark.parametrize(("data", "record"), RECORDS)
+def test_wbc_27_a_record_whole_byte_by_byte_and_with_what_follows(data: bytes, record: Record) -> None:
+    assert VisionReceiver().feed(data) == [record]
+    receiver = VisionReceiver()
+    assert [found for byte in data for found in receiver.feed(bytes((byte,)))] == [record]
+    assert VisionReceiver().feed(data + data + b"N1 X") == [record, record]
+
+
+NO_RECORDS = (
+    b"N1 X2 Y3\r",
+    b"X1 Y2 A3 N4\r",
+    b"N X1 Y2 A3\r",
+    b"N1 X1 Y2 A3 B4\r",
+    b"N1 X1.2.3 Y2 A3\r",
+    b"\r\r",
+    b"N" * 5000,
+)
+
+
+@pytest.mark.parametrize("data", NO_RECORDS)
+def test_wbc_27_a_line_that_is_no_record_is_passed_over(data: bytes) -> None:
+    receiver = VisionReceiver()
+    assert receiver.feed(data) == []
+    receiver.feed(b"\r")
+    assert receiver.feed(b"N1 X2 Y3 A4\r") == [Record(1, 2, 3, 4)]
+
+
+PROGRAM = """
+L:
+WAIT VisionNew = 1
+$R0 = VisionNo
+$R2 = VisionX
+$R4 = VisionY
+$R6 = VisionA
+n = n + 1
+$R8 = n
+VisionNew = 0
+JUMP L
+"""
+
+
+def test_a_program_sees_records() -> None:
+    rig = ProgramRig(PROGRAM)
+    rig.start()
+    rig.wait(1)
+    port = Com1Port(rig.device)
+    for number in (1, 2):
+        port.receive(f"N{number} X12.5 Y-7 A90\r\n".encode(), rig.now)
+        rig.kernel.deadline()
+        rig.wait(1)
+        assert [rig.r(n) for n in (0, 2, 4, 6, 8)] == [number, 12.5, -7, 90, number]
+    assert (port.to_send(rig.now), port.deadline()) == ([], None)
+
+
+def test_wbc_15_modbus_and_records_on_one_port() -> None:
+    rig = ProgramRig(PROGRAM)
+    rig.start()
+    modbus = RtuSlavePort({1: rig.device})
+    frames: list[Direction] = []
+    modbus.on_frame = lambda now, direction, frame: frames.append(direction)
+    port = Com1Port(rig.device, modbus)
+    ask = encode_frame(1, read_pdu(3, 0, 2))
+    # A frame whose data look like a record is a frame.
+    text = b"\rN9 X9 Y9 A9\r\n"
+    write = encode_frame(1, bytes((16, 0, 100, 0, len(text) // 2, len(text))) + text)
+    answers: list[int] = []
+    for pieces in ([ask], [write], [write[:9], write[9:]], [b"N3 X1 Y2 A3\r" + ask], [b"N4 X1 ", ask, b"\r"]):
+        rig.wait(0.5)
+        for piece in pieces:
+            rig.wait(0.005)
+            port.receive(piece, rig.now)
+        rig.kernel.deadline()
+        rig.wait(0.5)
+        answers.append(len(port.to_send(rig.now)))
+    assert answers == [1] * 5
+    assert frames.count(Direction.IN) == 5
+    assert (rig.r(0), rig.r(8)) == (3, 1)
