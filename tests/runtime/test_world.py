@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import dedent
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -239,7 +240,7 @@ def test_scripts_that_take_no_time_for_ever_are_a_runaway() -> None:
 
 def test_a_request_gives_its_answer_in_the_time_of_the_line() -> None:
     world = World.from_toml('[[line]]\nname = "bus"\ntiming = "real"\n[[mic488]]\nname = "a"\nline = "bus"\nunit = 5\n')
-    seen: list[object] = []
+    seen: list[Any] = []
 
     def master() -> Steps:
         seen.append((yield do.Request("bus", 5, bytes.fromhex("03 2719 0001"), SECOND)))

@@ -124,7 +124,9 @@ def test_a_condition_says_when_it_may_come_true() -> None:
     profile = Moving().profile
     at_zero = moving.due(SECOND // 2)
     assert at_zero == profile.pulse_time(0, 0)
+    assert at_zero is not None
     below = moving.due(at_zero)
+    assert below is not None
     assert below == profile.pulse_time(-1, 0)
     assert moving.due(below) == below
     assert Condition("b", SIGNALS.__getitem__).due(5) is None

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
-from steptwin.motion import MotionState, Profile, plan_position, plan_velocity
+from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
 from steptwin.motion.ramps import SpeedCurve, plan_endless
 from steptwin.world.course import Build, Course, Standing
 from steptwin.world.motor import Motor
@@ -23,7 +23,14 @@ LINEAR = ((0.0, 1.0), (32_000.0, 0.2))
 """1 N·m at standstill, 0.2 at 10 rev/s."""
 
 
-def motor(curve=LINEAR, *, inertia=INERTIA, friction=0.0, load=0.0, start=None) -> Motor:
+def motor(
+    curve: tuple[tuple[float, float], ...] = LINEAR,
+    *,
+    inertia: float = INERTIA,
+    friction: float = 0.0,
+    load: float = 0.0,
+    start: float | None = None,
+) -> Motor:
     return Motor(curve, inertia, friction, load, start, 64)
 
 
@@ -164,7 +171,7 @@ def test_the_moment_is_the_first_at_which_a_walk_finds_too_little_torque(  # noq
             assert found >= walked - 2 * step or is_close(drive, s, found)
 
 
-def is_close(drive: Motor, s, t: float) -> bool:
+def is_close(drive: Motor, s: Segment, t: float) -> bool:
     """What is needed and what is there differ by so little at ``t`` that the walk may step over it."""
     torque = at_speed(drive.curve, abs(s.velocity(t)))
     need = drive.inertia * (2 * s.c2 + 6 * s.c3 * (t - s.anchor_s)) + drive.friction + drive.load

@@ -269,7 +269,7 @@ class Plant:
         elif script.is_outside:
             self.outside(step)
         else:
-            self.do(step)
+            self.perform(step)
         return None
 
     def expect(self, text: str) -> None:
@@ -291,10 +291,10 @@ class Plant:
 
     def outside(self, what: Outside) -> None:
         """Something comes from outside now: it is done, and remembered for a replay."""
-        self.do(what)
+        self.perform(what)
         self.inputs.append(Given(self.now, what))
 
-    def do(self, what: Outside) -> None:
+    def perform(self, what: Outside) -> None:
         """Do something at the present moment. Raises `Misuse` for what is not there."""
         act(self, what)
 
