@@ -343,3 +343,27 @@ def test_slave_shows_inputs_and_sets_outputs(served: ProgramRig) -> None:
     served.set("POS_ACT", 77.0)
     served.wait(0.2)
     assert served.r(114) == 77.0
+
+
+# ---------------------------------------------------------------------- gate
+
+
+def test_gate_opens_and_shuts() -> None:
+    rig = example("gate")
+    place_switch(rig, 1, "IN1", 20.0)
+    rig.wait(3.0)
+    assert (rig.state, rig.status(1), rig.position(1)) == (RUNNING, 4, 0.0)
+    rig.pin("IN5", 1.0)
+    lit = rig.pin_until("OUT1", 1.0)
+    dark = rig.pin_until("OUT1", 0.0)
+    # 850 mm at 200 mm/s with ramps of 150 mm/s².
+    assert dark - lit == pytest.approx(850 / 200 + 200 / 150, abs=0.01)
+    assert rig.position(1) == 850.0
+    rig.pin("IN5", 0.0)
+    rig.wait(20.0)
+    assert (rig.position(1), rig.out(1)) == (850.0, False)
+    rig.pin("IN6", 1.0)
+    free = rig.now / 1e9
+    assert rig.pin_until("OUT1", 1.0) - free == pytest.approx(5.0 + FILTER_S, abs=0.003)
+    rig.pin_until("OUT1", 0.0)
+    assert (rig.position(1), rig.state) == (0.0, RUNNING)

@@ -40,6 +40,9 @@ def mic488(
     vision: Annotated[
         str | None, typer.Option(help="Records of a vision system ('N1 X12.5 Y-3 A90' and a line end) on HOST:PORT.")
     ] = None,
+    statement_time: Annotated[
+        str, typer.Option(metavar="TIME", help="What one statement of a program takes; 0 for none.")
+    ] = "1ms",
     state: Annotated[
         Path | None, typer.Option(help="Directory of the non-volatile memory. Without it, memory ends with the twin.")
     ] = None,
@@ -66,6 +69,7 @@ def mic488(
     127.0.0.1:5021 (RTU over TCP).
     """
     from steptwin.runtime.serve_mic488 import Mic488Options, serve
+    from steptwin.runtime.timedinputs import parse_duration
 
     if not (pty or serial or tcp or rtu_tcp or rfc2217):
         from steptwin.runtime.control import runtime_directory
@@ -85,6 +89,7 @@ def mic488(
             programs=tuple(program or ()),
             positions=tuple(positions or ()),
             vision=vision,
+            statement_time=parse_duration(statement_time, "--statement-time"),
             state=state,
             lenient=lenient,
             line_timing=line_timing,

@@ -26,6 +26,7 @@ from steptwin.runtime.links import Port
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.programbanks import Banks
 from steptwin.runtime.vision import Com1Link, uses_vision
+from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
@@ -55,6 +56,7 @@ class Mic488Line:
         banks: Banks | None = None,
         *,
         lenient: bool = False,
+        statement_time: Nanos = STATEMENT_TIME,
         state: StateDirectory | None = None,
         demo: bool = False,
         options: LineOptions | None = None,
@@ -65,7 +67,15 @@ class Mic488Line:
         self.devices: dict[int, Mic488] = {}
         for unit in units:
             memory = state.load(memory_name(unit)) if state is not None else None
-            device = Mic488(config, firmware, lenient=lenient, memory=memory, programs=banks.programs, positions=banks.positions)
+            device = Mic488(
+                config,
+                firmware,
+                lenient=lenient,
+                memory=memory,
+                programs=banks.programs,
+                positions=banks.positions,
+                statement_time=statement_time,
+            )
             if state is not None:
                 device.store = partial(state.save, memory_name(unit))
             self.devices[unit] = device

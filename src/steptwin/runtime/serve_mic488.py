@@ -27,6 +27,7 @@ from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop, shows_live_view
 from steptwin.runtime.tcp import parse_address
 from steptwin.wbc.dialect import dialect_for
+from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
 from steptwin.world.faults import Line
 
@@ -53,6 +54,7 @@ class Mic488Options:
     programs: tuple[str, ...] = ()
     positions: tuple[str, ...] = ()
     vision: str | None = None
+    statement_time: Nanos = STATEMENT_TIME
     state: Path | None = None
     lenient: bool = False
     line_timing: str = "off"
@@ -147,6 +149,7 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
             options.firmware,
             banks,
             lenient=options.lenient,
+            statement_time=options.statement_time,
             state=open_state(stack, options.state),
             demo=options.demo,
             options=LineOptions(baud=baud, timing=options.line_timing == "real", frames=live or options.log_frames),
