@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from textwrap import dedent
 from typing import Any
@@ -366,4 +367,19 @@ def test_random_worlds_do_the_same_again_in_pieces_and_from_a_snapshot(parts: li
 def test_examples_run_as_their_scripts_expect(path: Path) -> None:
     world = World.load(path)
     world.run(for_="30 s")
+    assert world.failures == []
+
+
+def test_the_page_about_worlds_does_what_it_says(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(__file__).parents[2]
+    page = (root / "docs" / "worlds.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    (toml,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(root)
+    exec(compile(code, "worlds.md", "exec"), {})
+    *_, gentle, hasty = capsys.readouterr().out.split("\n")[:-1]
+    assert gentle.endswith(" 0")
+    assert int(hasty.split()[1]) > 0
+    world = World.from_toml(toml)
+    world.run(for_=60)
     assert world.failures == []

@@ -10,9 +10,12 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli.commands import Format, Section, show
+from steptwin.errors import Misuse
+
 
 def up(
-    world: Annotated[Path, typer.Argument(metavar="MACHINE.toml", help="The description of the world.")],
+    world: Annotated[Path | None, typer.Argument(metavar="[MACHINE.toml]", help="The description of the world.")] = None,
     speed: Annotated[
         str, typer.Option(help="Virtual seconds in a second: 0.1, 1, 10; 'max' for worlds without clients outside.")
     ] = "1",
@@ -23,8 +26,15 @@ def up(
     trace: Annotated[Path | None, typer.Option(help="Write what happened to a file or into a directory when it ends.")] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    keys: Annotated[bool, typer.Option("--keys", help="Show what a description may say.")] = False,
+    form: Annotated[Format, typer.Option("--format", help="How to print the keys.")] = Format.TEXT,
 ) -> None:
     """Run a world until Ctrl-C, with its lines open to other programs."""
+    if keys:
+        show(sections(), form)
+        return
+    if world is None:
+        raise Misuse("which world? give the TOML file that describes it")
     from steptwin.runtime.up_world import UpOptions
     from steptwin.runtime.up_world import up as run_up
 
@@ -39,3 +49,30 @@ def up(
     )
     if not run_up(options):
         raise typer.Exit(1)
+
+
+def sections() -> list[Section]:
+    """The tables of a description, for people."""
+    from steptwin.world.script import ACTIONS
+    from steptwin.world.spec import KEYS, TABLES
+
+    found = [
+        Section(
+            TABLES[name],
+            ("key", "meaning", "default"),
+            [(key.name, key.meaning, "required" if key.is_required else _default(key.default)) for key in keys],
+        )
+        for name, keys in KEYS.items()
+    ]
+    steps = [
+        (action.main.name, action.main.meaning, ", ".join(f"{key.name}: {key.meaning}" for key in action.others))
+        for action in ACTIONS.values()
+    ]
+    steps.append(("repeat", "how often", "steps: a list of steps"))
+    return [*found, Section("Steps of events and scripts", ("first key", "meaning", "more keys"), steps)]
+
+
+def _default(value: object) -> str:
+    if value is None or value == ():
+        return ""
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -378,6 +378,23 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
 }
 
 
+TABLES: Mapping[str, str] = {
+    "world": "[world]",
+    "line": "[[line]]",
+    "mic488": "[[mic488]]",
+    "m1486": "[[m1486]]",
+    "axis": "[[axis]]",
+    "switch": "[[axis.switch]]",
+    "encoder": "[axis.encoder]",
+    "motor": "[axis.motor]",
+    "wire": "[[wire]]",
+    "button": "[[button]]",
+    "source": "[[source]]",
+    "event": "[[event]]",
+    "script": "[[script]]",
+}
+"""How each table is written."""
+
 # ---------------------------------------------------------------------- reading
 
 
