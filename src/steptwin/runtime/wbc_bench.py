@@ -31,7 +31,7 @@ NAME = "mic488"
 PROGRAM = "program"
 """The subject of its statements."""
 
-SLICE_NS: Nanos = SECOND
+SLICE_NS: Nanos = 10 * SECOND
 """The longest stretch of time between two looks at whether anything is still going on."""
 
 ASSUMED_TRAVEL_S = 0.1
@@ -241,17 +241,20 @@ class Bench:
 
     def look(self, now: Nanos) -> None:
         """Tell what axes have begun or ended."""
+        for index, axis in enumerate(self.device.axes):
+            known = self._axes[index]
+            if axis.revision != known[1] or axis.status is not known[0]:
+                self._axes[index] = axis.status, axis.revision, axis.velocity_p
+                self._tell_of(axis, known[0], known[2], now)
+
+    def _tell_of(self, axis: Axis, before: Status, velocity_p: float, now: Nanos) -> None:
+        """An axis has another status than ``before``, or another motion."""
         step = self._caused(now)
         kind = None if step is None or step >= len(self.program.steps) else self.program.steps[step]
         moves = isinstance(kind, s.Motion | s.Halt | s.RowMotion)
-        caused = step if moves or isinstance(kind, s.Set | s.End | s.ProgReset) else None
-        for index, axis in enumerate(self.device.axes):
-            before, revision, velocity_p = self._axes[index]
-            if axis.revision == revision and axis.status is before:
-                continue
-            self._axes[index] = axis.status, axis.revision, axis.velocity_p
-            if axis.status is not before or moves or (axis.status is Status.VELOCITY and axis.velocity_p != velocity_p):
-                self._tell(now, "axis", _words(axis, before, now), caused)
+        if axis.status is not before or moves or (axis.status is Status.VELOCITY and axis.velocity_p != velocity_p):
+            caused = moves or isinstance(kind, s.Set | s.End | s.ProgReset)
+            self._tell(now, "axis", _words(axis, before, now), step if caused else None)
 
     def copy_state(self) -> Plain:
         return ()
