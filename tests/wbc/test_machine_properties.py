@@ -36,7 +36,7 @@ def acts() -> SearchStrategy[list[Any]]:
     write = st.tuples(st.just("write"), st.binary(min_size=4, max_size=4))
     control = st.tuples(st.just("control"), st.sampled_from((1, 2, 2, 1)))
     volts = st.tuples(st.just("volts"), st.integers(0, 10))
-    moment = st.one_of(st.integers(0, 3000).map(lambda ms: ms * MILLISECOND), st.integers(0, 3 * SECOND))
+    moment = st.one_of(st.integers(0, 1800).map(lambda ms: ms * MILLISECOND), st.integers(0, 2 * SECOND))
     act = st.tuples(moment, st.one_of(pin, pin, write, control, volts)).map(lambda a: (a[0], *a[1]))
     return st.lists(act, max_size=12).map(lambda found: sorted(found, key=lambda a: a[0]))
 
@@ -77,7 +77,7 @@ def seen(device: Mic488) -> tuple[Any, ...]:
     return device.take_edges(), (control.state, control.statement, control.fault), device.user.tobytes(), axes, events
 
 
-END = 4 * SECOND
+END = 2 * SECOND
 STATEMENT_TIMES = (MILLISECOND, 700_001, 13 * MILLISECOND)
 
 
@@ -86,7 +86,7 @@ def cases(programs: SearchStrategy[Any]) -> SearchStrategy[Any]:
     return st.tuples(programs, acts(), st.sampled_from(STATEMENT_TIMES))
 
 
-few = settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
+few = settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 @few
@@ -162,11 +162,11 @@ def test_wbc_24_without_statement_time_every_program_comes_to_an_end_of_each_mom
     loaded = ready(program.text, program.positions)
     one, other = started(loaded, 0), started(loaded, 0)
     for moment, *what in happening:
-        one_tenth = (moment // 10, *what)
-        act(one, one_tenth)
-        other.advance(max(other.now, moment // 20))
-        act(other, one_tenth)
-    end = max(one.now, other.now) + 50 * MILLISECOND
+        soon = (moment // 100, *what)
+        act(one, soon)
+        other.advance(max(other.now, moment // 200))
+        act(other, soon)
+    end = max(one.now, other.now) + 10 * MILLISECOND
     one.advance(end)
     other.advance(end)
     assert seen(one) == seen(other)
