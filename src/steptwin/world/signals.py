@@ -42,7 +42,7 @@ def find_signal(plan: Plan, name: str) -> SignalOf:
     if name == "time":
         return SignalOf((), lambda now: now / SECOND, lambda now: ())
     if name == "idle":
-        return SignalOf(tuple(plan.kernels), lambda now: float(all(is_idle(m, now) for m in plan.machines.values())))
+        return SignalOf(tuple(plan.kernels), lambda now: float(_all_idle(plan, now)))
     owner, _, rest = name.partition(".")
     if owner in plan.axes:
         return _of_axis(plan.axes[owner], rest, name)
@@ -63,6 +63,12 @@ def find_signal(plan: Plan, name: str) -> SignalOf:
     if isinstance(machine, Mic488):
         return _of_mic488(machine, kernel, rest, name)
     return _of_m1486(machine, kernel, rest, name)
+
+
+def _all_idle(plan: Plan, now: Nanos) -> bool:
+    """Whether all machines are idle, and nothing is on its way on a line."""
+    machines = all(is_idle(machine, now) for machine in plan.machines.values())
+    return machines and all(line.deadline() is None for line in plan.lines.values())
 
 
 def is_idle(machine: Mic488 | M1486, now: Nanos) -> bool:

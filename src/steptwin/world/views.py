@@ -222,7 +222,7 @@ class AxisView:
 
     @property
     def lost(self) -> int:
-        """Pulses the motor has lost so far."""
+        """Pulses by which the motor is behind the pulses given; negative where it is above, after losses on the way down."""
         return self._fitted.mechanism.lost(self._now)
 
     @property
