@@ -6,11 +6,11 @@ be repeated; one that may not is either done once or not done, and says that thi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import pytest
-from host_rig import KINDS, LATE, Fault, Wire, driver
+from host_rig import KINDS, Fault, Kind, Wire, driver
 
 from steptwin.errors import LineFailure
 from steptwin.host import Mic488, NoAnswer
@@ -96,11 +96,8 @@ def ready(*, tcp: bool = False) -> tuple[Wire, Mic488]:
     return wire, mic
 
 
-def cases(operation: Operation, *, tcp: bool, whole: bool) -> Iterator[Fault]:
-    """Faults of every kind at every byte; unless ``whole``, not in the read before a motion, which is the same everywhere.
-
-    TCP keeps bytes or loses the connection: only their time can be wrong.
-    """
+def cases(operation: Operation, kinds: Iterable[Kind], *, tcp: bool, whole: bool) -> Iterator[Fault]:
+    """Faults at every byte; unless ``whole``, not in the read before a motion, which is the same everywhere."""
     wire, mic = ready(tcp=tcp)
     wire.put()
     begin = {"to twin": 0, "to master": 0}
@@ -111,7 +108,7 @@ def cases(operation: Operation, *, tcp: bool, whole: bool) -> Iterator[Fault]:
     operation.do(mic)
     for direction, length in wire._passed.items():
         for index in range(begin[direction] if length > begin[direction] else 0, length):
-            for kind in LATE if tcp else KINDS:
+            for kind in kinds:
                 yield Fault(direction, index, kind)  # type: ignore[arg-type]
 
 
@@ -156,17 +153,24 @@ def run(operation: Operation, fault: Fault, *, tcp: bool) -> None:
         assert operation.done(wire), fault
 
 
+FEW_KINDS: tuple[Kind, ...] = ("drop", "too late", "cut")
+"""For operations of many exchanges, each of which is the same as in others."""
+TIMES: tuple[Kind, ...] = ("late", "too late", "much too late")
+"""TCP keeps bytes or loses the connection: only their time can be wrong."""
+
+
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_a_fault_at_every_byte_of_every_exchange_rtu(name: str) -> None:
-    faults = list(cases(OPERATIONS[name], tcp=False, whole=name == "move_to"))
-    assert len(faults) >= len(KINDS) * 16
+    kinds = FEW_KINDS if name == "move_together" else KINDS
+    faults = list(cases(OPERATIONS[name], kinds, tcp=False, whole=name == "move_to"))
+    assert len(faults) >= len(kinds) * 16
     for fault in faults:
         run(OPERATIONS[name], fault, tcp=False)
 
 
 @pytest.mark.parametrize("name", ["read", "move_to", "move_by"])
 def test_a_late_byte_anywhere_tcp(name: str) -> None:
-    faults = list(cases(OPERATIONS[name], tcp=True, whole=False))
-    assert len(faults) >= len(LATE) * 20
+    faults = list(cases(OPERATIONS[name], TIMES, tcp=True, whole=False))
+    assert len(faults) >= len(TIMES) * 20
     for fault in faults:
         run(OPERATIONS[name], fault, tcp=True)
