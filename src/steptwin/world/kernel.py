@@ -115,8 +115,8 @@ class Kernel:
         self._levels: dict[PinName, float] = {}
         """What was driven to each input last."""
         self._flights: list[Flight] = []
-        self._plans: dict[tuple[str, int], tuple[int, Profile]] = {}
-        """Revision and profile of each axis as recorded last."""
+        self._plans: list[_Plans] = []
+        """Of each machine, as recorded last."""
         self._due: Nanos | None = None
 
     # ------------------------------------------------------------------ what is in it
@@ -127,6 +127,7 @@ class Kernel:
             raise Misuse(f"there is a machine {name!r} already")
         machine.advance(self.now)
         self.machines[name] = machine
+        self._plans.append(_Plans(name, machine))
         machine.changed = self.mark
         self.mark()
 
@@ -196,6 +197,8 @@ class Kernel:
             raise TimeReversal(self.now, now)
         if self.stale:
             self.settle()
+        if len(self.machines) == 1 and not self.parts and not self._wires:
+            self._advance_alone(now)
         while self._due is not None and self._due <= now:
             self.now = self._due
             for machine in self.machines.values():
@@ -206,6 +209,22 @@ class Kernel:
                 self._arrive()
             self.settle()
         self.now = now
+
+    def _advance_alone(self, now: Nanos) -> None:
+        """What `advance` and `settle` do where there is one machine and nothing that could act on it."""
+        ((name, machine),) = self.machines.items()
+        (plans,) = self._plans
+        due = self._due
+        while due is not None and due <= now:
+            self.now = due
+            machine.advance(due)
+            for edge in machine.take_edges():
+                self._edge(name, edge)
+            if self._record is not None:
+                plans.tell(self._record, due)
+            due = machine.deadline()
+        self._due = due
+        self.stale = False
 
     def deadline(self) -> Nanos | None:
         """The next moment at which something happens by itself."""
@@ -227,7 +246,8 @@ class Kernel:
         else:
             raise Runaway(f"signals did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at {self.now} ns: a loop of wires")
         if self._record is not None:
-            self._record_plans(self._record)
+            for plans in self._plans:
+                plans.tell(self._record, self.now)
         dues = [due for machine in self.machines.values() if (due := machine.deadline()) is not None]
         dues += [due for part in self.parts if (due := part.deadline()) is not None]
         dues += [flight.arrival for flight in self._flights]
@@ -247,17 +267,6 @@ class Kernel:
         self._flights = [flight for flight in self._flights if flight.arrival > self.now]
         for flight in arrived:
             self.drive(flight.target, flight.level)
-
-    def _record_plans(self, record: Recorder) -> None:
-        for name, machine in self.machines.items():
-            for number, drive in enumerate(machine.axes, start=1):
-                seen = self._plans.get((name, number))
-                if seen is not None and seen[0] == drive.revision:
-                    continue
-                profile = drive.profile
-                self._plans[name, number] = (drive.revision, profile)
-                if seen is None or not _only_rests(seen[1], profile):
-                    record(Record(self.now, name, "plan", str(number), getattr(drive, "train", profile)))
 
     # ------------------------------------------------------------------ snapshots
 
@@ -282,10 +291,35 @@ class Kernel:
             part.set_state(its_state)
         self._levels = dict(state.levels)
         self._flights = list(state.flights)
-        for name, machine in self.machines.items():
-            for number, drive in enumerate(machine.axes, start=1):
-                self._plans[name, number] = (drive.revision, drive.profile)
+        for plans in self._plans:
+            plans.take_as_told()
         self.settle()
+
+
+class _Plans:
+    """The plans of a machine's axes, as far as they have been told."""
+
+    __slots__ = ("_drives", "_name", "_profiles", "_revisions")
+
+    def __init__(self, name: str, machine: DrivingMachine) -> None:
+        self._name = name
+        self._drives = [(i, str(i + 1), drive) for i, drive in enumerate(machine.axes)]
+        self._revisions = [-1] * len(self._drives)
+        self._profiles: list[Profile | None] = [None] * len(self._drives)
+
+    def tell(self, record: Recorder, now: Nanos) -> None:
+        """Tell of new plans; that an axis rests where it was to come to rest is none."""
+        for i, number, drive in self._drives:
+            if self._revisions[i] == drive.revision:
+                continue
+            before, profile = self._profiles[i], drive.profile
+            self._revisions[i], self._profiles[i] = drive.revision, profile
+            if before is None or not _only_rests(before, profile):
+                record(Record(now, self._name, "plan", number, getattr(drive, "train", profile)))
+
+    def take_as_told(self) -> None:
+        for i, _, drive in self._drives:
+            self._revisions[i], self._profiles[i] = drive.revision, drive.profile
 
 
 def _snapshot(machine: Any) -> Any:

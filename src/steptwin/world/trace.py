@@ -238,9 +238,13 @@ def _framed(tag: bytes, data: bytes) -> bytes:
 
 
 def _profile(profile: Profile) -> bytes:
-    parts = [_FLOAT.pack(b"f", profile.final_p)]
-    parts += [_segment(s) if isinstance(s, Segment) else _arc(s) for s in profile.segments]
-    return _framed(b"p", f"{profile.start} {profile.base} ".encode() + b"".join(parts))
+    parts = [f"{profile.start} {profile.base} ".encode(), _FLOAT.pack(b"f", profile.final_p)]
+    for s in profile.segments:
+        if type(s) is Segment:
+            parts.append(_SEGMENT.pack(s.end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction))
+        else:
+            parts.append(_arc(s))
+    return _framed(b"p", b"".join(parts))
 
 
 def _segment(s: Segment) -> bytes:
