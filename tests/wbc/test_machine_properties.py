@@ -103,6 +103,68 @@ def test_wbc_18_resting_changes_nothing(data: st.DataObject, cases: SearchStrate
     assert seen(resting) == seen(looking)
 
 
+@st.composite
+def polling(draw: st.DrawFn) -> str:
+    """A program that looks again and again at what changes by itself, and now and then does something about it."""
+    changing = (
+        "PosM1",
+        "VactM1",
+        "PosM2",
+        "VactM2",
+        "TIMA1",
+        "TIMB1",
+        "ENC1",
+        "XENC2",
+        "M1",
+        "M2",
+        "StatM2",
+        "AIN1",
+        "$I0",
+        "IN2",
+    )
+    number = st.integers(-60, 150).map(str)
+    condition = st.tuples(
+        st.sampled_from(changing), st.sampled_from(("=", "<", ">", "<=", ">=")), st.one_of(number, st.sampled_from(changing))
+    ).map(" ".join)
+    doing = st.one_of(
+        st.sampled_from(
+            ("OUT1 = ON", "OUT2 = OFF", "OUT3 = IN2", "TIMA1 = 0", "n = n + 1", "n = 3", "$I5 = n", "x = PosM1", "JUMP SUB")
+        ),
+        st.sampled_from(
+            ("VABS M1 -30", "PABS M1 40", "PREL M2 -25", "BRAKE M2", "PosM1 = 0", "DELAY 0.02", "DELAY 0.137", "LimRM1 = 12")
+        ),
+        condition.map(lambda text: f"WAIT {text}"),
+    )
+    lines = [
+        "M1 = ON",
+        "M2 = ON",
+        f"{draw(st.sampled_from(('VABS', 'PABS')))} M1 {draw(number)}",
+        f"PABS M2 {draw(number)}",
+        "L:",
+    ]
+    for _ in range(draw(st.integers(1, 4))):
+        lines += [f"IF {draw(condition)}", *draw(st.lists(doing, max_size=2)), "ENDIF"]
+        lines += draw(
+            st.lists(st.sampled_from(("DELAY 0.05", "n = 7", "x = TIMB1", "JUMP SUB", "OUT4 = ON", "DELAY AIN1")), max_size=1)
+        )
+    lines += draw(st.sampled_from((["JUMP L"], [f"WHILE {draw(condition)}", "ENDWHILE", "JUMP L"], ["JUMP L"])))
+    return "\n".join(["n = 0", *lines, "SUB:", "$I6 = n", "RETURN", "INT_IN3:", "$I7 = $I7 + 1", "RETURN", ""])
+
+
+@settings(few, max_examples=40)
+@given(text=polling(), happening=acts(), statement_time=st.sampled_from(STATEMENT_TIMES))
+def test_wbc_18_polling_loops_rest_and_nobody_notices(text: str, happening: list[Act], statement_time: Nanos) -> None:
+    loaded = ready(text, "A;1;2;3;4\n")
+    resting, looking = (started(loaded, statement_time, rests=rests) for rests in (True, False))
+    for one in happening:
+        act(resting, one)
+        act(looking, one)
+        assert resting.program.statement == looking.program.statement
+    resting.advance(END)
+    looking.advance(END)
+    assert seen(resting) == seen(looking)
+
+
 @few
 @given(data=st.data())
 def test_one_jump_is_many_steps(data: st.DataObject, cases: SearchStrategy[Any]) -> None:
