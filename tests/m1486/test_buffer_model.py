@@ -13,7 +13,7 @@ from m1486_rig import Bench
 
 #: Lines, and the bytes each takes in the memory by the manual's rule.
 LINES = {
-    "u20": 2, ":7": 4, "+1": 2, "u4": 2, "d": 1, "v900": 3, "w1000": 4, "r": 1, "t80": 2, "u14": 2,
+    "u20": 2, ":7": 4, "+1": 2, "u4": 2, "d": 1, "v150": 3, "w1000": 4, "r": 1, "t80": 2, "u14": 2,
     "@1": 0, "@2": 0, "[": 0, "]": 0,
 }  # fmt: skip
 BUFFER = {"A": 12, "B": 32}

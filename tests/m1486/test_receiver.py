@@ -192,6 +192,17 @@ def test_m_27_kill_needs_no_room(command: str) -> None:
     assert bench.chip.drive.is_stopping
 
 
+def test_m_27_kill_follows_a_character_that_was_refused() -> None:
+    bench = stalled("A")
+    bench.raw(b"w10\rw10\rw10\r")
+    assert bench.raw(b"u") == b"\x5e"
+    bench.send("k")
+    assert bench.chip.drive.is_stopping
+    # The host sends it again when there is room.
+    bench.finish()
+    assert bench.send("u20") + bench.finish() == b"\x41"
+
+
 def test_m_27_kill_acts_at_the_end_of_its_line_and_takes_no_room() -> None:
     bench = stalled("A")
     bench.raw(b"k")

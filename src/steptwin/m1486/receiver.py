@@ -112,13 +112,15 @@ class Receiver(Stateful):
             self._part_of_line(byte)
 
     def _part_of_line(self, byte: int) -> None:
-        if len(self._seen) < _MOST_SEEN:
+        before = self._seen
+        if len(before) < _MOST_SEEN:
             char = chr(byte)
             self._seen += char.upper() if char.isascii() else char
         if self._acts_when_received():
             self._echo(byte)
-        elif self.is_listening and not self._skips_line:
-            self._store(byte)
+        elif self.is_listening and not self._skips_line and not self._store(byte) and not self._is_torn:
+            # What is not received is no part of the line: K may follow at once.
+            self._seen = before
 
     def _acts_when_received(self) -> bool:
         """M-27: no other command begins with K or X, so these lines are never put into the buffer."""
