@@ -113,6 +113,21 @@ def test_wbc_19_what_was_interrupted_goes_on(statement: str) -> None:
     assert rig.out(1)
 
 
+def test_wbc_19_a_delay_of_a_polling_loop_ends_when_it_would_have() -> None:
+    ends = []
+    for interrupted in (False, True):
+        rig = started(f"CFGINT_IN2 = RIS\nWHILE IN1 = OFF\nDELAY 1\nENDWHILE\nOUT1 = ON\nWAIT 1 = 2\nINT_IN2:\n{COUNTING}")
+        rig.wait(20.4)
+        rig.pin("IN2", float(interrupted))
+        rig.wait(0.1)
+        rig.pin("IN1", 1)
+        rig.wait(2)
+        assert rig.i(0) == interrupted
+        ends.append(rig.changes("OUT1"))
+    assert ends[0] == ends[1]
+    assert len(ends[0]) == 1
+
+
 def test_wbc_19_a_motion_goes_on_during_an_interrupt_and_waitpos_looks_again() -> None:
     rig = started("CFGINT_IN1 = RIS\nM1 = ON\nPABS M1 1000\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\nINT_IN1:\nDELAY 5\nRETURN\n")
     rig.wait(0.5)
