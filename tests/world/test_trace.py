@@ -88,3 +88,27 @@ def test_what_a_trace_does_not_take() -> None:
     trace.add(Record(5, "a", "event", "x", [1]))
     with pytest.raises(Misuse, match=r"\[1\] cannot be in a trace"):
         trace.digest()
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_a_trace_goes_back_to_a_mark_and_forward_again(keep: bool) -> None:
+    def take(trace: Trace, *times: int) -> str:
+        for time in times:
+            trace.add(Record(time, "a", "edge", "OUT1", float(time)))
+            trace.add(Record(time, "b", "event", "code", "text"))
+        return trace.digest()
+
+    trace, plain = Trace(["a"], keep=keep), Trace(["a"], keep=keep)
+    start = trace.mark()
+    early = take(trace, 1, 2)
+    middle = trace.mark()
+    late = take(trace, 3, 4)
+    end = trace.mark()
+    trace.rewind(middle)
+    assert (trace.digest(), len(trace)) == (early, 4)
+    other = take(trace, 3, 5)
+    assert other != late
+    trace.rewind(end)
+    assert (trace.digest(), len(trace)) == (late, 8)
+    trace.rewind(start)
+    assert take(trace, 1, 2, 3, 4) == late == take(plain, 1, 2, 3, 4)

@@ -152,21 +152,14 @@ class World(Plant):
 
     # ------------------------------------------------------------------ branches
 
-    def branch(self) -> Self:
-        """Another world in the same state, which goes its own way. Scripts that were started from Python go along."""
-        other = type(self)(read_world(self.spec.text.source.name, self.spec.text.source.text), self.files)
-        other.take_over(self)
-        return other
+    def branch(self, snapshot: PlantSnapshot | None = None) -> Self:
+        """Another world in the state of this one, now or at a snapshot, which goes its own way.
 
-    def take_over(self, other: Plant, snapshot: PlantSnapshot | None = None) -> None:
-        """Take the state and the past of another world of the same description."""
-        snapshot = other.snapshot() if snapshot is None else snapshot
-        for script in other.scripts[len(self.scripts) :]:
-            self.start(script.name, script.make, is_outside=script.is_outside)
-        self.inputs[:] = other.inputs
-        self.failures[:] = other.failures
-        self.trace.copy_from(other.trace)
-        self.restore(snapshot)
+        Scripts go along. Functions given to `at` and `when` do what they did: those that name this world act on this one.
+        """
+        other = type(self)(read_world(self.spec.text.source.name, self.spec.text.source.text), self.files)
+        other.restore(self.snapshot() if snapshot is None else snapshot)
+        return other
 
 
 def _steps(reaction: Reaction) -> tuple[do.Step, ...]:

@@ -117,6 +117,8 @@ class Kernel:
         self._flights: list[Flight] = []
         self._plans: list[_Plans] = []
         """Of each machine, as recorded last."""
+        self._fresh: dict[str, Plain] = {}
+        """First states of what stands around machines."""
         self._due: Nanos | None = None
 
     # ------------------------------------------------------------------ what is in it
@@ -136,6 +138,7 @@ class Kernel:
         if name not in self.machines:
             raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
         self.machines[name] = machine
+        self._fresh[name] = machine.copy_state()  # type: ignore[attr-defined]
         machine.changed = self.mark
         self.mark()
 
@@ -283,10 +286,10 @@ class Kernel:
         )
 
     def restore(self, state: KernelState) -> None:
-        """Take the state of a kernel with the same machines and parts."""
+        """Take the state of a kernel with the same machines and parts; what has come to stand around them since begins anew."""
         self.now = state.now
-        for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
-            _restore(machine, its_state)
+        for name, its_state in zip(self.machines, state.machines, strict=True):
+            _restore(self.machines[name], its_state, self._fresh.get(name, ()))
         for part, its_state in zip(self.parts, state.parts, strict=True):
             part.set_state(its_state)
         self._levels = dict(state.levels)
@@ -322,19 +325,25 @@ class _Plans:
             self._revisions[i], self._profiles[i] = drive.revision, drive.profile
 
 
+class Around(NamedTuple):
+    """State of what stands around a machine, and of the machine."""
+
+    outer: Plain
+    inner: Any
+
+
 def _snapshot(machine: Any) -> Any:
-    """State of a machine, and of what stands around it."""
     inner = getattr(machine, "inner", None)
-    return machine.snapshot() if inner is None else (machine.copy_state(), _snapshot(inner))
+    return machine.snapshot() if inner is None else Around(machine.copy_state(), inner.snapshot())
 
 
-def _restore(machine: Any, state: Any) -> None:
+def _restore(machine: Any, state: Any, fresh: Plain) -> None:
     inner = getattr(machine, "inner", None)
     if inner is None:
         machine.restore(state)
     else:
-        machine.set_state(state[0])
-        _restore(inner, state[1])
+        machine.set_state(state.outer if isinstance(state, Around) else fresh)
+        inner.restore(state.inner if isinstance(state, Around) else state)
 
 
 def _only_rests(before: Profile, after: Profile) -> bool:

@@ -24,7 +24,7 @@ from steptwin.world import script as do
 from steptwin.world.actions import Outside, act
 from steptwin.world.build import Files, Fitted, Plan, build
 from steptwin.world.expression import Condition
-from steptwin.world.faults import Fault, M1486Body, Mic488Body, rig
+from steptwin.world.faults import Active, Fault, M1486Body, Mic488Body, rig
 from steptwin.world.faults.table import Layer
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import SCRIPTS, Line
@@ -62,8 +62,11 @@ class _Waiting:
 
 
 class ScriptState(NamedTuple):
-    """What a script was sent so far, as (value, how often), and whether it has ended."""
+    """A script, what it was sent so far, as (value, how often), what it waits for, and whether it has ended."""
 
+    name: str
+    make: Callable[[], do.Steps]
+    is_outside: bool
     sent: tuple[tuple[Any, int], ...]
     until: Nanos | None
     condition: str | None
@@ -118,10 +121,12 @@ class PlantSnapshot:
 
     now: Nanos
     kernels: tuple[KernelState, ...]
-    faults: Any
+    faults: tuple[tuple[Fault, str, Nanos], ...]
+    """Those that were set, with their names and moments."""
+    faults_state: Any
     scripts: tuple[ScriptState, ...]
-    inputs: int
-    failures: int
+    inputs: tuple[Given, ...]
+    failures: tuple[Record, ...]
     trace: Mark
 
 
@@ -338,10 +343,13 @@ class Plant:
     def put_fault(self, fault: Fault) -> None:
         """Set a fault now."""
         self.settle_all()
+        self._prepare(fault)
+        self.plan.faults.add(fault, self.now)
+
+    def _prepare(self, fault: Fault) -> None:
         if fault.kind.layer not in (Layer.BYTES, Layer.FRAMES) or fault.kind.name == "no-answer":
             for name in self.machines:
                 self._rig(name)
-        self.plan.faults.add(fault, self.now)
 
     def _rig(self, name: str) -> None:
         """Let a machine have faults; mechanics of its axes have them instead of the bare shafts."""
@@ -451,9 +459,13 @@ class Plant:
         return PlantSnapshot(
             self.now,
             tuple(kernel.snapshot() for kernel in self.kernels),
+            tuple((active.fault, active.name, active.since) for active in self.plan.faults.active),
             self.plan.faults.copy_state(),
             tuple(
                 ScriptState(
+                    script.name,
+                    script.make,
+                    script.is_outside,
                     tuple(script.sent),
                     None if script.waiting is None else script.waiting.until,
                     None if script.waiting is None or script.waiting.condition is None else script.waiting.condition.text,
@@ -462,31 +474,31 @@ class Plant:
                 )
                 for script in self._scripts
             ),
-            len(self.inputs),
-            len(self.failures),
+            tuple(self.inputs),
+            tuple(self.failures),
             self.trace.mark(),
         )
 
     def restore(self, snapshot: PlantSnapshot) -> None:
-        """Go on where a snapshot of this world, or of one with the same description and scripts, was taken.
+        """Go on where a snapshot of this world, or of one with the same description, was taken.
 
-        Scripts that were started later are forgotten. Raises `Misuse` for a snapshot of another world.
+        Raises `Misuse` for a snapshot of another world.
         """
-        if len(snapshot.kernels) != len(self.kernels) or len(snapshot.scripts) > len(self._scripts):
-            raise Misuse("the snapshot is of another world, or of one with other scripts")
+        if [len(state.machines) for state in snapshot.kernels] != [len(kernel.machines) for kernel in self.kernels]:
+            raise Misuse("the snapshot is of another world")
         self.now = snapshot.now
         self.stopped = None
         self.trace.rewind(snapshot.trace)
+        self._restore_faults(snapshot)
         for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
             kernel.restore(state)
-        self.plan.faults.set_state(snapshot.faults)
-        del self.inputs[snapshot.inputs :], self.failures[snapshot.failures :]
-        del self._scripts[len(snapshot.scripts) :]
-        self._timed, self._watching = [], []
-        for script, state in zip(self._scripts, snapshot.scripts, strict=True):
+        self.inputs, self.failures = list(snapshot.inputs), list(snapshot.failures)
+        self._scripts, self._timed, self._watching = [], [], []
+        for number, state in enumerate(snapshot.scripts):
+            script = Script(number, state.name, state.make, is_outside=state.is_outside)
+            self._scripts.append(script)
             script.replay(state.sent)
             script.ended = state.ended
-            script.waiting = None
             if state.ended:
                 continue
             condition = None if state.condition is None else self.condition(state.condition)
@@ -495,3 +507,11 @@ class Plant:
                 heappush(self._timed, (state.until, script.number))
             else:
                 self._watching.append(script)
+
+    def _restore_faults(self, snapshot: PlantSnapshot) -> None:
+        """The faults that were set then; machines stay prepared for those that were set since."""
+        faults = self.plan.faults
+        for fault, _, _ in snapshot.faults:
+            self._prepare(fault)
+        faults.active = tuple(Active(fault, name, faults.seed, since) for fault, name, since in snapshot.faults)
+        faults.set_state(snapshot.faults_state)

@@ -41,9 +41,6 @@ class Record(NamedTuple):
     value: object
 
 
-Hashed: TypeAlias = tuple[blake2b, int]
-"""A hash, and how many kept records are in it."""
-
 Recorder: TypeAlias = Callable[[Record], None]
 """Takes each record as it happens: a `Trace`'s `add`, or anything else that wants to know."""
 
@@ -124,25 +121,16 @@ class Trace:
         return self.of("fault", machine=machine)
 
     def mark(self) -> Mark:
-        """How far the trace is, for `rewind`."""
-        return Mark(tuple((name, stream.count, stream.latest, stream.hashed()) for name, stream in self._streams.items()))
+        """The past, for `rewind`."""
+        return Mark(tuple((name, stream.mark()) for name, stream in self._streams.items()))
 
     def rewind(self, mark: Mark) -> None:
-        """Forget what came after ``mark``, which is of this trace or of one that began the same.
-
-        Where records are kept and ``mark`` is of another trace, those before it must have been copied: see `copy_from`.
-        """
-        known = {name: (count, latest, hashed) for name, count, latest, hashed in mark.streams}
+        """Have the past of ``mark``, which was taken of this trace or of one of the same machines."""
+        known = dict(mark.streams)
+        for name in known:
+            self._streams.setdefault(name, _Stream())
         for name, stream in self._streams.items():
-            count, latest, hashed = known.get(name, (0, 0, None))
-            stream.rewind(count, latest, hashed)
-
-    def copy_from(self, other: Trace) -> None:
-        """Take over all records of another trace of the same machines."""
-        for name, stream in other._streams.items():
-            own = self._streams.setdefault(name, _Stream())
-            own.records = stream.records.copy()
-            own.count, own.latest = stream.count, stream.latest
+            stream.rewind(known.get(name) or _Stream().mark())
 
     def digest(self) -> str:
         """What two runs of the same world share, on any machine and Python version: 32 hexadecimal digits.
@@ -156,10 +144,20 @@ class Trace:
         return whole.hexdigest()
 
 
-class Mark(NamedTuple):
-    """A place in a trace: for each machine how many records there are, the moment of the last, and what was hashed of them."""
+class StreamMark(NamedTuple):
+    """The past of one machine: its records, as far as they are kept, and what was hashed of them."""
 
-    streams: tuple[tuple[str, int, Nanos, Hashed], ...]
+    count: int
+    latest: Nanos
+    hash: blake2b
+    hashed: int
+    records: tuple[Record, ...]
+
+
+class Mark(NamedTuple):
+    """A place in a trace."""
+
+    streams: tuple[tuple[str, StreamMark], ...]
 
 
 class _Stream:
@@ -181,13 +179,12 @@ class _Stream:
         self._hashed = len(self.records)
         return self.hash.digest()
 
-    def hashed(self) -> Hashed:
-        return self.hash.copy(), self._hashed
+    def mark(self) -> StreamMark:
+        return StreamMark(self.count, self.latest, self.hash.copy(), self._hashed, tuple(self.records))
 
-    def rewind(self, count: int, latest: Nanos, hashed: Hashed | None) -> None:
-        del self.records[count:]
-        self.count, self.latest = count, latest
-        self.hash, self._hashed = (hashed[0].copy(), hashed[1]) if hashed is not None else (blake2b(digest_size=DIGEST_BYTES), 0)
+    def rewind(self, mark: StreamMark) -> None:
+        self.count, self.latest, hashed, self._hashed, records = mark
+        self.hash, self.records = hashed.copy(), list(records)
 
 
 # ---------------------------------------------------------------------- canonical bytes
@@ -240,10 +237,10 @@ def _framed(tag: bytes, data: bytes) -> bytes:
 def _profile(profile: Profile) -> bytes:
     parts = [f"{profile.start} {profile.base} ".encode(), _FLOAT.pack(b"f", profile.final_p)]
     for s in profile.segments:
-        if type(s) is Segment:
-            parts.append(_SEGMENT.pack(s.end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction))
-        else:
+        if isinstance(s, ArcSegment):
             parts.append(_arc(s))
+        else:
+            parts.append(_SEGMENT.pack(s.end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction))
     return _framed(b"p", b"".join(parts))
 
 
