@@ -459,4 +459,7 @@ def test_where_a_program_stands_can_be_seen() -> None:
     assert sorted(seen[:3]) == [3, 4, 5]
     rig.pin("IN1", 0)
     rig.wait(0.1)
-    assert line() == 7
+    assert line() == 6
+    rig.pause()
+    rig.wait(10)
+    assert line() == 6

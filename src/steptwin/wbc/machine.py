@@ -456,5 +456,9 @@ class Machine(Stateful):
         self._loop = ()
 
     def place(self) -> int:
-        """The step in execution, or executed next."""
-        return self._next_visit(self.after(self.controller.now))[1].step if self._loop else self.pc
+        """The step in execution (a DELAY until it ends), or executed next."""
+        if self._loop:
+            visit = self._next_visit(self.after(self.controller.now))[1]
+            return visit.step - 1 if visit.held else visit.step
+        now = self.controller.now if self.paused_at is None else self.paused_at
+        return self.pc - 1 if self.not_before > now else self.pc
