@@ -78,9 +78,12 @@ HOUR_GOAL_S = 1.0
 CHECK_LINES = 4000
 CHECK_GOAL_S = 0.1
 
+RUNS = 3
+"""The best counts."""
 
-def statements_per_second() -> tuple[float, float]:
-    """Of the compute loop with a statement time of 0: statements per second, and the sum it found."""
+
+def statements_per_second() -> float:
+    """Of the compute loop with a statement time of 0."""
     device = Mic488(ControllerConfig(), programs={0: load(check(COMPUTE))}, statement_time=0)
     device.program.command(1, 0)
     device.touch()
@@ -90,9 +93,9 @@ def statements_per_second() -> tuple[float, float]:
         now += 10 * SECOND
         device.advance(now)
     seconds = perf_counter() - begin
-    # Six statements a round, SUM and the rest every seventh; the ENDIF is executed in every round.
-    executed = 1_000_000 * 7 + 1_000_000 // 7
-    return executed / seconds, float(device.user[0])
+    # Six statements a round (a false IF goes on behind its ENDIF); two more every seventh.
+    executed = 1_000_000 * 6 + 1_000_000 // 7 * 2
+    return executed / seconds
 
 
 CONFIG = ControllerConfig(axes=(AxisConfig(gear=100.0, acc=1000.0, dec=1000.0, vel=200.0),) * 4)
@@ -157,11 +160,11 @@ def checking() -> float:
 
 
 def main() -> None:
-    rate, _ = statements_per_second()
+    rate = max(statements_per_second() for _ in range(RUNS))
     print(f"compute loop: {rate / 1e6:.2f} million statements/s (goal {COMPUTE_GOAL / 1e6:g})")
-    seconds, parts = machine_hour()
+    seconds, parts = min(machine_hour() for _ in range(RUNS))
     print(f"an hour of a machine: {seconds:.3f} s, {parts} parts (goal {HOUR_GOAL_S:g} s)")
-    seconds, parts = cell_hour()
+    seconds, parts = min(cell_hour() for _ in range(RUNS))
     print(f"an hour of a machine and its feeder on wires: {seconds:.3f} s, {parts} parts")
     print(f"an hour of polling two inputs: {polling_hour():.4f} s")
     print(f"{CHECK_LINES} lines checked: {checking():.3f} s (goal {CHECK_GOAL_S:g} s)")
