@@ -1,0 +1,174 @@
+"""The pytest plugin: fixtures ``mic488``, ``m1486`` and ``steptwin_world``, and the option ``--device``.
+
+pytest loads it wherever steptwin is installed, so it brings nothing along until a test asks for a fixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import pytest
+
+from steptwin.errors import Misuse, SteptwinError
+
+if TYPE_CHECKING:
+    from steptwin.testing.m1486 import M1486Rig
+    from steptwin.testing.mic488 import Mic488Rig
+    from steptwin.testing.rig import Rig
+    from steptwin.testing.world import WorldRig
+
+T = TypeVar("T")
+
+FIXTURES = {
+    "mic488": "mic488(*, firmware, config, program, positions, unit, time, speed, link, faults, seed, lenient, line_timing, "
+    "baud, twin_only): the MIC488 that the fixture mic488 is (steptwin)",
+    "m1486": "m1486(*, variant, address, interface, program, time, speed, link, faults, seed, line_timing, baud, twin_only): the "
+    "M1486 that the fixture m1486 is (steptwin)",
+    "steptwin_world": "steptwin_world(file, *, time, speed): the world that the fixture steptwin_world is (steptwin)",
+}
+"""Fixtures and markers, which have the same names."""
+TIME = "steptwin_time"
+
+_devices: pytest.StashKey[dict[str, str]] = pytest.StashKey()
+_rigs: pytest.StashKey[dict[str, Rig]] = pytest.StashKey()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("steptwin", "steptwin: twins of the MIC488 and M1486")
+    group.addoption(
+        "--device",
+        action="append",
+        default=[],
+        metavar="[NAME=]ADDRESS",
+        help="run tests of the fixtures mic488 and m1486 against a real device: /dev/ttyUSB0, tcp://HOST:PORT, "
+        "rtu-tcp://HOST:PORT or rfc2217://HOST:PORT, with ,unit=N ,baud=N ,config=FILE behind it. IT MOVES. NAME= says which, "
+        "where tests need several: mic488=, m1486=, or a controller of a world",
+    )
+    parser.addini(TIME, "real or virtual: how time passes for twins where their marker does not say", default="real")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    for text in FIXTURES.values():
+        config.addinivalue_line("markers", text)
+    given = config.getoption("--device")
+    config.stash[_devices] = {}
+    if not given:
+        return
+    from steptwin.testing.devices import parse_devices
+
+    try:
+        config.stash[_devices] = dict(parse_devices(given))
+    except Misuse as misuse:
+        raise pytest.UsageError(str(misuse)) from None
+    if getattr(config.option, "numprocesses", None) or hasattr(config, "workerinput"):
+        raise pytest.UsageError("--device: several processes (-n) cannot share a device: run without -n")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    devices = config.stash[_devices]
+    used = {name for item in items for name in ("mic488", "m1486") if name in getattr(item, "fixturenames", ())}
+    if "" in devices and len(used - set(devices)) > 1:
+        raise pytest.UsageError(
+            f"--device {devices['']}: these tests are for a MIC488 and for an M1486: say which it is, mic488=ADDRESS or "
+            "m1486=ADDRESS, or choose tests with -k"
+        )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A test that fails shows what went over the lines of its twins at last."""
+    report = yield
+    if report.failed:
+        for name, rig in item.stash.get(_rigs, {}).items():
+            story = rig.story()
+            if story:
+                report.sections.append((f"{name}: what happened last", story))
+    return report
+
+
+# ---------------------------------------------------------------------- fixtures
+
+
+def _options(request: pytest.FixtureRequest, name: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """What the markers of a test say; the nearest has the last word."""
+    arguments: tuple[Any, ...] = ()
+    options: dict[str, Any] = {"time": request.config.getini(TIME)}
+    for marker in reversed(list(request.node.iter_markers(name))):
+        arguments = marker.args or arguments
+        options |= marker.kwargs
+    return arguments, options
+
+
+def _rig(request: pytest.FixtureRequest, name: str, make: Callable[[], Rig]) -> Iterator[Any]:
+    rig = _without_traceback(name, make)
+    request.node.stash.setdefault(_rigs, {})[name] = rig
+    try:
+        _without_traceback(name, rig.begin)
+        yield rig
+    finally:
+        _without_traceback(f"{name}, after the test", rig.close)
+
+
+def _without_traceback(name: str, do: Callable[[], T]) -> T:
+    """What people did wrong, and devices that do not answer, are told in a line."""
+    try:
+        return do()
+    except SteptwinError as error:
+        text = f"fixture {name}: {error}"
+    pytest.fail(text, pytrace=False)
+
+
+@pytest.fixture
+def mic488(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[Mic488Rig]:
+    """A running MIC488 (`steptwin.testing.Mic488Rig`), new for each test. ``@pytest.mark.mic488(...)`` says which.
+
+    It is a twin, in real time on a free port unless the marker says otherwise; with ``--device`` it is that device.
+    """
+    from steptwin.testing.devices import device_for
+    from steptwin.testing.mic488 import Mic488Options, Mic488Rig
+    from steptwin.testing.rig import options_of
+
+    def make() -> Rig:
+        options = options_of("mic488", Mic488Options, *_options(request, "mic488"))
+        device = device_for(request.config.stash[_devices], "mic488")
+        return Mic488Rig(options, device, tmp_path, request.path.parent)
+
+    yield from _rig(request, "mic488", make)
+
+
+@pytest.fixture
+def m1486(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[M1486Rig]:
+    """A running M1486 (`steptwin.testing.M1486Rig`), new for each test. ``@pytest.mark.m1486(...)`` says which.
+
+    It is a twin, in real time on a free port unless the marker says otherwise; with ``--device`` it is that device.
+    """
+    from steptwin.testing.devices import device_for
+    from steptwin.testing.m1486 import M1486Options, M1486Rig
+    from steptwin.testing.rig import options_of
+
+    def make() -> Rig:
+        options = options_of("m1486", M1486Options, *_options(request, "m1486"))
+        device = device_for(request.config.stash[_devices], "m1486")
+        return M1486Rig(options, device, tmp_path, request.path.parent)
+
+    yield from _rig(request, "m1486", make)
+
+
+@pytest.fixture
+def steptwin_world(request: pytest.FixtureRequest) -> Iterator[WorldRig]:
+    """A running world (`steptwin.testing.WorldRig`), new for each test.
+
+    ``@pytest.mark.steptwin_world("machine.toml")`` says which. Its lines are on free ports, wherever its file would have them.
+    """
+    from steptwin.testing.rig import options_of
+    from steptwin.testing.world import WorldOptions, WorldRig
+
+    def make() -> Rig:
+        arguments, given = _options(request, "steptwin_world")
+        options = options_of("steptwin_world", WorldOptions, arguments, given)
+        return WorldRig(options, request.config.stash[_devices], request.path.parent)
+
+    yield from _rig(request, "steptwin_world", make)

@@ -1,0 +1,52 @@
+"""``--device``: which real device stands where a test asks for a twin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from steptwin.errors import Misuse
+from steptwin.host import Mic488
+from steptwin.host.address import parse_device
+from steptwin.host.place import parse_place
+from steptwin.mic488.config import ControllerConfig
+
+ANY = ""
+"""The name of an address that is given without one."""
+
+
+def parse_devices(given: Sequence[str]) -> Mapping[str, str]:
+    """Addresses by name: of a fixture (``mic488``, ``m1486``) or of a controller in a world; `ANY` is the one without.
+
+    ``/dev/ttyUSB0,unit=2`` has no name, ``m1486=/dev/ttyUSB1`` has one. Raises `Misuse`.
+    """
+    found: dict[str, str] = {}
+    for text in given:
+        place, *_ = text.split(",")
+        name, equals, _ = place.partition("=")
+        if not equals:
+            name = ANY
+        address = text[len(name) + 1 :] if equals else text
+        if name in found:
+            raise Misuse(f"--device {text}: {f'{name} has' if name else 'there is'} an address already: {found[name]}")
+        parsed = parse_device(address)
+        parse_place(parsed.place, parsed.baud)
+        found[name] = address
+    return found
+
+
+def device_for(devices: Mapping[str, str], name: str) -> str | None:
+    """The address of a device, None for the twin."""
+    return devices.get(name, devices.get(ANY))
+
+
+def driver_of(address: str, config: ControllerConfig | None = None) -> Mic488:
+    """A driver of a device, not opened. ``config`` holds where the address names none."""
+    given = parse_device(address)
+    return Mic488(
+        given.place,
+        given.unit,
+        baud=given.baud,
+        firmware=given.firmware,
+        config=given.config or config,
+        timeout_s=given.timeout,
+    )

@@ -1,0 +1,251 @@
+"""A world in the hands of a test: controllers with wiring and mechanics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import KW_ONLY, dataclass
+from itertools import count
+from pathlib import Path
+from typing import Literal, NamedTuple, TypeVar
+
+from steptwin.errors import Misuse
+from steptwin.host import Mic488
+from steptwin.host.address import parse_device
+from steptwin.host.place import Channel, parse_place
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488 as Twin
+from steptwin.runtime.run_world import describe, is_told
+from steptwin.runtime.up_world import LiveWorld, PlacePort
+from steptwin.runtime.world import World
+from steptwin.testing.devices import ANY, driver_of
+from steptwin.testing.realtime import RealTime, WallTime
+from steptwin.testing.rig import Rig, check_time
+from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
+from steptwin.world import script as do
+from steptwin.world.faults import read
+from steptwin.world.trace import Record
+
+T = TypeVar("T")
+
+MARKER = "steptwin_world"
+
+
+@dataclass(frozen=True, slots=True)
+class WorldOptions:
+    """What ``@pytest.mark.steptwin_world`` takes."""
+
+    file: str | Path | None = None
+    """The world's TOML, beside the test."""
+    _: KW_ONLY
+    time: Literal["real", "virtual"] = "real"
+    """Virtual time passes only while the test lets it, and needs no clock; programs outside need real time."""
+    speed: float = 1.0
+    """In real time: seconds of the world per second, 0.001 to 1000."""
+    twin_only: bool = False
+    """Skip the test before it begins where devices stand in the world's place."""
+
+
+class WorldAxis(NamedTuple):
+    """The mechanics of an axis at one moment: where it really is."""
+
+    position: float
+    """Of the load, in the axis' units."""
+    unit: str
+    lost: int
+    """Pulses the motor has lost so far."""
+    stalled: bool
+
+
+class WorldRig(Rig):
+    """A running world, new for each test. ``driver`` talks to one of its controllers, ``address`` is for a program under test.
+
+    With ``--device NAME=ADDRESS`` drivers and addresses are those of real controllers, by the names of the world; what is said
+    to be *the twin's* skips the test then.
+    """
+
+    def __init__(self, options: WorldOptions, devices: Mapping[str, str], base: Path) -> None:
+        check_time(MARKER, options.time)
+        if options.file is None:
+            raise Misuse(f'which world? @pytest.mark.{MARKER}("machine.toml")')
+        world = World.load(base / options.file)
+        self.options = options
+        self._places = count(1)
+        self._drivers: dict[str, Mic488] = {}
+        self._addresses: dict[str, str] = {}
+        self._channels: dict[str, Channel] = {}
+        self._spec = world.spec
+        names = [spec.name for spec in (*world.spec.mic488, *world.spec.m1486)]
+        self._given = {name: devices[name] for name in names if name in devices}
+        if ANY in devices and not self._given:
+            self._given = {names[0]: devices[ANY]} if len(names) == 1 else {ANY: devices[ANY]}
+        if self._given:
+            super().__init__(MARKER, WallTime(), ", ".join(self._given.values()), base)
+            return
+        self._live = live = LiveWorld(world)
+        super().__init__(
+            MARKER,
+            VirtualTime(live) if options.time == "virtual" else RealTime(live, options.speed, f"the world {world.spec.name}"),
+            None,
+            base,
+        )
+        world.trace.watchers.append(self._happened)
+
+    def _happened(self, record: Record) -> None:
+        if is_told(record):
+            self._told.append(describe(record))
+
+    def begin(self) -> None:
+        if self._given and (self.options.twin_only or ANY in self._given):
+            self.twin_only("a world of several controllers (--device NAME=ADDRESS says which of them is there)")
+
+    # ------------------------------------------------------------------ talking to it
+
+    def address(self, line: str) -> str:
+        """Where a program finds a line of the world: ``tcp://127.0.0.1:PORT``. Raises `Misuse`.
+
+        Modbus TCP, or the characters of M1486 chips. In virtual time there is none: programs outside need a clock.
+        """
+        if line in self._addresses:
+            return self._addresses[line]
+        kind = self._kind(line)
+        if self._given:
+            there = [
+                spec.name for spec in (*self._spec.mic488, *self._spec.m1486) if spec.line == line and spec.name in self._given
+            ]
+            if not there:
+                self.twin_only(f"line {line!r}")
+            return parse_device(self._given[there[0]]).place
+        if not isinstance(self._time, RealTime):
+            raise Misuse("a world in virtual time has no address, for programs outside need a clock: use time='real'")
+        address = self._time.open_tcp(lambda: self._port(line, kind))
+        self._addresses[line] = f"tcp://{address}"
+        return self._addresses[line]
+
+    def _kind(self, line: str) -> str:
+        found = next((spec for spec in self._spec.lines if spec.name == line), None)
+        if found is None:
+            raise World.unknown("line", line, [spec.name for spec in self._spec.lines])
+        return "tcp" if found.kind == "modbus" else "raw"
+
+    def _port(self, line: str, kind: str) -> PlacePort:
+        return PlacePort(self._live, line, f"test-{next(self._places)}", kind)
+
+    def driver(self, controller: str) -> Mic488:
+        """A driver that is connected to a MIC488 of the world; it is closed after the test. Raises `Misuse`."""
+        if controller not in self._drivers:
+            driver = self._driver(controller)
+            driver.open()
+            self._drivers[controller] = driver
+        return self._drivers[controller]
+
+    def _driver(self, controller: str) -> Mic488:
+        spec = next((spec for spec in self._spec.mic488 if spec.name == controller), None)
+        if spec is None:
+            raise World.unknown("MIC488", controller, [spec.name for spec in self._spec.mic488])
+        if self._given:
+            if controller not in self._given:
+                self.twin_only(f"controller {controller!r}")
+            return driver_of(self._given[controller])
+        if spec.line is None:
+            raise Misuse(f"{controller!r} is on no line: its table in {self.options.file} needs line = NAME")
+        line = spec.line
+        device = self.call(lambda world: world.machines[controller])
+        if not isinstance(device, Twin):
+            raise Misuse(f"{controller!r} is no MIC488")
+        unit = device.config.address if spec.unit is None else spec.unit
+        if not isinstance(self._time, VirtualTime):
+            return Mic488(self.address(line), unit, firmware=spec.firmware, config=device.config)
+        endpoint = MemoryEndpoint(self._time, lambda: self._port(line, "tcp"), f"line {line!r}")
+        return joined_driver(endpoint, self._time, unit, framed=True, firmware=spec.firmware, config=device.config)
+
+    def channel(self, line: str) -> Channel:
+        """Characters to the M1486 chips of a line and back; closed after the test. Raises `Misuse`."""
+        if line not in self._channels:
+            kind = self._kind(line)
+            if isinstance(self._time, VirtualTime):
+                endpoint = MemoryEndpoint(self._time, lambda: self._port(line, kind), f"line {line!r}")
+                self._channels[line] = endpoint.open()
+            else:
+                address = self.address(line)
+                self._channels[line] = parse_place(address, 4800).endpoint.open()
+        return self._channels[line]
+
+    # ------------------------------------------------------------------ a hand at the machine
+
+    def call(self, act: Callable[[World], T]) -> T:
+        """Do anything with the world at the present moment; it is not to be kept. The twin's."""
+        __tracebackhide__ = True
+        if self._given:
+            self.twin_only("the world")
+
+        def at(now: Nanos) -> T:
+            try:
+                return act(self._live.world)
+            finally:
+                self._live.stale = True
+
+        return self._at_present(at)
+
+    def axis(self, name: str) -> WorldAxis:
+        """Where the load of an axis really is. The twin's."""
+        __tracebackhide__ = True
+
+        def act(world: World) -> WorldAxis:
+            axis = world.axis[name]
+            return WorldAxis(axis.position, axis.unit, axis.lost, axis.stalled)
+
+        return self.call(act)
+
+    def value(self, signal: str) -> float:
+        """A signal as conditions of the world name it: ``x.position``, ``table.IN1``, ``table.M1.status``. The twin's."""
+        __tracebackhide__ = True
+        return self.call(lambda world: world.read(signal))
+
+    def set_pin(self, pin: str, value: float) -> None:
+        """Set an input ``MACHINE.PIN`` from outside: 0, 1, volts. Raises `Misuse`. The twin's."""
+        __tracebackhide__ = True
+        machine, dot, name = pin.rpartition(".")
+        if not dot:
+            raise Misuse(f"{pin!r}: expected MACHINE.PIN, such as {next(iter(self._spec.mic488), self._spec).name}.IN1")
+        self.call(lambda world: world.outside(do.Set(((machine, name.upper(), float(value)),))))
+
+    def press(self, button: str, for_s: float | None = None) -> None:
+        """Press a button of the world, until `release` or for so many seconds. Raises `Misuse`. The twin's."""
+        __tracebackhide__ = True
+        self.call(lambda world: world.press(button, for_s))
+
+    def release(self, button: str) -> None:
+        """The twin's."""
+        __tracebackhide__ = True
+        self.call(lambda world: world.release(button))
+
+    def fault(self, *faults: str) -> None:
+        """Let something go wrong from now on, as `Mic488Rig.fault`. Raises `Misuse`. The twin's."""
+        __tracebackhide__ = True
+        for fault in map(read, faults):
+            self.call(lambda world, fault=fault: world.outside(do.SetFault(fault)))
+
+    def clear_faults(self, *names: str) -> None:
+        """Let it be well again; without names all of it. The twin's."""
+        __tracebackhide__ = True
+
+        def act(world: World) -> None:
+            for name in names or [active.name for active in world.plan.faults.active]:
+                world.outside(do.ClearFault(name))
+
+        self.call(act)
+
+    # ------------------------------------------------------------------ end
+
+    def close(self) -> None:
+        """After the test. Devices that drivers were asked for are stopped."""
+        try:
+            if self._given:
+                for driver in self._drivers.values():
+                    driver.stop_all()
+        finally:
+            for driver in self._drivers.values():
+                driver.close()
+            for channel in self._channels.values():
+                channel.close()
+            super().close()

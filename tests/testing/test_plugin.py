@@ -1,0 +1,458 @@
+"""The pytest plugin as its users meet it: each test runs pytest on a small file."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import pytest
+
+from steptwin import testing  # else every run imports it anew, for pytester forgets what a run has imported
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "testing"
+WORLD = ROOT / "examples" / "worlds" / "feeder.toml"
+
+
+@pytest.fixture
+def run(pytester: pytest.Pytester) -> Callable[..., pytest.RunResult]:
+    """``run(text, *options)``: pytest on a file with that text; a warning fails its test, as here."""
+
+    def run_(text: str, *options: str) -> pytest.RunResult:
+        pytester.makepyfile(test_it=dedent(text))
+        return pytester.runpytest_inprocess("-W", "error", "-p", "no:cacheprovider", *options)
+
+    return run_
+
+
+Run = Callable[..., pytest.RunResult]
+
+
+# ---------------------------------------------------------------------- time
+
+
+def test_rigs_can_be_named_in_annotations() -> None:
+    assert {name for name in testing.__all__ if not hasattr(testing, name)} == set()
+
+
+def test_in_virtual_time_a_driver_in_the_tests_thread_moves_the_twin(run: Run) -> None:
+    run("""
+        import threading
+        import pytest
+
+        @pytest.mark.mic488(time="virtual")
+        def test_it(mic488):
+            threads = threading.active_count()
+            axis = mic488.driver.axis(1)
+            axis.enable()
+            axis.move_to(200.0)
+            assert axis.wait().ok
+            assert mic488.axis(1).position == 200.0
+            assert mic488.axis(1).position_p == 20_000
+            # 200 mm at 25 mm/s and 50 mm/s²: 8.5 s.
+            assert 8.5 <= mic488.time < 8.7
+            assert threading.active_count() == threads
+            mic488.sleep(3600)
+            assert mic488.time > 3600
+    """).assert_outcomes(passed=1)
+
+
+def test_virtual_time_gives_the_same_each_time(run: Run) -> None:
+    run("""
+        import pytest
+
+        stories = []
+
+        @pytest.mark.mic488(time="virtual", link="rtu", faults=["no-answer probability=0.2"], seed=5)
+        @pytest.mark.parametrize("time", [1, 2])
+        def test_it(mic488, time):
+            axis = mic488.driver.axis(2)
+            axis.enable()
+            axis.home(-10.0)
+            axis.wait()
+            stories.append((mic488.time, mic488.story(), mic488.faults))
+            assert mic488.faults[0].happened > 0
+            assert stories[0] == stories[-1]
+    """).assert_outcomes(passed=2)
+
+
+@pytest.mark.parametrize("link", ["tcp", "rtu", "pty"])
+def test_in_real_time_programs_find_the_twin_at_its_address(run: Run, link: str) -> None:
+    run(f"""
+        import pytest
+        from steptwin.host import Mic488
+
+        @pytest.mark.mic488(link={link!r}, unit=3, firmware="1.23")
+        def test_it(mic488):
+            with Mic488(mic488.address, 3) as driver:
+                assert driver.firmware == "1.23"
+                mic488.set_pin("IN20", 1)
+                mic488.until(lambda: driver.inputs()[19])
+            assert mic488.device_address == mic488.address + ",unit=3"
+    """).assert_outcomes(passed=1)
+
+
+def test_time_can_be_virtual_for_all_tests(run: Run, pytester: pytest.Pytester) -> None:
+    pytester.makeini("[pytest]\nsteptwin_time = virtual\n")
+    run("""
+        def test_it(mic488):
+            mic488.sleep(1000)
+            assert mic488.time == 1000
+    """).assert_outcomes(passed=1)
+
+
+def test_a_condition_that_does_not_come_fails_with_its_name_and_the_last_frames(run: Run) -> None:
+    result = run("""
+        import pytest
+
+        @pytest.mark.mic488(time="virtual")
+        def test_it(mic488):
+            mic488.driver.enable(1)
+            mic488.until(lambda: mic488.axis(1).position > 5, within_s=3, what="the axis beyond 5 mm")
+    """)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["*Failed: after 3 s not yet: the axis beyond 5 mm", "*mic488: what happened last*"])
+    result.stdout.fnmatch_lines(["*→ write M_ENABLE = M1 (1)", "*← wrote M_ENABLE = M1 (1)"])
+
+
+def test_until_sees_what_lasts_a_moment_only(run: Run) -> None:
+    run("""
+        import pytest
+
+        @pytest.mark.mic488(time="virtual")
+        def test_it(mic488):
+            mic488.later(1.0, lambda: mic488.set_pin("IN9", 1))
+            mic488.later(1.000001, lambda: mic488.set_pin("IN9", 0))
+            mic488.until(lambda: mic488.pins["IN9"])
+            assert mic488.time == 1.0
+    """).assert_outcomes(passed=1)
+
+
+# ---------------------------------------------------------------------- hands at the machine
+
+
+def test_sensors_encoders_power_and_events(run: Run) -> None:
+    run("""
+        import pytest
+
+        @pytest.mark.mic488(time="virtual")
+        def test_it(mic488):
+            axis = mic488.driver.axis(1)
+            axis.enable()
+            mic488.later(1.0, lambda: mic488.set_pin("in5", 1))
+            axis.move_to(200.0)
+            end = axis.wait(check=False)
+            assert end.reason.name == "LIMIT_R"
+            mic488.set_pin("AIN1", 4.5)
+            assert mic488.pins["AIN1"] == 4.5
+            mic488.turn_encoder(2, 40)
+            assert mic488.driver.axis(2).encoder() == 40 == mic488.axis(2).encoder
+            mic488.power_cycle()
+            assert not mic488.axis(1).enabled
+            assert mic488.events[-1].code == "power-on"
+            assert mic488.call(lambda device, now: device.firmware.name) == "1.70"
+    """).assert_outcomes(passed=1)
+
+
+def test_a_switch_that_is_stuck_stays_stuck_under_a_hand(run: Run) -> None:
+    run("""
+        def test_it(mic488):
+            mic488.fault("stuck pin=IN9 value=0 name=kl")
+            mic488.set_pin("IN9", 1)
+            assert not mic488.driver.inputs()[8]
+            mic488.clear_faults("kl")
+            assert mic488.faults == []
+            mic488.until(lambda: mic488.driver.inputs()[8])
+    """).assert_outcomes(passed=1)
+
+
+def test_with_a_configuration_and_a_program_the_twin_is_that_machine(run: Run, pytester: pytest.Pytester) -> None:
+    for name in ("slave.cfg", "slave.prg"):
+        shutil.copy(ROOT / "examples" / "mic488" / name, pytester.path)
+    run("""
+        import pytest
+
+        @pytest.mark.mic488(time="virtual", config="slave.cfg", program="slave.prg")
+        def test_it(mic488):
+            mic488.driver.program.start()
+            mic488.until(lambda: mic488.call(lambda device, now: device.program.state.name) == "RUNNING")
+    """).assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("foo=1", "no option 'foo': there are firmware, config,"),
+        ("time='fast'", "time = 'fast': permitted are 'real', 'virtual'"),
+        ("link='usb'", "link = 'usb': permitted are 'tcp', 'rtu', 'pty'"),
+        ("unit=300", "unit = 300: permitted are 1 to 247"),
+        ("speed=0", "speed = 0: permitted are 0.001 to 1000"),
+        ("firmware='9'", "1.23, 1.40, 1.70"),
+        ("config='no.cfg'", "cannot read the configuration"),
+        ("faults=['crc nth=3']", "fault crc happens on Modbus RTU: this twin serves Modbus TCP"),
+        ("faults=['nonsense']", "nonsense"),
+        ("3", "3 needs a name"),
+    ],
+)
+def test_wrong_options_are_told_in_a_line(run: Run, options: str, message: str) -> None:
+    result = run(f"""
+        import pytest
+
+        @pytest.mark.mic488({options})
+        def test_it(mic488):
+            pass
+    """)
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines([f"fixture mic488: *{message.replace('[', '[[]')}*"])
+    result.stdout.no_fnmatch_line("*Traceback*")
+
+
+def test_the_nearest_marker_has_the_last_word(run: Run) -> None:
+    run("""
+        import pytest
+
+        pytestmark = pytest.mark.mic488(time="virtual", firmware="1.23")
+
+        @pytest.mark.mic488(firmware="1.40")
+        def test_it(mic488):
+            assert mic488.driver.firmware == "1.40"
+            mic488.sleep(100)
+
+        def test_other(mic488):
+            assert mic488.driver.firmware == "1.23"
+    """).assert_outcomes(passed=2)
+
+
+def test_a_twin_in_virtual_time_has_no_address(run: Run) -> None:
+    result = run("""
+        import pytest
+
+        @pytest.mark.mic488(time="virtual")
+        def test_it(mic488):
+            mic488.address
+    """)
+    result.stdout.fnmatch_lines(["*a twin in virtual time has no address*use time='real'*"])
+
+
+# ---------------------------------------------------------------------- M1486 and worlds
+
+
+@pytest.mark.parametrize("how", ["time='virtual'", "link='tcp'", "link='pty'"])
+def test_an_m1486(run: Run, how: str) -> None:
+    run(f"""
+        import pytest
+
+        @pytest.mark.m1486({how}, variant="B", address=3)
+        def test_it(m1486):
+            m1486.send("x3", "F1280", "R", "U20")
+            assert m1486.receive(within_s=20) == b"B"
+            assert m1486.position == 1280
+            assert not m1486.is_moving
+            m1486.set_pin("B5", 0)
+            assert m1486.pins["B5"] == 0
+            m1486.power_cycle()
+            assert m1486.call(lambda chip, now: chip.drive.counter_u(now)) == 0
+    """).assert_outcomes(passed=1)
+
+
+def test_characters_that_do_not_come_fail_the_test(run: Run) -> None:
+    result = run("""
+        import pytest
+
+        @pytest.mark.m1486(time="virtual")
+        def test_it(m1486):
+            m1486.send("U20")
+            m1486.receive(3)
+    """)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["*after 1 s only 1 of 3 characters: 41"])
+
+
+@pytest.mark.parametrize("time", ["virtual", "real"])
+def test_a_world(run: Run, pytester: pytest.Pytester, time: str) -> None:
+    shutil.copy(WORLD, pytester.path)
+    run(f"""
+        import pytest
+
+        @pytest.mark.steptwin_world("feeder.toml", time={time!r}, speed=50.0)
+        def test_it(steptwin_world):
+            world = steptwin_world
+            world.until(lambda: world.value("table.M1.status") == 4, within_s=60, what="home")
+            driver = world.driver("table")
+            assert driver.axis(1).unit == "mm"
+            world.until(lambda: world.axis("x").position > 100, within_s=60)
+            world.set_pin("table.IN9", 1)
+            world.until(lambda: driver.inputs()[8])
+            world.press("start", 0.2)
+            world.fault("no-answer lost=answer count=1")
+            assert world.driver("table").inputs()[8]
+            assert world.axis("x").lost == 0
+            world.channel("chips").write(b"x3\\rU20\\r")
+            received = []
+            world.until(lambda: received.append(world.channel("chips").read(0.0)) or b"B" in received, within_s=20)
+    """).assert_outcomes(passed=1)
+
+
+def test_a_world_needs_its_file(run: Run) -> None:
+    result = run("""
+        def test_it(steptwin_world):
+            pass
+    """)
+    result.stdout.fnmatch_lines(['fixture steptwin_world: which world? @pytest.mark.steptwin_world("machine.toml")'])
+
+
+# ---------------------------------------------------------------------- nothing is left
+
+
+def test_no_threads_or_sockets_are_left_even_where_programs_stay_connected(run: Run) -> None:
+    threads = threading.active_count()
+    run("""
+        import socket
+
+        def test_it(mic488, m1486, request):
+            host, port = mic488.address.removeprefix("tcp://").split(":")
+            connected = socket.create_connection((host, int(port)))
+            request.config.add_cleanup(connected.close)
+            m1486.channel.write(b"U1")
+    """).assert_outcomes(passed=1)
+    assert threading.active_count() == threads
+
+
+def test_a_twin_that_fails_by_itself_is_told_after_the_test(run: Run) -> None:
+    result = run("""
+        def test_it(mic488):
+            def fail():
+                raise ValueError("no such thing")
+            mic488.later(0.0, fail)
+            mic488.sleep(0.2)
+    """)
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines(["fixture mic488, after the test: the MIC488 failed: no such thing"])
+
+
+def test_it_works_in_processes_of_xdist(run: Run) -> None:
+    run(
+        """
+        import pytest
+
+        def test_it(mic488):
+            assert mic488.driver.axis(1).position() == 0.0
+        """,
+        "-n1",
+    ).assert_outcomes(passed=1)
+
+
+# ---------------------------------------------------------------------- devices
+
+
+def test_the_example_passes(pytester: pytest.Pytester) -> None:
+    _copy_example(pytester)
+    pytester.runpytest_inprocess("-W", "error").assert_outcomes(passed=6)
+
+
+def test_the_example_runs_on_a_device_too(pytester: pytest.Pytester, serve: Callable[..., Any]) -> None:
+    served = serve("--demo")
+    _copy_example(pytester)
+    address = f"tcp://127.0.0.1:{served.tcp_port}"
+    pytester.runpytest_inprocess("-W", "error", "--device", address, "-k", "operator").assert_outcomes(passed=1, deselected=5)
+    assert any("M1 is at its home position" in line for line in served.lines)
+
+
+def _copy_example(pytester: pytest.Pytester) -> None:
+    for file in EXAMPLE.iterdir():
+        if file.is_file():
+            shutil.copy(file, pytester.path)
+
+
+def test_axes_of_a_device_are_stopped_after_the_test(run: Run, serve: Callable[..., Any]) -> None:
+    served = serve("--demo")
+    address = f"tcp://127.0.0.1:{served.tcp_port}"
+    result = run(
+        """
+        import pytest
+
+        def test_it(mic488):
+            mic488.driver.enable(1)
+            mic488.driver.axis(1).move_velocity(5.0)
+            assert False, "something else went wrong"
+
+        @pytest.mark.mic488(twin_only=True)
+        def test_twin(mic488):
+            raise AssertionError
+
+        def test_look(mic488):
+            mic488.axis(1)
+
+        @pytest.mark.mic488(firmware="1.23")
+        def test_other(mic488):
+            raise AssertionError
+        """,
+        "--device",
+        address,
+        "-rs",
+    )
+    result.assert_outcomes(failed=1, skipped=3)
+    result.stdout.fnmatch_lines(["*axis(1) is there on a twin only, and --device says tcp:*"])
+    result.stdout.fnmatch_lines(["*this test is for firmware 1.23, tcp:* has 1.70"])
+    axis = served.state()["axes"][0]
+    assert axis["enabled"]
+    assert axis["velocity"] == 0.0
+
+
+def test_a_device_that_is_not_there_is_told_in_a_line(run: Run) -> None:
+    result = run("def test_it(mic488):\n    mic488.driver\n", "--device", "tcp://127.0.0.1:1")
+    result.stdout.fnmatch_lines(["fixture mic488, after the test: cannot connect to tcp://127.0.0.1:1: connection refused"])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--device", "nonsense:"], "*'nonsense:' is no address*"),
+        (["--device", "/dev/a", "--device", "/dev/b"], "*there is an address already: /dev/a*"),
+        (["--device", "m1486=/dev/a", "--device", "m1486=/dev/b"], "*m1486 has an address already: /dev/a*"),
+        (["--device", "/dev/a", "-n2"], "*several processes (-n) cannot share a device: run without -n*"),
+        (["--device", "/dev/a"], "*for a MIC488 and for an M1486: say which it is, mic488=ADDRESS or m1486=ADDRESS*"),
+    ],
+)
+def test_devices_that_cannot_be_meant_are_refused_before_anything_moves(run: Run, options: list[str], message: str) -> None:
+    result = run("def test_it(mic488, m1486):\n    raise AssertionError\n", *options)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([message])
+
+
+def test_a_world_of_several_controllers_asks_which_of_them_is_there(
+    run: Run, pytester: pytest.Pytester, serve: Callable[..., Any]
+) -> None:
+    served = serve("--demo")
+    shutil.copy(WORLD, pytester.path)
+    address = f"tcp://127.0.0.1:{served.tcp_port}"
+    text = """
+        import pytest
+
+        @pytest.mark.steptwin_world("feeder.toml")
+        def test_it(steptwin_world):
+            steptwin_world.driver("table").enable(1)
+            steptwin_world.axis("x")
+    """
+    named = run(text, "--device", f"table={address}", "-rs")
+    named.stdout.fnmatch_lines(["*the world is there on a twin only, and --device says tcp:*"])
+    assert served.state()["axes"][0]["enabled"]
+    run(text, "--device", address, "-rs").stdout.fnmatch_lines(["*a world of several controllers (--device NAME=ADDRESS*"])
+
+
+# ---------------------------------------------------------------------- others' test runs
+
+
+def test_the_plugin_brings_nothing_along_until_it_is_used(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile("""
+        import sys
+
+        def test_it():
+            mine = {name for name in sys.modules if name.startswith("steptwin")}
+            assert mine == {"steptwin", "steptwin.errors", "steptwin.pytest_plugin"}
+    """)
+    pytester.runpytest_subprocess().assert_outcomes(passed=1)
