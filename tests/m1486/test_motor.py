@@ -193,7 +193,7 @@ def test_m_11_divisions_that_do_not_go_together_are_wrong_data_when_a_move_start
 
 
 @pytest.mark.parametrize(("q", "most"), [(4, 3000), (2, 6000), (1, 20_000)])
-def test_the_highest_speed_with_q(q: int, most: int) -> None:
+def test_m_34_the_highest_speed_with_q(q: int, most: int) -> None:
     bench = moving("m64", f"q{q}", "v20000", "a65000", "g+", seconds=2.0)
     assert speed(bench) == most
     bench = moving("m64", f"q{q}", "v20000", "a65000", "g+", kind="B2x", seconds=2.0)

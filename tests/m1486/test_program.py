@@ -72,6 +72,22 @@ def test_the_later_of_two_labels_counts() -> None:
     assert sends("j1", "@1", "u20", "j2", "@1", "u15", "@2") == b"\x02"
 
 
+def test_a_label_given_anew_counts_for_commands_that_were_done_before() -> None:
+    def next_round(bench: Bench) -> bytes:
+        bench.pin(B3=0)
+        answer = bench.run(ms=5)
+        bench.pin(B3=1)
+        return answer + bench.run(ms=5)
+
+    for condition in ("j1", "i80l1"):
+        bench = Bench()
+        bench.file("@1", "u20", "z3", "o3", condition)
+        bench.run(ms=5)
+        assert next_round(bench) == b"\x42"
+        bench.send("@1", "u15")
+        assert next_round(bench) == b"\x02"
+
+
 def test_the_internal_variable_stands_for_a_number_left_out() -> None:
     assert sends(":2", "j", "@1", "u20", "@2", "u15") == b"\x02"
     assert sends(":3", "l", "u20", "e") == b"\x42" * 3

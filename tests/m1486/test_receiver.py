@@ -171,6 +171,16 @@ def test_function_57_reports_three_free_bytes_and_an_empty_buffer() -> None:
     assert bench.finish() == b"\x7e\x7f\x41\x41\x00"
 
 
+def test_function_57_calls_a_buffer_empty_when_no_character_is_in_it() -> None:
+    bench = Bench("B")
+    bench.do("t57", "v100", "f64000")
+    bench.send("r")
+    bench.run(ms=10)
+    bench.raw(b"u20\ru1")
+    assert bench.finish() == b"\x42"
+    assert bench.raw(b"5\r") == b"\x7f\x02"
+
+
 def test_function_57_tells_three_bytes_only_where_fewer_were_free() -> None:
     bench = Bench("A")
     bench.do("t57", "v100", "f64000")

@@ -234,6 +234,7 @@ class Drive(Stateful):
         return Microstepping(self.grid_u, microstep_size(qualification), self._speed(low_range_limit(microstep)))
 
     def _speed_curve(self) -> SpeedCurve:
+        # M-34: V may ask for more than Q permits.
         top = min(self.velocity, HIGHEST_SPEED[self.qualification])
         start, knee = self._speed(self.start_stop), self._speed(self.profile_speed)
         return SpeedCurve(start, self._acceleration(), knee, self._speed(top))
