@@ -15,7 +15,7 @@ from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.links import Feed
 from steptwin.runtime.session import session_of
-from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, handlers_of, up
+from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, begin, handlers_of, up
 from steptwin.runtime.world import World
 from steptwin.wire.crc import with_crc
 
@@ -130,3 +130,16 @@ def test_requests_of_the_control_endpoint() -> None:
 def test_speeds_that_cannot_be_are_misuse(speed: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
         up(UpOptions(world=EXAMPLES / "feeder.toml", speed=speed))
+
+
+def test_a_world_wakes_up_by_itself() -> None:
+    async def run() -> None:
+        live = LiveWorld(World.load(EXAMPLES / "lift.toml"))
+        noted = asyncio.Event()
+        live.world.trace.watchers.append(lambda record: noted.set() if record.subject == "note" else None)
+        cell = Cell(live, Clock(1000.0))
+        begin(cell)
+        await asyncio.wait_for(noted.wait(), 60)
+        cell.close()
+
+    asyncio.run(run())

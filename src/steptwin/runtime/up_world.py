@@ -63,7 +63,7 @@ class LiveWorld:
 
     def advance(self, now: Nanos) -> None:
         world = self.world
-        while (due := self.deadline()) is not None and due <= now:
+        while (due := self._due()) is not None and due <= now:
             world.advance(due)
             for kernel in world.kernels:
                 at = kernel.deadline()
@@ -73,6 +73,9 @@ class LiveWorld:
 
     def deadline(self) -> Nanos | None:
         self.stale = False
+        return self._due()
+
+    def _due(self) -> Nanos | None:
         dues = [due for kernel in self.world.kernels if (due := kernel.deadline()) is not None]
         own = self.world.next()
         return min(dues if own is None else [*dues, own], default=None)
@@ -171,13 +174,19 @@ async def _serve(options: UpOptions, world: World, speed: float | None, name: st
             if speed is None:
                 await _run_freely(server, world)
             else:
-                server.cell.enter()
-                server.cell.leave()
+                begin(server.cell)
                 await server.until_ended()
+                server.cell.enter()
         finally:
             await server.close()
             for text in _keep(options, world):
                 output.line(text)
+
+
+def begin(cell: Cell) -> None:
+    """Wake up for the first thing that happens by itself."""
+    cell.enter()
+    cell.leave()
 
 
 def _greet(output: Output, server: Server, world: World, speed: float | None) -> None:

@@ -296,7 +296,7 @@ class _Builder:
             play=pulses(spec.backlash),
             motor=None if spec.motor is None else _motor(spec, spec.motor, scale),
         )
-        mechanism = Mechanism(kernel, machine, number, build)
+        mechanism = Mechanism(kernel, machine, number, build, spec.name)
         kernel.add_part(mechanism)
         plan.axes[spec.name] = Fitted(spec, kernel, mechanism, scale)
         for switch in spec.switches:

@@ -145,6 +145,11 @@ class Course:
                     return time
         return None
 
+    def next_stall(self, after: Nanos) -> Nanos | None:
+        """First moment > ``after`` at which the rotor loses the field or is caught again."""
+        stalled = self._piece(after).stalled
+        return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
+
     def _piece(self, now: Nanos) -> Piece:
         return self.pieces[max(bisect_right(self.pieces, now, key=attrgetter("begin")) - 1, 0)]
 

@@ -193,6 +193,11 @@ class Kernel:
         else:
             self.drive(wire.target, level)
 
+    def tell(self, machine: str, kind: str, subject: str, value: object) -> None:
+        """Something worth recording happens to a machine now."""
+        if self._record is not None:
+            self._record(Record(self.now, machine, kind, subject, value))
+
     # ------------------------------------------------------------------ time
 
     def advance(self, now: Nanos) -> None:

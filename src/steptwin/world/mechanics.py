@@ -58,16 +58,20 @@ class Mechanism(Stateful):
         "_encoders",
         "_kernel",
         "_lost",
+        "_name",
         "_revision",
         "_simple",
+        "_stall_due",
+        "_stalled",
         "build",
         "machine",
         "number",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_encoders", "_kernel", "_revision", "build", "machine", "number"})
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_encoders", "_kernel", "_name", "_revision", "build", "machine", "number"})
 
-    def __init__(self, kernel: Kernel, machine: str, number: int, build: Build) -> None:
+    def __init__(self, kernel: Kernel, machine: str, number: int, build: Build, name: str = "axis") -> None:
         self._kernel = kernel
+        self._name = name
         self.machine = machine
         self.number = number
         self.build = build
@@ -76,6 +80,9 @@ class Mechanism(Stateful):
         """Whether encoders have been told that they are not simply turned by the drive."""
         self._due: Nanos | None = None
         """When controllers that follow are told next that their encoder turns."""
+        self._stalled = False
+        self._stall_due: Nanos | None = None
+        """When the motor loses the field next, or is caught."""
         self._lost = 0
         self._blocked = False
         self._changes = 0
@@ -127,10 +134,23 @@ class Mechanism(Stateful):
                 self._renew(drive, now)
             elif self._due is not None and self._due <= now:
                 self._turn_encoders(now)
+            if self._stall_due is not None and self._stall_due <= now:
+                self._watch_motor(now)
 
     def deadline(self) -> Nanos | None:
-        """Courses are laid out ahead: only who follows the axis is to be told again and again."""
-        return self._due
+        """Courses are laid out ahead: only who follows or watches the axis is to be told."""
+        if self._due is None or self._stall_due is None:
+            return self._stall_due if self._due is None else self._due
+        return min(self._due, self._stall_due)
+
+    def _watch_motor(self, now: Nanos) -> None:
+        """Tell where the motor has lost the field, and where it has found it."""
+        stalled = self._course.at(now).stalled
+        if stalled is not self._stalled:
+            self._stalled = stalled
+            text = f"{self._name} loses the field" if stalled else f"{self._name} is caught, {self.lost(now)} pulses behind"
+            self._kernel.tell(self.machine, "event", "stall", text)
+        self._stall_due = self._course.next_stall(now)
 
     def _renew(self, drive: Drive, now: Nanos, standing: Standing | None = None) -> None:
         """The drive follows another plan, or something has changed in the mechanics."""
@@ -147,6 +167,8 @@ class Mechanism(Stateful):
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
+        if self.build.motor is not None:
+            self._watch_motor(now)
 
     # ------------------------------------------------------------------ encoders
 

@@ -190,7 +190,7 @@ class Plant:
     @staticmethod
     def unknown(what: str, name: str, known: Iterable[str]) -> Misuse:
         near = NearMiss().of(name, known)
-        hint = "" if near is None else f"; did you mean {near!r}?"
+        hint = "" if near is None else f" (did you mean {near!r}?)"
         return Misuse(f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
 
     def condition(self, text: str) -> Condition:

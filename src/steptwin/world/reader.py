@@ -155,11 +155,24 @@ def read_table(text: Text, path: Path, value: object, keys: Sequence[Key], also:
                 text.wrong((*path, name), "D003", f"{what}: {name}: {error}", key.meaning)
         elif name not in also:
             near = text.near(name, permitted)
-            text.wrong((*path, name), "D004", f"{what} has no {name!r}{near}", f"permitted: {', '.join(permitted)}")
+            text.wrong((*path, name), "D004", f"{what} has no {name!r}{near}", f"permitted: {_listed(known, also)}")
     for key in keys:
         if key.is_required and key.name not in value:
             text.wrong(path, "D005", f"{what}: {key.name} is missing", key.meaning)
     return values
+
+
+_MANY = 5
+
+
+def _listed(known: Iterable[str], also: Iterable[str]) -> str:
+    """Keys for people; of the many numbered tables of a controller the first and last."""
+    others = list(also)
+    names = {name.rstrip("0123456789") for name in others}
+    if len(others) > _MANY:
+        ends = [[other for other in others if other.rstrip("0123456789") == name] for name in sorted(names)]
+        others = [f"{group[0]} to {group[-1]}" for group in ends]
+    return ", ".join([*known, *others])
 
 
 def _what(path: Path) -> str:

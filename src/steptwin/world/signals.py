@@ -53,7 +53,7 @@ def find_signal(plan: Plan, name: str) -> SignalOf:
     if machine is None:
         known = [*plan.machines, *plan.axes, *plan.buttons, "time", "idle"]
         near = NearMiss().of(owner, known)
-        hint = f"; did you mean {near!r}?" if near else ""
+        hint = f" (did you mean {near!r}?)" if near else ""
         raise Misuse(f"no signal {name!r}: nothing is called {owner!r}{hint}; there are {', '.join(known)}")
     kernel = plan.kernel_of[owner]
     pins = machine.pins()
@@ -83,7 +83,7 @@ def _chosen(known: Mapping[str, SignalOf], rest: str, name: str, others: str = "
     found = known.get(rest.lower())
     if found is None:
         near = NearMiss().of(rest, known)
-        hint = f"; did you mean {near!r}?" if near else ""
+        hint = f" (did you mean {near!r}?)" if near else ""
         raise Misuse(f"no signal {name!r}{hint}; there are {', '.join(known)}{others}")
     return found
 

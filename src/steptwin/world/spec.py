@@ -476,7 +476,7 @@ def _configured(row: ConfigKey) -> Callable[[Any], Any]:
             elif value.upper() in words:
                 value = words[value.upper()]
             else:
-                raise Misuse(f"{value!r}: permitted are {', '.join(words) or row.hint}")
+                raise Misuse(f"{value!r}: permitted are {', '.join(words)}" if words else f"{value!r} is no number")
         if isinstance(value, bool) or not isinstance(value, int | float) or not row.permits(value):
             raise Misuse(f"{value!r} is not permitted")
         return int(value) if row.whole and value == int(value) else value
