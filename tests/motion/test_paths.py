@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
@@ -258,6 +258,7 @@ def test_lines_start_and_finish_together_within_a_pulse(
 
 
 @given(arc=circles, speed=speeds, part=st.floats(0.0, 1.0))
+@example(arc=circle(0.0, 0.0, 9.0, 4.0), speed=166.0, part=0.9999999999999999)
 def test_braking_stays_on_the_path(arc: Arc, speed: float, part: float) -> None:
     run = run_arc(arc, 5000.0, 5000.0, speed, start=1000)
     assert run.way.end is not None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.wbc.controller import FOREVER
@@ -20,6 +20,7 @@ HORIZON = 10**6
     period=st.integers(1, 50),
     endless=st.booleans(),
 )
+@example(turns=[(200, -9), (400, -9)], threshold=0, begin=0, period=1, endless=True)
 def test_wbc_18_the_first_look_that_differs_is_found(
     turns: list[tuple[int, int]], threshold: int, begin: int, period: int, *, endless: bool
 ) -> None:
@@ -39,7 +40,7 @@ def test_wbc_18_the_first_look_that_differs_is_found(
         return float(height(moment) > threshold)
 
     stretches = [end - 1 for end in ends[bisect_right(ends, begin) :]] + ([FOREVER] if endless else [])
-    looks = range(begin + period, begin + period + 6000 * period, period)
+    looks = range(begin + period, begin + period + 30_000 * period, period)
     expected = next((moment for moment in looks if side(moment) != side(begin)), None)
     found = first_change(side, begin, period, stretches, HORIZON)
     assert found == expected or (expected is None and endless and found is not None and found > HORIZON)

@@ -185,6 +185,12 @@ class Circular:
                 end_s = s.end_s if part.end_w >= end_w else s.when(part.end_w)
                 segments.append(ArcSegment(end_s, part.direction, s, local, part.half, part.end_p))
             begin_w = end_w
+        if way.segments and (not segments or segments[-1].end_s < way.segments[-1].end_s):
+            # The last stretch is too short to lead anywhere, but it takes its time.
+            s = way.segments[-1]
+            half = floor(0.5 * (local.angle_q + local.turn_q * begin_w))
+            falls = (half & 1 == 0) is (local.turn_q > 0.0)
+            segments.append(ArcSegment(s.end_s, -1 if falls else 1, s, local, half, local.position(begin_w)))
         profile = ArcProfile(way.start, count, tuple(segments), local.position(way.final_p))
         if final is None:
             return profile
