@@ -11,7 +11,7 @@ import asyncio
 import contextlib
 import socket
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Generator
 from statistics import median
 
 from pymodbus.client import AsyncModbusTcpClient, ModbusTcpClient
@@ -54,7 +54,7 @@ class Peer:
 
 
 @contextlib.contextmanager
-def peer() -> Iterator[tuple[int, Peer]]:
+def peer() -> Generator[tuple[int, Peer]]:
     listener = socket.create_server(("127.0.0.1", 0))
     end = Peer(listener)
     try:

@@ -17,7 +17,8 @@ Plain: TypeAlias = tuple[Any, ...]
 class Stateful:
     """Base of objects made of plain state and `Stateful` parts (single, or in a tuple).
 
-    Lists, dictionaries, deques, arrays and bytearrays are copied and hold immutable values; all other values are immutable and shared.
+    Lists, dictionaries, deques, arrays and bytearrays are copied and hold immutable values; all other values are immutable and
+    shared.
     """
 
     __slots__ = ()

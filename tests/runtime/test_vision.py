@@ -39,8 +39,8 @@ def frame(pdu: bytes) -> bytes:
 READ = frame(b"\x03" + struct.pack(">HH", 0, 10))
 
 
-def served(text: str = PICK, **options: bool) -> tuple[Mic488Line, Mic488]:
-    line = Mic488Line(ControllerConfig(), [1], "1.70", Banks({0: loaded(text)[0]}), options=LineOptions(**options))
+def served(text: str = PICK, options: LineOptions | None = None) -> tuple[Mic488Line, Mic488]:
+    line = Mic488Line(ControllerConfig(), [1], "1.70", Banks({0: loaded(text)[0]}), options=options)
     device = line.devices[1]
     device.program.command(1, 0)
     device.touch()
@@ -55,7 +55,7 @@ def records(device: Mic488, now: int) -> tuple[int, list[float]]:
 
 @pytest.mark.parametrize("options", [{}, {"frames": True}, {"timing": True}, {"timing": True, "frames": True}])
 def test_wbc_15_records_and_frames_share_an_rtu_line(options: dict[str, bool]) -> None:
-    line, device = served(**options)
+    line, device = served(options=LineOptions(**options))
     port = line.rtu_port("pty")
     answered, now = b"", 0
     for data in (READ, RECORD, READ, RECORD[:9], RECORD[9:], READ):
