@@ -1,0 +1,222 @@
+"""Programs into a chip: typed command by command with the chip's flow control, a file in ``[ ]`` whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from steptwin.diagnostics import Severity, Source, render
+from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.host.m1486.failures import Busy, DoubtfulMove, FileGivenUp
+from steptwin.host.m1486.motion import UNKNOWN_S, ChipMotion, Told
+from steptwin.host.m1486.settings import ChipSettings, after_reset
+from steptwin.host.m1486.talk import WHO
+from steptwin.host.m1486.unit import Unit
+from steptwin.m1486.check import check
+from steptwin.m1486.functions import FUNCTIONS, RETURN, TABLE
+from steptwin.m1486.lines import STEP_DIRECTION, Interface
+from steptwin.m1486.syntax import Command, Program
+from steptwin.m1486.variants import Store, Variant
+from steptwin.machine import MILLISECOND, SECOND
+
+Progress = Callable[[int, int], object]
+"""Told how many commands were typed, of how many."""
+
+ERASE_MARGIN_S = 0.1
+FULL_PAUSE_NS = 50 * MILLISECOND
+"""The input buffer is given this long to empty when characters come back inverted."""
+_MOVES = frozenset("r)(jk'[")
+
+
+def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> Program:
+    """Raises `Misuse` with every error in it."""
+    checked = check(text, variant, interface)
+    if not checked.is_sound:
+        errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
+        raise Misuse(f"{name} is not sent:\n{render(Source(name, text), errors)}")
+    return checked.program
+
+
+def parts(program: Program) -> list[tuple[int | None, list[Command]]]:
+    """The commands in order, cut where ``X`` chooses another chip; None before the first X."""
+    found: list[tuple[int | None, list[Command]]] = [(None, [])]
+    for command in program.commands:
+        if command.key == "XG":
+            raise Misuse("XG is not sent: what several chips take at once cannot be verified; name each chip with X")
+        if command.key == "X":
+            found.append((command.number, []))
+        else:
+            found[-1][1].append(command)
+    return [(address, commands) for address, commands in found if commands]
+
+
+async def send_program(
+    units: Mapping[int | None, Unit],
+    text: str,
+    *,
+    progress: Progress | None = None,
+    name: str = "program",
+) -> bytes:
+    """Type a program into the chips it names; ``units[None]`` gets what stands before any ``X``. Returns what ``U`` uploaded
+    outside ``[ ]``.
+    """
+    first = next(iter(units.values()))
+    program = checked_program(text, first.variant, first.notes.interface or STEP_DIRECTION, name)
+    found = parts(program)
+    for address, commands in found:
+        if address not in units:
+            missing = f"chip {address:X}, which it names" if address is not None else f"a chip for {commands[0]}: no X before it"
+            raise Misuse(f"{name} is not sent: there is no {missing}")
+    total = sum(len(commands) for _, commands in found)
+    done = 0
+    uploaded = b""
+
+    def tell(count: int) -> None:
+        if progress is not None:
+            progress(done + count, total)
+
+    for address, commands in found:
+        uploaded += await _Typist(units[address], tell).type(commands)
+        done += len(commands)
+    return uploaded
+
+
+class _Typist:
+    """Types commands into one chip."""
+
+    def __init__(self, unit: Unit, tell: Callable[[int], object]) -> None:
+        self._unit = unit
+        self._tell = tell
+        self._guard = unit.stop_guard()
+        self._capacity = unit.variant.input_bits // 8
+        self._typed = 0  # characters that may lie in the input buffer
+
+    async def type(self, commands: Sequence[Command]) -> bytes:
+        unit = self._unit
+        uploaded = b""
+        index = 0
+        async with unit.turn():
+            await unit.rest()
+            while index < len(commands):
+                if commands[index].key == "[":
+                    closes = next(n for n in range(index, len(commands)) if commands[n].key == "]")
+                    await self._file(commands[index : closes + 1], index)
+                    index = closes + 1
+                else:
+                    uploaded += await self._command(commands[index])
+                    index += 1
+                self._tell(index)
+        return uploaded
+
+    async def _file(self, commands: Sequence[Command], done: int) -> None:
+        unit = self._unit
+        await self._empty()
+        if unit.variant.store is Store.EEPROM:
+            await reset(unit)
+        await type_file(unit, [str(command).lower() for command in commands], self._guard, lambda count: self._tell(done + count))
+        self._typed = self._capacity
+
+    async def _command(self, command: Command) -> bytes:
+        unit = self._unit
+        text = str(command).lower()
+        if command.key == "\\":
+            await self._empty()
+            await reset(unit)
+            return b""
+        if command.key == "K":
+            await unit.kill()
+            return b""
+        if self._typed + len(text) + 1 + len(WHO) + 1 > self._capacity - 3:
+            await self._empty()
+        if text[0] in _MOVES:
+            await begin(unit, text, ChipMotion.BLOCK, self._guard)
+        else:
+            unit.notes.settings = ChipSettings()
+            if command.key == "U":
+                await self._empty()
+                return await unit.say(text, answers=True)
+            await unit.say(text, acts=True)
+        self._typed += len(text) + 1
+        if unit.talk.nearly_full:
+            await self._empty()
+        return b""
+
+    async def _empty(self) -> None:
+        """Until the chip has done all it was told: its buffer is empty then. Raises `Busy` after a minute."""
+        unit = self._unit
+        if await unit.asks_who(round(UNKNOWN_S * SECOND)) is None:
+            raise Busy(f"{unit.place}: {unit.name} takes no more: it {unit.why_busy()}")
+        self._typed = 0
+
+
+async def type_file(unit: Unit, lines: Sequence[str], guard: Callable[[], bool], tell: Callable[[int], object]) -> None:
+    """Type a file from ``[`` to ``]``, which makes it run.
+
+    When something goes wrong before, nothing of it runs: the chip is reset, which is how the manual has a file given up (chapter
+    II, Memory), and `FileGivenUp` is raised. Raises `DoubtfulMove` when nobody knows whether ``]`` was heard.
+    """
+    try:
+        for count, line in enumerate(lines[:-1], start=1):
+            await unit.say(line, once=True, retype=count == 1)
+            if unit.talk.nearly_full:
+                await unit.line.sleep(FULL_PAUSE_NS / SECOND)
+            tell(count)
+        await begin(unit, lines[-1], ChipMotion.BLOCK, guard, retype=False)
+    except DoubtfulMove:
+        raise
+    except (LineFailure, Refusal) as failure:
+        try:
+            await reset(unit)
+        except (LineFailure, Refusal) as second:
+            raise FileGivenUp(
+                f"{unit.place}: the file for {unit.name} could not be typed ({failure}), and the chip not be reset ({second}): "
+                "it still waits for the rest of it"
+            ) from failure
+        raise FileGivenUp(
+            f"{unit.place}: the file for {unit.name} was not typed to its end ({failure}); the chip was reset: nothing of it "
+            "runs, position and settings are those of power-up"
+        ) from failure
+    tell(len(lines))
+
+
+async def begin(
+    unit: Unit,
+    text: str,
+    kind: ChipMotion,
+    guard: Callable[[], bool],
+    *,
+    target_u: int | None = None,
+    duration_s: float | None = None,
+    retype: bool = True,
+) -> None:
+    """Say what begins a motion, once."""
+    notes = unit.notes
+
+    def told(target_u: int | None, duration_s: float | None) -> None:
+        if kind is ChipMotion.BLOCK:
+            notes.settings = ChipSettings()
+            unit.talk.uploads = bytearray()
+        notes.motion = Told(kind, unit.line.now(), notes.stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0))
+
+    notes.motion = None
+    try:
+        await unit.say(text, once=True, allowed=guard, retype=retype)
+    except LineFailure as failure:
+        if not getattr(failure, "uncertain", False):
+            raise
+        told(None, None)
+        raise DoubtfulMove(unit.name, kind.value, failure) from failure
+    told(target_u, duration_s)
+
+
+async def reset(unit: Unit) -> None:
+    """``\\``, and the time an E type takes for it."""
+    await unit.say("\\", stored=False)
+    notes = unit.notes
+    unit.talk.forget(unit.address)
+    notes.motion = None
+    notes.is_killed = False
+    notes.is_position_valid = True
+    notes.functions = sum(function.default << bit for bit, function in enumerate(TABLE)) | 1 << (RETURN - FUNCTIONS.start)
+    notes.settings = ChipSettings() if notes.interface is None else after_reset(unit.variant, notes.interface)
+    if unit.variant.erase_ns:
+        await unit.line.sleep(unit.variant.erase_ns / SECOND + ERASE_MARGIN_S)

@@ -1,0 +1,587 @@
+"""An M1486 as a driver shows it, for asyncio. `steptwin.host.m1486.sync` has the same for threads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from math import isfinite
+from types import TracebackType
+from typing import Self
+
+from steptwin.errors import LineFailure, Misuse
+from steptwin.host.line import Line
+from steptwin.host.m1486.download import Progress, begin, reset, send_program, type_file
+from steptwin.host.m1486.failures import Busy, ChipMoveFailed, PositionUnknown
+from steptwin.host.m1486.lines import BAUD, AsyncM1486Line
+from steptwin.host.m1486.motion import EARLY, EARLY_S, MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
+from steptwin.host.m1486.settings import COMMANDS, ChipSettings, checked_number
+from steptwin.host.m1486.talk import Say
+from steptwin.host.m1486.unit import SLICE_NS, Unit
+from steptwin.m1486.commands import memory_bits
+from steptwin.m1486.functions import CARRY, FUNCTIONS, LIMITOFF, RECOVER, REPORT, RETURN, USER_FLAGS
+from steptwin.m1486.lines import LINES
+from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.unit import MASK
+from steptwin.m1486.variants import Store, Variant
+from steptwin.m1486.variants import variant as variant_named
+from steptwin.machine import SECOND
+
+TIMEOUT_S = 0.5
+LARGEST = 16_000_000
+"""Farthest distance and position of F, B, G and =, in minimum microsteps."""
+_TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
+"""Commands that may be typed alone: they move nothing, lead nowhere and are not answered."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChipStatus:
+    """A chip at rest at a glance."""
+
+    type: str
+    interface: str
+    series: int
+    counter_u: int
+    """The position counter, in minimum microsteps."""
+    position: float
+    unit: str
+    is_position_valid: bool
+    variable: int
+    flags: dict[int, bool]
+    functions: dict[int, bool]
+
+
+class AsyncM1486:
+    """A chip at an address (``/dev/ttyUSB0``, ``tcp://host:5022``) or on a line shared with others.
+
+    ``address`` 0 to 15 as its pins say; None for the only chip on a line. ``variant``: found out when not given; a type for
+    24 MHz cannot be told from its brother and has to be named. Positions are in ``unit``, ``steps_per_unit`` full steps each;
+    the position counter has no sign, and ``origin_u`` is its value, in minimum microsteps, where the position is 0.
+
+    The driver switches function 41 (echo) on and 57 (report) off. It types nothing before `open` (or ``async with``).
+    """
+
+    def __init__(
+        self,
+        where: str | Line[Say, bytes],
+        address: int | None = None,
+        *,
+        baud: int = BAUD,
+        variant: str | None = None,
+        steps_per_unit: float = 1.0,
+        unit: str = "step",
+        origin_u: int = 0,
+        timeout_s: float = TIMEOUT_S,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        if not 0.0 < timeout_s <= 60.0:
+            raise Misuse(f"a time-out of {timeout_s:g} s is outside 0 to 60 s")
+        if address is not None and address not in range(16):
+            raise Misuse(f"address {address}: permitted are 0 to 15")
+        if not (isfinite(steps_per_unit) and steps_per_unit > 0.0):
+            raise Misuse(f"steps_per_unit = {steps_per_unit:g}: must be above 0")
+        if not 0 <= origin_u <= LARGEST:
+            raise Misuse(f"origin_u = {origin_u}: permitted are 0 to {LARGEST} minimum microsteps")
+        self._variant = None if variant is None else variant_named(variant)
+        self._own = isinstance(where, str)
+        self.line: Line[Say, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
+        self._unit = Unit(self.line, address, timeout_ns=round(timeout_s * SECOND))
+        self.unit = unit
+        self.scale_u = FULL_STEP * steps_per_unit
+        """Minimum microsteps in a unit."""
+        self.origin_u = origin_u
+
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Say, bytes]:
+        return AsyncM1486Line(address, baud=baud, log=log)
+
+    def __repr__(self) -> str:
+        return f"<AsyncM1486 {self._unit.name} on {self.line.place}>"
+
+    @property
+    def address(self) -> int | None:
+        return self._unit.address
+
+    @property
+    def variant(self) -> Variant:
+        """The type, once the chip was opened."""
+        return self._unit.variant
+
+    @property
+    def settings(self) -> ChipSettings:
+        """What the chip is set to as far as drivers on this line have set it."""
+        return self._unit.notes.settings
+
+    # ------------------------------------------------------------------ opening
+
+    async def open(self) -> None:
+        """Open the line, have the chip echo, find out what it is. Raises `NoEcho`, `Busy` while it moves, `WrongType`."""
+        await self.line.open()
+        try:
+            async with self._unit.turn():
+                if self._unit.notes.variant is None:
+                    self._unit.notes.variant = self._variant
+                await self._unit.look()
+        except BaseException:
+            if self._variant is None:
+                self._unit.notes.variant = None
+            await self.close()
+            raise
+
+    async def close(self) -> None:
+        """Close the line, unless it is shared. The chip goes on with what it does."""
+        if self._own:
+            await self.line.close()
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self.close()
+
+    # ------------------------------------------------------------------ reading
+
+    async def counter(self) -> int:
+        """The position counter, in minimum microsteps. Raises `Busy` while the chip moves: the line gives none then (M-28)."""
+        async with self._unit.turn():
+            return await self._unit.read_number(1)
+
+    async def position(self) -> float:
+        """Where the motor is. Raises `Busy` while it moves, `PositionUnknown` after a move that was stopped."""
+        counter = await self.counter()
+        self._check_position()
+        return self._shown(counter)
+
+    def _check_position(self) -> None:
+        if not self._unit.notes.is_position_valid:
+            raise PositionUnknown(
+                f"{self.line.place}: the counter of {self._unit.name} shows where it was sent, not where it was stopped: "
+                "seek a line whose place is known, and say where that is (set_position)"
+            )
+
+    def _shown(self, counter_u: int) -> float:
+        return (counter_u - self.origin_u) / self.scale_u
+
+    async def variable(self) -> int:
+        """The internal variable, 24 bits."""
+        async with self._unit.turn():
+            return await self._unit.read_number(4)
+
+    async def flags(self) -> dict[int, bool]:
+        """Flags 80 to 87."""
+        async with self._unit.turn():
+            (byte,) = await self._unit.read(14)
+        return {number: bool(byte >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))}
+
+    async def functions(self) -> dict[int, bool]:
+        """Functions 40 to 63."""
+        async with self._unit.turn():
+            word = int.from_bytes(bytes(await self._unit.read(17, 18, 19)), "little")
+        self._unit.notes.functions = word
+        return {number: bool(word >> bit & 1) for bit, number in enumerate(FUNCTIONS)}
+
+    async def status(self) -> ChipStatus:
+        """Everything the chip tells of itself. Raises `Busy` while it moves."""
+        async with self._unit.turn():
+            found = await self._unit.read(1, 2, 3, 4, 5, 6, 14, 15, 16, 17, 18, 19)
+        word = int.from_bytes(bytes(found[9:12]), "little")
+        counter = int.from_bytes(bytes(found[0:3]), "little")
+        interface = self._unit.notes.interface
+        return ChipStatus(
+            type=self.variant.title,
+            interface=f"mode {found[7]}" if interface is None else interface.title,
+            series=found[8],
+            counter_u=counter,
+            position=self._shown(counter),
+            unit=self.unit,
+            is_position_valid=self._unit.notes.is_position_valid,
+            variable=int.from_bytes(bytes(found[3:6]), "little"),
+            flags={number: bool(found[6] >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))},
+            functions={number: bool(word >> bit & 1) for bit, number in enumerate(FUNCTIONS)},
+        )
+
+    async def is_busy(self) -> bool:
+        """Whether the chip moves, waits or runs its program."""
+        async with self._unit.turn():
+            return await self._unit.asks_who() is None
+
+    # ------------------------------------------------------------------ settings
+
+    async def configure(
+        self,
+        *,
+        start_stop: float | None = None,
+        acceleration: float | None = None,
+        velocity: float | None = None,
+        profile: float | None = None,
+        microstep: int | None = None,
+        qualification: int | None = None,
+        waveform: int | None = None,
+    ) -> None:
+        """Set S, V, P (full steps/s), A (full steps/s²), M, Q and N, as the commands take them; M and Q before the others.
+
+        Raises `Misuse` with the permitted range, for M and Q that do not go together too.
+        """
+        unit = self._unit
+        given = {
+            "microstep": microstep,
+            "qualification": qualification,
+            "start_stop": start_stop,
+            "acceleration": acceleration,
+            "velocity": velocity,
+            "profile": profile,
+            "waveform": waveform,
+        }
+        numbers = {
+            name: checked_number(COMMANDS[name], value, unit.variant, name) for name, value in given.items() if value is not None
+        }
+        wanted = unit.notes.settings.with_(**numbers)
+        wanted.check()
+        async with unit.turn():
+            await unit.rest()
+            for name, number in numbers.items():
+                unit.notes.settings = unit.notes.settings.with_(**{name: None})
+                await unit.say(f"{COMMANDS[name]}{number}")
+                unit.notes.settings = unit.notes.settings.with_(**{name: number})
+
+    async def set_position(self, position: float) -> None:
+        """Say where the motor is. It does not move."""
+        counter = self._counter_of(position)
+        async with self._unit.turn():
+            await self._unit.rest()
+            self._unit.notes.is_position_valid = False
+            await self._unit.say(f"={counter}" if counter else "c100")
+            self._unit.notes.is_position_valid = True
+
+    async def set_output(self, line: int, on: bool) -> None:
+        """Set B1 to B21 high or low."""
+        if line not in LINES:
+            raise Misuse(f"no line {line}: lines are {LINES[0]} to {LINES[-1]}")
+        interface = self._unit.notes.interface
+        if interface is not None and line in interface.occupied:
+            raise Misuse(f"B{line} belongs to the {interface.title} interface")
+        await self._switch(line, on)
+
+    async def set_flag(self, flag: int, on: bool) -> None:
+        """Set user flag 80 to 86."""
+        if flag not in USER_FLAGS:
+            raise Misuse(f"no user flag {flag}: they are {USER_FLAGS[0]} to {USER_FLAGS[-1]}")
+        await self._switch(flag, on)
+
+    async def set_function(self, function: int, on: bool) -> None:
+        """Switch function 40 to 63. 41 (echo) and 57 (report) are the driver's own."""
+        if function not in FUNCTIONS:
+            raise Misuse(f"no function {function}: they are {FUNCTIONS[0]} to {FUNCTIONS[-1]}")
+        if function in (RETURN, REPORT):
+            raise Misuse(f"function {function} is what this driver lives by: it stays {'ON' if function == RETURN else 'OFF'}")
+        await self._switch(function, on)
+        self._unit.notes.note_function(function, on=on)
+
+    async def set_limit(self, on: bool) -> None:
+        """Have LIMIT stop the motor (function 42 OFF) or not, as to leave the switch again."""
+        await self.set_function(LIMITOFF, not on)
+
+    async def _switch(self, number: int, on: bool) -> None:
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f"{'t' if on else 'c'}{number}", acts=True)
+
+    async def set_variable(self, number: int) -> None:
+        """Give the internal variable a value, 0 to 2^24 − 1."""
+        checked_number(":", number, self.variant, "the internal variable")
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f":{number}")
+
+    async def inputs(self, first: int = 1, count: int = 4) -> tuple[bool, ...]:
+        """Levels of up to nine lines from ``first`` on. They go through the internal variable, which is theirs afterwards."""
+        checked_number("?", 10 * first + count, self.variant, f"{count} lines from B{first} on")
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f"?{10 * first + count}")
+            bits = await self._unit.read_number(4, rests=True)
+        return tuple(bool(bits >> bit & 1) for bit in range(count))
+
+    async def reset(self, *, force: bool = False) -> None:
+        """``\\``: defaults, position 0, and an E type forgets its stored file. Raises `Busy` while the chip does something.
+
+        ``force``: also then. Its motion is stopped by Kill before, and a file in ``[ ]`` it waits for the rest of is given up.
+        """
+        unit = self._unit
+        if force:
+            await self.stop()
+        async with unit.turn():
+            if not force:
+                await unit.rest()
+            await reset(unit)
+
+    # ------------------------------------------------------------------ motion
+
+    def _counter_of(self, position: float) -> int:
+        if not isfinite(position):
+            raise Misuse(f"{position} {self.unit} is no position")
+        counter = self._on_grid(position, self.origin_u)
+        if not 0 <= counter <= LARGEST:
+            least, most = self._shown(0), self._shown(LARGEST)
+            raise Misuse(f"position {position:g} {self.unit} is outside {least:g} to {most:g} {self.unit}")
+        return counter
+
+    def _on_grid(self, value: float, offset_u: int) -> int:
+        """The value in minimum microsteps, on the nearest microstep."""
+        grid = self.settings.grid_u
+        exact = value * self.scale_u + offset_u
+        rounded = round(exact / grid) * grid
+        if self.settings.microstep is None and abs(exact - rounded) > 0.5:
+            raise Misuse(
+                f"{value:g} {self.unit} is {exact:g} minimum microsteps and no whole full step ({FULL_STEP}), and M of "
+                f"{self._unit.name} is not known: configure(microstep=...) first"
+            )
+        return rounded
+
+    async def move_to(self, position: float) -> None:
+        """Begin to move to a position, rounded to a microstep. `wait` waits for the end.
+
+        Raises `Misuse` for a position the counter has not, `Busy`, `PositionUnknown`; `DoubtfulMove` when nobody knows whether
+        it was begun. R is sent once only.
+        """
+        target = self._counter_of(position)
+        unit = self._unit
+        guard = unit.stop_guard()
+        async with unit.turn():
+            self._check_position()
+            before = await unit.read_number(1)
+            await self._move(f"g{target}" if target else "h", target - before, target, guard)
+
+    async def move_by(self, distance: float) -> None:
+        """Begin to move by a distance, rounded to a microstep. Errors as `move_to`."""
+        if not isfinite(distance):
+            raise Misuse(f"{distance} {self.unit} is no distance")
+        distance_u = self._on_grid(distance, 0)
+        if abs(distance_u) > LARGEST:
+            raise Misuse(f"distance {distance:g} {self.unit} is outside ±{LARGEST / self.scale_u:g} {self.unit}")
+        unit = self._unit
+        guard = unit.stop_guard()
+        async with unit.turn():
+            before = await unit.read_number(1)
+            text = f"{'f' if distance_u > 0 else 'b'}{abs(distance_u)}"
+            await self._move(text, distance_u, before + distance_u & MASK, guard)
+
+    async def _move(self, specification: str, distance_u: int, target_u: int, guard: Callable[[], bool]) -> None:
+        if distance_u == 0:
+            notes = self._unit.notes
+            notes.motion = Told(ChipMotion.MOVE, self.line.now(), notes.stops, target_u, 0.0)
+            return
+        await self._unit.say(specification)
+        duration = self.settings.travel_s(distance_u, self.variant)
+        await begin(self._unit, "r", ChipMotion.MOVE, guard, target_u=target_u, duration_s=duration)
+
+    async def run(self, direction: int, velocity: float | None = None) -> None:
+        """Run until stopped, in direction +1 or −1; ``velocity`` sets V first (full steps/s)."""
+        if direction not in (1, -1):
+            raise Misuse(f"direction {direction}: permitted are 1 and -1")
+        if velocity is not None:
+            await self.configure(velocity=velocity)
+        guard = self._unit.stop_guard()
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say("g+" if direction > 0 else "g-")
+            await begin(self._unit, "r", ChipMotion.ENDLESS, guard)
+
+    async def seek(self, direction: int, line: int) -> None:
+        """Begin to move at start/stop speed until a line has its end level: low for B1–3, 8–11, 16–19, else high.
+
+        The number of the line goes through the internal variable: so no garbled digit can make the motor seek another line.
+        """
+        if direction not in (1, -1):
+            raise Misuse(f"direction {direction}: permitted are 1 and -1")
+        checked_number(")", line, self.variant, "the line to seek")
+        guard = self._unit.stop_guard()
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f":{line}")
+            await begin(self._unit, ")" if direction > 0 else "(", ChipMotion.SEEK, guard)
+
+    async def start_program(self, label: int) -> None:
+        """Go to a label of what is in the command memory. Its number goes through the internal variable, as of `seek`."""
+        checked_number("j", label, self.variant, "the label")
+        guard = self._unit.stop_guard()
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f":{label}")
+            await begin(self._unit, "j", ChipMotion.BLOCK, guard)
+
+    async def stop(self) -> None:
+        """K: brake with the ramp. Goes before everything that waits for the line; moves that wait are not begun any more.
+
+        A program goes on after it unless function 51 is OFF: `stop_program` ends it. Raises `steptwin.host.Untold`.
+        """
+        notes = self._unit.notes
+        motion = notes.motion
+        if motion is not None and motion.kind in (ChipMotion.MOVE, ChipMotion.BLOCK) and not motion.is_over(self.line.now()):
+            notes.is_position_valid = False
+        await self._unit.kill()
+
+    async def recover(self) -> None:
+        """C75: what Kill has stopped goes on, where function 51 is OFF. A program may move the motor at once."""
+        async with self._unit.turn():
+            await self._unit.say("c75", stored=False)
+            self._unit.notes.is_killed = False
+
+    async def stop_program(self, timeout_s: float = 10.0) -> None:
+        """End what the chip does: its motion by Kill, its program by wrong data (function 44 has to be OFF). Nothing is erased.
+
+        Raises `Busy` when that did not help: then only `reset` or RST does, which lose the position.
+        """
+        unit = self._unit
+        notes = unit.notes
+        notes.stops += 1
+        if notes.motion is None or notes.motion.kind is not ChipMotion.ENDLESS:
+            notes.is_position_valid = False
+        unit.talk.dirty = True  # what is typed before K then is wrong data
+        await unit.kill()
+        async with unit.turn():
+            if notes.function(RECOVER) is not True:
+                await unit.say("c75", stored=False)
+            notes.is_killed = False
+            notes.motion = None
+            if await unit.asks_who(round(timeout_s * SECOND)) is None:
+                raise Busy(
+                    f"{self.line.place}: {unit.name} goes on nevertheless: function 44 is ON, LIMIT is low, or it brakes yet"
+                )
+
+    async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> ChipMoveEnd:
+        """Wait until the chip has done what it was told, and say why a motion ended.
+
+        Without ``timeout_s`` the time is computed from the motion where all its settings are known, else it is a minute. With
+        other chips on the line it is left to them for the computed time; a wait of unknown length keeps it, but for stops.
+        Raises `ChipMoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
+        reported as the end.
+        """
+        begin = self.line.now()
+        try:
+            end = await self._ended(timeout_s, begin)
+        except LineFailure as failure:
+            if check:
+                raise
+            seconds = (self.line.now() - begin) / SECOND
+            return ChipMoveEnd(self.address, ChipReason.COMMUNICATION, None, self.unit, seconds, str(failure), failure)
+        if check and not end.ok:
+            raise ChipMoveFailed(end)
+        return end
+
+    async def _ended(self, timeout_s: float | None, begin: int) -> ChipMoveEnd:
+        unit, notes = self._unit, self._unit.notes
+        motion = notes.motion
+        if timeout_s is None:
+            timeout_s = self._time_out_s(motion)
+        limit = begin + round(timeout_s * SECOND)
+        looked = unit.is_alone
+        if motion is not None and motion.duration_s is not None and not looked:
+            await self._sleep_until(min(limit, motion.at + round(motion.duration_s * SECOND)), motion)
+        async with unit.turn():
+            letter = await unit.asks_who(max(limit - self.line.now(), SLICE_NS))
+            ended = self.line.now()
+            seconds = (ended - begin) / SECOND
+            if letter is None:
+                stopped = motion is not None and motion.stops != notes.stops
+                reason = ChipReason.STOPPED if stopped else ChipReason.OVERDUE
+                return ChipMoveEnd(self.address, reason, None, self.unit, seconds, unit.why_busy())
+            counter = await unit.read_number(1, rests=True)
+            notes.motion = None
+        reason, detail = self._reason(motion, counter, ended, looked=looked)
+        if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
+            notes.is_position_valid = False
+        position = self._shown(counter) if notes.is_position_valid else None
+        return ChipMoveEnd(self.address, reason, position, self.unit, seconds, detail)
+
+    def _time_out_s(self, motion: Told | None) -> float:
+        if motion is None or motion.stops != self._unit.notes.stops:
+            return UNKNOWN_S
+        if motion.kind is ChipMotion.ENDLESS:
+            raise Misuse(f"{self._unit.name} runs without end: give the time to wait, timeout_s")
+        return UNKNOWN_S if motion.duration_s is None else MARGIN * motion.duration_s + MARGIN_S
+
+    async def _sleep_until(self, moment: int, motion: Told) -> None:
+        while (rest := moment - self.line.now()) > 0 and motion.stops == self._unit.notes.stops:
+            await self.line.sleep(min(rest, 2 * SLICE_NS) / SECOND)
+
+    def _reason(self, motion: Told | None, counter: int, ended: int, *, looked: bool) -> tuple[ChipReason, str]:
+        if motion is None:
+            return ChipReason.REST, ""
+        if motion.stops != self._unit.notes.stops:
+            return ChipReason.STOPPED, ""
+        if motion.kind is ChipMotion.ENDLESS:
+            return ChipReason.LIMIT, ""
+        if motion.kind is ChipMotion.SEEK:
+            return ChipReason.SOUGHT, ""
+        if motion.kind is ChipMotion.BLOCK:
+            whole = self._unit.talk.spoilt.get(self.address, 0) == motion.spoilt
+            return (ChipReason.DONE if whole else ChipReason.CUT), ""
+        if motion.target_u is not None and counter != motion.target_u:
+            return ChipReason.DIVERTED, f"the target was {self._shown(motion.target_u):g} {self.unit}"
+        took_s = (ended - motion.at) / SECOND
+        if looked and motion.duration_s is not None and took_s < EARLY * motion.duration_s - EARLY_S:
+            return ChipReason.EARLY, f"after {took_s:.2f} s of {motion.duration_s:.2f} s"
+        return ChipReason.TARGET, ""
+
+    # ------------------------------------------------------------------ commands and programs
+
+    async def command(self, text: str) -> None:
+        """Type one command, as ``t6`` or ``f12800``. What moves, jumps or answers has a method of its own.
+
+        Raises `Misuse` for what the chip would drop.
+        """
+        unit = self._unit
+        typed = unit.checked(text)
+        if typed[0] not in _TYPED:
+            raise Misuse(f"{text!r} is no command to type alone: motions, files and questions have methods of their own")
+        async with unit.turn():
+            await unit.rest()
+            self._learn(typed)
+            await unit.say(typed, once=typed[0] in "d+-*/", acts=True)
+
+    def _learn(self, typed: str) -> None:
+        """Settings typed by hand are known again when they are configured."""
+        notes = self._unit.notes
+        name = next((name for name, letter in COMMANDS.items() if letter == typed[0]), None)
+        if name is not None:
+            notes.settings = notes.settings.with_(**{name: int(typed[1:]) if typed[1:] else None})
+        if typed[0] in "tc" and typed[1:].isdecimal() and int(typed[1:]) in FUNCTIONS:
+            notes.note_function(int(typed[1:]), on=typed[0] == "t")
+
+    async def run_block(self, commands: Iterable[str], timeout_s: float | None = None) -> ChipMoveEnd:
+        """Have commands done one after the other, as a file in ``[ ]`` that nothing of runs before it is there whole, and wait
+        until the last one is done. The chip says so by an upload behind them (manual chapter II, Memory).
+
+        Not for E types, which would keep it in their EEPROM. ``timeout_s``: by default a minute. Raises `Misuse` for commands
+        that have no place in a block, `FileGivenUp` when it could not be typed whole.
+        """
+        unit = self._unit
+        if unit.variant.store is Store.EEPROM:
+            raise Misuse(f"{unit.variant.title} keeps what stands in [ ] in its EEPROM: use download")
+        typed = [unit.checked(command) for command in commands]
+        for command in typed:
+            if command[0] in "[]\\kxu" or command == "c75":
+                raise Misuse(f"{command!r} has no place in a block")
+        if 8 + sum(memory_bits(command[0].upper()) for command in typed) > unit.variant.memory_bits - 8:
+            raise Misuse(f"the block is larger than the command memory of {unit.variant.title}, {unit.variant.memory_bits} bits")
+        guard = unit.stop_guard()
+        async with unit.turn():
+            await unit.rest()
+            await type_file(unit, ["[", *typed, "]"], guard, lambda count: None)
+        return await self.wait(timeout_s if timeout_s is not None else UNKNOWN_S)
+
+    async def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
+        """Type a program into the chip: a file in ``[ ]``, which runs from ``]`` on and which an E type keeps, or plain commands.
+
+        An E type is erased before a file. Returns what ``U`` outside ``[ ]`` uploaded. Raises `Misuse` with every error the
+        checker finds, `NoRoom`, `FileGivenUp`.
+        """
+        return await send_program({self.address: self._unit, None: self._unit}, text, progress=progress, name=name)
+
+
+async def download_to(
+    chips: Iterable[AsyncM1486], text: str, *, progress: Progress | None = None, name: str = "program"
+) -> bytes:
+    """Type a program that names its chips with ``X`` into chips on one line, all of one type."""
+    units = {chip.address: chip._unit for chip in chips}
+    return await send_program(units, text, progress=progress, name=name)

@@ -1,0 +1,89 @@
+"""What a chip was set to by the driver: nothing of it can be read back. And how long a motion takes with it.
+
+Speeds in full steps/s, accelerations in full steps/s², distances in minimum microsteps (full step/64), as the arguments of the
+commands; at 24 MHz the motor turns twice as fast with the same numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+from steptwin.errors import Misuse
+from steptwin.m1486.commands import find, range_text, rows
+from steptwin.m1486.flow import defaults
+from steptwin.m1486.lines import Interface
+from steptwin.m1486.microsteps import FULL_STEP, HIGHEST_SPEED, PAIRS, microstep_size
+from steptwin.m1486.variants import Variant
+from steptwin.machine import SECOND
+from steptwin.motion.ramps import SpeedCurve, plan_distance
+
+COMMANDS = {
+    "start_stop": "s",
+    "acceleration": "a",
+    "velocity": "v",
+    "profile": "p",
+    "microstep": "m",
+    "qualification": "q",
+    "waveform": "n",
+}
+"""The command of each setting."""
+OFF_PROFILE = 25_000
+"""P above V: no parabolic part. What it is after power-up."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChipSettings:
+    """What a chip is set to as far as it is known; None: not known."""
+
+    start_stop: int | None = None
+    acceleration: int | None = None
+    velocity: int | None = None
+    profile: int | None = None
+    microstep: int | None = None
+    qualification: int | None = None
+    waveform: int | None = None
+
+    def with_(self, **changes: int | None) -> ChipSettings:
+        return replace(self, **changes)
+
+    @property
+    def grid_u(self) -> int:
+        """Every distance and position has to be a multiple of this; a full step where M is not known."""
+        return FULL_STEP if self.microstep is None else microstep_size(self.microstep)
+
+    def check(self) -> None:
+        """Raises `Misuse` for an M and Q that do not go together: a move would not start (M-11)."""
+        m, q = self.microstep, self.qualification
+        if m is not None and q is not None and q not in PAIRS[m]:
+            raise Misuse(f"M{m} and Q{q} do not go together: with M{m} go {', '.join(f'Q{n}' for n in PAIRS[m])}")
+
+    def travel_s(self, distance_u: int, variant: Variant) -> float | None:
+        """How long a move takes; None where a setting is not known."""
+        s, a, v, p, q = self.start_stop, self.acceleration, self.velocity, self.profile, self.qualification
+        if s is None or a is None or v is None or p is None or q is None:
+            return None
+        speed = float(FULL_STEP * variant.clock)
+        curve = SpeedCurve(s * speed, a * speed * variant.clock, p * speed, min(v, HIGHEST_SPEED[q]) * speed)
+        profile = plan_distance(0, 0, distance_u, curve)
+        return 0.0 if profile.end is None else profile.end / SECOND
+
+
+def after_reset(variant: Variant, interface: Interface) -> ChipSettings:
+    """The settings after power-up and ``\\`` (M-3)."""
+    state = defaults(variant, interface)
+    return ChipSettings(
+        state.start_stop, state.acceleration, state.velocity, state.profile, state.microstep, state.qualification, 1
+    )
+
+
+def checked_number(letter: str, number: float, variant: Variant, what: str) -> int:
+    """``number`` if the command takes it. Raises `Misuse` with the permitted range."""
+    key = letter.upper()
+    if number != int(number) or find(key, int(number), variant) is None:
+        permitted = ", ".join(range_text(spec, variant, named=len(rows(key)) > 1) for spec in rows(key))
+        raise Misuse(f"{what} = {number:g}: {variant.title} takes {permitted}")
+    return int(number)
+
+
+if {field.name for field in fields(ChipSettings)} != set(COMMANDS):
+    raise ValueError("each setting needs its command")
