@@ -372,6 +372,50 @@ def test_a_snapshot_goes_on_like_the_original(plan: list[Action], cut: int, is_t
     assert one.copy_state() == other.copy_state()
 
 
+def test_a_snapshot_takes_the_place_of_another_program() -> None:
+    one, other = Bench("B"), Bench("B")
+    one.file("@1", "+1", "u4", "w10", "j1")
+    other.file("@1", "+2", "u5", "w10", "j1")
+    for bench in (one, other):
+        bench.run(ms=25)
+    other.chip.restore(one.chip.snapshot())
+    assert one.run(ms=100) == other.run(ms=100)
+    assert one.chip.copy_state() == other.chip.copy_state()
+
+
+def test_looking_changes_nothing_while_commands_wait_for_room() -> None:
+    sent = []
+    for looks in (1, 300):
+        bench = Bench("A")
+        bench.do("t57")
+        bench.send("w50", *["+1"] * 58)
+        assert bench.chip.receiver.is_stalled
+        bench.sent()
+        end = 300 * MILLISECOND
+        sent.append(
+            [piece for n in range(1, looks + 1) for piece in bench.chip.to_send(bench.now + (end - bench.now) * n // looks)]
+        )
+        assert bench.variable == 58
+    assert sent[0] == sent[1]
+    assert [data for _, data in sent[0]] == [b"\x7e", b"\x7f"]
+
+
+def test_looking_changes_nothing_while_a_loop_that_has_run_before_makes_room() -> None:
+    chips = []
+    for looks in (1, 500):
+        bench = Bench("A")
+        bench.file("@1", "w50", *["+1"] * 20, "j1")
+        bench.run(ms=80)
+        bench.send(*["-1"] * 60)
+        assert bench.chip.receiver.is_stalled
+        begin = bench.now
+        for n in range(1, looks + 1):
+            bench.chip.advance(begin + 500 * MILLISECOND * n // looks)
+        chips.append(bench.chip)
+    assert list(chips[0].events) == list(chips[1].events)
+    assert chips[0].copy_state() == chips[1].copy_state()
+
+
 def test_time_does_not_go_back() -> None:
     bench = Bench()
     bench.run(1.0)

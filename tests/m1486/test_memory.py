@@ -136,6 +136,13 @@ def test_a_program_in_the_ring_keeps_what_was_not_done_yet() -> None:
     assert bench.finish() == b"\x41" * 55
 
 
+def test_a_program_goes_round_the_ring_as_often_as_it_likes() -> None:
+    bench = Bench("A")
+    for number in range(100):
+        assert bench.do(f":{number}", "u4") == bytes((number,))
+    assert bench.chip.memory.write == 600 % 216
+
+
 def test_m_12_a_jump_reaches_back_over_what_is_still_in_the_ring() -> None:
     bench = Bench("A")
     bench.do("c80", "@1", "u20", "i80h2", "t80")
