@@ -15,6 +15,7 @@ from mic488_rig import OFFSETS, OUT, Rig, coil_pdu, controller, dint_words, read
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.slave import PLANS_KEPT, slave
 from steptwin.wire import pdu as modbus
+from steptwin.wire.slave import TcpSlavePort
 
 FIRMWARES = tuple(OFFSETS)
 USER_REGISTERS = {"1.23": 500, "1.40": 2000, "1.70": 2000}
@@ -258,6 +259,15 @@ def test_mic_24_impossible_quantities_and_lengths_are_refused(pdu: bytes) -> Non
     rig.write_words(0, 7, 7)  # so that the beginning of the request is known already
     assert rig.exception(pdu) == ILLEGAL_VALUE
     assert rig.read_words(0, 2) == [7, 7]
+
+
+@pytest.mark.parametrize("count", [124, 127])
+def test_mic_24_a_write_of_too_many_registers_is_refused_on_tcp_too(count: int) -> None:
+    port = TcpSlavePort({1: Rig().device})
+    pdu = words_pdu(0, *range(count))
+    request = struct.pack(">HHHB", 7, 0, len(pdu) + 1, 1) + pdu
+    assert port.exchange(request, 0) == bytes.fromhex("00 07 00 00 00 03 01 90 03")
+    assert port.broken is None
 
 
 def test_mic_24_the_longest_requests_are_served() -> None:

@@ -290,7 +290,7 @@ def test_mic_23_any_other_unit_is_refused_as_a_gateway_does(new_bank: NewBank, u
     assert not any(bank.executed for bank in banks.values())
 
 
-@pytest.mark.parametrize("wrong", ["00 01 00 01 00 06 01 03 00 00 00 01", "00 01 00 00 00 01 01 03", "00 01 00 00 01 06 01 03"])
+@pytest.mark.parametrize("wrong", ["00 01 00 01 00 06 01 03 00 00 00 01", "00 01 00 00 00 01 01 03", "00 01 00 00 01 07 01 03"])
 def test_a_wrong_header_breaks_the_connection_and_good_requests_before_it_are_answered(bank: Any, wrong: str) -> None:
     good = mbap.encode_frame(1, 1, bytes.fromhex("03 00 05 00 01"))
     port = TcpSlavePort({1: bank})
@@ -307,8 +307,8 @@ def test_the_largest_tcp_frame_and_no_larger(bank: Any) -> None:
     port = TcpSlavePort({1: bank})
     assert len(port.exchange(mbap.encode_frame(1, 1, bytes(253)), 0)) == 9
     assert bank.executed == [(0, bytes(253))]
-    port.exchange(bytes.fromhex("00 01 00 00 00 FF 01") + bytes(254), 0)
-    assert port.broken == "MBAP length 255 is outside 2 to 254 bytes"
+    port.exchange(bytes.fromhex("00 01 00 00 01 07 01") + bytes(262), 0)
+    assert port.broken == "MBAP length 263 is outside 2 to 262 bytes"
 
 
 tcp_frames = st.builds(mbap.encode_frame, st.integers(0, 0xFFFF), st.integers(0, 2), st.binary(min_size=1, max_size=20))

@@ -18,6 +18,10 @@ MIN_LENGTH = 2
 MAX_LENGTH = MAX_PDU + 1
 """Of unit and PDU together, as the header states it."""
 MAX_FRAME = HEADER_BYTES + MAX_PDU
+LONGEST_LENGTH = 1 + 6 + 255
+"""Of a function 16 with the largest byte count: too long for the protocol, but taken, so that a quantity above the permitted
+one is answered with exception 03 (MIC-24) and not with a closed connection."""
+LONGEST_FRAME = HEADER_BYTES - 1 + LONGEST_LENGTH
 
 _HEADER = struct.Struct(">HHHB")
 _PROTOCOL_AND_LENGTH = struct.Struct(">HH")
@@ -52,7 +56,7 @@ def encode_frame(transaction: int, unit: int, pdu: bytes) -> bytes:
 
 
 class TcpFramer(Stateful):
-    """Cuts the frames of one direction of one connection, less than 260 bytes held between calls."""
+    """Cuts the frames of one direction of one connection, less than 268 bytes held between calls."""
 
     __slots__ = ("broken", "held")
 
@@ -71,11 +75,11 @@ class TcpFramer(Stateful):
         start, size = 0, len(held)
         while size - start >= 6:
             protocol, length = _PROTOCOL_AND_LENGTH.unpack_from(held, start + 2)
-            if protocol != 0 or not MIN_LENGTH <= length <= MAX_LENGTH:
+            if protocol != 0 or not MIN_LENGTH <= length <= LONGEST_LENGTH:
                 self.broken = (
                     f"MBAP protocol {protocol} is not 0"
                     if protocol != 0
-                    else f"MBAP length {length} is outside {MIN_LENGTH} to {MAX_LENGTH} bytes"
+                    else f"MBAP length {length} is outside {MIN_LENGTH} to {LONGEST_LENGTH} bytes"
                 )
                 start = size
                 break

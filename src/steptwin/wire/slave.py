@@ -25,7 +25,7 @@ class Device(Protocol):
     """What a unit does with a request."""
 
     def execute(self, pdu: bytes, now: Nanos) -> bytes:
-        """Advance to ``now``, then the response PDU to a request PDU of 1 to 253 bytes: a refusal is an exception PDU."""
+        """Advance to ``now``, then the response PDU to a request PDU: a refusal is an exception PDU."""
         ...
 
 
