@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mic488_rig import Rig, controller, word_pdu
+from mic488_rig import VALUES, Rig, controller, real_words, word_pdu, words_pdu
 
 from steptwin.machine import SECOND
 from steptwin.mic488.config import AxisConfig, InputConfig
@@ -42,6 +42,21 @@ def test_mic_12_nothing_limits_at_power_on(rig: Rig) -> None:
     rig.set("VEL_ABS", 1000)
     rig.wait(10.0)
     assert rig.status() == VELOCITY
+
+
+@pytest.mark.parametrize("gear", [1.0, 100.0, 0.3, 12800.0, 1e-20, 1e6])
+def test_mic_12_limits_that_do_not_limit_are_written_back_as_they_were_read(gear: float) -> None:
+    rig = Rig(controller(AxisConfig(gear=gear)))
+    for limit in ("POSLIM_L", "POSLIM_R"):
+        rig.set(limit, rig.get(limit))
+    rig.use_dint()
+    assert (rig.get("POSLIM_L"), rig.get("POSLIM_R")) == (-(2**31), 2**31 - 1)
+
+
+@pytest.mark.parametrize("value", [2147484160.0, -2147484160.0, 3e9])
+def test_mic_7_positions_beyond_what_is_counted_are_refused(rig: Rig, value: float) -> None:
+    for register in ("POSLIM_R", "POS_ABS", "POS_ACT"):
+        assert rig.exception(words_pdu(rig.base + VALUES[register], *real_words(value))) == 3
 
 
 @pytest.mark.parametrize(("sign", "limit", "reached"), [(1, "POSLIM_R", LIMIT_R), (-1, "POSLIM_L", LIMIT_L)])

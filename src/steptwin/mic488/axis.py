@@ -452,7 +452,8 @@ class Axis(Stateful):
     def _clamped(self, velocity_p: float) -> float:
         if abs(velocity_p) <= MAX_SPEED_P:
             return velocity_p if abs(velocity_p) >= LEAST else 0.0
-        self.host.axis_event(self.number, "speed-clamped", f"{velocity_p:g} imp/s is above {MAX_SPEED_P:g} imp/s")
+        text = f"M{self.number}: {velocity_p:g} imp/s is more than the outputs give, {MAX_SPEED_P:g} imp/s"
+        self.host.axis_event(self.number, "speed-clamped", text)
         return MAX_SPEED_P if velocity_p > 0.0 else -MAX_SPEED_P
 
     # ------------------------------------------------------------------ switches
