@@ -125,6 +125,13 @@ def test_decimal_point_and_comma(written: str) -> None:
     assert read_config(parse(f"[Axis0]\nGear={written}")).axes[0].gear == 0.5
 
 
+def test_mic_19_encoder_tolerance_and_times_have_keys_of_our_own() -> None:
+    axis = read_config(parse("[Axis1]\nEncTolerance=0\nEncSettle=250\nErrTime=500")).axes[1]
+    assert (axis.enc_tolerance, axis.enc_settle_ms, axis.err_time_ms) == (0, 250, 500)
+    _, findings = examine_config(parse("[Axis0]\nEncTolerance=-1\nEncSettle=0\nErrTime=0.5"))
+    assert [finding.code for finding in findings] == ["C008", "C008", "C007"]
+
+
 def test_input_numbers_of_encoder_channels() -> None:
     shown = [encoder_channel(number) for number in (0, 7, 8, 9, 10, 11, 19, 20)]
     assert shown == [None, None, (0, "C"), (0, "B"), (0, "A"), (1, "C"), (3, "A"), None]

@@ -273,6 +273,28 @@ def test_mic_19_a_correction_without_progress_gives_up_after_err_time() -> None:
     assert rig.status() == ERROR
 
 
+def test_mic_19_tolerance_settling_and_giving_up_are_configured() -> None:
+    rig = encoder_rig(enc_tolerance=0, enc_settle_ms=700, err_time_ms=300)
+    rig.set("POS_ABS", 800.0)
+    rig.wait(0.7)
+    turn(rig, -2)
+    rig.until(1, CORRECTION)
+    rig.wait_ns(700_000_000 - 1)
+    assert rig.position() == 800.0
+    rig.until(1, REACHED)
+    assert rig.get("ENC_IMP") == 100
+    couple(rig, Coupling.BLOCKED)
+    rig.set("POS_ABS", 5000.0)
+    began = rig.now
+    rig.until(1, ERROR)
+    assert 0.3 * SECOND <= rig.now - began <= 0.32 * SECOND
+    rig = encoder_rig(enc_tolerance=50)
+    rig.set("POS_ABS", 500.0)
+    rig.wait(0.7)
+    turn(rig, -50)
+    rig.until(1, REACHED)
+
+
 def test_reaction_none_never_gives_up() -> None:
     rig = encoder_rig(ENCODER, NONE)
     rig.set("POS_ABS", 500.0)

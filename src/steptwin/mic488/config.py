@@ -65,6 +65,13 @@ class AxisConfig:
     """0 NONE, 1 ERRMODE0, 2 ERRMODE1, 3 ERRMODE2."""
     kp: float = 50.0
     """Gain of the position correction."""
+    # MIC-19: the vendor's tool has no keys for these.
+    enc_tolerance: int = 4
+    """Encoder counts by which a position may be missed."""
+    enc_settle_ms: int = 100
+    """How long after a move the correction begins."""
+    err_time_ms: int = 2000
+    """How long a drive may be blocked, or a correction make no progress."""
 
     @property
     def unit_name(self) -> str:
@@ -178,6 +185,7 @@ def _number(name: str, attribute: str) -> Key:
 
 _SWITCHES = f"0…7 (IN1…IN8), 8…19 (channels C, B, A of encoders 1…4), {NO_INPUT} (none)"
 _COUNT = Range(1, DINT_MAX)
+_DURATION_MS = Range(1, 3_600_000)
 
 AXIS_KEYS = (
     _choice("Unit", "unit", *UNITS),
@@ -195,6 +203,9 @@ AXIS_KEYS = (
     _choice("PosCtrlMode", "pos_ctrl_mode", "OFF", "ENCODER", "ENCFOLLOW"),
     _choice("ErrCtrlMode", "err_ctrl_mode", "NONE", "ERRMODE0", "ERRMODE1", "ERRMODE2"),
     Key("Kp", "kp", Range(0, REAL_MAX), whole=False, note="a number ≥ 0"),
+    Key("EncTolerance", "enc_tolerance", Range(0, DINT_MAX), note="a whole number ≥ 0 in encoder counts"),
+    Key("EncSettle", "enc_settle_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
+    Key("ErrTime", "err_time_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
 )
 INPUT_KEYS = (
     _choice("Filter", "filter", "10 ms", "50 ms", "100 ms", "250 ms", "500 ms"),

@@ -1,7 +1,7 @@
 """Position control with an encoder: correction (ENCODER), following (ENCFOLLOW), and watching for a blocked drive.
 
 A control loop, re-planned every 10 ms while it is active; inactive it costs nothing. Drive and encoder are compared from a
-*reference* on, a pair of motor count and encoder shaft that are taken to agree.
+*reference* on, a pair of motor count and encoder shaft that are taken to agree. Tolerance, settling and giving up: MIC-19.
 """
 
 from __future__ import annotations
@@ -17,11 +17,6 @@ if TYPE_CHECKING:
     from steptwin.mic488.axis import Axis
 
 PERIOD_NS: Nanos = 10 * MILLISECOND
-
-# MIC-19
-TOLERANCE_COUNTS = 4
-SETTLE_NS: Nanos = 100 * MILLISECOND
-ERR_TIME_NS: Nanos = 2000 * MILLISECOND
 
 STOP_LAG_REVOLUTIONS = 0.05
 """HOME3: the mechanical stop is found when the encoder lags the drive by this much of a revolution, and the tolerance."""
@@ -96,11 +91,10 @@ class PositionControl(Stateful):
             return
         self.tick_ns = None
         missing_p = abs(axis.target_p - self.true_p(axis, now))
-        if axis.status is Status.REACHED and axis.encoder.counts(missing_p) > TOLERANCE_COUNTS:
+        if axis.status is Status.REACHED and axis.encoder.counts(missing_p) > axis.config.enc_tolerance:
             axis.status = axis.arrival = Status.CORRECTION
             self._best_p = missing_p
-            self._progress_ns = now
-            self.tick_ns = now + SETTLE_NS
+            self.tick_ns = self._progress_ns = now + axis.config.enc_settle_ms * MILLISECOND
 
     def _expect_progress(self, axis: Axis, now: Nanos) -> None:
         self._progress_ns = now
@@ -121,7 +115,7 @@ class PositionControl(Stateful):
 
     def _seek_stop(self, axis: Axis, now: Nanos) -> None:
         lag = axis.encoder.counts(abs(axis.profile.count(now) - self.true_p(axis, now)))
-        if lag > max(STOP_LAG_REVOLUTIONS * axis.encoder.enc_resol, TOLERANCE_COUNTS):
+        if lag > max(STOP_LAG_REVOLUTIONS * axis.encoder.enc_resol, axis.config.enc_tolerance):
             axis.homing.stop_reached(axis, now)
         else:
             self.tick_ns = now + PERIOD_NS
@@ -146,7 +140,7 @@ class PositionControl(Stateful):
             axis.target_p += lost
             self._ref_motor += lost
         missing = axis.target_p - axis.profile.count(now)
-        within = axis.encoder.counts(abs(missing)) <= TOLERANCE_COUNTS
+        within = axis.encoder.counts(abs(missing)) <= axis.config.enc_tolerance
         if within and not axis.profile.moving(now):
             axis.status = axis.arrival = Status.REACHED
             return
@@ -169,7 +163,8 @@ class PositionControl(Stateful):
         self.tick_ns = now + PERIOD_NS
 
     def _given_up(self, axis: Axis, now: Nanos) -> bool:
-        return now - self._progress_ns >= ERR_TIME_NS and axis.config.err_ctrl_mode != self.REACTION_NONE
+        patience = axis.config.err_time_ms * MILLISECOND
+        return now - self._progress_ns >= patience and axis.config.err_ctrl_mode != self.REACTION_NONE
 
 
 def _part(missing_p: int, kp: float) -> int:
