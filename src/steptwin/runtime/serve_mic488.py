@@ -8,10 +8,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from steptwin.diagnostics import render
+from steptwin.diagnostics import Severity, render
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.mic488.config import ControllerConfig, read_config
+from steptwin.mic488.config import ConfigError, ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registers import firmware as known_firmware
 from steptwin.runtime.cell import Cell
@@ -95,12 +95,20 @@ def serve(options: Mic488Options) -> None:
 
 
 def load_config(path: Path, firmware: str) -> ControllerConfig:
-    """The configuration in a ``.cfg`` file. Raises `Misuse` with every problem of it, `LineFailure` if it cannot be read."""
+    """The configuration in a ``.cfg`` file. Raises `Misuse` with every error in it, `LineFailure` if it cannot be read.
+
+    Warnings go to standard error.
+    """
     try:
         data = path.read_bytes()
     except OSError as error:
         raise LineFailure(f"cannot read the configuration {path}: {where(error)}") from error
-    return read_config(IniFile.parse(data, str(path)), firmware)
+    file = IniFile.parse(data, str(path))
+    config, findings = examine_config(file, firmware)
+    if any(finding.severity is Severity.ERROR for finding in findings):
+        raise ConfigError(file.source, findings)
+    _show(((file.source, findings),))
+    return config
 
 
 def parse_units(text: str) -> list[int]:
@@ -208,6 +216,6 @@ def _remarks(options: Mic488Options) -> list[str]:
     remarks = []
     if options.listen_any:
         remarks.append("Modbus has no authentication: whoever reaches these addresses moves the axes")
-    if options.state is None:
+    if options.state is None and known_firmware(options.firmware).stored_user_registers:
         remarks.append("non-volatile memory ends with this process (--state DIR keeps it)")
     return remarks
