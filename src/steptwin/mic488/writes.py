@@ -164,8 +164,8 @@ def _check(register: Register, data_type: DataType) -> Check:
     held = _position_p if register.kind is Kind.POSITION else _rate_p if register.permitted.above else _velocity_p
     if data_type is DataType.DINT:
         return lambda device, value: held(value) if permits(value) else None
-    if held is _position_p:
-        held = _position_of_real_p
+    if register.key in ("POSLIM_L", "POSLIM_R"):
+        held = _limit_of_real_p
     return lambda device, value: held(value * device.axes[number].gear) if permits(value) else None
 
 
@@ -177,12 +177,12 @@ def _position_p(pulses: float) -> int | None:
 
 
 _REAL_STEP = 2.0**-23
-"""Distance of neighbouring REALs, as part of their size: that near to the end of the range, a REAL means the end."""
+"""Distance of neighbouring REALs, as part of their size: nearer to the end of the range, a REAL means the end."""
 
 
-def _position_of_real_p(pulses: float) -> int | None:
+def _limit_of_real_p(pulses: float) -> int | None:
     """As `_position_p`; a soft limit that does not limit (MIC-12) can be written back as it was read."""
-    if 1.0 - _REAL_STEP <= abs(pulses) / 2.0**31 <= 1.0 + _REAL_STEP:
+    if abs(abs(pulses) / 2.0**31 - 1.0) < _REAL_STEP:
         return DINT_MAX if pulses > 0.0 else DINT_MIN
     return _position_p(pulses)
 
