@@ -99,6 +99,8 @@ class Served:
         if self.process.poll() is not None:
             raise AssertionError(f"the server ended with {self.process.returncode}: {self.errors}{self.lines}")
         self._end_points = {point["kind"]: point for point in json.loads(self.ready_file.read_text())["end_points"]}
+        if "tcp" in self._end_points:
+            self.environment["STEPTWIN_DEVICE"] = f"tcp://127.0.0.1:{self.tcp_port}"
 
     @property
     def lines(self) -> list[str]:
@@ -117,7 +119,7 @@ class Served:
         return self._end_points["rtu-tcp"]["port"]
 
     def command(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run ``steptwin`` where this twin is the only one."""
+        """Run ``steptwin`` where this twin is the only one, and the device that commands mean."""
         return subprocess.run([STEPTWIN, *arguments], capture_output=True, text=True, env=self.environment, check=False)
 
     def state(self) -> dict[str, Any]:
