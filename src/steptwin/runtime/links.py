@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
@@ -109,4 +110,7 @@ class Link(Protocol):
 
 def where(error: OSError) -> str:
     """The reason of a system error in words."""
+    # Event loops put more into the text than the reason: the address, which the caller names anyway.
+    if error.errno is not None and error.errno > 0:
+        return os.strerror(error.errno).lower()
     return (error.strerror or str(error)).lower()
