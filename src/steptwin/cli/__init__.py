@@ -21,6 +21,7 @@ from steptwin.cli import (
     fmt,
     get,
     info,
+    monitor,
     move,
     record,
     registers,
@@ -66,6 +67,7 @@ app.command()(move.home)
 app.command()(move.move)
 app.command()(move.jog)
 app.command()(move.stop)
+app.command()(monitor.monitor)
 app.command()(scan.ports)
 app.command()(scan.scan)
 app.command()(send.send)

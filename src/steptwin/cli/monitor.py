@@ -1,0 +1,27 @@
+"""``steptwin monitor``: registers, axes and frames of a controller on the terminal.
+
+From Python: `steptwin.host.AsyncMic488`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def monitor(
+    device: Annotated[
+        str | None,
+        typer.Argument(
+            envvar="STEPTWIN_DEVICE",
+            metavar="[DEVICE]",
+            help="As --device of the other commands. Default: the twin on tcp://127.0.0.1:5020.",
+        ),
+    ] = None,
+    hz: Annotated[float, typer.Option(help="How often a second it is looked at, up to 10.")] = 5.0,
+) -> None:
+    """Watch a MIC488 and work its axes and registers, with the keyboard. Space or Esc stops. ? shows the keys."""
+    from steptwin.monitor import monitor as show
+
+    show(device, hz)

@@ -1,0 +1,24 @@
+"""The terminal monitor: a MIC488's registers, axes and frames, live. `steptwin monitor` behind its options.
+
+`session` talks to the controller and knows nothing of terminals; `app` shows what it has found.
+"""
+
+from __future__ import annotations
+
+from steptwin.errors import SteptwinError
+
+
+class NoTextual(SteptwinError):
+    """The library that draws on terminals is missing."""
+
+
+def monitor(device: str | None, hz: float) -> None:
+    """Watch a controller until the user ends it. Raises `Misuse`, or `NoTextual` naming the extra."""
+    try:
+        import textual  # noqa: F401
+    except ImportError as error:
+        raise NoTextual("the monitor needs textual: pip install 'steptwin[monitor]'") from error
+    from steptwin.monitor.app import Monitor
+    from steptwin.monitor.session import session_at
+
+    Monitor(session_at(device, hz)).run()

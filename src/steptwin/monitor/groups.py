@@ -1,0 +1,71 @@
+"""How the monitor shows registers: in which groups, and what people type for a value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from steptwin.errors import Misuse
+from steptwin.host.mic488.values import Value
+from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type
+
+AXES = "M"
+CONTROLLER, INPUTS, OUTPUTS, USER = "Controller", "Inputs", "Outputs", "User"
+USER_SHOWN = 32
+"""So many user registers at a time."""
+
+_ON, _OFF = ("on", "1", "true"), ("off", "0", "false")
+
+
+def groups_of(registers: RegisterMap) -> Mapping[str, list[Register]]:
+    """Every register by the group it is shown in, in the order of groups; user registers apart."""
+    groups: dict[str, list[Register]] = {f"{AXES}{axis}": [] for axis in range(1, 5)}
+    groups |= {CONTROLLER: [], INPUTS: [], OUTPUTS: []}
+    for register in registers:
+        if register.type is Type.MEMORY:
+            continue
+        if register.axis is not None:
+            group = f"{AXES}{register.axis}"
+        elif register.space is Space.INPUT:
+            group = INPUTS
+        else:
+            group = OUTPUTS if register.key == "OUT" else CONTROLLER
+        groups[group].append(register)
+    # What changes comes before what is set, and that before what only can be written.
+    for members in groups.values():
+        members.sort(key=lambda r: (not r.reads, bool(r.accepts) and bool(r.reads)))
+    return groups
+
+
+def shown(register: Register, value: Value) -> str:
+    """A value as people read it: ``REAL (0)``, ``on``, ``12.5``."""
+    if register.type is Type.BIT:
+        return "on" if value else "off"
+    if register.values:
+        return f"{register.values.get(int(value), 'unknown')} ({value})"
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
+
+
+def value_of(register: Register, typed: str) -> float:
+    """What was typed as a number: with a point or a comma, hexadecimal, ``on``, or the name of a value. Raises `Misuse`."""
+    text = typed.strip()
+    for number, name in register.values.items():
+        if text.lower() == name.lower():
+            return number
+    if register.type is Type.BIT and text.lower() in _ON + _OFF:
+        return float(text.lower() in _ON)
+    try:
+        return int(text, 16) if text.lower().startswith("0x") else float(text.replace(",", "."))
+    except ValueError:
+        names = f", or {', '.join(register.values.values())}" if register.values else ""
+        raise Misuse(f"{text!r} is no number{names}") from None
+
+
+def permitted(register: Register, data_type: DataType, unit: str) -> str:
+    """What a register takes, in words."""
+    if not register.accepts:
+        return "read only"
+    if register.values:
+        return ", ".join(f"{name} ({number})" for number, name in register.values.items())
+    if register.type is Type.BIT:
+        return "on, off"
+    return f"{register.permitted} {register.unit(data_type, unit)}".rstrip()

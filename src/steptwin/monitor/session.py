@@ -1,0 +1,187 @@
+"""A conversation with a controller that goes on: it is looked at again and again, and found again when lost."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.host import AsyncJog, AsyncMic488, Mic488Status
+from steptwin.host.address import DEFAULT, parse_device
+from steptwin.host.mic488.frames import Heard
+from steptwin.host.mic488.program import ProgramState
+from steptwin.host.mic488.values import Value
+from steptwin.mic488.registermap import RegisterMap
+from steptwin.mic488.registers import register_map
+
+AGAIN_S = 1.0
+"""A controller that does not answer is tried again after this time."""
+HZ = (0.2, 10.0)
+JOG_HOLD_S = 0.2
+"""How long an axis runs on after the last key: the least there is."""
+KEY_S = 0.25
+"""A key that is held comes again sooner than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """What was found at the last look. ``trouble``: why there was no answer; the rest is from before, then."""
+
+    status: Mic488Status | None = None
+    values: Mapping[str, tuple[Value, str]] = field(default_factory=dict)
+    trouble: str | None = None
+
+
+class Session:
+    """A controller that is watched. ``on_picture`` is told of every look, ``on_frame`` of every frame.
+
+    ``watched`` are names of registers to read besides the status, in as few frames as may be.
+    """
+
+    def __init__(self, mic: AsyncMic488, place: str, hz: float) -> None:
+        if not HZ[0] <= hz <= HZ[1]:
+            raise Misuse(f"--hz {hz:g}: permitted are {HZ[0]:g} to {HZ[1]:g}")
+        self.mic = mic
+        self.place = place
+        self.picture = Picture(trouble="connecting")
+        self.watched: Sequence[str] = ()
+        self.on_picture: Callable[[Picture], object] = lambda _: None
+        self.on_frame: Callable[[Heard], object] = lambda _: None
+        self._period_s = 1.0 / hz
+        self._is_open = False
+        self._at_once = asyncio.Event()
+        self._jog: _Jogging | None = None
+        frames = mic.line.notes.get("frames")
+        if frames is not None:
+            frames.sinks.append(self._heard)
+
+    def _heard(self, heard: Heard) -> None:
+        self.on_frame(heard)
+
+    @property
+    def registers(self) -> RegisterMap:
+        """The map of the firmware that was found; of the newest before."""
+        return register_map(self.mic.firmware)
+
+    @property
+    def is_connected(self) -> bool:
+        return self.picture.trouble is None
+
+    # ------------------------------------------------------------------ looking
+
+    async def run(self) -> None:
+        """Look until cancelled."""
+        try:
+            while True:
+                await self._look()
+                self.on_picture(self.picture)
+                self._at_once.clear()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(self._period_s if self.is_connected else AGAIN_S):
+                        await self._at_once.wait()
+        finally:
+            await self.mic.close()
+
+    async def _look(self) -> None:
+        try:
+            if not self._is_open:
+                await self.mic.open()
+                self._is_open = True
+            status = await self.mic.status()
+            values = await self.mic.get_shown(*self.watched) if self.watched else {}
+        except SteptwinError as error:
+            self.picture = Picture(self.picture.status, {}, str(error))
+        else:
+            self.picture = Picture(status, values)
+
+    def watch(self, names: Sequence[str]) -> None:
+        """Read these registers from now on."""
+        self.watched = tuple(names)
+        self._at_once.set()
+
+    def look_soon(self) -> None:
+        self._at_once.set()
+
+    # ------------------------------------------------------------------ acting
+
+    async def stop(self) -> str:
+        """Stop all axes at once, without ramp. A program that runs is paused, else it would move them again.
+
+        Goes before everything that waits for the line. Gives what was done; raises `Untold` when the controller cannot be told.
+        """
+        self._jog = None
+        await self.mic.stop_all()
+        status = self.picture.status
+        if status is None or status.program != ProgramState.RUNNING:
+            return "stopped"
+        await self.mic.program.pause()
+        await self.mic.stop_all()  # the program may have begun another motion meanwhile
+        return "stopped; the program is paused"
+
+    async def jog(self, axis: int, velocity_u: float) -> str:
+        """A key that jogs was pressed, or came again because it is held. The axis runs for as long as it comes again.
+
+        Every other press while it runs keeps it running; another direction ends it. Gives why it has ended, if it has.
+        """
+        jogging = self._jog
+        if jogging is not None and not jogging.is_over:
+            if (jogging.axis, jogging.velocity_u) == (axis, velocity_u):
+                jogging.press()
+            else:
+                jogging.let_go()
+            return ""
+        jogging = self._jog = _Jogging(axis, velocity_u)
+        async with self.mic.axis(axis).jog(velocity_u, hold_s=JOG_HOLD_S) as jog:
+            await jogging.run(jog, lambda: self._jog is jogging)
+        end = jog.end
+        return "" if end is None or end.ok else str(end)
+
+    async def do(self, action: Awaitable[object]) -> None:
+        """Do something with the controller, and look what came of it."""
+        try:
+            await action
+        finally:
+            self.look_soon()
+
+
+class _Jogging:
+    """A key that is held."""
+
+    def __init__(self, axis: int, velocity_u: float) -> None:
+        self.axis = axis
+        self.velocity_u = velocity_u
+        self.is_over = False
+        self._pressed = asyncio.get_running_loop().time()
+        self._is_let_go = False
+
+    def press(self) -> None:
+        self._pressed = asyncio.get_running_loop().time()
+
+    def let_go(self) -> None:
+        self._is_let_go = True
+
+    async def run(self, jog: AsyncJog, is_wanted: Callable[[], bool]) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            while not self._is_let_go and is_wanted() and loop.time() - self._pressed < KEY_S and await jog.hold():
+                pass
+        finally:
+            self.is_over = True
+
+
+def session_at(device: str | None, hz: float) -> Session:
+    """A session with the controller at an address as `steptwin … --device` takes it. Raises `Misuse`."""
+    address = parse_device(device or DEFAULT)
+    mic = AsyncMic488(
+        address.place,
+        address.unit,
+        baud=address.baud,
+        firmware=address.firmware,
+        config=address.config,
+        timeout_s=address.timeout,
+        observe=True,
+        log=lambda _: None,  # there have to be words for frames to be shown
+    )
+    return Session(mic, str(address), hz)
