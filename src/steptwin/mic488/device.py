@@ -220,13 +220,9 @@ class Mic488(Stateful):
             acted = False
             if due is not None and due <= at:
                 acted = self.program.advance(at, until if others is None else min(until, others - 1))
-            if acted or happened:
-                self._find_due()
-            else:
-                # The program concerned only itself: nothing else is due at another time than before.
-                due = self.program.deadline()
-                self._due = others if due is None or (others is not None and others < due) else due
-                self.changed()
+            if acted:
+                others = self._due_without_program()
+            self._plan_ahead(others, lamp=acted or happened)
             if self._due is None or self._due > at:
                 return
         raise Runaway(f"more than {MAX_EVENTS_PER_INSTANT} events of one MIC488 at {at} ns")
@@ -242,7 +238,8 @@ class Mic488(Stateful):
             if due is not None and due <= at:
                 axis.advance(at)
         self.program.disturbed(at, inside=True)
-        self.program.inputs_changed(changed, at)
+        if changed:
+            self.program.inputs_changed(changed, at)
 
     def deadline(self) -> Nanos | None:
         return self._due
@@ -250,7 +247,7 @@ class Mic488(Stateful):
     def touch(self) -> None:
         """State was changed from outside: tell the program, find the next deadline and the ERR lamp anew."""
         self.program.disturbed(self.now, inside=False)
-        self._find_due()
+        self._plan_ahead(self._due_without_program(), lamp=True)
 
     def _due_without_program(self) -> Nanos | None:
         due = self.inputs.deadline()
@@ -260,19 +257,19 @@ class Mic488(Stateful):
                 due = at
         return due
 
-    def _find_due(self) -> None:
-        self._others = due = self._due_without_program()
-        at = self.program.deadline()
-        if at is not None and (due is None or at < due):
-            due = at
-        self._due = due
-        lit = self.program.error
-        for axis in self.axes:
-            if axis.status is Status.ERROR:
-                lit = True
-        if lit is not self.error_led:
-            self.error_led = lit
-            self._edges.append(Edge(self.now, "ERR", float(lit)))
+    def _plan_ahead(self, others: Nanos | None, *, lamp: bool) -> None:
+        """Find the next deadline, which for all but the program is ``others``, and the ERR ``lamp`` anew."""
+        self._others = others
+        due = self.program.deadline()
+        self._due = others if due is None or (others is not None and others < due) else due
+        if lamp:
+            lit = self.program.error
+            for axis in self.axes:
+                if axis.status is Status.ERROR:
+                    lit = True
+            if lit is not self.error_led:
+                self.error_led = lit
+                self._edges.append(Edge(self.now, "ERR", float(lit)))
         self.changed()
 
     # ------------------------------------------------------------------ banks of programs and positions
