@@ -397,9 +397,9 @@ class Axis(Stateful):
         target, velocity = self.target_p, state.velocity
         rest = _rest_p(state, dec_p)
         for direction in (-1, 1):
-            edge = self.edge(direction)
             outward = (target - rest) * direction > 0.0 or velocity * direction > 0.0
-            if edge is not None and outward and (target - edge) * direction > 0:
+            edge = self.edge(direction) if outward else None
+            if edge is not None and (target - edge) * direction > 0:
                 profile = self._to_edge(state, edge, direction, dec_p, self.speed_p)
                 self._begin(profile, Status.POSITION, LIMIT[direction])
                 return

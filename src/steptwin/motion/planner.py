@@ -29,6 +29,9 @@ class MotionState(NamedTuple):
 
     @classmethod
     def of(cls, profile: Profile, now: Nanos) -> MotionState:
+        if not profile.moving(now):
+            rests = profile.counts[-1]
+            return cls(now, profile.base + rests, profile.final_p - rests, 0.0)
         return cls(now, profile.count(now), profile.phase(now), profile.velocity(now))
 
 

@@ -112,7 +112,10 @@ class Profile:
         self.counts: list[int] = [0]
         #: first whole nanosecond at which the motion is finished; None when endless
         self.end: Nanos | None = start
+        if not segments:
+            return
         count = 0
+        last = segments[-1]
         for s in segments:
             if s.end_s == inf:
                 self.ends.append(inf)
@@ -120,12 +123,13 @@ class Profile:
                 return
             end_ns = ceil(s.end_s * 1e9)
             self.ends.append(end_ns)
-            self.end = start + end_ns
-            p = self._end_p(len(self.counts) - 1)
-            reached = floor(p) if s.direction > 0 else ceil(p)
-            if (reached - count) * s.direction > 0:
-                count = reached
+            p = final_p if s is last else s.position(s.end_s)
+            if s.direction > 0:
+                count = max(count, floor(p))
+            else:
+                count = min(count, ceil(p))
             self.counts.append(count)
+        self.end = start + end_ns
 
     def __repr__(self) -> str:
         return f"Profile(start={self.start}, base={self.base}, end={self.end}, segments={len(self.segments)})"

@@ -235,13 +235,10 @@ def _framed(tag: bytes, data: bytes) -> bytes:
 
 
 def _profile(profile: Profile) -> bytes:
-    parts = [f"{profile.start} {profile.base} ".encode(), _FLOAT.pack(b"f", profile.final_p)]
+    data = b"%d %d " % (profile.start, profile.base) + _FLOAT.pack(b"f", profile.final_p)
     for s in profile.segments:
-        if isinstance(s, ArcSegment):
-            parts.append(_arc(s))
-        else:
-            parts.append(_SEGMENT.pack(s.end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction))
-    return _framed(b"p", b"".join(parts))
+        data += _arc(s) if isinstance(s, ArcSegment) else _segment(s)
+    return _framed(b"p", data)
 
 
 def _segment(s: Segment) -> bytes:
