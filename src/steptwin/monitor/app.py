@@ -31,12 +31,13 @@ HELP = """\
 ← →           jog while held (*)      v   set the jog velocity
 m             move to a position      b   move by a distance
 h             home at a velocity: negative towards KL, positive towards KR
-Tab           axes, registers, …      ↑ ↓ and Enter   choose a register and write it
+Tab           axes, registers, …      ↑ ↓ Enter   write a register
 \\[ ]           groups of registers     n p   next, previous user registers
 f             frames or registers     r   reads among the frames
 q             quit; axes go on with what they were told
-? closes this. (*) while Axes has the focus. A held key is one that your terminal
-repeats: until it does, and when it is let go, the axis comes to rest by itself."""
+?             close this
+(*) While Axes has the focus. A held key is one that your terminal repeats:
+until it does, and when it is let go, the axis comes to rest by itself."""
 
 
 class Monitor(App[None]):
@@ -45,7 +46,7 @@ class Monitor(App[None]):
     ENABLE_COMMAND_PALETTE = False
     TITLE = "steptwin monitor"
     CSS = """
-    #head { height: 1; background: $primary-background; padding: 0 1; }
+    #head { height: auto; max-height: 3; background: $primary-background; padding: 0 1; }
     #head.lost { background: $error; color: $text; text-style: bold; }
     #axes { height: 7; border: round $primary; }
     #axes:focus { border: round $accent; }
@@ -56,7 +57,7 @@ class Monitor(App[None]):
     #meaning { height: 1; padding: 0 1; color: $text-muted; }
     #ask { display: none; height: 3; border: round $accent; }
     #ask.open { display: block; }
-    #said { height: 1; padding: 0 1; }
+    #said { height: auto; min-height: 1; max-height: 4; padding: 0 1; }
     #said.bad { color: $error; text-style: bold; }
     #help { display: none; layer: above; dock: bottom; offset-y: -3; height: auto; border: round $accent; padding: 0 1;
             background: $panel; }
@@ -118,7 +119,7 @@ class Monitor(App[None]):
     def on_mount(self) -> None:
         axes = self.query_one("#axes", DataTable)
         axes.border_title = "Axes"
-        for column, width in (("axis", 6), ("position", 14), ("velocity", 12), ("unit", 6), ("drive", 6), ("status", 28)):
+        for column, width in (("axis", 4), ("position", 14), ("velocity", 12), ("unit", 6), ("drive", 5), ("status", 24)):
             label = Text(column.rjust(width) if column in ("position", "velocity") else column)
             axes.add_column(label, key=column, width=width)
         for number in range(1, 5):
@@ -157,7 +158,9 @@ class Monitor(App[None]):
             head.update(f"NOT CONNECTED, trying again: {picture.trouble}")
         elif picture.status is not None:
             program = PROGRAM_STATES[picture.status.program] if picture.status.program < 3 else "?"
-            head.update(f"{self.session.place}   firmware {self._firmware}   program {program}   jog {self._jog_velocity:g} u/s")
+            head.update(
+                f"{self.session.place}   firmware {self._firmware}   program {program}   jog ← → {self._jog_velocity:g} u/s"
+            )
         self._show_axes(picture)
         self._show_io(picture)
         self._show_values(picture)
@@ -400,7 +403,7 @@ class AxisTable(DataTable[str]):
     """The arrow keys to the left and right jog: they are no use in a table whose rows are chosen."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("left", "app.jog(-1)", "Jog", key_display="← →"),
+        Binding("left", "app.jog(-1)", show=False),
         Binding("right", "app.jog(1)", show=False),
     ]
 

@@ -53,6 +53,8 @@ class Session:
         self._is_open = False
         self._at_once = asyncio.Event()
         self._jog: _Jogging | None = None
+        self._ignored_until: float | None = None
+        """A key that is held through the end of its jog begins no other: until then it has to be let go."""
         frames = mic.line.notes.get("frames")
         if frames is not None:
             frames.sinks.append(self._heard)
@@ -112,6 +114,7 @@ class Session:
         Goes before everything that waits for the line. Gives what was done; raises `Untold` when the controller cannot be told.
         """
         self._jog = None
+        self._ignore_held_key()
         await self.mic.stop_all()
         status = self.picture.status
         if status is None or status.program != ProgramState.RUNNING:
@@ -123,8 +126,12 @@ class Session:
     async def jog(self, axis: int, velocity_u: float) -> str:
         """A key that jogs was pressed, or came again because it is held. The axis runs for as long as it comes again.
 
-        Every other press while it runs keeps it running; another direction ends it. Gives why it has ended, if it has.
+        Another direction ends it. Gives why it has ended otherwise than by letting go: then, and after `stop`, a key that is held
+        on does nothing more.
         """
+        if self._ignored_until is not None and asyncio.get_running_loop().time() < self._ignored_until:
+            self._ignore_held_key()
+            return ""
         jogging = self._jog
         if jogging is not None and not jogging.is_over:
             if (jogging.axis, jogging.velocity_u) == (axis, velocity_u):
@@ -133,10 +140,22 @@ class Session:
                 jogging.let_go()
             return ""
         jogging = self._jog = _Jogging(axis, velocity_u)
-        async with self.mic.axis(axis).jog(velocity_u, hold_s=JOG_HOLD_S) as jog:
-            await jogging.run(jog, lambda: self._jog is jogging)
+        try:
+            async with self.mic.axis(axis).jog(velocity_u, hold_s=JOG_HOLD_S) as jog:
+                await jogging.run(jog, lambda: self._jog is jogging)
+        except SteptwinError:
+            self._ignore_held_key()
+            raise
+        finally:
+            jogging.is_over = True
         end = jog.end
-        return "" if end is None or end.ok else str(end)
+        if end is None or end.ok:
+            return ""
+        self._ignore_held_key()
+        return str(end)
+
+    def _ignore_held_key(self) -> None:
+        self._ignored_until = asyncio.get_running_loop().time() + KEY_S
 
     async def do(self, action: Awaitable[object]) -> None:
         """Do something with the controller, and look what came of it."""
@@ -164,11 +183,8 @@ class _Jogging:
 
     async def run(self, jog: AsyncJog, is_wanted: Callable[[], bool]) -> None:
         loop = asyncio.get_running_loop()
-        try:
-            while not self._is_let_go and is_wanted() and loop.time() - self._pressed < KEY_S and await jog.hold():
-                pass
-        finally:
-            self.is_over = True
+        while not self._is_let_go and is_wanted() and loop.time() - self._pressed < KEY_S and await jog.hold():
+            pass
 
 
 def session_at(device: str | None, hz: float) -> Session:
