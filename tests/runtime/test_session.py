@@ -99,6 +99,25 @@ def test_what_is_no_session_is_misuse(tmp_path: Path, text: str, message: str) -
         load(path)
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": 8}, "the session says seed 8, its world 7"),
+        ({"firmware": {"table": "1.40"}}, "the session says that table runs firmware 1.40, its world 1.70"),
+        ({"until_ns": SECOND}, "the session ends at 1000000000 ns, before what came at 2000000000 ns"),
+    ],
+)
+def test_a_session_that_contradicts_itself_is_misuse(tmp_path: Path, change: dict[str, object], message: str) -> None:
+    world = World.load(EXAMPLES / "feeder.toml")
+    world.run(for_=2)
+    world.press("start", 0.3)
+    file = tmp_path / "s.json"
+    save(session_of(world), file)
+    file.write_text(json.dumps(json.loads(file.read_text()) | change))
+    with pytest.raises(Misuse, match=message):
+        load(file).replay()
+
+
 @pytest.mark.parametrize("name", GOLDEN)
 def test_digests_are_the_same_everywhere(name: str) -> None:
     if name == "busy":

@@ -81,6 +81,52 @@ def test_lost_steps_of_a_described_axis_are_lost_by_its_load() -> None:
     assert spoilt.read("table.M1.position") == pytest.approx(100.0)
 
 
+DRUM = """
+[[line]]
+name = "chips"
+kind = "m1486"
+
+[[m1486]]
+name = "drum"
+line = "chips"
+address = 3
+
+[[axis]]
+name = "y"
+kind = "rotary"
+unit = "rev"
+pulses_per_rev = 12800
+drive = "drum.M1"
+
+[[fault]]
+kind = "lost-steps"
+machine = "drum"
+pulses = 400
+at_s = 2.0
+
+[[fault]]
+kind = "stall"
+machine = "drum"
+at_s = 5.0
+for_s = 0.01
+"""
+
+
+def test_the_load_of_an_m1486_is_what_stalls_and_loses_steps() -> None:
+    world = World.from_toml(DRUM)
+    world.line["chips"].send(b"x3\rf12800\rr\r")
+    world.run(for_=1.5)
+    assert world.axis["y"].position == 1.0
+    world.run(for_=1.0)
+    assert world.axis["y"].lost == 400
+    assert world.axis["y"].position == pytest.approx(1.0 - 400 / 12800)
+    world.run(until="time >= 4.9", for_=10)
+    world.line["chips"].send(b"f12800\rr\r")
+    world.run(for_=2.0)
+    assert world.axis["y"].lost > 400
+    assert world.read("drum.position") == 25600
+
+
 def test_what_goes_wrong_is_in_the_trace_and_two_runs_share_it() -> None:
     worlds = [World.from_toml(PLANT + FAULTS) for _ in range(2)]
     for world in worlds:

@@ -25,6 +25,9 @@ def wrong(text: str) -> str:
     [
         ("[world\n", "w.toml:1:7: error D001: this is no TOML"),
         ("[worlds]\n", "w.toml:1:1: error D004: the file has no [worlds]; did you mean 'world'?"),
+        (TABLE + "[[axs]]\n", "w.toml:3:1: error D004: the file has no [axs]"),
+        (TABLE + '[[fault]]\nkind = "crc"\nprobability = 2\n', "w.toml:5:1: error D003: [[fault]] (crc): probability = 2"),
+        (TABLE + '[[fault]]\nkind = "stall"\naxis = 9\n', "w.toml:3:1: error D009: fault stall: axis = 9: permitted are 1 to 4"),
         ("world = 3\n", "w.toml:1:1: error D002: [world] is 3"),
         ("[mic488]\nname = 't'\n", "w.toml:1:1: error D002: [mic488] stands once"),
         ("[[mic488]]\nunit = 3\n", "w.toml:1:1: error D005: [mic488]: name is missing"),
@@ -72,6 +75,41 @@ def test_all_problems_are_told_at_once_in_order() -> None:
     assert [line.split(": ")[0] for line in told.splitlines() if "error" in line] == [
         "w.toml:3:1", "w.toml:4:1", "w.toml:5:1", "w.toml:5:1"
     ]  # fmt: skip
+
+
+STEPS = """
+[[script]]
+name = "s"
+steps = [
+  { note = "a { in a text" }, # and [ here
+  { press = "nothing" },
+  { repeat = 2, steps = [{ wait = "1 s" }, { write = { "table.M1_EN" = 1 } }] },
+  { write = { "table.M1_ENN" = 1 } },
+  { until = "table.M1.stat == 4" }, { set = { "table.OUT1" = 1 } },
+]
+
+[[event]]
+name = "e"
+when = "table.IN99 == 1"
+do = [{ turn = "table.M5", counts = 1 }]
+"""
+
+
+def test_steps_that_speak_of_what_is_not_there_are_told_before_anything_runs() -> None:
+    lines = [line for line in wrong(TABLE + STEPS).splitlines() if line.startswith("w.toml")]
+    assert [line.partition(" ")[0] for line in lines] == [
+        "w.toml:8:3:",
+        "w.toml:10:3:",
+        "w.toml:11:3:",
+        "w.toml:11:37:",
+        "w.toml:16:1:",
+        "w.toml:17:7:",
+    ]
+    assert "step 2: no button is called 'nothing'" in lines[0]
+    assert "step 4: firmware 1.70 has no register named 'M1_ENN'" in lines[1]
+    assert "step 5: no signal 'table.M1.stat'; there are status" in lines[2]
+    assert "step 6: no input pin 'OUT1'" in lines[3]
+    assert "step 1: 'table' has no M5: axes are M1 to M4" in lines[5]
 
 
 def test_keys_of_nested_tables_have_their_lines() -> None:

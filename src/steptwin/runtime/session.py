@@ -43,13 +43,24 @@ class Session:
     version: str = __version__
 
     def world(self) -> World:
-        """The world at its beginning. Raises `WorldError`."""
-        return World(read_world(self.name, self.text), self.files)
+        """The world at its beginning. Raises `WorldError`, and `Misuse` where seed or firmware are not the description's."""
+        world = World(read_world(self.name, self.text), self.files)
+        if world.spec.seed != self.seed:
+            raise Misuse(f"the session says seed {self.seed!r}, its world {world.spec.seed}")
+        ran = {name: view.device.firmware.name for name, view in world.mic488.items()}
+        for name, firmware in self.firmware.items():
+            if ran.get(name) != firmware:
+                raise Misuse(
+                    f"the session says that {name} runs firmware {firmware}, its world {ran.get(name, 'has no such machine')}"
+                )
+        return world
 
     def replay(self) -> World:
         """The world after all of it. Raises `Misuse` where inputs do not fit the world."""
         world = self.world()
         for time, what in self.inputs:
+            if time > self.until:
+                raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")
             if time > world.now:
                 world.advance(time)
             world.outside(what)

@@ -68,10 +68,7 @@ def _release(plant: Plant, step: do.Release) -> None:
 
 
 def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
-    found = plant.plan.buttons.get(name)
-    if found is None:
-        raise plant.unknown("button", name, plant.plan.buttons)
-    button, kernel = found
+    button, kernel = plant.button(name)
     kernel.advance(plant.now)
     _record(plant, button.target.machine, name, "pressed" if pressed else "released")
     button.press(pressed, plant.now)

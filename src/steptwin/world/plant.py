@@ -23,11 +23,13 @@ from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
 from steptwin.world.actions import Outside, act
 from steptwin.world.build import Files, Fitted, Plan, build
+from steptwin.world.contacts import Button
 from steptwin.world.expression import Condition
 from steptwin.world.faults import Active, Fault, M1486Body, Mic488Body, rig
 from steptwin.world.faults.table import Layer
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import SCRIPTS, Line
+from steptwin.world.references import check_scripts
 from steptwin.world.signals import find_signal
 from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.trace import Mark, Record, Trace
@@ -151,8 +153,12 @@ class Plant:
         self._scripts: list[Script] = []
         self._timed: list[tuple[Nanos, int]] = []
         self._watching: list[Script] = []
-        for fault in spec.faults:
-            self.put_fault(fault)
+        for n, fault in enumerate(spec.faults):
+            try:
+                self.put_fault(fault)
+            except Misuse as error:
+                spec.text.wrong(("fault", n), "D009", str(error))
+        check_scripts(self, spec.scripts)
         for line in spec.scripts:
             self._begin(line)
 
@@ -209,7 +215,6 @@ class Plant:
     def _begin(self, spec: ScriptSpec) -> None:
         if spec.when is not None:
             text, once = spec.when, spec.once
-            self.condition(text)
             self.start(spec.name, lambda: do.run_when(spec.steps, text, once=once))
         elif spec.every is not None:
             period = spec.every
@@ -333,6 +338,13 @@ class Plant:
             found = self._encoded[key] = self.encode(device, values)
         return found
 
+    def button(self, name: str) -> tuple[Button, Kernel]:
+        """Raises `Misuse` with the buttons there are."""
+        found = self.plan.buttons.get(name)
+        if found is None:
+            raise self.unknown("button", name, self.plan.buttons)
+        return found
+
     def line_called(self, name: str) -> Line:
         """Raises `Misuse` with the lines there are."""
         line = self.lines.get(name)
@@ -356,10 +368,14 @@ class Plant:
         machine, faults = self.machines[name], self.plan.faults
         if name in faults.machines:
             return
-        body = Mic488Body(machine, self.unit_of(name)) if isinstance(machine, Mic488) else M1486Body(machine)
-        for axis in self.axes.values():
-            if axis.spec.drive[0] == name and isinstance(body, Mic488Body):
-                body.shafts[axis.mechanism.number - 1] = axis.mechanism
+        mechanisms = {axis.mechanism.number: axis.mechanism for axis in self.axes.values() if axis.spec.drive[0] == name}
+        body: Mic488Body | M1486Body
+        if isinstance(machine, Mic488):
+            body = Mic488Body(machine, self.unit_of(name))
+            for number, mechanism in mechanisms.items():
+                body.shafts[number - 1] = mechanism
+        else:
+            body = M1486Body(machine, mechanisms.values())
         rig(self.plan.kernel_of[name], name, faults, body)
 
     def unit_of(self, name: str) -> int:

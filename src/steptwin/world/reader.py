@@ -19,7 +19,9 @@ Path: TypeAlias = tuple[str | int, ...]
 
 _MISSING: Any = object()
 _HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]]+?)\s*\]{1,2}\s*(?:#.*)?$")
-_KEY = re.compile(r"\s*([\w\"'.&-]+)\s*=")
+_KEY = re.compile(r"\s*([\w\"'.&-]+)\s*=\s*")
+_BRACKET = re.compile(r"""\"(?:\\.|[^\"\\\n])*\"|'[^'\n]*'|#[^\n]*|[\[\]{}]""")
+"""A bracket, or what may hold one that means nothing."""
 
 
 class WorldError(Misuse):
@@ -57,6 +59,8 @@ class Text:
 
     def wrong(self, path: Path, code: str, message: str, hint: str | None = None) -> None:
         """Something is wrong with the value at ``path``, or with what holds it."""
+        if (*path, 0) in self._spans and path not in self._spans:
+            path = *path, 0
         while path and path not in self._spans:
             path = path[:-1]
         self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint)
@@ -96,8 +100,28 @@ def _spans(text: str) -> dict[Path, Span]:
             for part in _parts(key[1]):
                 path = (*path, part)
                 spans.setdefault(path, Span(offset + key.start(1), offset + len(line.split("#")[0].rstrip())))
+            if line.startswith("[", key.end()):
+                spans |= {(*path, n): span for n, span in enumerate(_items(text, offset + key.end()))}
         offset += len(line)
     return spans
+
+
+def _items(text: str, begin: int) -> list[Span]:
+    """The first lines of the tables in the array that begins there."""
+    found: list[Span] = []
+    depth = start = 0
+    for bracket in _BRACKET.finditer(text, begin):
+        if bracket[0] in "[{":
+            if depth == 1:
+                start = bracket.start()
+            depth += 1
+        elif bracket[0] in "]}":
+            depth -= 1
+            if depth == 0:
+                break
+            if depth == 1:
+                found.append(Span(start, start + len(text[start : bracket.end()].splitlines()[0])))
+    return found
 
 
 def _parts(dotted: str) -> list[str]:

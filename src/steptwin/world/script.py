@@ -306,8 +306,8 @@ def read_steps(text: Text, path: Path, value: object) -> tuple[Step, ...]:
         text.wrong(path, "D002", f"{path[-1]} is {value!r}", "expected a list of steps, such as [{ wait = '1 s' }]")
         return ()
     steps: list[Step] = []
-    for n, table in enumerate(value, start=1):
-        step = _step(text, path, n, table)
+    for n, table in enumerate(value):
+        step = _step(text, (*path, n), n + 1, table)
         if step is not None:
             steps.append(step)
     return tuple(steps)
@@ -319,7 +319,7 @@ def _step(text: Text, path: Path, n: int, table: object) -> Step | None:
         return None
     if "repeat" in table:
         values = read_table(text, path, table, (Key("repeat", whole(1, 10**9), "how often"),), ("steps",))
-        return Repeat(values.get("repeat", 1), read_steps(text, path, table.get("steps", [])))
+        return Repeat(values.get("repeat", 1), read_steps(text, (*path, "steps"), table.get("steps", [])))
     kinds = [key for key in table if key in ACTIONS]
     if len(kinds) != 1:
         near = "".join(text.near(key, ACTIONS) for key in table if key not in ACTIONS)

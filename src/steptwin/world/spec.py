@@ -5,6 +5,7 @@ Every table has rows (`KEYS`): the reader, the messages and the reference page t
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -549,7 +550,8 @@ def _faults(toml: Text) -> list[Fault]:
         try:
             found.append(parse(table, "[[fault]]"))
         except Misuse as error:
-            toml.wrong(("fault", n), "D003", str(error))
+            key = re.search(r"(\w+) = ", str(error))
+            toml.wrong(("fault", n, key[1] if key else ""), "D003", str(error))
     return found
 
 
