@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import struct
 from pathlib import Path
 
@@ -22,6 +23,16 @@ def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
     for label in ("M1 position", "M4 velocity", "mm/s", "IN20", "OUT3", "M2_EN", "AIN1", "tcp-1", "events", "time (s)"):
         assert f">{label}<" in text, label
     assert ">IN9<" not in text
+
+
+def test_long_names_are_not_cut_off(tmp_path: Path) -> None:
+    trace = Trace()
+    for name in ("a-machine-with-a-long-name", "b"):
+        trace.add(Record(0, name, "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
+    write_trace(trace, tmp_path / "run.svg")
+    begins = re.findall(r"translate\(([-\d.]+) [-\d.]+\)\">a-machine-with", (tmp_path / "run.svg").read_text())
+    assert len(begins) == 2
+    assert all(float(begin) > 0 for begin in begins)
 
 
 @pytest.mark.parametrize("form", ["svg", "png"])

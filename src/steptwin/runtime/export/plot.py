@@ -13,6 +13,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from steptwin.machine import SECOND, Nanos
@@ -30,6 +32,8 @@ MOST_ROWS = 48
 
 _WIDTH_IN = 12.0
 _LEFT_IN, _RIGHT_IN, _TOP_IN, _BOTTOM_IN = 1.5, 0.3, 0.55, 0.55
+_SCALE_IN, _MARGIN_IN = 0.55, 0.12
+"""Left of a panel: room for the numbers of its scale, then its label, then the margin."""
 _MOTION_IN, _ROW_IN, _GAP_IN = 0.78, 0.24, 0.1
 _COLUMNS = 1500
 """Of pixels across the picture: more points than a few in each are not seen."""
@@ -72,7 +76,8 @@ def write_plot(recording: Recording, path: Path, form: str, progress: Progress) 
     rows = rows[:MOST_ROWS]
     heights = [_MOTION_IN] * (2 * len(axes)) + ([_ROW_IN * len(rows)] if rows else [])
     with rc_context(_STYLE):
-        figure, panels = _figure(recording, heights)
+        left = max(_LEFT_IN, _room([*(_label(track, recording) + " velocity" for track in axes), *(row.label for row in rows)]))
+        figure, panels = _figure(recording, heights, left)
         for i, track in enumerate(axes):
             _motion(panels[2 * i], panels[2 * i + 1], track, recording)
             progress(begin + (until - begin) * (i + 1) // (len(axes) + 1))
@@ -108,16 +113,27 @@ def _rows(recording: Recording) -> list[_Row]:
     return rows
 
 
-def _figure(recording: Recording, heights: list[float]) -> tuple[Figure, list[Axes]]:
-    """One panel of each height (inches), one below the other."""
+def _room(labels: list[str]) -> float:
+    """Inches that the longest label needs left of the panels."""
+    font = FontProperties(family="DejaVu Sans", size=8.5)
+    widest = max((TextPath((0, 0), label, prop=font).get_extents().width for label in labels), default=0.0)
+    return _SCALE_IN + widest / 72 + _MARGIN_IN
+
+
+def _label(track: AxisTrack, recording: Recording) -> str:
+    return track.view.name if len(recording.machines) == 1 else track.name
+
+
+def _figure(recording: Recording, heights: list[float], left: float) -> tuple[Figure, list[Axes]]:
+    """One panel of each height (inches), one below the other, ``left`` inches from the edge."""
     height = _TOP_IN + _BOTTOM_IN + sum(heights) + _GAP_IN * max(len(heights) - 1, 0)
     figure = Figure(figsize=(_WIDTH_IN, max(height, 1.6)), facecolor="white")
     panels: list[Axes] = []
     at = height - _TOP_IN
-    width = (_WIDTH_IN - _LEFT_IN - _RIGHT_IN) / _WIDTH_IN
+    width = (_WIDTH_IN - left - _RIGHT_IN) / _WIDTH_IN
     for panel_height in heights:
         at -= panel_height
-        panel = figure.add_axes((_LEFT_IN / _WIDTH_IN, at / height, width, panel_height / height))
+        panel = figure.add_axes((left / _WIDTH_IN, at / height, width, panel_height / height))
         _dress(panel, recording)
         panels.append(panel)
         at -= _GAP_IN
@@ -125,7 +141,7 @@ def _figure(recording: Recording, heights: list[float]) -> tuple[Figure, list[Ax
         panels[-1].tick_params(axis="x", labelbottom=True, length=3)
         panels[-1].set_xlabel(_time_unit(recording))
     title = ", ".join(recording.machines[:8]) + (" …" if len(recording.machines) > 8 else "")
-    figure.text(_LEFT_IN / _WIDTH_IN, 1 - 0.3 / max(height, 1.6), title, fontsize=11, fontweight="bold")
+    figure.text(left / _WIDTH_IN, 1 - 0.3 / max(height, 1.6), title, fontsize=11, fontweight="bold")
     return figure, panels
 
 
@@ -163,14 +179,14 @@ def _motion(above: Axes, below: Axes, track: AxisTrack, recording: Recording) ->
     resolution = (recording.until - recording.begin) // _COLUMNS
     points = curve(track, recording.begin, recording.until, resolution)
     times = np.array(points.times) / SECOND
-    name = view.name if len(recording.machines) == 1 else track.name
+    name = _label(track, recording)
     for panel, values, color, label in (
         (above, points.positions, _POSITION, f"{name} position\n{view.unit}"),
         (below, points.velocities, _VELOCITY, f"{name} velocity\n{view.unit}/s"),
     ):
         panel.plot(*_thinned(times, np.array(values) / view.pulses_per_unit), color=color, linewidth=1.1)
         panel.set_ylabel(label, rotation=0, ha="right", va="center", labelpad=36, color=color)
-        panel.yaxis.set_label_coords(-0.052, 0.5)
+        panel.yaxis.set_label_coords(-_SCALE_IN / (panel.get_position().width * _WIDTH_IN), 0.5)
         panel.yaxis.set_major_locator(MaxNLocator(3))
         panel.margins(y=0.12)
         panel.grid(axis="y", color=_FAINT, linewidth=0.5)
