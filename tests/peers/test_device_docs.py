@@ -24,10 +24,9 @@ def blocks(page: str, language: str) -> list[str]:
 
 def test_the_programs_run(serve: Callable[..., Any], capsys: pytest.CaptureFixture[str]) -> None:
     twin = serve("--demo")
-    programs = blocks("drivers.md", "python")
+    programs = [program for program in blocks("drivers.md", "python") if HERE in program]
     assert len(programs) == 4
     for program in programs:
-        assert HERE in program
         exec(compile(program.replace(HERE, f"tcp://127.0.0.1:{twin.tcp_port}"), "drivers.md", "exec"), {})
         printed = capsys.readouterr().out.splitlines()
         assert printed
@@ -45,3 +44,24 @@ def test_the_commands_run(serve: Callable[..., Any], monkeypatch: pytest.MonkeyP
         with pytest.raises(SystemExit) as end:
             main()
         assert end.value.code == 0, (typed, capsys.readouterr().err)
+
+
+def test_the_m1486s_part(
+    serve_m1486: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    here = "tcp://127.0.0.1:5022"
+    twin = serve_m1486("--variant", "B", "--chain", "0,7", "--tcp", "127.0.0.1:0")
+    place = f"tcp://127.0.0.1:{twin.tcp_port}"
+    (program,) = (program for program in blocks("drivers.md", "python") if here in program)
+    exec(compile(program.replace(here, place), "drivers.md", "exec"), {})
+    printed = capsys.readouterr().out.splitlines()
+    promised = re.findall(r"print\(.*\)  # (chip.*)", program)
+    assert promised
+    assert set(promised) <= set(printed)
+    (commands,) = blocks("drivers.md", "sh")
+    monkeypatch.setenv("STEPTWIN_DEVICE", f"{place},chip=7")
+    for line in commands.splitlines()[1:]:
+        monkeypatch.setattr("sys.argv", shlex.split(line.replace("examples/", f"{DOCS.parent}/examples/")))
+        with pytest.raises(SystemExit) as end:
+            main()
+        assert end.value.code == 0, (line, capsys.readouterr().err)

@@ -22,7 +22,7 @@ Device = Annotated[
         envvar="STEPTWIN_DEVICE",
         metavar="ADDRESS",
         help="/dev/ttyUSB0, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT; behind it ,unit=N ,baud=N ,config=FILE "
-        ",firmware=V ,timeout=S. Default: the twin on tcp://127.0.0.1:5020.",
+        ",firmware=V ,timeout=S; for an M1486 ,kind=m1486 or ,chip=7 ,variant=B. Default: the twin on tcp://127.0.0.1:5020.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -38,6 +38,8 @@ def opened(device: str | None, *, observe: bool = True, log_frames: bool = False
     from steptwin.host.address import DEFAULT, parse_device
 
     address = parse_device(device or DEFAULT)
+    if address.kind != "mic488":
+        raise Misuse("this command is for the MIC488; an M1486 has info, get, set, watch, move, stop and send")
     mic = Mic488(
         address.place,
         address.unit,

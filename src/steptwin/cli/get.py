@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from steptwin.cli.chip import chip_address, set_values
+from steptwin.cli.chip import get as chip_get
 from steptwin.cli.device import Device, Json, LogFrames, number_of, opened, print_json, shown, table
 from steptwin.errors import Misuse
 
@@ -43,7 +45,11 @@ def get(
     json: Json = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Read registers by name. 'steptwin registers mic488' lists them."""
+    """Read registers by name. 'steptwin registers mic488' lists them; an M1486 tells POSITION, COUNTER, VARIABLE, FLAGS…"""
+    chip = chip_address(device)
+    if chip is not None:
+        chip_get(chip, names, json=json, log_frames=log_frames)
+        return
     with opened(device, log_frames=log_frames) as mic:
         registers = map_of(mic)
         wanted = expanded(registers, names)
@@ -69,6 +75,10 @@ def set_(
 
     A register that repeats would act twice on is sent once only; where its answer is lost, the message says so.
     """
+    chip = chip_address(device)
+    if chip is not None:
+        set_values(chip, changes, log_frames=log_frames)
+        return
     given = [_change(change) for change in changes]
     with opened(device, log_frames=log_frames) as mic:
         registers = map_of(mic)

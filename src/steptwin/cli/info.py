@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from steptwin.cli.chip import chip_address
+from steptwin.cli.chip import info as chip_info
 from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, shown, table
 
 if TYPE_CHECKING:
@@ -19,6 +21,10 @@ _PROGRAM = {0: "stopped", 1: "running", 2: "paused"}
 
 def info(device: Device = None, json: Json = False, log_frames: LogFrames = False) -> None:
     """Show what a controller is and what it is doing."""
+    chip = chip_address(device)
+    if chip is not None:
+        chip_info(chip, json=json, log_frames=log_frames)
+        return
     with opened(device, log_frames=log_frames) as mic:
         status = mic.status()
         data_type = mic.get("DATA_TYPE")["DATA_TYPE"]

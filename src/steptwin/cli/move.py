@@ -15,11 +15,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from steptwin.cli.chip import chip_address
+from steptwin.cli.chip import move as move_chip
+from steptwin.cli.chip import stop as chip_stop
 from steptwin.cli.device import Axes, Device, Json, LogFrames, axes_of, complain, opened, print_json, tied
 from steptwin.errors import Misuse, Refusal
 
 if TYPE_CHECKING:
     from steptwin.host import Mic488, MoveEnd
+    from steptwin.host.address import DeviceAddress
 
 Wait = Annotated[bool, typer.Option("--wait/--no-wait", help="Wait for the end, and stop at Ctrl-C.")]
 Timeout = Annotated[float | None, typer.Option(help="Seconds to wait at most. Default: computed from the motion.")]
@@ -45,7 +49,11 @@ def stop(
     ] = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Stop axes at once, without ramp. A program that runs may move them again: see --program."""
+    """Stop axes at once, without ramp; an M1486 with its ramp. A program that runs may move them again: see --program."""
+    chip = chip_address(device)
+    if chip is not None:
+        chip_stop(chip, program=program, log_frames=log_frames)
+        return
     with opened(device, log_frames=log_frames) as mic:
         mic.stop(*axes_of(axes))
         if program:
@@ -64,7 +72,14 @@ def move(
     json: Json = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Move axes; several begin in the same instant. Exit code 1 when one does not arrive."""
+    """Move axes; several begin in the same instant. Exit code 1 when one does not arrive.
+
+    An M1486 has axis 1, and its unit is the full step.
+    """
+    chip = chip_address(device)
+    if chip is not None:
+        _move_chip(chip, targets, by=by, velocity=velocity, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+        return
     values = tied(targets)
 
     def begin(mic: Mic488, begun: set[int]) -> None:
@@ -79,6 +94,32 @@ def move(
         begun.update(values)
 
     _do(device, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+
+
+def _move_chip(
+    chip: DeviceAddress,
+    targets: list[str],
+    *,
+    by: bool,
+    velocity: float | None,
+    wait: bool,
+    timeout: float | None,
+    json: bool,
+    log_frames: bool,
+) -> None:
+    values = tied(targets)
+    if set(values) != {1}:
+        raise Misuse(f"an M1486 has one axis, 1: {' '.join(targets)}")
+    with _interruptible():
+        end = move_chip(chip, values[1], by=by, velocity=velocity, wait=wait, timeout=timeout, log_frames=log_frames)
+    if end is None:
+        return
+    if json:
+        print_json({"ok": end.ok, "reason": end.reason.value, "position": end.position, "unit": end.unit, "after_s": end.after_s})
+    else:
+        typer.echo(str(end))
+    if not end.ok:
+        raise typer.Exit(1)
 
 
 def home(

@@ -1,4 +1,7 @@
-"""``steptwin send``: a program into a device."""
+"""``steptwin send``: a program into a device.
+
+From Python: `steptwin.host.m1486.M1486.download`.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,22 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli.chip import chip_address
+from steptwin.cli.chip import send as send_to_chip
+from steptwin.cli.device import Device, LogFrames
 from steptwin.errors import Refusal
 
 
-def send(file: Annotated[Path, typer.Argument(help="The program.")]) -> None:
-    """Download a program."""
+def send(
+    file: Annotated[Path, typer.Argument(help="The program.")], device: Device = None, log_frames: LogFrames = False
+) -> None:
+    """Download a program into an M1486. A file in [ ] runs from its end on; an E type is erased before, and keeps it."""
+    chip = chip_address(device)
+    if chip is not None:
+        send_to_chip(chip, file, log_frames=log_frames)
+        return
     raise Refusal(
         f"{file} is not sent: how the vendor's tool downloads a program into a MIC488 is documented nowhere. "
         "'steptwin build' makes the vendor's image of it; download that with the vendor's tool, or give it to a twin: "
-        "'steptwin serve mic488 --program'"
+        "'steptwin serve mic488 --program'. An M1486 takes programs: name it with --device ADDRESS,kind=m1486"
     )

@@ -5,20 +5,21 @@ From Python: `steptwin.host.Mic488.get_shown` in a loop.
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, Generator, Iterator
+from typing import Annotated, Any
 
 import typer
 
+from steptwin.cli.chip import chip_address, opened_chip, read
 from steptwin.cli.device import Device, LogFrames, opened, shown, table
 from steptwin.cli.get import expanded, map_of, names_from
 from steptwin.errors import Misuse
 
-if TYPE_CHECKING:
-    from steptwin.host import Mic488
-
+Look = Callable[[], dict[str, tuple[Any, str]]]
+CHIP_NAMES = ("POSITION", "VARIABLE", "FLAGS")
 DEFAULT_NAMES = ("M?_POS_ACT", "M?_VEL_ACT", "M?_STATUS")
 MOST_HZ = 50.0
 
@@ -39,9 +40,8 @@ def watch(
         raise Misuse(f"--hz {hz:g}: permitted are more than 0 and at most {MOST_HZ:g}")
     if count is not None and count < 1:
         raise Misuse(f"--count {count}: permitted are 1 and more")
-    with opened(device, log_frames=log_frames) as mic:
-        wanted = expanded(map_of(mic), names or DEFAULT_NAMES)
-        looks = _looks(mic, wanted, hz, count)
+    with _reading(device, names, log_frames=log_frames) as look:
+        looks = _looks(look, hz, count)
         try:
             if json:
                 _print_json(looks)
@@ -53,12 +53,25 @@ def watch(
             pass
 
 
-def _looks(mic: Mic488, names: list[str], hz: float, count: int | None) -> Iterator[tuple[float, dict[str, tuple[Any, str]]]]:
+@contextlib.contextmanager
+def _reading(device: str | None, names: list[str] | None, *, log_frames: bool) -> Generator[Look]:
+    """One look at what is wanted of the device meant."""
+    chip = chip_address(device)
+    if chip is not None:
+        with opened_chip(chip, log_frames=log_frames) as one:
+            yield lambda: read(one, names or CHIP_NAMES)
+        return
+    with opened(device, log_frames=log_frames) as mic:
+        wanted = expanded(map_of(mic), names or DEFAULT_NAMES)
+        yield lambda: mic.get_shown(*wanted)
+
+
+def _looks(look: Look, hz: float, count: int | None) -> Iterator[tuple[float, dict[str, tuple[Any, str]]]]:
     """Seconds since the first look, and the values."""
     begin = time.monotonic()
     number = 0
     while count is None or number < count:
-        yield time.monotonic() - begin, mic.get_shown(*names)
+        yield time.monotonic() - begin, look()
         number += 1
         # A look that is late is left out, so that a slow line is not asked without a pause.
         number_due = (time.monotonic() - begin) * hz

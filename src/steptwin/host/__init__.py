@@ -1,6 +1,7 @@
 """Drivers for the real devices and their twins.
 
 ``with Mic488("/dev/ttyUSB0") as mic:`` for threads, ``async with AsyncMic488("tcp://host:502") as mic:`` for asyncio.
+The M1486 has the same in `steptwin.host.m1486`.
 Errors are `steptwin.errors.Misuse`, `Refusal` and `LineFailure`; what is listed here are their kinds.
 """
 

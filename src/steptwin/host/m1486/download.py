@@ -11,7 +11,6 @@ from steptwin.host.m1486.motion import UNKNOWN_S, ChipMotion, Told
 from steptwin.host.m1486.settings import ChipSettings, after_reset
 from steptwin.host.m1486.talk import WHO
 from steptwin.host.m1486.unit import Unit
-from steptwin.m1486.check import check
 from steptwin.m1486.functions import FUNCTIONS, RETURN, TABLE
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import Command, Program
@@ -29,6 +28,8 @@ _MOVES = frozenset("r)(jk'[")
 
 def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> Program:
     """Raises `Misuse` with every error in it."""
+    from steptwin.m1486.check import check
+
     checked = check(text, variant, interface)
     if not checked.is_sound:
         errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]

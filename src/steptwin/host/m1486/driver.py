@@ -126,6 +126,10 @@ class AsyncM1486:
             await self.close()
             raise
 
+    async def open_line(self) -> None:
+        """Open the line only: enough for `stop` and `stop_program` of a chip that moves, which cannot be asked anything."""
+        await self.line.open()
+
     async def close(self) -> None:
         """Close the line, unless it is shared. The chip goes on with what it does."""
         if self._own:
@@ -433,12 +437,11 @@ class AsyncM1486:
         """
         unit = self._unit
         notes = unit.notes
-        notes.stops += 1
         if notes.motion is None or notes.motion.kind is not ChipMotion.ENDLESS:
             notes.is_position_valid = False
-        unit.talk.dirty = True  # what is typed before K then is wrong data
-        await unit.kill()
+        await unit.kill(program=True)
         async with unit.turn():
+            unit.talk.settle(unit.address)  # questions went with the program
             if notes.function(RECOVER) is not True:
                 await unit.say("c75", stored=False)
             notes.is_killed = False

@@ -59,7 +59,7 @@ class NoEcho(LineFailure):
 
     uncertain = False
 
-    def __init__(self, place: str, chip: str, cause: LineFailure) -> None:
+    def __init__(self, place: str, chip: str, cause: LineFailure | None) -> None:
         super().__init__(
             f"{place}: {chip} does not echo: it is off, has another address or baud rate, or still does what it was told before "
             f"({cause})"

@@ -112,6 +112,7 @@ class M1486(Blocking):
         return finish(self._driver.download(text, progress=progress, name=name))
 
     open = blocking(AsyncM1486.open)
+    open_line = blocking(AsyncM1486.open_line)
     close = blocking(AsyncM1486.close)
     counter = blocking(AsyncM1486.counter)
     position = blocking(AsyncM1486.position)

@@ -110,6 +110,7 @@ class CharacterTalk:
         """Whether characters of a command that was given up may lie in front of the next one."""
         self.nearly_full = False
         """Whether the last command met one of the last three places of the input buffer."""
+        self._is_stuck = False  # the spoiler found no room: it is to be said again
         self._request: Say | None = None
         self._lines: list[bytes] = []  # still to be said, the one being said first
         self._sent = b""
@@ -119,6 +120,8 @@ class CharacterTalk:
     wary = True
 
     def allowance_ns(self, request: Say) -> Nanos:
+        if request.sort is Sort.LISTEN:
+            return 0
         return self._serial.duration(2 * len(request.text) + 16)
 
     def knows(self, address: int | None) -> bool:
@@ -144,7 +147,7 @@ class CharacterTalk:
         self._request = request
         self._heard = b""
         self._lines = []
-        self.nearly_full = False
+        self.nearly_full = self._is_stuck = False
         request.committed = request.commented = False
         selection = [] if request.address in (ALL, self.selected) else [f"x{request.address:x}".encode()]
         spoiler = [SPOILER] if self.dirty else []
@@ -161,7 +164,12 @@ class CharacterTalk:
                 return self._put(text, now)
             case Sort.KILL:
                 request.committed = True
-                return self._put(b"".join(line + _END for line in (*spoiler, *selection, text)), now)
+                said = b"".join(line + _END for line in (*selection, *text.splitlines()))
+                if self.dirty:
+                    said = SPOILER + _END + said
+                elif not self.knows(request.address):
+                    said *= 2  # the first line may meet the rest of another one
+                return self._put(said, now)
             case Sort.SELECT:
                 self._lines = [*spoiler, *selection]
             case Sort.LINE:
@@ -217,7 +225,8 @@ class CharacterTalk:
             self.nearly_full = True
             return None
         if byte == NO_ROOM:
-            if expected == SPOILER[0]:
+            if expected == SPOILER[0] or (request.sort is Sort.KILL and self._heard.endswith(SPOILER)):
+                self._is_stuck = True
                 return self._echo(request, expected, rest, now)
             self._give_up(now)
             raise NoRoom(self._place, request)
@@ -249,7 +258,7 @@ class CharacterTalk:
 
     def _came_back(self, request: Say, rest: bytes, now: Nanos) -> bytes | More | None:
         if request.sort is Sort.KILL:
-            self.dirty = False
+            self.dirty = self._is_stuck
             self.selected = request.address
             return self._done(b"")
         if self._sent != _END:
@@ -264,7 +273,7 @@ class CharacterTalk:
     def _line_taken(self, request: Say, rest: bytes, now: Nanos) -> bytes | More | None:
         line = self._lines.pop(0)
         if line == SPOILER:
-            self.dirty = False
+            self.dirty = self._is_stuck
             self.spoilt[request.address] = self.spoilt.get(request.address, 0) + 1
         elif request.sort is Sort.SELECT or self._lines:
             self.selected = request.address

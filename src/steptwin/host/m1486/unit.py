@@ -16,7 +16,7 @@ from steptwin.host.m1486.failures import Busy, Garbled, NoEcho, WrongType, untol
 from steptwin.host.m1486.lines import TALK
 from steptwin.host.m1486.motion import Told
 from steptwin.host.m1486.settings import ChipSettings
-from steptwin.host.m1486.talk import WHO, CharacterTalk, Say, Sort, chip_name
+from steptwin.host.m1486.talk import SPOILER, WHO, CharacterTalk, Say, Sort, chip_name
 from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN
 from steptwin.m1486.lines import INTERFACES, Interface
 from steptwin.m1486.ranges import out_of_range
@@ -124,32 +124,32 @@ class Unit:
     async def wake(self) -> None:
         """Have the chip echo what it hears, and select it. Raises `NoEcho`."""
         failure: LineFailure | None = None
+        rest = ""
         for pause in PAUSES_NS:
             try:
                 if self.address is not None:
                     # Everybody is to echo, so that the selection is verified by whoever hears it.
-                    await self._blind(f"xg\rxg\rt{RETURN}\r", pause)
+                    await self._blind(f"{rest}xg\rxg\rt{RETURN}\r", pause)
+                    rest = ""
                     await self._exchange(Say(self.address, "", sort=Sort.SELECT, acts=False))
-                await self._blind_echo(pause)
+                await self._blind_echo(rest, pause)
                 await self._exchange(Say(self.address, f"t{RETURN}", acts=False))
             except (NoAnswer, Garbled) as error:
                 failure = error
+                # What was not echoed lacks only its CR. To spoil it would end a program that runs (M-11).
+                rest = "\r" if isinstance(error, NoAnswer) else ""
                 continue
             self.talk.echoing.add(self.address)
             self._written()
             return
-        if failure is None:
-            raise Misuse("no pauses")
+        await self._blind(rest, PAUSES_NS[0])
         raise NoEcho(self.place, self.name, failure) from failure
 
-    async def _blind_echo(self, pause: Nanos) -> None:
+    async def _blind_echo(self, rest: str, pause: Nanos) -> None:
         """Switch the echo on, with the selection as it is."""
-        say = Say(self.address, 2 * f"t{RETURN}\r", sort=Sort.BLIND)
         selected = self.talk.selected
-        try:
-            await self._exchange(say, timeout_ns=pause)
-        except NoAnswer:
-            self.talk.selected = selected
+        await self._blind(rest + 2 * f"t{RETURN}\r", pause)
+        self.talk.selected = selected
 
     async def _ready(self) -> None:
         """It echoes, and its EEPROM is free."""
@@ -308,27 +308,27 @@ class Unit:
 
     # ------------------------------------------------------------------ stopping
 
-    async def kill(self) -> None:
-        """K, before everything that waits for the line. Raises `steptwin.host.Untold`."""
+    async def kill(self, *, program: bool = False) -> None:
+        """K, before everything that waits for the line; ``program``: and wrong data before it. Raises `steptwin.host.Untold`."""
         notes = self.notes
         notes.stops += 1
+        notes.is_killed = True
+        text = f"{SPOILER.decode()}\rk" if program else "k"
         failure: LineFailure | None = None
-        for _ in range(STOP_TRIES):
-            if not self.talk.knows(self.address):
-                break
+        for attempt in range(STOP_TRIES):
+            if attempt and not self.talk.knows(self.address):
+                break  # it was worth a try: function 41 may be ON since before
             try:
-                await self._exchange(Say(self.address, "k", sort=Sort.KILL), urgent=True)
+                await self._exchange(Say(self.address, text, sort=Sort.KILL), urgent=True)
             except (Garbled, NoAnswer) as error:
                 failure = error
                 continue
-            notes.is_killed = True
+            self.talk.echoing.add(self.address)
             return
         select = "" if self.address is None else f"x{self.address:x}\r"
-        for _ in range(2):  # nobody says whether it was heard: the first line may have met the rest of another one
-            await self._blind(f"{select}k\r", PAUSES_NS[0], urgent=True)
-        notes.is_killed = True
-        if failure is None:
-            failure = LineFailure(
-                f"{self.place}: Kill was sent, and the chip does not echo, so nobody knows whether it was heard"
-            )
-        raise untold(self.name, failure)
+        await self._blind(2 * f"{select}{text}\r", PAUSES_NS[0], urgent=True)
+        try:
+            await self.wake()
+            await self._exchange(Say(self.address, text, sort=Sort.KILL), urgent=True)
+        except (NoEcho, Garbled, NoAnswer) as error:
+            raise untold(self.name, failure or error) from error

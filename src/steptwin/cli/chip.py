@@ -1,0 +1,241 @@
+"""What the commands for devices do with an M1486: info, get, set, watch, move, stop, send.
+
+From Python: `steptwin.host.m1486.M1486`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Generator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from steptwin.cli.device import complain, number_of, print_json, shown, table
+from steptwin.errors import Misuse
+
+if TYPE_CHECKING:
+    from steptwin.host.address import DeviceAddress
+    from steptwin.host.m1486 import M1486, ChipMoveEnd
+
+Shown = dict[str, tuple[Any, str]]
+NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
+_SETTINGS = {
+    "S": "start_stop",
+    "A": "acceleration",
+    "V": "velocity",
+    "P": "profile",
+    "M": "microstep",
+    "Q": "qualification",
+    "N": "waveform",
+}
+_SWITCHES = {"ON": True, "TRUE": True, "1": True, "OFF": False, "FALSE": False, "0": False}
+SETTABLE = "POSITION, VARIABLE, B1…B21, FLAG80…FLAG86, F40…F63, S, A, V, P, M, Q, N"
+
+
+def chip_address(device: str | None) -> DeviceAddress | None:
+    """The address if it is an M1486's."""
+    if device is None:
+        return None
+    from steptwin.host.address import parse_device
+
+    address = parse_device(device)
+    return address if address.kind == "m1486" else None
+
+
+@contextlib.contextmanager
+def opened_chip(address: DeviceAddress, *, log_frames: bool = False) -> Generator[M1486]:
+    from steptwin.host.m1486 import M1486
+
+    with M1486(
+        address.place,
+        address.chip,
+        baud=address.baud,
+        variant=address.variant,
+        timeout_s=address.timeout,
+        log=complain if log_frames else None,
+    ) as chip:
+        yield chip
+
+
+# ---------------------------------------------------------------------- looking
+
+
+def checked(names: Sequence[str]) -> list[str]:
+    """Raises `Misuse` for a name there is not."""
+    wanted = [name.upper() for name in names]
+    for name in wanted:
+        if name not in NAMES:
+            raise Misuse(f"{name!r} is nothing an M1486 tells: there are {', '.join(NAMES)}")
+    return wanted
+
+
+def read(chip: M1486, names: Sequence[str]) -> Shown:
+    """Values by name, each with its unit. Errors as `checked`."""
+    wanted = checked(names)
+    status = chip.status()
+    known: Shown = {
+        "POSITION": (status.position if status.is_position_valid else None, status.unit),
+        "COUNTER": (status.counter_u, "min. microsteps"),
+        "VARIABLE": (status.variable, ""),
+        "FLAGS": (_on(status.flags), ""),
+        "FUNCTIONS": (_on(status.functions), ""),
+        "TYPE": (status.type, ""),
+        "INTERFACE": (status.interface, ""),
+        "SERIES": (status.series, ""),
+    }
+    return {name: known[name] for name in wanted}
+
+
+def _on(states: Mapping[int, bool]) -> str:
+    return " ".join(str(number) for number, on in states.items() if on) or "none"
+
+
+def _tell(values: Shown, *, as_json: bool) -> None:
+    if as_json:
+        print_json({name: {"value": value, "unit": unit} for name, (value, unit) in values.items()})
+    else:
+        typer.echo(table([(name, shown(value), unit) for name, (value, unit) in values.items()]))
+
+
+def info(address: DeviceAddress, *, json: bool, log_frames: bool) -> None:
+    with opened_chip(address, log_frames=log_frames) as chip:
+        values = read(chip, NAMES)
+        if json:
+            print_json(
+                {"device": chip.place, "chip": chip.address} | {name.lower(): value for name, (value, _) in values.items()}
+            )
+            return
+        which = "" if chip.address is None else f", chip {chip.address:X}"
+        typer.echo(f"{values['TYPE'][0]}{which} at {chip.place}, {values['INTERFACE'][0]}, series {values['SERIES'][0]}")
+        typer.echo(f"position {shown(values['POSITION'][0])} {values['POSITION'][1]} ({values['COUNTER'][0]} min. microsteps)")
+        typer.echo(f"internal variable {values['VARIABLE'][0]}; flags ON: {values['FLAGS'][0]}")
+        typer.echo(f"functions ON: {values['FUNCTIONS'][0]}")
+
+
+def get(address: DeviceAddress, names: Sequence[str], *, json: bool, log_frames: bool) -> None:
+    wanted = checked(names)
+    with opened_chip(address, log_frames=log_frames) as chip:
+        _tell(read(chip, wanted), as_json=json)
+
+
+# ---------------------------------------------------------------------- changing
+
+
+def set_values(address: DeviceAddress, changes: Sequence[str], *, log_frames: bool) -> None:
+    """Everything is looked at before anything is typed."""
+    actions = [_action(change) for change in changes]
+    with opened_chip(address, log_frames=log_frames) as chip:
+        for action in actions:
+            action(chip)
+
+
+def _action(text: str) -> Callable[[M1486], object]:
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise Misuse(f"{text!r}: expected NAME=VALUE, such as VARIABLE=7 or B6=off")
+    name = name.upper()
+    if name == "POSITION":
+        position = number_of(value, text)
+        return lambda chip: chip.set_position(position)
+    if name in _SETTINGS or name == "VARIABLE":
+        number = number_of(value, text)
+        if number != int(number):
+            raise Misuse(f"{text!r}: {name} takes whole numbers")
+        if name == "VARIABLE":
+            return lambda chip: chip.set_variable(int(number))
+        setting: dict[str, Any] = {_SETTINGS[name]: int(number)}
+        return lambda chip: chip.configure(**setting)
+    for prefix in ("FLAG", "B", "F"):
+        if name.startswith(prefix) and name[len(prefix) :].isdecimal():
+            return _switch(prefix, int(name[len(prefix) :]), value, text)
+    raise Misuse(f"{text!r}: {name} cannot be set: there are {SETTABLE}")
+
+
+def _switch(prefix: str, number: int, value: str, text: str) -> Callable[[M1486], object]:
+    on = _SWITCHES.get(value.upper())
+    if on is None:
+        raise Misuse(f"{text!r}: expected on or off")
+    match prefix:
+        case "B":
+            return lambda chip: chip.set_output(number, on)
+        case "FLAG":
+            return lambda chip: chip.set_flag(number, on)
+        case _:
+            return lambda chip: chip.set_function(number, on)
+
+
+# ---------------------------------------------------------------------- motion
+
+
+def move(
+    address: DeviceAddress,
+    target: float,
+    *,
+    by: bool,
+    velocity: float | None,
+    wait: bool,
+    timeout: float | None,
+    log_frames: bool,
+) -> ChipMoveEnd | None:
+    """Full steps. Ctrl-C stops it."""
+    with opened_chip(address, log_frames=log_frames) as chip:
+        if velocity is not None:
+            chip.configure(velocity=velocity)
+        try:
+            (chip.move_by if by else chip.move_to)(target)
+            return chip.wait(timeout, check=False) if wait else None
+        except KeyboardInterrupt:
+            chip.stop()
+            complain("stopped")
+            raise
+
+
+def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
+    """K is typed whether the chip can be asked or not: one that moves cannot."""
+    from steptwin.host.m1486 import M1486
+
+    chip = M1486(
+        address.place,
+        address.chip,
+        baud=address.baud,
+        variant=address.variant,
+        timeout_s=address.timeout,
+        log=complain if log_frames else None,
+    )
+    chip.open_line()
+    try:
+        (chip.stop_program if program else chip.stop)()
+    finally:
+        chip.close()
+
+
+# ---------------------------------------------------------------------- programs
+
+
+def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
+    """Download a program; it runs from its ``]`` on."""
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise Misuse(f"cannot read {file}: {getattr(error, 'strerror', None) or error}") from None
+    with opened_chip(address, log_frames=log_frames) as chip, _progress(file.name) as tell:
+        uploaded = chip.download(text, progress=tell, name=str(file))
+        title = chip.variant.title
+    typer.echo(f"{file} is in the {title}" + (f"; it uploaded {uploaded.hex(' ')}" if uploaded else ""))
+
+
+@contextlib.contextmanager
+def _progress(title: str) -> Generator[Callable[[int, int], object]]:
+    """A bar on the standard error, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

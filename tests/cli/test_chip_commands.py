@@ -1,0 +1,57 @@
+"""The commands for devices against a served M1486, as people type them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.host.address import parse_device
+
+PROGRAM = "[\n@1\nf640\nr\nw100\nd\nr\nj1\n]\n"
+
+
+def test_an_address_says_what_kind_of_device_is_meant() -> None:
+    address = parse_device("/dev/ttyUSB0,chip=b,variant=E1")
+    assert (address.kind, address.chip, address.variant, address.baud, address.timeout) == ("m1486", 11, "E1", 4800, 0.5)
+    assert parse_device("tcp://h:1,kind=m1486,baud=300").baud == 300
+    assert parse_device("tcp://h:1").kind == "mic488"
+    for text in ("h,kind=plc", "h,kind=mic488,chip=3", "h,chip=3,unit=2", "h,chip=x"):
+        with pytest.raises(Misuse):
+            parse_device(text)
+
+
+def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path: Path) -> None:
+    twin = serve_m1486("--variant", "B", "--chain", "0,7")
+    device = f"{twin.pty},chip=7"
+
+    def run(*arguments: str, code: int = 0) -> str:
+        done = twin.command(*arguments, "--device", device)
+        assert done.returncode == code, done.stderr
+        return done.stdout or done.stderr
+
+    assert run("info").startswith(
+        f"M1486B, chip 7 at {twin.pty}, Step & Direction, series 1\nposition 0 step (0 min. microsteps)"
+    )
+    run("set", "V=2000", "A=50000", "VARIABLE=77", "FLAG83=on", "B6=off", "F52=off", "POSITION=10")
+    values = json.loads(run("get", "position", "variable", "flags", "functions", "--json"))
+    assert [values[name]["value"] for name in ("POSITION", "VARIABLE", "FLAGS")] == [10.0, 77, "83"]
+    assert "52" not in values["FUNCTIONS"]["value"]
+    assert run("move", "1=40") == "chip 7: target reached at 40 step\n"
+    assert run("watch", "position", "--count", "1").splitlines()[1].endswith("\t40")
+    assert "is nothing an M1486 tells: there are POSITION" in run("get", "M1_POS_ACT", code=2)
+    assert "an M1486 has info, get, set" in run("enable", "1", code=2)
+    assert "velocity = 30000: M1486B takes 16 to 20 000 step/s" in run("set", "V=30000", code=2)
+
+    program = tmp_path / "toandfro.m1486"
+    program.write_text(PROGRAM)
+    assert run("send", str(program)) == f"{program} is in the M1486B\n"
+    assert "does not answer yet" in run("info", code=1)
+    run("stop", "--program")
+    assert run("get", "counter").startswith("COUNTER")
+    program.write_text("v99999\n")
+    assert "error M110: V 99 999 is out of range" in run("send", str(program), code=2)
