@@ -8,15 +8,16 @@ from math import isfinite
 from types import TracebackType
 from typing import Self
 
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import Misuse
 from steptwin.host.line import Line
 from steptwin.host.m1486.download import Progress, begin, reset, send_program, type_file
 from steptwin.host.m1486.failures import Busy, ChipMoveFailed, PositionUnknown
 from steptwin.host.m1486.lines import BAUD, AsyncM1486Line
-from steptwin.host.m1486.motion import EARLY, EARLY_S, MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
+from steptwin.host.m1486.motion import UNKNOWN_S, ChipMotion, ChipMoveEnd, Told
 from steptwin.host.m1486.settings import COMMANDS, ChipSettings, checked_number
 from steptwin.host.m1486.talk import Say
-from steptwin.host.m1486.unit import SLICE_NS, Unit
+from steptwin.host.m1486.unit import Unit
+from steptwin.host.m1486.waiting import wait_for
 from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.functions import CARRY, FUNCTIONS, LIMITOFF, RECOVER, REPORT, RETURN, USER_FLAGS
 from steptwin.m1486.lines import LINES
@@ -459,72 +460,10 @@ class AsyncM1486:
         Raises `ChipMoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
         reported as the end.
         """
-        begin = self.line.now()
-        try:
-            end = await self._ended(timeout_s, begin)
-        except LineFailure as failure:
-            if check:
-                raise
-            seconds = (self.line.now() - begin) / SECOND
-            return ChipMoveEnd(self.address, ChipReason.COMMUNICATION, None, self.unit, seconds, str(failure), failure)
+        end = await wait_for(self._unit, timeout_s, self.unit, self._shown, check=check)
         if check and not end.ok:
             raise ChipMoveFailed(end)
         return end
-
-    async def _ended(self, timeout_s: float | None, begin: int) -> ChipMoveEnd:
-        unit, notes = self._unit, self._unit.notes
-        motion = notes.motion
-        if timeout_s is None:
-            timeout_s = self._time_out_s(motion)
-        limit = begin + round(timeout_s * SECOND)
-        looked = unit.is_alone
-        if motion is not None and motion.duration_s is not None and not looked:
-            await self._sleep_until(min(limit, motion.at + round(motion.duration_s * SECOND)), motion)
-        async with unit.turn():
-            letter = await unit.asks_who(max(limit - self.line.now(), SLICE_NS))
-            ended = self.line.now()
-            seconds = (ended - begin) / SECOND
-            if letter is None:
-                stopped = motion is not None and motion.stops != notes.stops
-                reason = ChipReason.STOPPED if stopped else ChipReason.OVERDUE
-                return ChipMoveEnd(self.address, reason, None, self.unit, seconds, unit.why_busy())
-            counter = await unit.read_number(1, rests=True)
-            notes.motion = None
-        reason, detail = self._reason(motion, counter, ended, looked=looked)
-        if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
-            notes.is_position_valid = False
-        position = self._shown(counter) if notes.is_position_valid else None
-        return ChipMoveEnd(self.address, reason, position, self.unit, seconds, detail)
-
-    def _time_out_s(self, motion: Told | None) -> float:
-        if motion is None or motion.stops != self._unit.notes.stops:
-            return UNKNOWN_S
-        if motion.kind is ChipMotion.ENDLESS:
-            raise Misuse(f"{self._unit.name} runs without end: give the time to wait, timeout_s")
-        return UNKNOWN_S if motion.duration_s is None else MARGIN * motion.duration_s + MARGIN_S
-
-    async def _sleep_until(self, moment: int, motion: Told) -> None:
-        while (rest := moment - self.line.now()) > 0 and motion.stops == self._unit.notes.stops:
-            await self.line.sleep(min(rest, 2 * SLICE_NS) / SECOND)
-
-    def _reason(self, motion: Told | None, counter: int, ended: int, *, looked: bool) -> tuple[ChipReason, str]:
-        if motion is None:
-            return ChipReason.REST, ""
-        if motion.stops != self._unit.notes.stops:
-            return ChipReason.STOPPED, ""
-        if motion.kind is ChipMotion.ENDLESS:
-            return ChipReason.LIMIT, ""
-        if motion.kind is ChipMotion.SEEK:
-            return ChipReason.SOUGHT, ""
-        if motion.kind is ChipMotion.BLOCK:
-            whole = self._unit.talk.spoilt.get(self.address, 0) == motion.spoilt
-            return (ChipReason.DONE if whole else ChipReason.CUT), ""
-        if motion.target_u is not None and counter != motion.target_u:
-            return ChipReason.DIVERTED, f"the target was {self._shown(motion.target_u):g} {self.unit}"
-        took_s = (ended - motion.at) / SECOND
-        if looked and motion.duration_s is not None and took_s < EARLY * motion.duration_s - EARLY_S:
-            return ChipReason.EARLY, f"after {took_s:.2f} s of {motion.duration_s:.2f} s"
-        return ChipReason.TARGET, ""
 
     # ------------------------------------------------------------------ commands and programs
 
