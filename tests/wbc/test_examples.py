@@ -329,6 +329,16 @@ def test_slave_answers_commands_within_a_few_statements(served: ProgramRig) -> N
     assert served.r(108) == -2.25
 
 
+@pytest.mark.parametrize("later_ms", range(15))
+def test_slave_hears_a_command_whenever_it_follows_its_operands(served: ProgramRig, later_ms: int) -> None:
+    served.r(104, 1.25)
+    served.r(106, -3.5)
+    served.wait(later_ms / 1000)
+    served.i(100, 3)
+    served.wait(0.04)
+    assert (served.i(100), served.i(101), served.r(108)) == (0, 3, -2.25)
+
+
 def test_slave_shows_inputs_and_sets_outputs(served: ProgramRig) -> None:
     served.pin("IN2", 1.0)
     served.pin("IN16", 1.0)
