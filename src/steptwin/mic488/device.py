@@ -31,6 +31,9 @@ MAX_EVENTS_PER_INSTANT = 10_000
 
 EVENTS_KEPT = 1000
 
+_ERROR = Status.ERROR
+"""Asked for at every instant: a member found through its class costs more than all the rest of the question."""
+
 
 class Event(NamedTuple):
     """Something worth telling that no register shows."""
@@ -265,7 +268,7 @@ class Mic488(Stateful):
         if lamp:
             lit = self.program.error
             for axis in self.axes:
-                if axis.status is Status.ERROR:
+                if axis.status is _ERROR:
                     lit = True
             if lit is not self.error_led:
                 self.error_led = lit

@@ -42,6 +42,10 @@ class ProgramState(enum.IntEnum):
     PAUSED = 2
 
 
+STOPPED, RUNNING, PAUSED = ProgramState
+"""Asked for at every statement: a member found through its class costs more than all the rest of the question."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedProgram:
     """A program in a bank, ready to run. Code has no state: any number of controllers may share it."""
@@ -123,7 +127,7 @@ class ProgramControl(Stateful):
         self.registers = ProgramRegisters()
         self.program_bank = 0
         self.position_bank = 0
-        self.state = ProgramState.STOPPED
+        self.state = STOPPED
         self.error = False
         """A program error is pending; cleared by the next start or stop (MIC-26)."""
         self.fault: Fault | None = None
@@ -162,7 +166,7 @@ class ProgramControl(Stateful):
         last = self.device.firmware.banks - 1
         if not 0 <= bank <= last:
             raise Misuse(f"{kind} bank {bank}: permitted are 0…{last}")
-        if self.state is not ProgramState.STOPPED and bank == in_use:
+        if self.state is not STOPPED and bank == in_use:
             raise Misuse(f"{kind} bank {bank} is in use: stop the program first")
 
     def contents(self) -> tuple[tuple[int, str], ...]:
@@ -189,14 +193,14 @@ class ProgramControl(Stateful):
 
     def command(self, value: int, now: Nanos) -> None:
         """PROGRAM_CTRL written: 0 stop, 1 start or continue, 2 pause."""
-        if value == ProgramState.RUNNING:
-            if self.state is ProgramState.STOPPED:
+        if value == RUNNING:
+            if self.state is STOPPED:
                 self._start(now)
-            elif self.state is ProgramState.PAUSED:
+            elif self.state is PAUSED:
                 self._resume(now)
-        elif value == ProgramState.PAUSED:
+        elif value == PAUSED:
             self._pause(now)
-        elif value == ProgramState.STOPPED:
+        elif value == STOPPED:
             self._end(now)
 
     def _start(self, now: Nanos) -> None:
@@ -210,7 +214,7 @@ class ProgramControl(Stateful):
             self._refuse(f"position bank {self.position_bank} is empty")
         else:
             self._program, self._table = self.program_bank, self.position_bank
-            self.state = ProgramState.RUNNING
+            self.state = RUNNING
             self._begin(now)
             self.machine.start(program.code, now)
 
@@ -226,7 +230,7 @@ class ProgramControl(Stateful):
 
     def _stop(self) -> None:
         self.machine.stop()
-        self.state = ProgramState.STOPPED
+        self.state = STOPPED
 
     def _end(self, now: Nanos) -> None:
         """As the statement END: drives and outputs off (MIC-31)."""
@@ -243,15 +247,15 @@ class ProgramControl(Stateful):
 
     def _pause(self, now: Nanos) -> None:
         """WBC-9. Ticks do not go on meanwhile."""
-        if self.state is ProgramState.RUNNING:
-            self.state = ProgramState.PAUSED
+        if self.state is RUNNING:
+            self.state = PAUSED
             self.machine.pause(now)
 
     def _resume(self, now: Nanos) -> None:
         begun = self.machine.paused_at
         if begun is not None:
             self.registers.ticks = {event: at + now - begun for event, at in self.registers.ticks.items()}
-        self.state = ProgramState.RUNNING
+        self.state = RUNNING
         self.machine.resume(self._code(), now)
 
     def _code(self) -> Code:
@@ -262,12 +266,12 @@ class ProgramControl(Stateful):
     @property
     def running(self) -> LoadedProgram | None:
         """The program that runs or is paused, whatever bank is selected."""
-        return None if self.state is ProgramState.STOPPED else self.programs[self._program]
+        return None if self.state is STOPPED else self.programs[self._program]
 
     @property
     def statement(self) -> Span | None:
         """Place, in the source, of the statement in execution or executed next; None when nothing runs."""
-        if self.state is ProgramState.STOPPED:
+        if self.state is STOPPED:
             return None
         return self._span(self.machine.place())
 
@@ -281,7 +285,7 @@ class ProgramControl(Stateful):
 
     def deadline(self) -> Nanos | None:
         due = None
-        if self.state is ProgramState.RUNNING:
+        if self.state is RUNNING:
             due = self.machine.due
             for at in self.registers.ticks.values():
                 if due is None or at < due:
@@ -295,7 +299,7 @@ class ProgramControl(Stateful):
         """Run what is due at ``now``, and of the program alone what follows up to ``until``. True: it acted on anything else."""
         machine = self.machine
         acted = bool(self._pulses) and self._invert(now)
-        if self.state is not ProgramState.RUNNING:
+        if self.state is not RUNNING:
             return acted
         code = self._code()
         ticks = self.registers.ticks
@@ -343,7 +347,7 @@ class ProgramControl(Stateful):
     def disturbed(self, now: Nanos, *, inside: bool) -> None:
         """Something happened at ``now`` that was not the program's doing; ``inside``: before its statement of this moment."""
         first = now if inside else self.machine.after(now)
-        if self.state is ProgramState.RUNNING:
+        if self.state is RUNNING:
             self.machine.disturb(first)
         self._look_at_drives(now, first)
 
@@ -358,9 +362,10 @@ class ProgramControl(Stateful):
                     if axis.on_path:
                         axis.brake(now)
                         self.device.event("path-left", f"M{axis.number} slows down: the other axis left their path")
-        if self.state is ProgramState.STOPPED:
+        if self.state is STOPPED:
             return
-        statuses = tuple(axis.status for axis in axes)
+        m1, m2, m3, m4 = axes
+        statuses = (m1.status, m2.status, m3.status, m4.status)
         if statuses != self._statuses:
             before, self._statuses = self._statuses, statuses
             for index, event in _DRIVES.items():
@@ -369,12 +374,12 @@ class ProgramControl(Stateful):
 
     def registers_written(self, now: Nanos) -> None:
         """A user register was written over Modbus."""
-        if self.state is not ProgramState.STOPPED and self.registers.switches[_MODBUS]:
+        if self.state is not STOPPED and self.registers.switches[_MODBUS]:
             self.machine.happen(self._code(), _MODBUS, now, self.machine.after(now))
 
     def inputs_changed(self, numbers: list[int], now: Nanos) -> None:
         """Filtered inputs ``numbers`` (from 0) changed: inside an instant, before the program's statement."""
-        if self.state is ProgramState.STOPPED:
+        if self.state is STOPPED:
             return
         for number in numbers:
             edge = 1 if self.device.inputs.filtered[number] else 2

@@ -57,9 +57,12 @@ def halt(axis: Axis, keyword: str, now: Nanos) -> None:
         axis.stop(now)
 
 
+_IN_MOTION = (Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION)
+
+
 def finished(axis: Axis, now: Nanos) -> bool:
     """Whether WAITPOS waits for this drive no longer (WBC-8)."""
-    if axis.status in (Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION):
+    if axis.status in _IN_MOTION:
         return False
     return not axis.profile.moving(now)
 
