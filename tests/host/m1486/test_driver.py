@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from chip_rig import ChipWire, chip_driver, chip_line
 
@@ -17,6 +19,7 @@ from steptwin.host.m1486 import (
     NoEcho,
     NoRoom,
     PositionUnknown,
+    Restarted,
     WrongType,
 )
 from steptwin.host.m1486.driver import download_to as async_download_to
@@ -325,9 +328,40 @@ def test_who_does_not_echo_is_told() -> None:
     wire = ChipWire("B", (7,))
     with pytest.raises(NoEcho, match="chip 3 does not echo: it is off, has another address or baud rate"):
         chip_driver(wire, 3)
+
+
+@pytest.mark.parametrize("call", [lambda c: c.move_to(0.25), lambda c: c.move_by(-0.25), lambda c: c.position()])
+def test_a_chip_that_was_switched_off_is_not_moved_with_what_it_was_set_to(call: Callable[[M1486], object]) -> None:
+    """With M1 it would drop f16 as wrong data, and R would make the default move of a thousand steps."""
+    wire = ChipWire("B", (7,))
     chip = chip_driver(wire, 7)
+    chip.configure(microstep=4)
+    chip.set_position(100.0)
     wire.chip.power_cycle(wire.now)
-    assert chip.counter() == 0  # its echo was off again
+    with pytest.raises(Restarted, match="chip 7 was switched off or reset meanwhile"):
+        call(chip)
+    assert wire.true() == 0
+    assert chip.settings == ChipSettings()
+    assert chip.counter() == 0
+    with pytest.raises(PositionUnknown):
+        chip.position()
+
+
+def test_a_chip_that_is_switched_off_between_the_distance_and_the_run_does_not_move() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(microstep=4)
+
+    def cycle(data: bytes) -> None:
+        if data == b"r":
+            wire.before_each = None
+            wire.chip.power_cycle(wire.now)
+
+    wire.before_each = cycle
+    with pytest.raises(Restarted):
+        chip.move_by(0.25)
+    wire.sleep(5.0)
+    assert wire.true() == 0
 
 
 def test_a_cut_line_is_told() -> None:

@@ -1,4 +1,4 @@
-"""Two chips on one line, shared by threads and tasks: nobody gets another's answer, motions run side by side, a stop goes first."""
+"""Two chips on one line, shared by threads and tasks: each gets its own answers, both move at once, a stop goes first."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from steptwin.host.m1486.failures import (
     NoEcho,
     NoRoom,
     PositionUnknown,
+    Restarted,
     WrongType,
 )
 from steptwin.host.m1486.lines import AsyncM1486Line
@@ -40,5 +41,6 @@ __all__ = [
     "NoEcho",
     "NoRoom",
     "PositionUnknown",
+    "Restarted",
     "WrongType",
 ]

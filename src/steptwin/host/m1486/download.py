@@ -11,7 +11,6 @@ from steptwin.host.m1486.motion import UNKNOWN_S, ChipMotion, Told
 from steptwin.host.m1486.settings import ChipSettings, after_reset
 from steptwin.host.m1486.talk import WHO
 from steptwin.host.m1486.unit import Unit
-from steptwin.m1486.functions import FUNCTIONS, RETURN, TABLE
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import Command, Program
 from steptwin.m1486.variants import Store, Variant
@@ -214,10 +213,9 @@ async def reset(unit: Unit) -> None:
     await unit.say("\\", stored=False)
     notes = unit.notes
     unit.talk.forget(unit.address)
-    notes.motion = None
-    notes.is_killed = False
+    notes.forget()
+    notes.was_awake = False
     notes.is_position_valid = True
-    notes.functions = sum(function.default << bit for bit, function in enumerate(TABLE)) | 1 << (RETURN - FUNCTIONS.start)
     notes.settings = ChipSettings() if notes.interface is None else after_reset(unit.variant, notes.interface)
     if unit.variant.erase_ns:
         await unit.line.sleep(unit.variant.erase_ns / SECOND + ERASE_MARGIN_S)

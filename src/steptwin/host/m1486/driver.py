@@ -352,8 +352,8 @@ class AsyncM1486:
         unit = self._unit
         guard = unit.stop_guard()
         async with unit.turn():
-            self._check_position()
             before = await unit.read_number(1)
+            self._check_position()
             await self._move(f"g{target}" if target else "h", target - before, target, guard)
 
     async def move_by(self, distance: float) -> None:

@@ -66,6 +66,18 @@ class NoEcho(LineFailure):
         )
 
 
+class Restarted(LineFailure):
+    """A chip does not echo any more, as after power-up: settings and position are not what they were."""
+
+    uncertain = False
+
+    def __init__(self, place: str, chip: str) -> None:
+        super().__init__(
+            f"{place}: {chip} was switched off or reset meanwhile: its settings are those of power-up, and where it stands is "
+            "not known; nothing was carried out"
+        )
+
+
 class DoubtfulMove(LineFailure):
     """It is not known whether a motion was begun."""
 

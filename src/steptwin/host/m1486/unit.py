@@ -12,12 +12,12 @@ from contextlib import AbstractAsyncContextManager, suppress
 from steptwin.errors import LineFailure, Misuse
 from steptwin.host.exchange import Job, NoAnswer
 from steptwin.host.line import Line
-from steptwin.host.m1486.failures import Busy, Garbled, NoEcho, WrongType, untold
+from steptwin.host.m1486.failures import Busy, Garbled, NoEcho, Restarted, WrongType, untold
 from steptwin.host.m1486.lines import TALK
 from steptwin.host.m1486.motion import Told
 from steptwin.host.m1486.settings import ChipSettings
 from steptwin.host.m1486.talk import SPOILER, WHO, CharacterTalk, Say, Sort, chip_name
-from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN
+from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN, TABLE
 from steptwin.m1486.lines import INTERFACES, Interface
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import parse_line
@@ -47,12 +47,22 @@ class Notes:
         self.settings = ChipSettings()
         self.motion: Told | None = None
         self.is_position_valid = True
+        self.was_awake = False
+        """Whether it echoed before: if it does not any more, it was switched off."""
         self.stops = 0
         """How often it was stopped: a motion asked for before must not begin after."""
         self.is_killed = False
         """Whether Kill may hold the program (function 51 OFF)."""
         self.ready_at: Nanos = 0
         """An EEPROM is being written until then."""
+
+    def forget(self) -> None:
+        """It was switched off or reset behind our back."""
+        self.settings = ChipSettings()
+        self.functions = sum(function.default << bit for bit, function in enumerate(TABLE)) | 1 << (RETURN - FUNCTIONS.start)
+        self.motion = None
+        self.is_position_valid = False
+        self.is_killed = False
 
     def function(self, number: int) -> bool | None:
         return None if self.functions is None else bool(self.functions >> (number - FUNCTIONS.start) & 1)
@@ -140,6 +150,7 @@ class Unit:
                 rest = "\r" if isinstance(error, NoAnswer) else ""
                 continue
             self.talk.echoing.add(self.address)
+            self.notes.was_awake = True
             self._written()
             return
         await self._blind(rest, PAUSES_NS[0])
@@ -157,8 +168,31 @@ class Unit:
         if rest > 0:
             await self.line.sleep(rest / SECOND)
         if not self.talk.knows(self.address):
-            await self.wake()
+            await self._wake_again()
             await self._ready()
+
+    async def _wake_again(self) -> None:
+        """Raises `Restarted` for a chip that echoed before and does not: nothing is as it was. (A line may also have failed.)"""
+        known = self.notes.was_awake
+        if known and await self._still_echoes():
+            return
+        await self.wake()
+        if known:
+            self.notes.forget()
+            raise Restarted(self.place, self.name)
+
+    async def _still_echoes(self) -> bool:
+        for _ in range(TRIES):
+            try:
+                await self._exchange(Say(self.address, f"t{RETURN}", acts=False))
+            except Garbled:
+                continue
+            except NoAnswer:
+                return False
+            self.talk.echoing.add(self.address)
+            self._written()
+            return True
+        return False
 
     def _written(self) -> None:
         """A command has gone into the memory. As long as the type is not known, so little is typed that the buffer holds it."""
@@ -329,6 +363,7 @@ class Unit:
         await self._blind(2 * f"{select}{text}\r", PAUSES_NS[0], urgent=True)
         try:
             await self.wake()
+            notes.forget()
             await self._exchange(Say(self.address, text, sort=Sort.KILL), urgent=True)
         except (NoEcho, Garbled, NoAnswer) as error:
             raise untold(self.name, failure or error) from error
