@@ -256,10 +256,12 @@ class Kernel:
         if self._record is not None:
             for plans in self._plans:
                 plans.tell(self._record, self.now)
-        dues = [due for machine in self.machines.values() if (due := machine.deadline()) is not None]
-        dues += [due for part in self.parts if (due := part.deadline()) is not None]
-        dues += [flight.arrival for flight in self._flights]
-        self._due = min(dues, default=None)
+        soonest = min(self._flights).arrival if self._flights else None
+        for one in (*self.machines.values(), *self.parts):
+            due = one.deadline()
+            if due is not None and (soonest is None or due < soonest):
+                soonest = due
+        self._due = soonest
 
     def _edge(self, name: str, edge: Edge) -> None:
         if self._record is not None:
