@@ -117,6 +117,12 @@ def test_requests_of_the_control_endpoint() -> None:
         assert hand["fault"]({"clear": True}) == []
         with pytest.raises(Misuse, match="choose a machine with --unit: table, drum"):
             hand["state"]({})
+        with pytest.raises(Misuse, match=r"strat: give a pin as MACHINE\.PIN; machines are table, drum; buttons are start"):
+            hand["pin"]({"set": {"strat": 1}})
+        with pytest.raises(Misuse, match="start = 2: a button takes 1"):
+            hand["pin"]({"set": {"start": 2}})
+        with pytest.raises(Misuse, match="axis = 9: permitted are 1 to 4"):
+            hand["fault"]({"set": ["stall machine=table axis=9"]})
         cell.close()
         assert len(world.inputs) == 5
 

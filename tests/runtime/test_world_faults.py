@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from steptwin.errors import Misuse
 from steptwin.runtime.world import World
+from steptwin.world.faults import read
 
 PLANT = """
 [world]
@@ -125,6 +127,9 @@ def test_the_load_of_an_m1486_is_what_stalls_and_loses_steps() -> None:
     world.run(for_=2.0)
     assert world.axis["y"].lost > 400
     assert world.read("drum.position") == 25600
+    bare = World.from_toml(DRUM.partition("[[axis]]")[0])
+    with pytest.raises(Misuse, match="fault stall: 'drum' has no shaft"):
+        bare.put_fault(read("stall at_s=1 for_s=1"))
 
 
 def test_what_goes_wrong_is_in_the_trace_and_two_runs_share_it() -> None:

@@ -69,8 +69,9 @@ def check(
     from steptwin.diagnostics import Severity, render, to_json
     from steptwin.runtime.textfiles import read_text
 
+    checker = _checker(file)
     source = read_text(file).source
-    report = _checker(file)(source, Options(variant, interface, memory, positions, config, firmware))
+    report = checker(source, Options(variant, interface, memory, positions, config, firmware))
     findings = [(source, report.diagnostics), *report.companions]
     errors = sum(d.severity is Severity.ERROR for _, found in findings for d in found)
     warnings = sum(d.severity is Severity.WARNING for _, found in findings for d in found)
@@ -172,4 +173,6 @@ _CHECKERS: dict[str, Callable[[Source, Options], Report]] = {".prg": _check_wbc}
 
 
 def _checker(file: Path) -> Callable[[Source, Options], Report]:
+    if file.suffix.lower() == ".wbc":
+        raise Misuse(f"{file} is a compiled image: steptwin decompile makes a program of it")
     return _CHECKERS.get(file.suffix.lower(), _check_m1486)

@@ -266,6 +266,30 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
 # ---------------------------------------------------------------------- a hand at the machine
 
 
+def _worked(world: World, name: str, value: float) -> do.Press | do.Release | None:
+    """A button by its name; None if there is no such button."""
+    button = next((b for b in world.plan.buttons if b.upper() == name.upper()), None)
+    if button is None:
+        return None
+    if value not in (0, 1):
+        raise Misuse(f"{button} = {value:g}: a button takes 1 (pressed) and 0 (released)")
+    return do.Press(button) if value else do.Release(button)
+
+
+def _chosen(world: World, wanted: str, pin: str | None) -> str:
+    """The machine meant, which is the only one where none is named."""
+    if not wanted and len(world.machines) == 1:
+        return next(iter(world.machines))
+    for name in world.machines:
+        if name.upper() == wanted.upper():
+            return name
+    machines = ", ".join(world.machines)
+    if pin is not None and not wanted:
+        buttons = ", ".join(world.plan.buttons) or "none"
+        raise Misuse(f"{pin}: give a pin as MACHINE.PIN; machines are {machines}; buttons are {buttons}")
+    raise Misuse(f"choose a machine with --unit: {machines}")
+
+
 def handlers_of(cell: Cell, live: LiveWorld) -> dict[str, Handler]:
     """Requests of the control endpoint. ``unit`` is the name of a machine; pins are ``MACHINE.PIN``, buttons their names."""
     world = live.world
@@ -281,25 +305,22 @@ def handlers_of(cell: Cell, live: LiveWorld) -> dict[str, Handler]:
 
         return handle
 
-    def chosen(request: Mapping[str, Any]) -> str:
-        wanted = str(request.get("unit") or (next(iter(world.machines)) if len(world.machines) == 1 else ""))
-        for name in world.machines:
-            if name.upper() == wanted.upper():
-                return name
-        raise Misuse(f"choose a machine with --unit: {', '.join(world.machines)}")
+    def chosen(request: Mapping[str, Any], pin: str | None = None) -> str:
+        return _chosen(world, str(request.get("unit") or ""), pin)
 
     def pin(request: Mapping[str, Any]) -> object:
         for name, value in (request.get("set") or {}).items():
             if not isinstance(value, int | float):
                 raise Misuse(f"{name} = {value!r}: a pin takes a number")
-            button = next((b for b in world.plan.buttons if b.upper() == name.upper()), None)
-            if button is not None:
-                world.outside(do.Press(button) if value else do.Release(button))
-                continue
-            owner, dot, rest = name.rpartition(".")
-            machine = chosen({"unit": owner} if dot else request)
-            world.outside(do.Set(((machine, rest.upper(), float(value)),)))
+            if "." in name:
+                owner, _, pin = name.rpartition(".")
+                step: do.Set | do.Press | do.Release = do.Set(((chosen({"unit": owner}), pin.upper(), float(value)),))
+            else:
+                step = _worked(world, name, value) or do.Set(((chosen(request, name), name.upper(), float(value)),))
+            world.outside(step)
         shown = list(world.machines) if request.get("unit") is None else [chosen(request)]
+        for name in shown:
+            world.touch(name)
         return {f"{name}.{pin}": value for name in shown for pin, value in world.machines[name].pins().items()}
 
     def state(request: Mapping[str, Any]) -> object:

@@ -328,7 +328,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(number(0.0, 1.0), "slip", "the part of the motion that its coupling loses", 0.0),
     ),
     "motor": (
-        Key("torque", points, "pull-out torque: [[rev/min, N·m], ...] from 0 on"),
+        Key("torque", points, "pull-out torque: [[rev/min, N·m], ...] from 0 on; none above the last speed"),
         _optional(_not_negative, "inertia", "kg·m² of rotor and load, at the motor", 0.0),
         _optional(_not_negative, "mass", "kg moved by a linear axis", 0.0),
         _optional(_not_negative, "friction", "N·m against motion", 0.0),

@@ -180,8 +180,11 @@ class FaultyMachine(Stateful):
         """`Misuse` unless the machine has the axis or input."""
         axis = fault.whole("axis")
         if axis is not None and axis > len(self.body.shafts):
-            there = f"1 to {len(self.body.shafts)}" if self.body.shafts else "none"
-            raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are {there}, for {self.name!r} has no more shafts")
+            if not self.body.shafts:
+                raise Misuse(
+                    f"fault {fault.kind.name}: {self.name!r} has no shaft: an M1486 has one where a world has its [[axis]]"
+                )
+            raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are 1 to {len(self.body.shafts)}")
         if fault.kind.parameter("pin") is None:
             return
         pin = self._pin(fault)
