@@ -259,6 +259,20 @@ def test_an_m1486(run: Run, how: str) -> None:
     """).assert_outcomes(passed=1)
 
 
+@pytest.mark.parametrize("how", ["time='virtual'", "speed=10"])
+def test_an_m1486_with_its_driver(run: Run, how: str) -> None:
+    run(f"""
+        import pytest
+
+        @pytest.mark.m1486({how}, variant="B", address=3)
+        def test_it(m1486):
+            m1486.driver.move_by(200)
+            assert str(m1486.driver.wait()) == "chip 3: target reached at 200 step"
+            assert m1486.driver.variant.name == "B"
+            assert m1486.position == 200 * 64
+    """).assert_outcomes(passed=1)
+
+
 def test_characters_that_do_not_come_fail_the_test(run: Run) -> None:
     result = run("""
         import pytest

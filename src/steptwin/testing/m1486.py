@@ -11,6 +11,8 @@ from typing import Literal, TypeVar
 import pytest
 
 from steptwin.errors import Misuse
+from steptwin.host import m1486 as host
+from steptwin.host.address import parse_device
 from steptwin.host.place import Channel, parse_place
 from steptwin.m1486.chip import M1486, OPEN_ADDRESS
 from steptwin.m1486.lines import interface
@@ -21,7 +23,7 @@ from steptwin.runtime.m1486 import ChainOptions, M1486Line, chip_name, pin_chang
 from steptwin.runtime.serve_m1486 import program_image
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, check_time, check_word
-from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime
+from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip
 
 T = TypeVar("T")
 
@@ -63,8 +65,8 @@ class M1486Options:
 class M1486Rig(LineRig[M1486Line]):
     """A running M1486: a twin of its own for each test, or the device that ``--device`` names.
 
-    ``channel`` carries characters to it and back, ``address`` is for a program under test. A serial port and a pty are for one
-    of them at a time. What is said to be *the twin's* skips the test on a device.
+    ``driver`` drives it, ``channel`` carries bare characters to it and back, ``address`` is for a program under test. A serial
+    port and a pty are for one of them at a time. What is said to be *the twin's* skips the test on a device.
     """
 
     def __init__(self, options: M1486Options, device: str | None, directory: Path, base: Path) -> None:
@@ -72,6 +74,7 @@ class M1486Rig(LineRig[M1486Line]):
         check_word(MARKER, "link", options.link, ("tcp", "pty"))
         self.options = options
         self._channel: Channel | None = None
+        self._opened: list[host.M1486] = []
         line, time = None, None
         if device is None:
             line = self._make(base)
@@ -128,6 +131,23 @@ class M1486Rig(LineRig[M1486Line]):
             else:
                 self._channel = parse_place(self.address, self._baud()).endpoint.open()
         return self._channel
+
+    @cached_property
+    def driver(self) -> host.M1486:
+        """A driver that is connected to it; it is closed after the test."""
+        driver = self._driver()
+        driver.open()
+        self._opened.append(driver)
+        return driver
+
+    def _driver(self) -> host.M1486:
+        options, time = self.options, self._time
+        if self._device is not None:
+            given = parse_device(self._device)
+            return host.M1486(given.place, given.chip, baud=given.baud, variant=given.variant)
+        if isinstance(time, VirtualTime):
+            return joined_chip(MemoryEndpoint(time, self._port, "the M1486"), time, options.address)
+        return host.M1486(self.address, options.address)
 
     def _baud(self) -> int:
         options = str(self._device).split(",")[1:]
@@ -188,6 +208,8 @@ class M1486Rig(LineRig[M1486Line]):
             if self._line is None and not self._is_twin_only:
                 self.send("XG", "K")
         finally:
+            for driver in self._opened:
+                driver.close()
             if self._channel is not None:
                 self._channel.close()
             super().close()

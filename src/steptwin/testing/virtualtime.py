@@ -9,6 +9,8 @@ from itertools import count
 from typing import TypeVar
 
 from steptwin.host import LineLost, Mic488
+from steptwin.host.m1486 import M1486
+from steptwin.host.m1486.lines import BAUD, TALK, talking
 from steptwin.host.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
 from steptwin.host.place import Channel, Place
 from steptwin.host.threads import ThreadLine
@@ -136,3 +138,11 @@ def joined_driver(
     line = ThreadLine(endpoint, exchanger, clock=time.now, sleeping=time.sleep)
     line.notes.update(notes)
     return Mic488(line, unit, firmware=firmware, config=config)
+
+
+def joined_chip(endpoint: MemoryEndpoint, time: VirtualTime, address: int) -> M1486:
+    """A driver of a chip whose waiting makes the twin's time pass."""
+    exchanger, talk = talking(endpoint, BAUD, None)
+    line = ThreadLine(endpoint, exchanger, clock=time.now, sleeping=time.sleep)
+    line.notes[TALK] = talk
+    return M1486(line, address)
