@@ -133,6 +133,8 @@ def test_a_delayed_wire_and_a_button() -> None:
 
 def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:
     world = small()
+    with pytest.raises(Misuse, match="no axis 5: axes are 1, 2, 3, 4"):
+        _ = world.mic488["a"].axis[5]
     with pytest.raises(Misuse, match="no MIC488 is called 'd'; there are a, b, c"):
         world.mic488["d"]
     with pytest.raises(Misuse, match=r"nothing is called 'z'.* there are a, b, c, x, go, time, idle"):

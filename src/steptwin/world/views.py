@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488
@@ -80,8 +81,8 @@ class Mic488View(MachineView):
     def __init__(self, plant: Plant, name: str, device: Mic488) -> None:
         super().__init__(plant, name)
         self.device = device
-        self.axis: Mapping[int, Mic488AxisView] = {axis.number: Mic488AxisView(self, axis) for axis in device.axes}
-        """Axes by number, from 1."""
+        self.axis: Mapping[int, Mic488AxisView] = _Axes((axis.number, Mic488AxisView(self, axis)) for axis in device.axes)
+        """Axes by number, from 1. A number that is not there raises `Misuse`."""
 
     @property
     def status(self) -> int:
@@ -97,6 +98,11 @@ class Mic488View(MachineView):
     def write(self, register: str, value: float) -> None:
         """Write a register by name as a master does, over the line if there is one. Raises `Misuse`."""
         self._plant.outside(do.Write(((self.name, register.upper(), float(value)),)))
+
+
+class _Axes(dict[int, "Mic488AxisView"]):
+    def __missing__(self, number: object) -> Mic488AxisView:
+        raise Misuse(f"no axis {number!r}: axes are {', '.join(map(str, self))}")
 
 
 class Mic488AxisView:
