@@ -214,7 +214,8 @@ def test_m_21_lines_of_the_driver_interface() -> None:
     assert codes("C8\nT10\n!102", A, "sd") == []
     assert codes("C8\nT10\n!102", A, "dual") == ["M113", "M113"]
     assert codes("C8\nT10\n!102", A, "two") == ["M113", "M113", "M113"]
-    assert codes("O8\n)10\n?78", A, "two") == ["M214", "M214", "M214"]
+    assert codes("O8\nZ9\n)10\n(11", A, "two") == ["M113", "M113", "M113", "M113"]
+    assert codes("[\nI8H1\n?78\n@1\n]", A, "two") == ["M214", "M214"]
     assert codes("C7\nC18\nT50\nT80", A, "two") == []
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from m1486_rig import Bench
 
@@ -77,9 +79,9 @@ def test_function_59_puts_the_remainder_out() -> None:
 
 
 @pytest.mark.parametrize("interface", [STEP_DIRECTION, DUAL_DAC, TWO_DACS], ids=lambda i: i.name)
-def test_m_21_lines_of_the_driver_interface_are_no_outputs(interface: Interface) -> None:
+def test_m_21_lines_of_the_driver_interface_are_not_there(interface: Interface) -> None:
     occupied = {STEP_DIRECTION: range(0), DUAL_DAC: range(10, 18), TWO_DACS: range(8, 18)}[interface]
-    for command in ("c{}", "t{}", "!{}1"):
+    for command in ("c{}", "t{}", "!{}1", "o{}", "z{}", "){}", "({}"):
         for line in LINES:
             bench = Bench(interface=interface)
             bench.do(command.format(line))
@@ -96,7 +98,19 @@ def test_m_21_a_line_of_the_driver_interface_reads_as_the_interface_drives_it() 
     bench = Bench(interface=TWO_DACS)
     bench.do("?89")
     assert bench.variable == 0b1_1111_1100
-    assert bench.do("i17h1", "@1", "z8", "o17", "u15") == b"\x00"
+    assert bench.do("[", "i17h1", "u20", "@1", "i8l2", "u20", "@2", "u15", "]") == b"\x00"
+
+
+def test_m_36_uploads_go_no_faster_than_the_line() -> None:
+    # 300 bit/s: a character takes 33.3 ms, a pass of the loop 3 ms where nothing waits.
+    bench = Bench(baud=300, is_timed=True)
+    bench.file("@1", "+1", "u4", "j1")
+    sent = bench.run(3.0)
+    # The bytes follow each other without a gap, and each is read when its turn has come.
+    uploads = bench.events("upload")
+    assert {b.time - a.time for a, b in pairwise(uploads)} <= {33_333_333, 33_333_334}
+    assert list(sent) == list(range(1, len(sent) + 1))
+    assert (len(uploads), bench.variable) == (len(sent) + 1, len(sent) + 2)  # one is on its way, one waits
 
 
 def test_a_wait_for_a_line_ends_with_the_line() -> None:

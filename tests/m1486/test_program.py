@@ -33,6 +33,19 @@ def test_m_5_loops_stand_inside_one_another_up_to_four_levels() -> None:
     assert "more than 4 loops" in bench.wrong[0]
 
 
+def test_m_35_a_loop_that_a_jump_has_left_begins_anew() -> None:
+    bench = Bench()
+    bench.file("@1", "l3", "i2h2", "e", "@2", "u20", "w5", "j1")  # B2 is high: no pass is finished
+    assert bench.run(ms=200) == b"\x42" * 23
+    assert bench.wrong == []
+    # One pass that is left, then three; the loop inside is over when the outer one begins anew.
+    assert sends("@1", "l3", "u15", "i80l2", "e", "u20", "j3", "@2", "t80", "j1", "@3") == b"\x02" * 4 + b"\x42"
+    bench = Bench()
+    bench.file("@1", "l3", "l2", "i80l2", "e", "u15", "e", "u20", "j3", "@2", "t80", "j1", "@3")
+    assert bench.finish() == b"\x02" * 3 + b"\x42"
+    assert bench.chip.program.loop_counts == []
+
+
 def test_a_loop_begun_outside_the_brackets_ends_inside() -> None:
     # As in example 6 of the manual.
     bench = Bench()

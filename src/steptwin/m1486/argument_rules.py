@@ -13,7 +13,7 @@ from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.syntax import Command, Condition
 from steptwin.m1486.variants import VARIANTS, Variant
 
-_WRITES_LINES = frozenset("CT!")
+_REFUSES_OCCUPIED = frozenset("CT!OZ()")
 #: Zero is no distance and no position; other commands do what is meant.
 _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
 
@@ -90,8 +90,8 @@ def _occupied(command: Command, spec: CommandSpec, number: int, interface: Inter
     taken = [line for line in lines_of(spec, number) if line in interface.occupied]
     if not taken:
         return None
-    # M-21: commands that write such a line are refused; reading it is possible and of no use.
-    finding = findings.LINE_OCCUPIED if command.key in _WRITES_LINES else findings.LINE_READ_OCCUPIED
+    # M-21: commands that write such a line, or wait for it, are refused; reading it is possible and of no use.
+    finding = findings.LINE_OCCUPIED if command.key in _REFUSES_OCCUPIED else findings.LINE_READ_OCCUPIED
     free = lines_text([line for line in LINES if line not in interface.occupied])
     verb = "belongs" if len(taken) == 1 else "belong"
     message = f"{lines_text(taken)} {verb} to the {interface.title} interface"

@@ -336,11 +336,15 @@ class M1486(Stateful):
         number = sum(self.level(line) << bit for bit, line in enumerate(lines))
         return number ^ (1 << len(lines)) - 1 if self.unit.on(COMPLEMENT) else number
 
+    def refuse_occupied(self, line: int) -> None:
+        """M-21: there is no such line while the driver interface has its pin. Raises `WrongData`."""
+        if line in self.interface.occupied:
+            raise WrongData(f"B{line} belongs to the {self.interface.title} interface")
+
     def put_out(self, lines: range, bits: int) -> None:
         """Set outputs, lowest line = least significant bit. Raises `WrongData` where the interface has one (M-21)."""
-        taken = [line for line in lines if line in self.interface.occupied]
-        if taken:
-            raise WrongData(f"B{taken[0]} belongs to the {self.interface.title} interface")
+        for line in lines:
+            self.refuse_occupied(line)
         for bit, line in enumerate(lines):
             level = bits >> bit & 1
             if self.io.latches[line] != level:

@@ -23,11 +23,15 @@ def _loop(chip: M1486, count: int, _place: int, following: int) -> Effect:
     program = chip.program
 
     def run() -> int:
-        counts = program.loop_counts
+        starts, counts = program.loop_starts, program.loop_counts
+        if following in starts:
+            # M-35: a jump has left this loop, and leads to its beginning again.
+            level = starts.index(following)
+            del starts[level:], counts[level:]
         if len(counts) >= LOOP_LEVELS:
             raise WrongData(f"more than {LOOP_LEVELS} loops inside one another")
         counts.append(count)
-        program.loop_starts.append(following)
+        starts.append(following)
         return following
 
     return run

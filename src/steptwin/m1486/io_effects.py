@@ -37,7 +37,8 @@ MAKERS.does("Clear")(_output(0))
 def _line_wait(level: int) -> Maker:
     def make(chip: M1486, line: int, _place: int, following: int) -> Effect:
         def run() -> int:
-            if chip.level(line) != level:
+            chip.refuse_occupied(line)
+            if chip.io.levels[line] != level:
                 chip.program.wait_for_line(line, level)
                 chip.event("wait", f"waits until B{line} is {'high' if level else 'low'}")
             return following
@@ -142,10 +143,15 @@ _UPLOADED: dict[int, Callable[[M1486], int]] = {
 
 
 @MAKERS.does("Upload")
-def _upload(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _upload(chip: M1486, number: int, place: int, following: int) -> Effect:
     read = _UPLOADED.get(number, _reserved)
 
     def run() -> int:
+        all_left = chip.uart.all_left()
+        if all_left is not None:
+            # M-36: there is one place for a byte to send, so the program goes no faster than the line.
+            chip.program.wait_until(all_left)
+            return place
         chip.upload(number, read(chip))
         return following
 

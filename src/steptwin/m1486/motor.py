@@ -56,7 +56,8 @@ class Motor(Stateful):
         chip = self._chip
         if self._must_wait():
             return False
-        if seek_ends(line, chip.level(line)):
+        chip.refuse_occupied(line)
+        if seek_ends(line, chip.io.levels[line]):
             return True
         try:
             self.drive.seek(direction, chip.now)

@@ -87,6 +87,10 @@ class Uart(Stateful):
         """When the next character arrives."""
         return self._arriving[0][0] if self._arriving else None
 
+    def all_left(self) -> Nanos | None:
+        """When the last character that waits to leave will have left; None if none does."""
+        return self._leaving[-1][0] if self._leaving else None
+
     def departure(self) -> Nanos | None:
         """When the next character has left."""
         return self._leaving[0][0] if self._leaving else None
