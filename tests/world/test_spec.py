@@ -91,7 +91,7 @@ steps = [
 [[event]]
 name = "e"
 when = "table.IN99 == 1"
-do = [{ turn = "table.M5", counts = 1 }]
+do = [{ turn = "table.M5", counts = 1 }, { fault = { kind = "stall", axis = 9 } }]
 """
 
 
@@ -104,12 +104,14 @@ def test_steps_that_speak_of_what_is_not_there_are_told_before_anything_runs() -
         "w.toml:11:37:",
         "w.toml:16:1:",
         "w.toml:17:7:",
+        "w.toml:17:42:",
     ]
     assert "step 2: no button is called 'nothing'" in lines[0]
     assert "step 4: firmware 1.70 has no register named 'M1_ENN'" in lines[1]
     assert "step 5: no signal 'table.M1.stat'; there are status" in lines[2]
     assert "step 6: no input pin 'OUT1'" in lines[3]
     assert "step 1: 'table' has no M5: axes are M1 to M4" in lines[5]
+    assert "step 2: fault stall: axis = 9: permitted are 1 to 4" in lines[6]
 
 
 def test_keys_of_nested_tables_have_their_lines() -> None:

@@ -358,6 +358,11 @@ class Plant:
         self._prepare(fault)
         self.plan.faults.add(fault, self.now)
 
+    def check_fault(self, fault: Fault) -> None:
+        """Raises `Misuse` for a fault of something that is not there."""
+        self._prepare(fault)
+        self.plan.faults.check(fault)
+
     def _prepare(self, fault: Fault) -> None:
         if fault.kind.layer not in (Layer.BYTES, Layer.FRAMES) or fault.kind.name == "no-answer":
             for name in self.machines:

@@ -75,6 +75,10 @@ def _turn(plant: Plant, step: do.Turn) -> None:
         raise Misuse(f"{step.machine!r} has no M{step.axis}: axes are M1 to M{len(axes)}")
 
 
+def _fault(plant: Plant, step: do.SetFault) -> None:
+    plant.check_fault(step.fault)
+
+
 _CHECKS: dict[type, Callable[[Plant, Any], None]] = {
     do.Until: _condition,
     do.Expect: _condition,
@@ -85,4 +89,5 @@ _CHECKS: dict[type, Callable[[Plant, Any], None]] = {
     do.Send: _send,
     do.PowerCycle: _power_cycle,
     do.Turn: _turn,
+    do.SetFault: _fault,
 }

@@ -160,15 +160,20 @@ class Faults(Stateful):
         if fault.name and self._named(fault.name) is not None:
             raise Misuse(f"there is a fault {fault.name!r} already")
         active = Active(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
-        machine = None
-        if fault.kind.layer is Layer.PHYSICS:
-            machine = self._machine(fault)
-            machine.check(fault)
+        machine = self.check(fault)
         self.active = (*self.active, active)
         if machine is not None:
             machine.begin(active)
         self._changed()
         return active
+
+    def check(self, fault: Fault) -> FaultyMachine | None:
+        """The machine whose physics go wrong, if any. `Misuse` for a machine, pin or axis that is not there."""
+        if fault.kind.layer is not Layer.PHYSICS:
+            return None
+        machine = self._machine(fault)
+        machine.check(fault)
+        return machine
 
     def remove(self, name: str, now: Nanos) -> Active:
         """Take a fault away; what it holds is let go. `Misuse` with the names there are."""
