@@ -31,6 +31,9 @@ settings.register_profile("steptwin", deadline=None)
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steptwin"))
 
+# Commands that tests start compile nothing twice, whatever the surroundings say.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
 PEER_FIXTURES = {"require_peer", "require_library"}
@@ -128,7 +131,7 @@ class Served:
     def end(self, number: int = signal.SIGINT) -> None:
         """End it as Ctrl-C does; nothing may be left behind and nothing complained about."""
         self.process.send_signal(number)
-        assert self.process.wait(10) == 0, self.errors
+        assert self.process.wait(60) == 0, self.errors
         assert self.errors == ""
         left = {path.relative_to(self.directory).as_posix() for path in self.directory.rglob("*") if not path.is_dir()}
         assert {name for name in left if not name.startswith("state/")} == {"out", "err"}
@@ -146,7 +149,7 @@ class ServedM1486(Served):
     what = ("m1486", "--tcp", "127.0.0.1:0")
 
 
-def until(condition: Callable[[], object], what: str, seconds: float = 10.0) -> None:
+def until(condition: Callable[[], object], what: str, seconds: float = 60.0) -> None:
     """Wait for a condition; the test fails when it does not come."""
     deadline = time.monotonic() + seconds
     while not condition():
