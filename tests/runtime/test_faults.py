@@ -99,7 +99,7 @@ def test_what_a_twin_does_not_have_cannot_go_wrong(fault: str, text: str) -> Non
 
 def test_chips_have_no_units_and_no_shafts() -> None:
     line = M1486Line(ChainOptions())
-    for fault, text in (("busy", "happens on"), ("stall", "axis = 1: permitted are none")):
+    for fault, text in (("busy", "happens on"), ("stall", "has no shaft")):
         with pytest.raises(Misuse, match=text):
             line.faults.start([fault], 0)
 
