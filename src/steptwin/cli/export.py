@@ -31,7 +31,7 @@ def export(
         Path | None, typer.Option("--output", "-o", help="File or directory; default: beside the trace, named alike.")
     ] = None,
     begin: Annotated[str, typer.Option("--from", metavar="TIME", help="Where to begin: 9.5, 500ms, 2min.")] = "0",
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="Where to end. Default: the end of the run.")] = None,
+    until: Annotated[str | None, typer.Option(metavar="TIME", help="Where to end. Default: the end of the run; of pictures, shortly after the last change.")] = None,
     machine: Annotated[list[str] | None, typer.Option(help="Only this machine; may be given more than once.")] = None,
     period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
 ) -> None:
@@ -44,7 +44,7 @@ def export(
     saved = read_trace(trace)
     formats = [form.value for form in to or ()]
     begin_ns = parse_duration(begin, "--from")
-    until_ns = saved.until if until is None else parse_duration(until, "--until")
+    until_ns = None if until is None else parse_duration(until, "--until")
     period_ns = parse_duration(period, "--period")
     source = trace / "trace.jsonl" if trace.is_dir() else trace
     targets = [source.with_suffix(f".{name}") for name in formats] if output is None else [output]
@@ -53,6 +53,8 @@ def export(
             saved.trace,
             target,
             views=saved.views,
+            title=saved.title,
+            ended=saved.until,
             formats=(formats or None) if output is not None else [formats[i]],
             begin=begin_ns,
             until=until_ns,

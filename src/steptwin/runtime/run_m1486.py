@@ -83,7 +83,7 @@ def run(options: M1486Run, say: Say, warn: Say) -> bool:
     wall_s = time.perf_counter() - begin
     report.end(bench, Outcome(options, ending, wall_s), say)
     if trace is not None and options.trace is not None:
-        _write(trace, options.trace, chips, ending.at)
+        _write(trace, options.trace, options.program.name, chips, ending.at)
     return not report.wrong
 
 
@@ -119,10 +119,10 @@ def _input(change: TimedInput, names: Sequence[str]) -> Input:
     return Input(change.time, chip, name, level)
 
 
-def _write(trace: Trace, where: Path, chips: Mapping[str, M1486], until: Nanos) -> None:
+def _write(trace: Trace, where: Path, title: str, chips: Mapping[str, M1486], ended: Nanos) -> None:
     from steptwin.runtime.export import bar, write_trace
 
-    write_trace(trace, where, views=chip_views(chips), until=until, watch=bar)
+    write_trace(trace, where, views=chip_views(chips), title=title, ended=ended, watch=bar)
 
 
 # ---------------------------------------------------------------------- what is said

@@ -99,7 +99,7 @@ def run(options: WbcRun, say: Say, warn: Say) -> bool:
     else:
         _say_lines(bench, outcome, say)
     if trace is not None and options.trace is not None:
-        _write(trace, options.trace, bench, ending.at)
+        _write(trace, options.trace, options.program.name, bench, ending.at)
     return not wrong
 
 
@@ -110,10 +110,10 @@ def _warn(findings: Findings, warn: Say) -> None:
             warn(render(source, shown))
 
 
-def _write(trace: Trace, where: Path, bench: Bench, until: Nanos) -> None:
+def _write(trace: Trace, where: Path, title: str, bench: Bench, ended: Nanos) -> None:
     from steptwin.runtime.export import axis_views, bar, write_trace
 
-    write_trace(trace, where, views=axis_views({NAME: bench.device}), until=until, watch=bar)
+    write_trace(trace, where, views=axis_views({NAME: bench.device}), title=title, ended=ended, watch=bar)
 
 
 # ---------------------------------------------------------------------- what is said

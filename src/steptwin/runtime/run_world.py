@@ -89,12 +89,17 @@ def _arrange(world: World, options: WorldRun) -> None:
 def _write(world: World, options: WorldRun) -> list[Path]:
     if options.trace is None:
         return []
-    written = write_trace(world.trace, options.trace, views=axis_views(world.machines), until=world.now, watch=bar)
+    written = _write_trace(world, options.trace)
     if options.trace.is_dir():
         where = options.trace / SESSION
         sessions.save(sessions.session_of(world), where)
         written.append(where)
     return written
+
+
+def _write_trace(world: World, where: Path) -> list[Path]:
+    views = axis_views(world.machines, world.axes)
+    return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now, watch=bar)
 
 
 # ---------------------------------------------------------------------- what is said
@@ -166,7 +171,7 @@ def replay(path: Path, trace: Path | None, say: Say, warn: Say) -> bool:
     world = session.replay()
     digest = world.trace.digest()
     if trace is not None:
-        for written in write_trace(world.trace, trace, views=axis_views(world.machines), until=world.now, watch=bar):
+        for written in _write_trace(world, trace):
             say(f"wrote {written}")
     if digest == session.digest:
         say(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")

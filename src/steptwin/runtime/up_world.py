@@ -219,7 +219,8 @@ def _keep(options: UpOptions, world: World) -> list[str]:
     if options.trace is not None:
         from steptwin.runtime.export import axis_views, write_trace
 
-        written = write_trace(world.trace, options.trace, views=axis_views(world.machines), until=world.now)
+        views = axis_views(world.machines, world.axes)
+        written = write_trace(world.trace, options.trace, views=views, title=world.spec.name, ended=world.now)
         told += [f"wrote {path}" for path in written]
     if options.session is not None:
         sessions.save(session, options.session)

@@ -76,6 +76,17 @@ class Piece(NamedTuple):
     stalled: bool
 
 
+class Carried(NamedTuple):
+    """From ``begin`` on the load is ``pulses`` from where the drive has counted to (``follows``), or stands at ``pulses``.
+
+    In pulses of the drive, whose direction and zero it has.
+    """
+
+    begin: Nanos
+    follows: bool
+    pulses: int
+
+
 class Course:
     """The way of an axis from ``begin`` on while ``plan`` is in force; immutable. ``blocked``: nothing moves the rotor."""
 
@@ -149,6 +160,23 @@ class Course:
         """First moment > ``after`` at which the rotor loses the field or is caught again."""
         stalled = self._piece(after).stalled
         return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
+
+    def carried(self) -> tuple[Carried, ...]:
+        """Where the load is, in as few words as say it; of a drive at rest it is said how far the load is from it."""
+        build, end = self.build, profile_of(self.plan).end
+        said: list[Carried] = []
+        for piece in self.pieces:
+            if piece.load_follows:
+                now = Carried(piece.begin, True, piece.load * build.sign)
+            elif end is not None and piece.begin >= end:
+                now = Carried(piece.begin, True, (piece.load - self.field(piece.begin)) * build.sign)
+            else:
+                now = Carried(piece.begin, False, (piece.load - build.zero) * build.sign)
+            if said and said[-1].begin == now.begin:
+                said.pop()
+            if not said or said[-1][1:] != now[1:]:
+                said.append(now)
+        return tuple(said)
 
     def _piece(self, now: Nanos) -> Piece:
         return self.pieces[max(bisect_right(self.pieces, now, key=attrgetter("begin")) - 1, 0)]

@@ -6,14 +6,16 @@ gives a `Course` in closed form. Positions in pulses of the mechanics.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import ClassVar, NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.state import Plain, Stateful
-from steptwin.world.course import Build, Course, Standing, plan_of, profile_of
+from steptwin.world.course import Build, Carried, Course, Standing, plan_of, profile_of
 from steptwin.world.kernel import Drive, Kernel
 
 FOLLOW_NS: Nanos = 10 * MILLISECOND
@@ -60,9 +62,11 @@ class Mechanism(Stateful):
         "_lost",
         "_name",
         "_revision",
+        "_said",
         "_simple",
         "_stall_due",
         "_stalled",
+        "_told",
         "build",
         "machine",
         "number",
@@ -86,6 +90,10 @@ class Mechanism(Stateful):
         self._lost = 0
         self._blocked = False
         self._changes = 0
+        self._said: tuple[Carried, ...] = (Carried(kernel.now, True, 0),)
+        """Where the load is, as it was told last."""
+        self._told: Course | None = None
+        """The course of which it was told."""
         self._simple = build.ideal
         """Nothing has come between pulses and load yet, and nothing can."""
         drive = self._drive
@@ -136,6 +144,18 @@ class Mechanism(Stateful):
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
                 self._watch_motor(now)
+            self._say(now)
+
+    def _say(self, now: Nanos) -> None:
+        """Tell where the load is, unless that follows from what has been told: a load that goes with its drive says nothing."""
+        course = self._course
+        if course is self._told:
+            return
+        self._told = course
+        carried = _from(course.carried(), now)
+        if carried != _from(self._said, now):
+            self._said = carried
+            self._kernel.tell(self.machine, "load", str(self.number), carried)
 
     def deadline(self) -> Nanos | None:
         """Courses are laid out ahead: only who follows or watches the axis is to be told."""
@@ -232,6 +252,12 @@ class Mechanism(Stateful):
         """As ever; the drive has its state already."""
         super().set_state(plain)
         self._revision = self._drive.revision
+
+
+def _from(said: tuple[Carried, ...], now: Nanos) -> tuple[Carried, ...]:
+    """What is said of ``now`` and later."""
+    past = max(bisect_right(said, now, key=attrgetter("begin")) - 1, 0)
+    return (said[past]._replace(begin=now), *said[past + 1 :])
 
 
 class RotorMark:

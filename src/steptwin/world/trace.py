@@ -4,10 +4,11 @@ Each machine's records come in the order in which they happened to it; machines 
 other, so the records of several machines are merged by (time, order of the machines, sequence) when somebody reads them.
 
 Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
-a pulse for every unit of position; ``edge`` the new level of a pin, input or output (0.0, 1.0 or volts); ``frame`` the bytes of
-a frame (subject link and direction, ``"tcp-1/in"``); ``statement`` the number of the line a program executes (subject: program);
-``event`` a text (subject: its code); ``input`` what came from outside (subject: what was done); ``fault`` a text (subject: its
-name).
+a pulse for every unit of position; ``load`` where the load of an axis is until the next such record: tuples (moment, whether it
+goes with the pulses of the drive, how many pulses from them, or else at which), before the first record with them; ``edge`` the
+new level of a pin, input or output (0.0, 1.0 or volts); ``frame`` the bytes of a frame (subject link and direction,
+``"tcp-1/in"``); ``statement`` the number of the line a program executes (subject: program); ``event`` a text (subject: its
+code); ``input`` what came from outside (subject: what was done); ``fault`` a text (subject: its name).
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.paths import ArcSegment
 
-KINDS = ("plan", "edge", "frame", "statement", "event", "input", "fault")
+KINDS = ("plan", "load", "edge", "frame", "statement", "event", "input", "fault")
 DIGEST_BYTES = 16
 
 
@@ -101,6 +102,9 @@ class Trace:
 
     def plans(self, machine: str | None = None) -> Iterator[Record]:
         return self.of("plan", machine=machine)
+
+    def loads(self, machine: str | None = None) -> Iterator[Record]:
+        return self.of("load", machine=machine)
 
     def edges(self, machine: str | None = None) -> Iterator[Record]:
         return self.of("edge", machine=machine)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from trace_rig import Run
 
 from steptwin.machine import SECOND, Nanos
-from steptwin.motion import MotionState, plan_position
+from steptwin.motion import MotionState, plan_position, plan_velocity
 from steptwin.runtime.export import write_trace
 from steptwin.runtime.export.polyline import curve
 from steptwin.runtime.export.recording import sort_out
@@ -69,6 +69,36 @@ def test_long_runs_have_clock_times(seconds: int, unit: str, tmp_path: Path) -> 
     trace.add(Record(SECOND, "a", "edge", "OUT1", 1.0))
     write_trace(trace, tmp_path / "run.svg", until=seconds * SECOND)
     assert f">{unit}<" in (tmp_path / "run.svg").read_text()
+
+
+def times_of(picture: Path) -> set[str]:
+    return set(re.findall(r">(\d+)</text>", picture.read_text()))
+
+
+def test_a_picture_ends_shortly_after_the_last_change_unless_asked_for_more(tmp_path: Path) -> None:
+    trace = Trace()
+    trace.add(Record(SECOND, "a", "edge", "OUT1", 1.0))
+    trace.add(Record(7 * SECOND, "a", "edge", "OUT1", 0.0))
+    for second in range(60):
+        trace.add(Record(second * SECOND, "b", "edge", "AIN1", float(second % 2)))
+    write_trace(trace, tmp_path / "short.svg", ended=60 * SECOND)
+    write_trace(trace, tmp_path / "long.svg", ended=60 * SECOND, until=60 * SECOND)
+    assert times_of(tmp_path / "short.svg") & {"7", "8", "60"} == {"7"}
+    assert "60" in times_of(tmp_path / "long.svg")
+
+
+def test_a_motion_without_end_is_shown_to_the_end(tmp_path: Path) -> None:
+    trace = Trace()
+    trace.add(Record(0, "a", "plan", "1", plan_velocity(MotionState(0, 0, 0.0, 0.0), 100.0, 100.0, 100.0)))
+    write_trace(trace, tmp_path / "run.svg", ended=60 * SECOND)
+    assert "60" in times_of(tmp_path / "run.svg")
+
+
+def test_the_title_is_the_name_of_what_ran(mic488: Run, tmp_path: Path) -> None:
+    write_trace(mic488.trace, tmp_path / "named.svg", views=mic488.views, title="bar <feeder>")
+    write_trace(mic488.trace, tmp_path / "plain.svg", views=mic488.views)
+    assert ">bar &lt;feeder&gt;<" in (tmp_path / "named.svg").read_text()
+    assert ">m<" in (tmp_path / "plain.svg").read_text()
 
 
 @given(

@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -35,6 +36,8 @@ NO_VIEWS: AxisViews = {}
 class _Options(NamedTuple):
     period: Nanos
     progress: Progress
+    window: bool
+    """Whether it was asked for to show everything up to the end."""
 
 
 class Format(NamedTuple):
@@ -81,13 +84,13 @@ def _parquet(recording: Recording, path: Path, options: _Options) -> None:
 def _png(recording: Recording, path: Path, options: _Options) -> None:
     from steptwin.runtime.export.plot import write_plot
 
-    write_plot(recording, path, "png", options.progress)
+    write_plot(recording if options.window else recording.to_last_change(), path, "png", options.progress)
 
 
 def _svg(recording: Recording, path: Path, options: _Options) -> None:
     from steptwin.runtime.export.plot import write_plot
 
-    write_plot(recording, path, "svg", options.progress)
+    write_plot(recording if options.window else recording.to_last_change(), path, "svg", options.progress)
 
 
 FORMATS: Mapping[str, Format] = {
@@ -108,6 +111,8 @@ def write_trace(
     where: Path | str,
     *,
     views: AxisViews = NO_VIEWS,
+    title: str = "",
+    ended: Nanos | None = None,
     formats: Sequence[str] | None = None,
     begin: Nanos = 0,
     until: Nanos | None = None,
@@ -118,10 +123,11 @@ def write_trace(
     """Write ``trace`` to a file, whose suffix says its format, or into a directory, as ``trace.jsonl`` and so on; what was
     written.
 
-    ``views`` (`axis_views`) give units of axes and names of their terminals. ``formats`` by default: for a directory `USUAL`;
-    what a file is to be where its suffix does not tell. A window of time (``begin`` to ``until``, ns; by default to where all
-    is at rest) and ``machines`` limit what is shown; JSON lines always have everything. ``period`` (ns) is that of samples.
-    ``watch=bar`` shows on a terminal how far each file is.
+    ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``title`` is the name of what ran, and
+    ``ended`` (ns) when that ended; by default when all came to rest. ``formats`` by default: for a directory `USUAL`; what a
+    file is to be where its suffix does not tell. A window of time (``begin`` to ``until``, ns) and ``machines`` limit what is
+    shown; JSON lines always have everything. Without ``until`` everything goes on to the end, but pictures end shortly after
+    the last change. ``period`` (ns) is that of samples. ``watch=bar`` shows on a terminal how far each file is.
 
     Raises `Misuse` for what is not permitted, for libraries that are missing, and where a file cannot be written; a file is
     there as a whole or, after an error, as it was before.
@@ -132,7 +138,8 @@ def write_trace(
         raise Misuse(f"period = {period} ns: must be 1 ns or more")
     if len(trace) and next(iter(trace), None) is None:
         raise Misuse("this trace has kept nothing but its digest: there is nothing to write")
-    recording = sort_out(trace, views, begin, until, machines)
+    recording = replace(sort_out(trace, views, begin, ended if until is None else until, machines), title=title)
+    ended = recording.until if ended is None else ended
     for name, path in targets:
         write = FORMATS[name].write
         try:
@@ -142,9 +149,9 @@ def write_trace(
                 with watch(path.name, recording.begin, recording.until) as progress:
                     if write is None:
                         with unfinished.open("w", encoding="utf-8") as file:
-                            write_records(trace, views, recording.until, file, progress)
+                            write_records(trace, views, file, progress, title=title, until=ended)
                     else:
-                        write(recording, unfinished, _Options(period, progress))
+                        write(recording, unfinished, _Options(period, progress, until is not None))
                 unfinished.replace(path)
             finally:
                 unfinished.unlink(missing_ok=True)

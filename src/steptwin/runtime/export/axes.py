@@ -6,9 +6,12 @@ A trace knows pulses only. A view is static: it is read from a machine once and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from steptwin.machine import MICROSECOND, Nanos
+
+if TYPE_CHECKING:
+    from steptwin.world.build import Fitted
 
 
 class StepOutputs(NamedTuple):
@@ -31,6 +34,24 @@ class PhaseOutputs(NamedTuple):
     characteristic_pin: str = "N"
 
 
+class Mechanics(NamedTuple):
+    """What an axis moves, which has a name, a unit and a zero of its own.
+
+    Its true position is (pulses of the load + ``zero_p``) / ``pulses_per_unit``; negative where positive pulses go down.
+    """
+
+    name: str
+    unit: str
+    pulses_per_unit: float
+    zero_p: int = 0
+    is_ideal: bool = True
+    """Whether the load is where the pulses have it, unless a trace says otherwise."""
+
+    @property
+    def position_name(self) -> str:
+        return f"{self.name}_true_position_{self.unit}"
+
+
 class AxisView(NamedTuple):
     """``pulses_per_unit``: units of its profiles in one ``unit``."""
 
@@ -38,6 +59,7 @@ class AxisView(NamedTuple):
     unit: str = "imp"
     pulses_per_unit: float = 1.0
     outputs: StepOutputs | PhaseOutputs = StepOutputs()
+    mechanics: Mechanics | None = None
 
     # Names of variables and columns.
 
@@ -50,6 +72,8 @@ class AxisView(NamedTuple):
         return f"{self.name}_velocity_{self.unit}_s"
 
 
+NOTHING_FITTED: Mapping[str, Fitted] = {}
+
 AxisViews: TypeAlias = Mapping[tuple[str, str], AxisView]
 """By machine and subject of its ``plan`` records (``"1"``…)."""
 
@@ -59,8 +83,8 @@ def plain_view(axis: str) -> AxisView:
     return AxisView(f"M{axis}", outputs=StepOutputs(f"M{axis}_STEP", f"M{axis}_DIR"))
 
 
-def axis_views(machines: Mapping[str, object]) -> dict[tuple[str, str], AxisView]:
-    """The views of all axes of ``machines`` (by name)."""
+def axis_views(machines: Mapping[str, object], axes: Mapping[str, Fitted] = NOTHING_FITTED) -> dict[tuple[str, str], AxisView]:
+    """The views of all axes of ``machines``, with the mechanics of ``axes``; both by name, as a world has them."""
     from steptwin.m1486.chip import M1486
     from steptwin.mic488.device import Mic488
     from steptwin.runtime.m1486_trace import chip_views
@@ -73,4 +97,14 @@ def axis_views(machines: Mapping[str, object]) -> dict[tuple[str, str], AxisView
                 views[name, number] = plain_view(number)._replace(unit=axis.config.unit_name, pulses_per_unit=axis.gear)
         elif isinstance(machine, M1486):
             views |= chip_views({name: machine})
+    for fitted in axes.values():
+        place = fitted.mechanism.machine, str(fitted.mechanism.number)
+        views[place] = views[place]._replace(mechanics=_mechanics(fitted))
     return views
+
+
+def _mechanics(fitted: Fitted) -> Mechanics:
+    spec, build = fitted.spec, fitted.mechanism.build
+    slips = spec.encoder is not None and spec.encoder.slip != 0.0
+    scale = build.sign * float(fitted.pulses_per_unit)
+    return Mechanics(spec.name, spec.unit, scale, build.sign * build.zero, build.ideal and not slips)

@@ -37,11 +37,12 @@ _SCALE_IN, _MARGIN_IN = 0.55, 0.12
 _MOTION_IN, _ROW_IN, _GAP_IN = 0.78, 0.24, 0.1
 _COLUMNS = 1500
 """Of pixels across the picture: more points than a few in each are not seen."""
+_GREY = "(grey: commanded)"
 _CLOCK_STEPS_S = (30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200, 86400)
 
 _INK, _FAINT = "#22262b", "#c9ced6"
-_POSITION, _VELOCITY, _LEVEL, _ANALOG, _FRAME, _EVENT, _FAULT = (
-    "#1f5fa8", "#c2570c", "#2f7d55", "#6b4fa0", "#5b6470", "#22262b", "#b3261e",
+_POSITION, _VELOCITY, _TRUE, _LEVEL, _ANALOG, _FRAME, _EVENT, _FAULT = (
+    "#1f5fa8", "#c2570c", "#0f7b8a", "#2f7d55", "#6b4fa0", "#5b6470", "#22262b", "#b3261e",
 )  # fmt: skip
 _STYLE = {
     "font.size": 8.5,
@@ -74,12 +75,19 @@ def write_plot(recording: Recording, path: Path, form: str, progress: Progress) 
     rows = _rows(recording)
     left_out = len(moving) - len(axes), max(len(rows) - MOST_ROWS, 0)
     rows = rows[:MOST_ROWS]
-    heights = [_MOTION_IN] * (2 * len(axes)) + ([_ROW_IN * len(rows)] if rows else [])
+    loads = [track.true() for track in axes]
+    panels_each = [2 if load is None else 3 for load in loads]
+    heights = [_MOTION_IN] * sum(panels_each) + ([_ROW_IN * len(rows)] if rows else [])
     with rc_context(_STYLE):
-        left = max(_LEFT_IN, _room([*(_label(track, recording) + " velocity" for track in axes), *(row.label for row in rows)]))
+        labels = [_label(track, recording) + " velocity" for track in axes] + [row.label for row in rows]
+        labels += [text for load in loads if load is not None for text in (f"{load.view.name} position", _GREY)]
+        left = max(_LEFT_IN, _room(labels))
         figure, panels = _figure(recording, heights, left)
-        for i, track in enumerate(axes):
-            _motion(panels[2 * i], panels[2 * i + 1], track, recording)
+        rest = iter(panels)
+        for i, (track, load) in enumerate(zip(axes, loads, strict=True)):
+            _motion(next(rest), next(rest), track, recording)
+            if load is not None:
+                _true(next(rest), track, load, recording)
             progress(begin + (until - begin) * (i + 1) // (len(axes) + 1))
         if rows:
             _lanes(panels[-1], rows, recording)
@@ -91,7 +99,9 @@ def write_plot(recording: Recording, path: Path, form: str, progress: Progress) 
 
 
 def _moves(track: AxisTrack, recording: Recording) -> bool:
-    return any(profile_of(plan).moving(after) for plan, after, _ in track.stretches(recording.begin, recording.until))
+    return len(track.loads) > 0 or any(
+        profile_of(plan).moving(after) for plan, after, _ in track.stretches(recording.begin, recording.until)
+    )
 
 
 def _rows(recording: Recording) -> list[_Row]:
@@ -140,8 +150,8 @@ def _figure(recording: Recording, heights: list[float], left: float) -> tuple[Fi
     if panels:
         panels[-1].tick_params(axis="x", labelbottom=True, length=3)
         panels[-1].set_xlabel(_time_unit(recording))
-    title = ", ".join(recording.machines[:8]) + (" …" if len(recording.machines) > 8 else "")
-    figure.text(left / _WIDTH_IN, 1 - 0.3 / max(height, 1.6), title, fontsize=11, fontweight="bold")
+    names = ", ".join(recording.machines[:8]) + (" …" if len(recording.machines) > 8 else "")
+    figure.text(left / _WIDTH_IN, 1 - 0.3 / max(height, 1.6), recording.title or names, fontsize=11, fontweight="bold")
     return figure, panels
 
 
@@ -176,22 +186,43 @@ def _clock(seconds: float) -> str:
 
 def _motion(above: Axes, below: Axes, track: AxisTrack, recording: Recording) -> None:
     view = track.view
-    resolution = (recording.until - recording.begin) // _COLUMNS
-    points = curve(track, recording.begin, recording.until, resolution)
-    times = np.array(points.times) / SECOND
+    times, positions, velocities = _points(track, recording)
     name = _label(track, recording)
     for panel, values, color, label in (
-        (above, points.positions, _POSITION, f"{name} position\n{view.unit}"),
-        (below, points.velocities, _VELOCITY, f"{name} velocity\n{view.unit}/s"),
+        (above, positions, _POSITION, f"{name} position\n{view.unit}"),
+        (below, velocities, _VELOCITY, f"{name} velocity\n{view.unit}/s"),
     ):
-        panel.plot(*_thinned(times, np.array(values) / view.pulses_per_unit), color=color, linewidth=1.1)
-        panel.set_ylabel(label, rotation=0, ha="right", va="center", labelpad=36, color=color)
-        panel.yaxis.set_label_coords(-_SCALE_IN / (panel.get_position().width * _WIDTH_IN), 0.5)
-        panel.yaxis.set_major_locator(MaxNLocator(3))
-        panel.margins(y=0.12)
-        panel.grid(axis="y", color=_FAINT, linewidth=0.5)
-        if not panel.dataLim.height:
-            panel.set_ylim(panel.dataLim.y0 - 1, panel.dataLim.y0 + 1)
+        panel.plot(*_thinned(times, values / view.pulses_per_unit), color=color, linewidth=1.1)
+        _scale(panel, label, color)
+
+
+def _true(panel: Axes, track: AxisTrack, load: AxisTrack, recording: Recording) -> None:
+    """Where the load is, over where the pulses would have it."""
+    view = load.view
+    mechanics = track.view.mechanics
+    zero_p = 0 if mechanics is None else mechanics.zero_p
+    times, commanded, _ = _points(track, recording)
+    panel.plot(*_thinned(times, (commanded + zero_p) / view.pulses_per_unit), color=_FAINT, linewidth=2.2)
+    times, positions, _ = _points(load, recording)
+    panel.plot(*_thinned(times, positions / view.pulses_per_unit), color=_TRUE, linewidth=1.1)
+    _scale(panel, f"{view.name} position\n{view.unit}\n{_GREY}", _TRUE)
+
+
+def _points(track: AxisTrack, recording: Recording) -> tuple[Reals, Reals, Reals]:
+    """Seconds, positions and velocities in pulses."""
+    resolution = (recording.until - recording.begin) // _COLUMNS
+    points = curve(track, recording.begin, recording.until, resolution)
+    return np.array(points.times) / SECOND, np.array(points.positions), np.array(points.velocities)
+
+
+def _scale(panel: Axes, label: str, color: str) -> None:
+    panel.set_ylabel(label, rotation=0, ha="right", va="center", labelpad=36, color=color)
+    panel.yaxis.set_label_coords(-_SCALE_IN / (panel.get_position().width * _WIDTH_IN), 0.5)
+    panel.yaxis.set_major_locator(MaxNLocator(3))
+    panel.margins(y=0.12)
+    panel.grid(axis="y", color=_FAINT, linewidth=0.5)
+    if not panel.dataLim.height:
+        panel.set_ylim(panel.dataLim.y0 - 1, panel.dataLim.y0 + 1)
 
 
 def _lanes(panel: Axes, rows: list[_Row], recording: Recording) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from typing import TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import StepTrain
 from steptwin.runtime.export.axes import AxisView, AxisViews, plain_view
+from steptwin.world.course import Carried
 from steptwin.world.trace import Record, Trace
 
 Plan: TypeAlias = Profile | StepTrain
@@ -30,6 +32,8 @@ class AxisTrack:
     view: AxisView
     times: list[Nanos] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
+    loads: list[Carried] = field(default_factory=list)
+    """Where the load is, by moments, as far as it does not go with the pulses from the beginning."""
 
     @property
     def name(self) -> str:
@@ -47,6 +51,22 @@ class AxisTrack:
             after = max(after, end)
             if after >= until:
                 return
+
+    def true(self) -> AxisTrack | None:
+        """The motion of the load, ``zero_p`` included; None where it is not known, or can only be that of the drive."""
+        mechanics = self.view.mechanics
+        if mechanics is None or (mechanics.is_ideal and not self.loads):
+            return None
+        view = AxisView(f"{mechanics.name} true", mechanics.unit, mechanics.pulses_per_unit)
+        track = AxisTrack(self.machine, view)
+        for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
+            past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
+            _, follows, pulses = self.loads[past] if past >= 0 else Carried(begin, True, 0)
+            profile = profile_of(self.plan(begin)) if follows else at_rest(begin, pulses)
+            off = mechanics.zero_p + (pulses if follows else 0)
+            track.times.append(begin)
+            track.plans.append(type(profile)(profile.start, profile.base + off, profile.segments, profile.final_p))
+        return track
 
     def most_pulses(self, after: Nanos, until: Nanos) -> int:
         """How many pulses there are, or more: the whole positions passed."""
@@ -105,6 +125,15 @@ class Recording:
     pins: list[PinTrack]
     marks: list[Record]
     """Frames, statements, events, inputs and faults, in order."""
+    last: Nanos
+    """When something changed last, analog inputs apart: their sources never end; ``until`` where something moves on."""
+    title: str = ""
+
+    def to_last_change(self) -> Recording:
+        """The same, ending shortly after the last change; all of it where nothing changes."""
+        if self.last == self.begin:
+            return self
+        return replace(self, until=min(self.until, self.last + (self.last - self.begin) // 32 + MILLISECOND))
 
     def of(self, kind: str) -> list[Record]:
         return [record for record in self.marks if record.kind == kind]
@@ -129,7 +158,7 @@ def sort_out(
     axes: dict[tuple[str, str], AxisTrack] = {}
     pins: dict[tuple[str, str], PinTrack] = {}
     marks: list[Record] = []
-    last = begin
+    last = changed = begin
     for record in trace:
         time, machine, kind, subject, value = record
         if machine not in order:
@@ -137,21 +166,30 @@ def sort_out(
         if until is not None and time > until:
             break
         last = max(last, time)
+        if not subject.startswith("AIN"):
+            changed = max(changed, time)
         if isinstance(value, (Profile, StepTrain)) and kind == "plan":
             _axis(axes, machine, subject, views).times.append(time)
             axes[machine, subject].plans.append(value)
-            last = max(last, profile_of(value).end or time)
+        elif isinstance(value, tuple) and kind == "load":
+            loads = _axis(axes, machine, subject, views).loads
+            while loads and loads[-1].begin >= time:
+                loads.pop()
+            loads += [Carried(*one) for one in value]
         elif isinstance(value, (int, float)) and kind == "edge":
             track = pins.setdefault((machine, subject), PinTrack(machine, subject))
             track.times.append(time)
             track.levels.append(float(value))
         elif time >= begin:
             marks.append(record)
+    for track in axes.values():
+        _stand_before(track, begin)
+    rests = [profile_of(track.plans[-1]).end for track in axes.values()]
+    at_rest_by = max((rest for rest in rests if rest is not None), default=begin)
+    last, changed = max(last, at_rest_by), max(changed, at_rest_by)
     end = last if until is None else until
     if end < begin:
         raise Misuse(f"the window of time ends at {end} ns and begins at {begin} ns: it must not end before it begins")
-    for track in axes.values():
-        _stand_before(track, begin)
     return Recording(
         begin,
         end,
@@ -159,6 +197,7 @@ def sort_out(
         sorted(axes.values(), key=lambda track: (order[track.machine], _numbers(track.view.name))),
         sorted(pins.values(), key=lambda track: (order[track.machine], _numbers(track.pin))),
         marks,
+        end if None in rests else min(changed if changed > begin else last, end),
     )
 
 
@@ -171,8 +210,11 @@ def _axis(axes: dict[tuple[str, str], AxisTrack], machine: str, subject: str, vi
 
 
 def _stand_before(track: AxisTrack, begin: Nanos) -> None:
-    """Before its first plan an axis stood where that begins."""
-    if track.times[0] > begin:
+    """Before its first plan an axis stood where that begins; without any, where it was switched on."""
+    if not track.times:
+        track.times.append(begin)
+        track.plans.append(at_rest(begin, 0))
+    elif track.times[0] > begin:
         first = profile_of(track.plans[0])
         track.times.insert(0, begin)
         track.plans.insert(0, at_rest(begin, first.count(first.start)))

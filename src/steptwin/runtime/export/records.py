@@ -1,8 +1,8 @@
 """A trace as JSON lines: all that was recorded, exactly, one record a line; and back.
 
-The first line says what the file is: names of the machines, how their axes are shown, the end of the run, the digest. Every
-other line is a record: ``time_ns``, ``machine``, ``kind``, ``subject``, ``value``. The value of a plan is its profile: moments
-in nanoseconds, positions in pulses, and for each segment ``[end_s, anchor_s, c0, c1, c2, c3, direction]`` with
+The first line says what the file is: a title, names of the machines, how their axes are shown, the end of the run, the digest.
+Every other line is a record: ``time_ns``, ``machine``, ``kind``, ``subject``, ``value``. The value of a plan is its profile:
+moments in nanoseconds, positions in pulses, and for each segment ``[end_s, anchor_s, c0, c1, c2, c3, direction]`` with
 position = base + c0 + c1·u + c2·u² + c3·u³, u = seconds since ``start_ns`` − anchor_s; an end or a limit that never
 comes is null. A segment of an arc is ``{"way": [its segment], "course": [centre_p, radius_p, angle_q, turn_q], …}`` with
 position = base + centre + radius · cos((angle + turn · way) · 90°). Bytes are ``{"hex": …}``.
@@ -20,7 +20,7 @@ from steptwin.machine import Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Division, Microstepping, StepTrain
 from steptwin.motion.paths import ArcProfile, ArcSegment, Circular
-from steptwin.runtime.export.axes import AxisView, AxisViews, PhaseOutputs, StepOutputs
+from steptwin.runtime.export.axes import AxisView, AxisViews, Mechanics, PhaseOutputs, StepOutputs
 from steptwin.runtime.export.progress import Progress
 from steptwin.world.trace import KINDS, Record, Trace
 
@@ -34,12 +34,21 @@ class SavedTrace(NamedTuple):
     trace: Trace
     views: dict[tuple[str, str], AxisView]
     until: Nanos
+    """When the run ended."""
     digest: str
+    title: str
 
 
-def write_records(trace: Trace, views: AxisViews, until: Nanos, file: IO[str], progress: Progress) -> None:
+def write_records(trace: Trace, views: AxisViews, file: IO[str], progress: Progress, *, title: str, until: Nanos) -> None:
     axes = [{"machine": machine, "axis": axis, **_view_to_json(view)} for (machine, axis), view in views.items()]
-    head = {"steptwin_trace": FORMAT, "machines": trace.machines, "until_ns": until, "digest": trace.digest(), "axes": axes}
+    head = {
+        "steptwin_trace": FORMAT,
+        "title": title,
+        "machines": trace.machines,
+        "until_ns": until,
+        "digest": trace.digest(),
+        "axes": axes,
+    }
     file.write(_line(head))
     for i, (time, machine, kind, subject, value) in enumerate(trace):
         file.write(_line({"time_ns": time, "machine": machine, "kind": kind, "subject": subject, "value": _to_json(value)}))
@@ -75,7 +84,7 @@ def _head(data: dict[str, Any]) -> SavedTrace:
     if data["steptwin_trace"] != FORMAT:
         raise Misuse(f"a trace of format {data['steptwin_trace']}: this version reads format {FORMAT}")
     views = {(axis["machine"], axis["axis"]): _view_from_json(axis) for axis in data["axes"]}
-    return SavedTrace(Trace(data["machines"]), views, data["until_ns"], data["digest"])
+    return SavedTrace(Trace(data["machines"]), views, data["until_ns"], data["digest"], data.get("title", ""))
 
 
 def _record(data: dict[str, Any]) -> Record:
@@ -150,7 +159,9 @@ def _arc_from_json(data: dict[str, Any]) -> ArcSegment:
 
 
 def _view_to_json(view: AxisView) -> dict[str, object]:
-    return {**view._asdict(), "outputs": view.outputs._asdict()}
+    data = {**view._asdict(), "outputs": view.outputs._asdict()}
+    del data["mechanics"]
+    return data if view.mechanics is None else {**data, "mechanics": view.mechanics._asdict()}
 
 
 def _view_from_json(data: dict[str, Any]) -> AxisView:
@@ -161,4 +172,5 @@ def _view_from_json(data: dict[str, Any]) -> AxisView:
         made = PhaseOutputs((first, second), **outputs)
     else:
         made = StepOutputs(**outputs)
-    return AxisView(data["name"], data["unit"], data["pulses_per_unit"], made)
+    mechanics = Mechanics(**data["mechanics"]) if "mechanics" in data else None
+    return AxisView(data["name"], data["unit"], data["pulses_per_unit"], made, mechanics)

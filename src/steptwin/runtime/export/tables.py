@@ -1,7 +1,8 @@
 """Sampled tables: time, position and velocity of every axis, level of every pin, once in every period.
 
-Columns: ``time_s``; ``MACHINE.AXIS_position_UNIT``, ``MACHINE.AXIS_velocity_UNIT_s``; ``MACHINE.PIN``, 0 or 1, volts on analog
-pins. A sample has everything that happened up to its moment. A level that is not known yet is empty.
+Columns: ``time_s``; ``MACHINE.AXIS_position_UNIT``, ``MACHINE.AXIS_velocity_UNIT_s``, both as commanded; where mechanics can be
+elsewhere ``MACHINE.NAME_true_position_UNIT``; ``MACHINE.PIN``, 0 or 1, volts on analog pins. A sample has everything that
+happened up to its moment. A level that is not known yet is empty.
 """
 
 from __future__ import annotations
@@ -28,14 +29,17 @@ Columns: TypeAlias = dict[str, NDArray[Any]]
 def samples(recording: Recording, period: Nanos) -> Iterator[tuple[Nanos, Columns]]:
     """The table in parts: the moment of the last row, and the columns. There is at least one row."""
     at = recording.begin
+    loads = [axis.true() for axis in recording.axes]
     while at <= recording.until:
         rows = min((recording.until - at) // period + 1, _ROWS)
         times = at + period * np.arange(rows, dtype=np.int64)
         columns: Columns = {"time_s": times / SECOND}
-        for axis in recording.axes:
+        for axis, load in zip(recording.axes, loads, strict=True):
             view = axis.view
             moved = _motion(axis, times)
             columns[f"{axis.machine}.{view.position_name}"], columns[f"{axis.machine}.{view.velocity_name}"] = moved
+            if load is not None and view.mechanics is not None:
+                columns[f"{axis.machine}.{view.mechanics.position_name}"], _ = _motion(load, times)
         columns |= {pin.name: _levels(pin, times) for pin in recording.pins}
         yield int(times[-1]), columns
         at += period * rows

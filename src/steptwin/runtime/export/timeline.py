@@ -30,7 +30,7 @@ _MOST_BYTES = 64
 
 
 def write_timeline(recording: Recording, file: IO[str], progress: Progress) -> None:
-    names = ", ".join(recording.machines[:4]) + (" …" if len(recording.machines) > 4 else "")
+    names = recording.title or ", ".join(recording.machines[:4]) + (" …" if len(recording.machines) > 4 else "")
     data = {
         "begin": recording.begin,
         "span": recording.until - recording.begin,
@@ -58,6 +58,13 @@ def _part(name: str) -> str:
 
 
 def _axis(track: AxisTrack, recording: Recording, progress: Progress, number: int) -> dict[str, object]:
+    """What is commanded, and under ``true`` where the load is, if that can be elsewhere."""
+    progress(recording.begin + (recording.until - recording.begin) * (number + 1) // (len(recording.axes) + 1))
+    load = track.true()
+    return _motion(track, recording) | ({} if load is None else {"true": _motion(load, recording)})
+
+
+def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
     """Flat ``pieces``, eight numbers each: begin (ns from that of the window), coefficients c0…c3 of the position (pulses) in
     powers of seconds from there, counted position, direction (0: no pulses), pulses of the profile for one STEP pulse.
     """
@@ -70,7 +77,6 @@ def _axis(track: AxisTrack, recording: Recording, progress: Progress, number: in
                 rounded = [float(f"{c:.12g}") for c in cubic]
                 numbers += [begin - recording.begin, *rounded, count, direction, grid]
     view = track.view
-    progress(recording.begin + (recording.until - recording.begin) * (number + 1) // (len(recording.axes) + 1))
     return {
         "machine": track.machine, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit, "pieces": numbers,
     }  # fmt: skip

@@ -1,8 +1,8 @@
 """Value change dumps (IEEE 1364): what a logic analyser at the terminals would have seen, for GTKWave and its kin.
 
-STEP and DIR, or the two phase currents, of every axis; all pins; position and velocity as real numbers; program lines, frames,
-events and faults as text. One unit of time is a nanosecond. Whole pulse lists become text at once (`vcdtext`), so that a
-pulse costs less than a tenth of a microsecond.
+STEP and DIR, or the two phase currents, of every axis; all pins; position and velocity, and the true position of mechanics that
+can be elsewhere, as real numbers; program lines, frames, events and faults as text. One unit of time is a nanosecond. Whole
+pulse lists become text at once (`vcdtext`), so that a pulse costs less than a tenth of a microsecond.
 """
 
 from __future__ import annotations
@@ -133,11 +133,20 @@ class _Dump:
     def _add_motion(self, track: AxisTrack, recording: Recording, quiet: _Quiet) -> None:
         view = track.view
         points = curve(track, recording.begin, recording.until)
-        for name, values in ((view.position_name, points.positions), (view.velocity_name, points.velocities)):
-            code = self._declare(track.machine, "real", 64, name)
-            tokens = [b"r%r %s\n" % (value / view.pulses_per_unit, code) for value in values]
-            self._initial.append(tokens[0] if tokens else b"r0.0 %s\n" % code)
-            quiet += _drawn_to(points.times, tokens)
+        scale = view.pulses_per_unit
+        self._add_real(track.machine, view.position_name, points.times, [p / scale for p in points.positions], quiet)
+        self._add_real(track.machine, view.velocity_name, points.times, [v / scale for v in points.velocities], quiet)
+        load = track.true()
+        if load is not None and view.mechanics is not None:
+            points, scale = curve(load, recording.begin, recording.until), load.view.pulses_per_unit
+            name = view.mechanics.position_name
+            self._add_real(track.machine, name, points.times, [p / scale for p in points.positions], quiet)
+
+    def _add_real(self, machine: str, name: str, times: list[Nanos], values: list[float], quiet: _Quiet) -> None:
+        code = self._declare(machine, "real", 64, name)
+        tokens = [b"r%r %s\n" % (value, code) for value in values]
+        self._initial.append(tokens[0] if tokens else b"r0.0 %s\n" % code)
+        quiet += _drawn_to(times, tokens)
 
     def _add_pin(self, pin: PinTrack, recording: Recording, quiet: _Quiet) -> None:
         code = self._declare(pin.machine, *(("real", 64) if pin.analog else ("wire", 1)), pin.pin)

@@ -115,7 +115,7 @@ class Pin {
 // ---------------------------------------------------------------------- lanes
 
 const HEIGHTS = { group: 28, position: 62, velocity: 46, step: 26, level: 24, analog: 40, frames: 40, statement: 24, marks: 24 };
-const COLORS = { position: "--position", velocity: "--velocity", step: "--step", level: "--level", analog: "--analog", frames: "--out", statement: "--statement" };
+const COLORS = { position: "--position", true: "--true", velocity: "--velocity", step: "--step", level: "--level", analog: "--analog", frames: "--out", statement: "--statement" };
 const MARK_COLORS = { frame: "--in", statement: "--statement", event: "--event", input: "--input", fault: "--fault" };
 const MARK_NAMES = { event: "events", input: "inputs", fault: "faults" };
 
@@ -127,6 +127,10 @@ function lanesOf(machine) {
     const common = { machine, motion, unit: axis.unit };
     const moves = motion.moves();
     lanes.push({ ...common, kind: "position", name: `${axis.name} position`, first: true, range: motion.range(false, 0, SPAN), thin: !moves });
+    if (axis.true) {
+      const load = new Motion(axis.true), range = load.range(false, 0, SPAN);
+      lanes.push({ machine, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, range });
+    }
     if (!moves) continue;
     lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, range: motion.range(true, 0, SPAN) });
     lanes.push({ ...common, kind: "step", name: `${axis.name} pulses` });
@@ -152,7 +156,7 @@ function lanesOf(machine) {
   lanes.push(...groups.values());
   for (const lane of lanes) {
     lane.height = lane.thin ? HEIGHTS.level : HEIGHTS[lane.kind];
-    lane.color = COLORS[lane.kind] ?? MARK_COLORS[lane.mark];
+    lane.color = lane.isTrue ? COLORS.true : COLORS[lane.kind] ?? MARK_COLORS[lane.mark];
   }
   return lanes;
 }
