@@ -55,3 +55,21 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert run("get", "counter").startswith("COUNTER")
     program.write_text("v99999\n")
     assert "error M110: V 99 999 is out of range" in run("send", str(program), code=2)
+
+
+def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) -> None:
+    """Both kinds of device, and a server of Modbus TCP, which hangs up when it hears characters."""
+    chips, controller = serve_m1486("--variant", "B", "--chain", "1,B"), serve("--demo")
+    places = [str(chips.pty), f"tcp://127.0.0.1:{chips.tcp_port}", f"tcp://127.0.0.1:{controller.tcp_port}"]
+    found = json.loads(chips.command("scan", *places, "--units", "1", "--baud", "2400,4800", "--json").stdout)
+    assert [(f["address"], f["baud"], f["kind"], f.get("chip"), f.get("variant"), f.get("unit")) for f in found] == [
+        (places[0], 2400, "m1486", 1, "B", None),
+        (places[0], 2400, "m1486", 11, "B", None),
+        (places[1], None, "m1486", 1, "B", None),
+        (places[1], None, "m1486", 11, "B", None),
+        (places[2], None, "mic488", None, None, 1),
+    ]
+    assert chips.command("scan", places[0]).stdout.splitlines()[1] == f"{places[0]}  4800  chip B  M1486B"
+    alone = chips.command("scan", str(controller.pty), "--kind", "m1486")
+    assert (alone.returncode, alone.stderr) == (1, f"nobody answers on {controller.pty}\n")
+    assert chips.command("scan", places[2], "--kind", "mic488", "--units", "1").returncode == 0

@@ -1,13 +1,15 @@
 """``steptwin ports``, ``scan``: where a device could be, and where one is.
 
-From Python: `steptwin.runtime.ports`, `steptwin.host.mic488.identify.scan`.
+From Python: `steptwin.runtime.ports`, `steptwin.host.mic488.identify.scan`, `steptwin.host.m1486.identify.scan_chips`.
 """
 
 from __future__ import annotations
 
 import contextlib
+import enum
 import sys
 from collections.abc import Callable, Generator
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -16,9 +18,16 @@ from steptwin.cli.device import Json, complain, print_json, table
 from steptwin.errors import LineFailure, Misuse
 
 if TYPE_CHECKING:
-    from steptwin.host.mic488.identify import Found
+    from steptwin.host.m1486.identify import SearchLine
 
-BAUDS = "38400,9600,19200,57600,115200"
+BAUDS = (38400, 9600, 19200, 57600, 115200)
+"""What a MIC488 is asked at; chips have rates of their own."""
+
+
+class Kind(enum.StrEnum):
+    ANY = "any"
+    MIC488 = "mic488"
+    M1486 = "m1486"
 
 
 def ports(json: Json = False) -> None:
@@ -38,71 +47,166 @@ def scan(
     places: Annotated[
         list[str] | None, typer.Argument(metavar="[ADDRESS]...", help="Ports or addresses. Default: all that 'ports' lists.")
     ] = None,
-    units: Annotated[str, typer.Option(help="Slave addresses, such as 1-247 or 1,2,5.")] = "1-16",
-    baud: Annotated[str, typer.Option(help="Baud rates to try on serial ports.")] = BAUDS,
-    timeout: Annotated[float, typer.Option(help="Seconds to wait for each unit beside the time on the wire.")] = 0.1,
+    kind: Annotated[Kind, typer.Option(help="What to look for.")] = Kind.ANY,
+    units: Annotated[str, typer.Option(help="Slave addresses of MIC488, such as 1-247 or 1,2,5.")] = "1-16",
+    baud: Annotated[
+        str | None, typer.Option(help="Baud rates to try on serial ports. Default: those each kind of device has.")
+    ] = None,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for each answer beside the time on the wire.")] = 0.1,
     json: Json = False,
 ) -> None:
-    """Look for MIC488 controllers: on each port, at each baud rate, each unit is asked to read its inputs. Nothing is written.
+    """Look for controllers. Nothing moves, and no setting is changed.
+
+    M1486 chips are asked for their type first: chip after chip, where anybody answers at all. Only where none does, MIC488
+    controllers are asked to read their inputs: each unit, at each baud rate. A chip that moves or runs a program cannot answer.
+    It is made deaf meanwhile, as far as that is possible, because rubbish would end its program; --kind m1486 is safe for it.
 
     Exit code 1 when nobody is found.
     """
     from steptwin.runtime.ports import serial_ports, twin_ports
 
-    numbers, bauds = numbers_of(units, "--units", 1, 247), numbers_of(baud, "--baud", 300, 1_000_000)
+    numbers = numbers_of(units, "--units", 1, 247)
+    bauds = None if baud is None else numbers_of(baud, "--baud", 300, 1_000_000)
     if not 0.0 < timeout <= 10.0:
         raise Misuse(f"--timeout {timeout:g}: permitted are more than 0 and at most 10 s")
     wanted = places or [place.address for place in serial_ports() + twin_ports()]
     rows: list[dict[str, Any]] = []
     try:
         for place in wanted:
-            for rate in bauds if "://" not in place or place.startswith("rfc2217") else bauds[:1]:
-                found = _scanned(place, rate, numbers, timeout)
-                rows += [_row(place, rate, one) for one in found]
-                if found:
-                    break  # a line has one baud rate
+            rows += _found_at(place, kind, numbers, bauds, timeout)
     except KeyboardInterrupt:
         complain("interrupted: not everything was looked at")
     if json:
         print_json(rows)
     elif rows:
-        typer.echo(table([(r["address"], f"{r['baud'] or ''}", f"unit {r['unit']}", r["what"]) for r in rows]))
+        typer.echo(table([(r["address"], f"{r['baud'] or ''}", _which(r), r["what"]) for r in rows]))
     if not rows:
         complain(f"nobody answers on {', '.join(wanted) or 'any port: there is none'}")
         raise typer.Exit(1)
 
 
-def _row(place: str, baud: int, found: Found) -> dict[str, Any]:
-    what = "answers, but is no MIC488" if found.firmware is None else f"MIC488, firmware {found.firmware}"
-    return {
-        "address": place,
-        "baud": None if "://" in place else baud,
-        "unit": found.unit,
-        "firmware": found.firmware,
-        "what": what,
-    }
+def _which(row: dict[str, Any]) -> str:
+    return f"unit {row['unit']}" if row["kind"] == Kind.MIC488 else f"chip {row['chip']:X}"
 
 
-def _scanned(place: str, baud: int, units: list[int], timeout: float) -> list[Found]:
+def _found_at(place: str, kind: Kind, units: list[int], bauds: list[int] | None, timeout: float) -> list[dict[str, Any]]:
+    """All that answer at an address; nobody where it cannot be opened, which is told."""
+    from steptwin.host.m1486.identify import CHIP_BAUDS
+
+    rows: list[dict[str, Any]] = []
+    try:
+        if kind is not Kind.MIC488:
+            chip_bauds = _rates(place, bauds or list(CHIP_BAUDS))
+            try:
+                rows = _chips(place, chip_bauds, timeout)
+                if not rows and kind is Kind.ANY:
+                    rows = _controllers(place, _rates(place, bauds or list(BAUDS)), units, timeout)
+            finally:
+                if not rows:
+                    _let_chips_listen(place, chip_bauds)
+        else:
+            rows = _controllers(place, _rates(place, bauds or list(BAUDS)), units, timeout)
+    except LineFailure as failure:
+        complain(str(failure))
+    return rows
+
+
+def _rates(place: str, bauds: list[int]) -> list[int]:
+    """Rates matter to serial ports, here or over the network; elsewhere any is as good."""
+    if place.startswith("rfc2217://") or not ("://" in place or str(Path(place).resolve()).startswith("/dev/pts/")):
+        return bauds
+    return bauds[:1]
+
+
+def _row(place: str, baud: int, kind: Kind, what: str, **more: object) -> dict[str, Any]:
+    return {"address": place, "baud": None if "://" in place else baud, "kind": kind.value, **more, "what": what}
+
+
+def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]:
+    from steptwin.host import LineLost
+    from steptwin.host.blocking import finish
+    from steptwin.host.m1486.identify import scan_chips
+    from steptwin.machine import SECOND
+
+    for baud in bauds:
+        with _search_line(place, baud) as line, _progress(f"{_title(place, baud)} M1486 chip", 16, "X") as step:
+            try:
+                found = finish(scan_chips(line, baud=baud, timeout_ns=round(timeout * SECOND), progress=step))
+            except LineLost:
+                if "://" not in place:
+                    raise
+                return []  # a server of Modbus TCP closes the connection when it hears characters
+        if found:
+            return [
+                _row(
+                    place,
+                    baud,
+                    Kind.M1486,
+                    "M1486, busy" if chip.variant is None else f"M1486{chip.variant}",
+                    chip=chip.address,
+                    variant=chip.variant,
+                )
+                for chip in found
+            ]
+    return []
+
+
+def _let_chips_listen(place: str, bauds: list[int]) -> None:
+    """At the likeliest rate last: what is said at the others is rubbish at it."""
+    from steptwin.host.blocking import finish
+    from steptwin.host.m1486.identify import let_all_listen
+
+    for baud in reversed(bauds):
+        with contextlib.suppress(LineFailure), _search_line(place, baud) as line:
+            finish(let_all_listen(line))
+
+
+@contextlib.contextmanager
+def _search_line(place: str, baud: int) -> Generator[SearchLine]:
+    from steptwin.host.blocking import finish
+    from steptwin.host.m1486.identify import SearchLine
+
+    line = SearchLine(place, baud=baud)
+    finish(line.open())
+    try:
+        yield line
+    finally:
+        finish(line.close())
+
+
+def _controllers(place: str, bauds: list[int], units: list[int], timeout: float) -> list[dict[str, Any]]:
     from steptwin.host.blocking import finish
     from steptwin.host.mic488.identify import scan as scan_units
     from steptwin.host.mic488.sync import ModbusLine
     from steptwin.machine import SECOND
 
-    title = place if "://" in place else f"{place} {baud}"
-    try:
-        with ModbusLine(place, baud=baud) as line, _progress(title, len(units)) as step:
-            return finish(scan_units(line.line, units, timeout_ns=round(timeout * SECOND), progress=step))
-    except LineFailure as failure:
-        complain(str(failure))
-        return []
+    for baud in bauds:
+        with ModbusLine(place, baud=baud) as line, _progress(f"{_title(place, baud)} unit", len(units), "d") as step:
+            found = finish(scan_units(line.line, units, timeout_ns=round(timeout * SECOND), progress=step))
+        if found:  # a line has one baud rate
+            return [
+                _row(
+                    place,
+                    baud,
+                    Kind.MIC488,
+                    "answers, but is no MIC488" if one.firmware is None else f"MIC488, firmware {one.firmware}",
+                    unit=one.unit,
+                    firmware=one.firmware,
+                )
+                for one in found
+            ]
+    return []
+
+
+def _title(place: str, baud: int) -> str:
+    return place if "://" in place else f"{place} {baud}"
 
 
 @contextlib.contextmanager
-def _progress(title: str, total: int) -> Generator[Callable[[int], object]]:
+def _progress(title: str, total: int, form: str) -> Generator[Callable[[int], object]]:
     """A bar on the standard error, if that is a terminal."""
     if not sys.stderr.isatty():
-        yield lambda unit: None
+        yield lambda number: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
@@ -110,7 +214,7 @@ def _progress(title: str, total: int) -> Generator[Callable[[int], object]]:
     bar = Progress(TextColumn("{task.description}"), BarColumn(), console=Console(stderr=True), transient=True)
     with bar:
         task = bar.add_task(title, total=total)
-        yield lambda unit: bar.update(task, advance=1, description=f"{title} unit {unit}")
+        yield lambda number: bar.update(task, advance=1, description=f"{title} {number:{form}}")
 
 
 def numbers_of(text: str, option: str, least: int, most: int) -> list[int]:
