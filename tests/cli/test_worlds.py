@@ -52,6 +52,22 @@ def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:
     assert "expectation failed at 1 s: a.M1.position > 3" in invoke("run", str(world), "--for", "2s", code=1)
 
 
+def test_what_was_waited_for_in_vain_is_a_warning(tmp_path: Path) -> None:
+    world = tmp_path / "w.toml"
+    steps = '[{ until = "a.M1.position > 3", within = "500 ms" }]'
+    world.write_text(f'[[mic488]]\nname = "a"\n[[script]]\nname = "hand"\nsteps = {steps}\n')
+    assert "warning: at 0.5 s hand waited in vain for a.M1.position > 3\n" in invoke("run", str(world), "--for", "2s")
+    told = json.loads(invoke("run", str(world), "--for", "2s", "--json"))
+    assert told["overdue"] == [{"time_s": 0.5, "what": "hand waited in vain for a.M1.position > 3"}]
+
+
+def test_a_fault_that_cannot_happen_is_refused() -> None:
+    with pytest.raises(Misuse, match="fault crc happens on Modbus RTU: line 'bus' carries Modbus TCP, where gap, split"):
+        invoke("run", str(FEEDER), "--fault", "crc nth=2")
+    told = invoke("run", str(FEEDER), "--for", "1s", "--fault", "lost-steps machine=table pulses=64 at_s=0.5")
+    assert "0.500000 s  table      lost-steps: M1 loses 64 pulses" in told
+
+
 def test_options_for_programs_are_refused() -> None:
     with pytest.raises(Misuse, match="--firmware is not for worlds, whose file says all that"):
         invoke("run", str(FEEDER), "--firmware", "1.70")

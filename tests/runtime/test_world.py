@@ -204,6 +204,32 @@ def test_expectations_that_do_not_hold_are_told() -> None:
     assert [(f.time, f.value) for f in world.failures] == [(SECOND, "x.position < 49")]
 
 
+def test_what_a_script_waits_for_in_vain_is_told_and_goes_on() -> None:
+    world = small(
+        """
+        [[script]]
+        name = "s"
+        steps = [
+          { until = "x.position > 60", within = "2 s" },
+          { until = "time >= 3", within = "2 s" },
+          { note = "on" },
+        ]
+        """
+    )
+    world.run(for_=1)
+    snapshot = world.snapshot()
+    world.run(for_=4)
+    told = [(r.time // SECOND, r.subject, r.value) for r in world.trace.events("world")]
+    assert told == [(2, "overdue", "s waited in vain for x.position > 60"), (3, "note", "on")]
+    assert [record.time for record in world.overdue] == [2 * SECOND]
+    assert not world.failures
+    digest = world.trace.digest()
+    world.restore(snapshot)
+    assert world.overdue == []
+    world.run(for_=4)
+    assert world.trace.digest() == digest
+
+
 def test_operators_in_python_yield_steps_and_are_sent_what_they_give() -> None:
     seen: list[object] = []
 
@@ -219,6 +245,7 @@ def test_operators_in_python_yield_steps_and_are_sent_what_they_give() -> None:
     world.script(operator)
     assert world.run(for_=60) == "done"
     assert seen == [False, True, 60.0]
+    assert world.overdue == []  # code is sent that it was in vain, and decides
 
 
 def test_at_and_when_call_functions() -> None:
@@ -228,6 +255,18 @@ def test_at_and_when_call_functions() -> None:
     world.when("x.position >= 52", lambda: seen.append((world.time, world.axis["x"].position)), once=True)
     world.run(for_=10)
     assert [position for _, position in seen] == [52.0]
+
+
+def test_a_moment_that_has_passed_is_refused() -> None:
+    world = small()
+    world.run(for_=3)
+    with pytest.raises(Misuse, match=r"at 2\.5 s: this world is at 3 s already"):
+        world.at(2.5, do.Note("late"))
+    with pytest.raises(Misuse, match=r"at 0 s: this world is at 3 s already"):
+        world.at("0 s", lambda: None)
+    world.at(3, do.Note("now"))
+    world.run(for_=1)
+    assert [(r.time, r.value) for r in world.trace.events("world")] == [(3 * SECOND, "now")]
 
 
 def test_scripts_that_take_no_time_for_ever_are_a_runaway() -> None:

@@ -157,3 +157,106 @@ def test_a_snapshot_at_any_moment_changes_nothing(moment: float) -> None:
     world.restore(snapshot)
     world.run(for_=f"{3.0 - round(moment, 9):.9f} s")
     assert world.trace.digest() == digest
+
+
+# ---------------------------------------------------------------------- faults where they can happen
+
+NETWORK = """
+[[line]]
+name = "bus"
+kind = "modbus"
+tcp = "127.0.0.1:0"
+[[mic488]]
+name = "table"
+line = "bus"
+unit = 4
+"""
+CHIPS = """
+[[line]]
+name = "chips"
+kind = "m1486"
+pty = "/tmp/chips"
+[[m1486]]
+name = "drum"
+line = "chips"
+address = 3
+[[axis]]
+name = "y"
+drive = "drum.M1"
+"""
+LINELESS = '[[mic488]]\nname = "alone"\n'
+
+ON_TCP = "line 'bus' carries Modbus TCP, where gap, split, delay, no-answer, late, wrong-unit, exception, busy can happen"
+ON_CHIPS = "line 'chips' carries M1486, where flip, drop, insert, gap, split, noise can happen"
+
+
+@pytest.mark.parametrize(
+    ("world", "fault", "message"),
+    [
+        (
+            NETWORK,
+            "crc",
+            f"fault crc happens on Modbus RTU: {ON_TCP}; with link=script it happens to the scripts' own requests, as Modbus RTU",
+        ),
+        (NETWORK, "noise", "fault noise happens on Modbus RTU and M1486: line 'bus' carries Modbus TCP, where"),
+        (NETWORK, "crc link=tcp-1", f"fault crc happens on Modbus RTU: {ON_TCP}"),
+        (NETWORK, "delay link=pty", "fault delay: link = 'pty': there are tcp, script"),
+        (NETWORK, "delay link=tcp-x", "fault delay: link = 'tcp-x': there are tcp, script"),
+        (NETWORK, "busy unit=1", "fault busy: unit = 1: served are 4"),
+        (CHIPS, "crc", f"fault crc happens on Modbus RTU: {ON_CHIPS}"),
+        (CHIPS, "exception", f"fault exception happens on Modbus RTU and Modbus TCP: {ON_CHIPS}"),
+        (CHIPS + NETWORK, "crc", f"fault crc happens on Modbus RTU: {ON_CHIPS}; {ON_TCP}; with link=script"),
+        (CHIPS, "slip", "fault slip: 'drum' is an M1486, which reads no encoder"),
+        (CHIPS, "wear", "fault wear: 'drum' saves nothing: it has no memory that survives power-off"),
+        (LINELESS, "gap", "fault gap happens on Modbus RTU and Modbus TCP and M1486: 'alone' is on no line"),
+        (LINELESS, "no-answer", "fault no-answer happens on Modbus RTU and Modbus TCP: 'alone' is on no line"),
+        (LINELESS, "busy unit=2", "fault busy: unit = 2: served are 1"),
+        (LINELESS, "bounce pin=AIN1", "fault bounce: pin = 'AIN1' is an analog input, which has no switch"),
+    ],
+)
+def test_a_fault_that_cannot_happen_is_refused_from_files_and_from_python(world: str, fault: str, message: str) -> None:
+    with pytest.raises(Misuse) as refused:
+        World.from_toml(world).put_fault(read(fault))
+    assert str(refused.value).startswith(message)
+    kind, *words = fault.split()
+    table = "".join(
+        f"{key} = {value if value.isdecimal() else repr(value)}\n" for key, _, value in (w.partition("=") for w in words)
+    )
+    with pytest.raises(Misuse) as refused:
+        World.from_toml(f'{world}[[fault]]\nkind = "{kind}"\n{table}')
+    line = world.count("\n") + 1
+    assert message in str(refused.value)
+    assert f"world.toml:{line}:" in str(refused.value)
+    given = ", ".join([f"kind = '{kind}'", *table.splitlines()])
+    with pytest.raises(Misuse) as refused:
+        World.from_toml(f"{world}[[event]]\nat = 1\ndo = [{{ fault = {{ {given} }} }}]\n")
+    assert f"step 1: {message}" in str(refused.value)
+
+
+def test_who_is_connected_counts_as_well() -> None:
+    world = World.from_toml(NETWORK.replace('tcp = "127.0.0.1:0"', ""))
+    world.rigging.check(read("crc"))
+    world.lines["bus"].connect("test-1", "tcp")
+    world.rigging.check(read("delay link=test-1"))
+    with pytest.raises(Misuse, match="line 'bus' carries Modbus TCP"):
+        world.rigging.check(read("crc"))
+
+
+@pytest.mark.parametrize(
+    ("world", "fault"),
+    [
+        (NETWORK, "crc link=script"),
+        (NETWORK, "gap link=tcp-12 direction=in"),
+        (NETWORK.replace("[[mic488]]", 'pty = "/tmp/bus"\n[[mic488]]'), "crc"),
+        (NETWORK.replace("[[mic488]]", 'rtu_tcp = "127.0.0.1:0"\n[[mic488]]'), "noise link=rtu-2"),
+        (CHIPS, "noise link=pty"),
+        (CHIPS + NETWORK, "flip"),
+        (CHIPS.replace("[[axis]]", 'variant = "E1"\n[[axis]]'), "wear"),
+        (LINELESS, "busy unit=1"),
+        (LINELESS, "no-answer lost=request"),
+    ],
+)
+def test_a_fault_that_can_happen_is_taken(world: str, fault: str) -> None:
+    found = World.from_toml(world)
+    found.put_fault(read(fault))
+    assert [str(active.fault) for active in found.plan.faults.active] == [fault]

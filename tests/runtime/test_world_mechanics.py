@@ -141,6 +141,22 @@ def test_a_stall_of_some_time_is_a_fault_of_the_mechanics() -> None:
     assert world.now > SECOND
 
 
+def test_an_ideal_axis_is_where_it_was_after_a_snapshot_in_the_middle_of_a_move() -> None:
+    world = World.from_toml(dedent(AXIS.partition("travel")[0]).format(config=""))
+    world.mic488["m"].axis[1].enable()
+    world.mic488["m"].axis[1].move_to(50.0)
+    world.run(until=0.5)
+    snapshot = world.snapshot()
+    world.run(until=0.9)
+    there = world.axis["x"].position
+    world.restore(snapshot)
+    world.run(until=0.9)
+    assert world.axis["x"].position == there > 20.0
+    other = world.branch(snapshot)
+    other.run(until=0.9)
+    assert other.axis["x"].position == there
+
+
 def test_faults_that_are_set_and_cleared_after_a_snapshot_are_undone_by_it() -> None:
     """Back from where the world has them to where it has not, and into another world that never had them."""
     world = world_of("", '[[fault]]\nkind = "stuck"\nname = "early"\nmachine = "m"\npin = "IN7"\nvalue = 1.0\nfrom_s = 0.1\n')

@@ -36,6 +36,7 @@ class Options:
     firmware: str | None = None
     travel: list[str] | None = None
     statement_time: str | None = None
+    fault: list[str] | None = None
 
     @property
     def until_idle(self) -> bool:
@@ -82,6 +83,10 @@ def run(
     statement_time: Annotated[
         str | None, typer.Option(metavar="TIME", help="MIC488: what one statement takes; default 1ms, 0 for none.")
     ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="World: something that goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
+    ] = None,
 ) -> None:
     """Run a program in virtual time: its moves, waits, outputs and uploads with their times."""
     from steptwin.runtime.timedinputs import parse_duration, parse_inputs
@@ -108,6 +113,7 @@ def run(
         firmware=firmware,
         travel=travel,
         statement_time=statement_time,
+        fault=fault,
     )
     if not runner(file, options):
         raise typer.Exit(1)
@@ -118,7 +124,7 @@ def _run_m1486(file: Path, options: Options) -> bool:
     from steptwin.runtime.run_m1486 import M1486Run
     from steptwin.runtime.run_m1486 import run as run_program
 
-    options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time")
+    options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time", "fault")
     wanted = M1486Run(
         program=file,
         variant=options.variant or DEFAULT.name,
@@ -140,7 +146,7 @@ def _run_wbc(file: Path, options: Options) -> bool:
     from steptwin.runtime.wbc_bench import parse_travel
     from steptwin.wbc.dialect import DEFAULT
 
-    options.refuse("WBC programs", "variant", "interface", "wire")
+    options.refuse("WBC programs", "variant", "interface", "wire", "fault")
     wanted = WbcRun(
         program=file,
         positions=options.positions,
@@ -168,6 +174,7 @@ def _run_world(file: Path, options: Options) -> bool:
         limit=options.limit,
         until=options.until,
         inputs=tuple(options.inputs),
+        faults=tuple(options.fault or ()),
         trace=options.trace,
         as_json=options.as_json,
     )

@@ -9,7 +9,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.control import Handler
-from steptwin.world.faults import Active, Body, Fault, Faults, Layer, Line, read, rig
+from steptwin.world.faults import Active, Body, Fault, Faults, Line, Wire, check_place, read, rig
 from steptwin.world.kernel import Kernel
 from steptwin.world.trace import Record
 
@@ -76,23 +76,12 @@ class FaultDesk:
             raise
 
     def _add(self, fault: Fault, now: Nanos) -> None:
-        lines = fault.kind.lines
-        if lines and self.lines and not self.lines & set(lines):
-            raise Misuse(f"fault {fault.kind.name} happens on {_listed(lines)}: this twin serves {_listed(sorted(self.lines))}")
+        units = tuple(int(name) for name in self._bodies if name.isdecimal())
+        check_place(fault, [Wire("this twin serves", line, units=units) for line in sorted(self.lines or Line)])
         for name, body in self._bodies.items():
             if name not in self.faults.machines:
                 rig(self._kernel, name, self.faults, body())
-        self._check_unit(fault)
         self.faults.add(fault, now)
-
-    def _check_unit(self, fault: Fault) -> None:
-        unit = fault.get("unit")
-        if fault.kind.layer in (Layer.FRAMES, Layer.PROTOCOL) and unit is not None and str(unit) not in self._bodies:
-            raise Misuse(f"fault {fault.kind.name}: unit = {unit}: served are {', '.join(self._bodies)}")
-
-
-def _listed(lines: Sequence[Line]) -> str:
-    return " and ".join(line.value for line in lines)
 
 
 def _shown(active: Active) -> dict[str, object]:

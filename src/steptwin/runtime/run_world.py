@@ -22,6 +22,8 @@ from steptwin.world.trace import Record
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
 SESSION = "session.json"
 JSON_VERSION = 1
+_NAMED = ("note", "expectation", "overdue")
+"""Events whose texts do not say what they are."""
 
 Say = Callable[[str], None]
 
@@ -112,15 +114,14 @@ def is_told(record: Record) -> bool:
 
 def describe(record: Record) -> str:
     """What happened, in one line."""
-    what = f"{record.subject}: " if record.kind != "event" or record.subject in ("note", "expectation") else ""
+    what = f"{record.subject}: " if record.kind != "event" or record.subject in _NAMED else ""
     value = record.value.hex(" ") if isinstance(record.value, bytes) else record.value
     return f"{record.time / SECOND:12.6f} s  {record.machine:<10} {what}{value}".rstrip()
 
 
 def _lines(world: World, outcome: Outcome, say: Say) -> None:
     for record in filter(is_told, world.trace):
-        what = f"{record.subject}:" if record.kind != "event" or record.subject in ("note", "expectation") else ""
-        say(f"{record.time / SECOND:12.6f} s  {record.machine:<10} {what}{' ' if what else ''}{record.value}".rstrip())
+        say(describe(record))
     say("")
     for name, axis in world.axis.items():
         lost = f"   {axis.lost} pulses lost" if axis.lost else ""
@@ -137,6 +138,8 @@ def _lines(world: World, outcome: Outcome, say: Say) -> None:
     say(f"{world.time:g} s of {world.spec.name} in {outcome.wall_s:.2f} s{ended}")
     for failure in world.failures:
         say(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
+    for late in world.overdue:
+        say(f"warning: at {late.time / SECOND:g} s {late.value}")
     for path in outcome.written:
         say(f"wrote {path}")
     say(f"digest {outcome.digest}")
@@ -150,6 +153,7 @@ def _json(world: World, outcome: Outcome, say: Say) -> None:
         "wall_s": round(outcome.wall_s, 3),
         "ended_by": outcome.reason,
         "failures": [{"time_s": f.time / SECOND, "condition": f.value} for f in world.failures],
+        "overdue": [{"time_s": late.time / SECOND, "what": late.value} for late in world.overdue],
         "axes": {
             name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}
             for name, axis in world.axis.items()

@@ -24,7 +24,8 @@ from steptwin.runtime.textfiles import read_bytes, read_text
 from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegisters, encode_request
 from steptwin.world import script as do
 from steptwin.world.durations import duration
-from steptwin.world.plant import Plant, PlantSnapshot, Script, Values
+from steptwin.world.plant import Plant, PlantSnapshot, Values
+from steptwin.world.running import Script
 from steptwin.world.spec import WorldSpec, read_world
 from steptwin.world.views import AxisView, LineView, M1486View, Mic488View, Views
 
@@ -127,8 +128,10 @@ class World(Plant):
     # ------------------------------------------------------------------ operators
 
     def at(self, time: Duration, reaction: Reaction, name: str = "at") -> Script:
-        """Do something at a moment; when it has passed, now."""
+        """Do something at a moment. Raises `Misuse` for one that has passed."""
         moment = duration(time)
+        if moment < self.now:
+            raise Misuse(f"at {moment / SECOND:g} s: this world is at {self.time:g} s already")
         return self.start(name, lambda: do.run_through((do.At(moment), *_steps(reaction))), is_outside=True)
 
     def when(self, condition: str, reaction: Reaction, *, once: bool = False, name: str = "when") -> Script:

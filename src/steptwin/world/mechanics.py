@@ -18,6 +18,8 @@ from steptwin.state import Plain, Stateful
 from steptwin.world.course import Build, Carried, Course, Standing, plan_of, profile_of
 from steptwin.world.kernel import Drive, Kernel
 
+_OUTDATED = -1
+"""No drive has this revision."""
 FOLLOW_NS: Nanos = 10 * MILLISECOND
 """A controller that follows an encoder looks at it this often while it turns, so it is told so."""
 
@@ -248,10 +250,16 @@ class Mechanism(Stateful):
             encoder.device.turn_encoder(encoder.axis, counts, now)
         self._kernel.mark()
 
+    # A drive counts its revisions on, whatever is restored: what is kept is whether the course is that of its plan.
+
+    def copy_state(self) -> Plain:
+        return super().copy_state(), self._revision == self._drive.revision
+
     def set_state(self, plain: Plain) -> None:
         """As ever; the drive has its state already."""
-        super().set_state(plain)
-        self._revision = self._drive.revision
+        own, is_current = plain
+        super().set_state(own)
+        self._revision = self._drive.revision if is_current else _OUTDATED
 
 
 def _from(said: tuple[Carried, ...], now: Nanos) -> tuple[Carried, ...]:

@@ -25,11 +25,12 @@ from steptwin.world.actions import Outside, act
 from steptwin.world.build import Files, Fitted, Plan, build
 from steptwin.world.contacts import Button
 from steptwin.world.expression import Condition
-from steptwin.world.faults import Active, Fault, M1486Body, Mic488Body, rig
-from steptwin.world.faults.table import Layer
+from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import SCRIPTS, Line
 from steptwin.world.references import check_scripts
+from steptwin.world.rigging import Rigging
+from steptwin.world.running import Script, ScriptState, Waiting
 from steptwin.world.signals import find_signal
 from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.trace import Mark, Record, Trace
@@ -54,69 +55,6 @@ class Given(NamedTuple):
     what: Outside
 
 
-@dataclass(slots=True)
-class _Waiting:
-    """What a script waits for. ``until`` is a moment; a condition or an answer may come before it."""
-
-    until: Nanos | None
-    condition: Condition | None = None
-    answer: Line | None = None
-
-
-class ScriptState(NamedTuple):
-    """A script, what it was sent so far, as (value, how often), what it waits for, and whether it has ended."""
-
-    name: str
-    make: Callable[[], do.Steps]
-    is_outside: bool
-    sent: tuple[tuple[Any, int], ...]
-    until: Nanos | None
-    condition: str | None
-    answer: str | None
-    ended: bool
-
-
-class Script:
-    """A generator of steps in progress."""
-
-    __slots__ = ("ended", "is_outside", "make", "name", "number", "sent", "steps", "waiting")
-
-    def __init__(self, number: int, name: str, make: Callable[[], do.Steps], *, is_outside: bool) -> None:
-        self.number = number
-        self.name = name
-        self.make = make
-        self.is_outside = is_outside
-        """Whether it is no part of the description: what it does comes from outside."""
-        self.sent: list[tuple[Any, int]] = []
-        self.steps = make()
-        self.waiting: _Waiting | None = None
-        self.ended = False
-
-    def send(self, value: Any) -> do.Step | None:
-        if self.sent and self.sent[-1][0] is value:
-            self.sent[-1] = value, self.sent[-1][1] + 1
-        else:
-            self.sent.append((value, 1))
-        return self._next(value)
-
-    def _next(self, value: Any) -> do.Step | None:
-        try:
-            return self.steps.send(value)
-        except StopIteration:
-            self.ended = True
-            return None
-
-    def replay(self, sent: Iterable[tuple[Any, int]]) -> None:
-        """Bring a fresh generator to where it had been sent all this."""
-        self.steps.close()
-        self.steps = self.make()
-        self.sent = list(sent)
-        self.ended = False
-        for value, count in self.sent:
-            for _ in range(count):
-                self._next(value)
-
-
 @dataclass(frozen=True, slots=True)
 class PlantSnapshot:
     """All state of a world at a moment."""
@@ -129,6 +67,7 @@ class PlantSnapshot:
     scripts: tuple[ScriptState, ...]
     inputs: tuple[Given, ...]
     failures: tuple[Record, ...]
+    overdue: tuple[Record, ...]
     trace: Mark
 
 
@@ -146,6 +85,8 @@ class Plant:
         """Why the run ended, where a script says so."""
         self.failures: list[Record] = []
         """Expectations that did not hold."""
+        self.overdue: list[Record] = []
+        """What scripts of the description waited for in vain."""
         self.inputs: list[Given] = []
         """Everything from outside so far."""
         self.encode = encode
@@ -153,6 +94,7 @@ class Plant:
         self._scripts: list[Script] = []
         self._timed: list[tuple[Nanos, int]] = []
         self._watching: list[Script] = []
+        self.rigging = Rigging(self.plan)
         for n, fault in enumerate(spec.faults):
             try:
                 self.put_fault(fault)
@@ -227,8 +169,7 @@ class Plant:
         """Let a script run from now on. ``make`` makes its generator, again whenever a snapshot is restored."""
         script = Script(len(self._scripts), name, make, is_outside=is_outside)
         self._scripts.append(script)
-        heappush(self._timed, (self.now, script.number))
-        script.waiting = _Waiting(self.now)
+        self._wait(script, Waiting(self.now))
         return script
 
     def _resume(self, script: Script, value: Any) -> None:
@@ -240,31 +181,34 @@ class Plant:
             value = None
             waiting = self._waits(step)
             if waiting is not None:
-                script.waiting = waiting
-                if waiting.condition is None and waiting.answer is None and waiting.until is not None:
-                    heappush(self._timed, (waiting.until, script.number))
-                else:
-                    self._watching.append(script)
-                    self._watching.sort(key=lambda one: one.number)
+                self._wait(script, waiting)
                 return
             value = self._gives(step, script)
             if self.stopped is not None:
                 return
         raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self.now} ns")
 
-    def _waits(self, step: do.Step) -> _Waiting | None:
+    def _wait(self, script: Script, waiting: Waiting) -> None:
+        script.waiting = waiting
+        if waiting.is_timed and waiting.until is not None:
+            heappush(self._timed, (waiting.until, script.number))
+        else:
+            self._watching.append(script)
+            self._watching.sort(key=lambda one: one.number)
+
+    def _waits(self, step: do.Step) -> Waiting | None:
         if isinstance(step, do.Wait):
-            return _Waiting(self.now + step.duration) if step.duration > 0 else None
+            return Waiting(self.now + step.duration) if step.duration > 0 else None
         if isinstance(step, do.At):
-            return _Waiting(step.time) if step.time > self.now else None
+            return Waiting(step.time) if step.time > self.now else None
         if isinstance(step, do.Until):
-            return _Waiting(None if step.within is None else self.now + step.within, self.condition(step.condition))
+            return Waiting(None if step.within is None else self.now + step.within, self.condition(step.condition))
         if isinstance(step, do.Request):
             line = self.line_called(step.line)
             self.touch(step.line)
             line.connect(SCRIPTS).received.clear()
             line.receive(SCRIPTS, encode_frame(step.unit, step.pdu), self.now)
-            return _Waiting(self.now + step.within, answer=line)
+            return Waiting(self.now + step.within, answer=line)
         return None
 
     def _gives(self, step: do.Step, script: Script) -> Any:
@@ -353,39 +297,9 @@ class Plant:
         return line
 
     def put_fault(self, fault: Fault) -> None:
-        """Set a fault now."""
+        """Set a fault now. Raises `Misuse` for one that cannot happen here."""
         self.settle_all()
-        self._prepare(fault)
-        self.plan.faults.add(fault, self.now)
-
-    def check_fault(self, fault: Fault) -> None:
-        """Raises `Misuse` for a fault of something that is not there."""
-        self._prepare(fault)
-        self.plan.faults.check(fault)
-
-    def _prepare(self, fault: Fault) -> None:
-        if fault.kind.layer not in (Layer.BYTES, Layer.FRAMES) or fault.kind.name == "no-answer":
-            for name in self.machines:
-                self._rig(name)
-
-    def _rig(self, name: str) -> None:
-        """Let a machine have faults; mechanics of its axes have them instead of the bare shafts."""
-        machine, faults = self.machines[name], self.plan.faults
-        if name in faults.machines:
-            return
-        mechanisms = {axis.mechanism.number: axis.mechanism for axis in self.axes.values() if axis.spec.drive[0] == name}
-        body: Mic488Body | M1486Body
-        if isinstance(machine, Mic488):
-            body = Mic488Body(machine, self.unit_of(name))
-            for number, mechanism in mechanisms.items():
-                body.shafts[number - 1] = mechanism
-        else:
-            body = M1486Body(machine, mechanisms.values())
-        rig(self.plan.kernel_of[name], name, faults, body)
-
-    def unit_of(self, name: str) -> int:
-        """The unit under which a controller is on its line; 1 without a line."""
-        return self.plan.line_of[name][1] if name in self.plan.line_of else 1
+        self.rigging.put(fault, self.now)
 
     # ------------------------------------------------------------------ time
 
@@ -434,9 +348,18 @@ class Plant:
             found, value = self._come(waiting)
             if found or (waiting.until is not None and waiting.until <= self.now):
                 self._watching.remove(script)
+                if not found:
+                    self._tell_overdue(script, waiting)
                 self._resume(script, value)
 
-    def _come(self, waiting: _Waiting) -> tuple[bool, Any]:
+    def _tell_overdue(self, script: Script, waiting: Waiting) -> None:
+        """Steps of a description go on whether or not what they wait for comes; code from outside is sent that, and decides."""
+        if waiting.condition is not None and not script.is_outside:
+            text = f"{script.name} waited in vain for {waiting.condition.text}"
+            self.overdue.append(Record(self.now, WORLD, "event", "overdue", text))
+            self.trace.add(self.overdue[-1])
+
+    def _come(self, waiting: Waiting) -> tuple[bool, Any]:
         """Whether what a script waits for has come, and what it is sent."""
         if waiting.answer is not None:
             self.touch(waiting.answer.name)
@@ -482,21 +405,10 @@ class Plant:
             tuple(kernel.snapshot() for kernel in self.kernels),
             tuple((active.fault, active.name, active.since) for active in self.plan.faults.active),
             self.plan.faults.copy_state(),
-            tuple(
-                ScriptState(
-                    script.name,
-                    script.make,
-                    script.is_outside,
-                    tuple(script.sent),
-                    None if script.waiting is None else script.waiting.until,
-                    None if script.waiting is None or script.waiting.condition is None else script.waiting.condition.text,
-                    None if script.waiting is None or script.waiting.answer is None else script.waiting.answer.name,
-                    script.ended,
-                )
-                for script in self._scripts
-            ),
+            tuple(script.state() for script in self._scripts),
             tuple(self.inputs),
             tuple(self.failures),
+            tuple(self.overdue),
             self.trace.mark(),
         )
 
@@ -510,10 +422,11 @@ class Plant:
         self.now = snapshot.now
         self.stopped = None
         self.trace.rewind(snapshot.trace)
-        self._restore_faults(snapshot)
+        self.rigging.put_back(snapshot.faults, snapshot.faults_state)
         for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
             kernel.restore(state)
-        self.inputs, self.failures = list(snapshot.inputs), list(snapshot.failures)
+        self.inputs = list(snapshot.inputs)
+        self.failures, self.overdue = list(snapshot.failures), list(snapshot.overdue)
         self._scripts, self._timed, self._watching = [], [], []
         for number, state in enumerate(snapshot.scripts):
             script = Script(number, state.name, state.make, is_outside=state.is_outside)
@@ -523,16 +436,4 @@ class Plant:
             if state.ended:
                 continue
             condition = None if state.condition is None else self.condition(state.condition)
-            script.waiting = _Waiting(state.until, condition, None if state.answer is None else self.lines[state.answer])
-            if condition is None and state.answer is None and state.until is not None:
-                heappush(self._timed, (state.until, script.number))
-            else:
-                self._watching.append(script)
-
-    def _restore_faults(self, snapshot: PlantSnapshot) -> None:
-        """The faults that were set then; machines stay prepared for those that were set since."""
-        faults = self.plan.faults
-        for fault, _, _ in snapshot.faults:
-            self._prepare(fault)
-        faults.active = tuple(Active(fault, name, faults.seed, since) for fault, name, since in snapshot.faults)
-        faults.set_state(snapshot.faults_state)
+            self._wait(script, Waiting(state.until, condition, None if state.answer is None else self.lines[state.answer]))

@@ -76,7 +76,7 @@ def _turn(plant: Plant, step: do.Turn) -> None:
 
 
 def _fault(plant: Plant, step: do.SetFault) -> None:
-    plant.check_fault(step.fault)
+    plant.rigging.check(step.fault)
 
 
 _CHECKS: dict[type, Callable[[Plant, Any], None]] = {

@@ -19,6 +19,7 @@ from steptwin.runtime.export.recording import sort_out
 from steptwin.runtime.export.timeline import write_timeline
 from steptwin.runtime.world import World
 from steptwin.world import script as do
+from steptwin.world.faults import read
 
 PERIOD = 10 * MILLISECOND
 PULSE = 1.001 / 640
@@ -162,16 +163,10 @@ def test_a_file_keeps_it(stalled: Ran, tmp_path: Path) -> None:
 
 def test_a_load_that_loses_steps_while_nothing_moves_is_told_too(tmp_path: Path) -> None:
     world = World.from_toml(dedent(MACHINE))
-    world.at(1.0, do.SetFault(_lost()))
+    world.at(1.0, do.SetFault(read("lost-steps machine=m pulses=640 at_s=0")))
     world.run(for_=2)
     write_trace(world.trace, tmp_path / "x.csv", views=axis_views(world.machines, world.axes), ended=world.now, period=SECOND)
     with (tmp_path / "x.csv").open(newline="") as file:
         positions = [float(row["m.x_true_position_mm"]) for row in csv.DictReader(file)]
     assert positions == [20.0, 19.0, 19.0]
     assert world.axis["x"].position == 19.0
-
-
-def _lost() -> object:
-    from steptwin.world.faults import read
-
-    return read("lost-steps machine=m pulses=640 at_s=0")

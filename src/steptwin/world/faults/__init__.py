@@ -9,6 +9,7 @@ from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, parse, read, sc
 from steptwin.world.faults.m1486 import M1486Body
 from steptwin.world.faults.machine import Body, FaultyMachine, Shaft, rig
 from steptwin.world.faults.mic488 import Mic488Body
+from steptwin.world.faults.places import Wire, check_place
 from steptwin.world.faults.port import FaultyPort, FaultyTalkingPort
 from steptwin.world.faults.table import KINDS, Kind, Layer, Line, Occasion, Parameter
 
@@ -31,6 +32,8 @@ __all__ = [
     "Occasion",
     "Parameter",
     "Shaft",
+    "Wire",
+    "check_place",
     "parse",
     "read",
     "rig",

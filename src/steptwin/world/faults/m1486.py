@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.pins import ALIASES, known_pin
+from steptwin.m1486.variants import Store
 from steptwin.machine import Nanos
 from steptwin.world.faults.machine import FaultyMachine, Shaft
 
@@ -17,6 +18,14 @@ class M1486Body:
     def __init__(self, chip: M1486, shafts: Iterable[Shaft] = ()) -> None:
         self._chip = chip
         self.shafts = list(shafts)
+
+    @property
+    def encoders(self) -> bool:
+        return False
+
+    @property
+    def keeps_memory(self) -> bool:
+        return self._chip.variant.store is Store.EEPROM
 
     def watch(self, owner: FaultyMachine) -> None:
         chip = self._chip

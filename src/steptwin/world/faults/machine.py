@@ -39,6 +39,16 @@ class Body(Protocol):
     shafts: list[Shaft]
     """By axis. Mechanics put themselves in the place of what is there."""
 
+    @property
+    def encoders(self) -> bool:
+        """Whether it reads encoders."""
+        ...
+
+    @property
+    def keeps_memory(self) -> bool:
+        """Whether it has a memory that survives power-off."""
+        ...
+
     def watch(self, owner: FaultyMachine) -> None:
         """Have ``owner`` asked before requests are served (`FaultyMachine.refusal`) and memory is kept (`FaultyMachine.kept`)."""
         ...
@@ -185,9 +195,15 @@ class FaultyMachine(Stateful):
                     f"fault {fault.kind.name}: {self.name!r} has no shaft: an M1486 has one where a world has its [[axis]]"
                 )
             raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are 1 to {len(self.body.shafts)}")
+        if fault.kind.name == "slip" and not self.body.encoders:
+            raise Misuse(f"fault slip: {self.name!r} is an M1486, which reads no encoder")
+        if fault.kind.occasion is Occasion.SAVE and not self.body.keeps_memory:
+            raise Misuse(f"fault {fault.kind.name}: {self.name!r} saves nothing: it has no memory that survives power-off")
         if fault.kind.parameter("pin") is None:
             return
         pin = self._pin(fault)
+        if fault.kind.name == "bounce" and pin.startswith("AIN"):
+            raise Misuse(f"fault bounce: pin = {pin!r} is an analog input, which has no switch")
         levels = self.inner.pins()
         if pin not in levels:
             raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: {self.name!r} has {', '.join(levels)}")

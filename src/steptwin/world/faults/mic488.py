@@ -38,6 +38,14 @@ class Mic488Body:
         self._unit = unit
         self.shafts: list[Shaft] = [EncoderShaft(device, axis.number) for axis in device.axes]
 
+    @property
+    def encoders(self) -> bool:
+        return True
+
+    @property
+    def keeps_memory(self) -> bool:
+        return True
+
     def watch(self, owner: FaultyMachine) -> None:
         device = self._device
         device.slave = _Watched(device.slave, self._unit, owner)

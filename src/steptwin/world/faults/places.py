@@ -1,0 +1,60 @@
+"""Where a fault is placed, and whether it can happen there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.world.faults.fault import Fault
+from steptwin.world.faults.table import KINDS, Layer, Line
+
+
+class Wire(NamedTuple):
+    """Something that requests come along. ``name`` with its verb is for people: ``"line 'bus' carries"``."""
+
+    name: str
+    line: Line | None
+    """None: none at all, so that nothing but being refused can happen to a request."""
+    link: str = ""
+    """What a fault calls it: this, or this with a number (``tcp``: tcp-1…). Empty: not known."""
+    units: tuple[int, ...] = ()
+    is_usual: bool = True
+    """Whether a fault that names no link is meant for it."""
+
+    def lets_happen(self, fault: Fault) -> bool:
+        if self.line is None:
+            return fault.kind.layer is Layer.PROTOCOL or fault.get("lost") == "request"
+        return self.line in fault.kind.lines
+
+    def is_called(self, link: str) -> bool:
+        name, _, number = link.rpartition("-")
+        return not self.link or link == self.link or (name == self.link and number.isdecimal())
+
+    @property
+    def offers(self) -> str:
+        """What can happen here."""
+        if self.line is None:
+            return self.name
+        kinds = (kind.name for kind in KINDS.values() if self.line in kind.lines)
+        return f"{self.name} {self.line.value}, where {', '.join(kinds)} can happen"
+
+
+def check_place(fault: Fault, wires: Sequence[Wire]) -> None:
+    """Raises `Misuse` for a fault of bytes, frames or protocol that none of ``wires`` can show."""
+    kind, link, unit = fault.kind, fault.get("link"), fault.get("unit")
+    if kind.layer is Layer.PHYSICS:
+        return
+    meant = [wire for wire in wires if (wire.is_usual if link is None else wire.is_called(str(link)))]
+    if link is not None and not meant:
+        there = ", ".join(dict.fromkeys(wire.link for wire in wires if wire.link)) or "none"
+        raise Misuse(f"fault {kind.name}: link = {link!r}: there are {there}")
+    able = [wire for wire in meant if wire.lets_happen(fault)]
+    if not able:
+        offers = "; ".join(dict.fromkeys(wire.offers for wire in meant)) or "there is no line"
+        others = [wire for wire in wires if not wire.is_usual and wire.lets_happen(fault)] if link is None else []
+        hint = f"; with link={others[0].link} it happens to the scripts' own requests, as {others[0].line}" if others else ""
+        raise Misuse(f"fault {kind.name} happens on {' and '.join(kind.lines)}: {offers}{hint}")
+    units = sorted({one for wire in able for one in wire.units})
+    if unit is not None and unit not in units:
+        raise Misuse(f"fault {kind.name}: unit = {unit}: served are {', '.join(map(str, units)) or 'none'}")

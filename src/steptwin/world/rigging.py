@@ -1,0 +1,89 @@
+"""The faults of a world: whether they can happen where they are placed, and the machines that are prepared for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488
+from steptwin.world.build import Plan
+from steptwin.world.faults import Active, Fault, M1486Body, Mic488Body, Wire, check_place, rig
+from steptwin.world.faults.table import Layer
+from steptwin.world.lines import SCRIPTS
+
+LINELESS_UNIT = 1
+"""Under which faults know a controller without a line."""
+
+
+class Rigging:
+    """Sets the faults of a world that was built from a description."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+
+    def check(self, fault: Fault) -> None:
+        """Raises `Misuse` for a fault of something that is not there, or that cannot happen there."""
+        check_place(fault, [*_wires(self._plan)])
+        self._prepare(fault)
+        self._plan.faults.check(fault)
+
+    def put(self, fault: Fault, now: Nanos) -> None:
+        """Set a fault; kernels are at ``now``. Raises as `check`."""
+        self.check(fault)
+        self._plan.faults.add(fault, now)
+
+    def put_back(self, faults: Iterable[tuple[Fault, str, Nanos]], state: Any) -> None:
+        """The faults that were set then, by name and moment; machines stay prepared for those that were set since."""
+        kept, there = list(faults), self._plan.faults
+        for fault, _, _ in kept:
+            self._prepare(fault)
+        there.active = tuple(Active(fault, name, there.seed, since) for fault, name, since in kept)
+        there.set_state(state)
+
+    def _prepare(self, fault: Fault) -> None:
+        if fault.kind.layer not in (Layer.BYTES, Layer.FRAMES) or fault.kind.name == "no-answer":
+            for name in self._plan.machines:
+                self._rig(name)
+
+    def _rig(self, name: str) -> None:
+        """Let a machine have faults; mechanics of its axes have them instead of the bare shafts."""
+        plan = self._plan
+        machine = plan.machines[name]
+        if name in plan.faults.machines:
+            return
+        mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.axes.values() if axis.spec.drive[0] == name}
+        body: Mic488Body | M1486Body
+        if isinstance(machine, Mic488):
+            body = Mic488Body(machine, plan.line_of[name][1] if name in plan.line_of else LINELESS_UNIT)
+            for number, mechanism in mechanisms.items():
+                body.shafts[number - 1] = mechanism
+        else:
+            body = M1486Body(machine, mechanisms.values())
+        rig(plan.kernel_of[name], name, plan.faults, body)
+
+
+def _wires(plan: Plan) -> Iterator[Wire]:
+    """What requests come along: links of lines to the outside, described or there now; their scripts; without a line nothing."""
+    for spec in plan.spec.lines:
+        line = plan.lines[spec.name]
+        serial, network = line.fault_kinds[line.kinds[0]], line.fault_kinds[line.kinds[-1]]
+        name = f"line {spec.name!r} carries"
+        outside = [
+            Wire(name, kind, link, line.units)
+            for link, kind, is_open in (
+                ("pty", serial, spec.pty),
+                ("serial", serial, spec.serial),
+                ("rtu", serial, spec.rtu_tcp),
+                ("tcp", network, spec.tcp),
+            )
+            if is_open is not None
+        ]
+        for place, there in line.places.items():
+            if place != SCRIPTS and not any(wire.is_called(place) for wire in outside):
+                outside.append(Wire(name, line.fault_kinds[there.kind], place, line.units))
+        yield from outside
+        yield Wire(name, serial, SCRIPTS, line.units, is_usual=not outside)
+    for name, machine in plan.machines.items():
+        if isinstance(machine, Mic488) and name not in plan.line_of:
+            yield Wire(f"{name!r} is on no line", None, units=(LINELESS_UNIT,))
