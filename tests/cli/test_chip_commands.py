@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.host.address import parse_device
 
+STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 PROGRAM = "[\n@1\nf640\nr\nw100\nd\nr\nj1\n]\n"
 
 
@@ -73,3 +76,38 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
     alone = chips.command("scan", str(controller.pty), "--kind", "m1486")
     assert (alone.returncode, alone.stderr) == (1, f"nobody answers on {controller.pty}\n")
     assert chips.command("scan", places[2], "--kind", "mic488", "--units", "1").returncode == 0
+
+
+def test_a_terminal_on_a_pipe(serve_m1486: Callable[..., Any]) -> None:
+    """As the manual has the commands, for whichever chip; a script ends with the first thing that goes wrong."""
+    twin = serve_m1486("--variant", "B", "--chain", "0,7")
+
+    def typed(script: str, device: str) -> tuple[int, list[str], str]:
+        run = subprocess.run(
+            [STEPTWIN, "terminal", "-d", device], input=script, capture_output=True, text=True, env=twin.environment, check=False
+        )
+        return run.returncode, run.stdout.splitlines(), run.stderr
+
+    position = "32H  U2 position, middle byte: 50"
+    script = "v2000 ; fast\nf12800\nr\nu2\nx0\nu2\nt41\nu17\nt57\nu15\nwait\nquit\nr\n"
+    for place in (str(twin.pty), f"tcp://127.0.0.1:{twin.tcp_port}"):
+        code, lines, errors = typed(script, f"{place},chip=7")
+        assert (code, errors) == (0, "")
+        assert lines == [
+            position,
+            "00H  U2 position, middle byte: 0",
+            "02H  U17 functions 40 to 47: ON 41",
+            "7FH  the input buffer is empty",
+            "02H  U15 driver interface: Step & Direction",
+            "7FH  the input buffer is empty",
+            "42H  U20 type letter in ASCII: M1486B",
+        ]
+        position = "64H  U2 position, middle byte: 100"
+        typed("c57\nc41\n", f"{place},chip=0")
+    code, lines, errors = typed("v99999\nr\n", f"{twin.pty},kind=m1486")
+    assert (code, lines, "V99999 is out of range" in errors) == (2, [], True)
+    code, lines, errors = typed("m1\ng+\nr\nf6400000\nf6400000\nf6400000\nf6400000\n", f"{twin.pty},chip=7")
+    assert (code, "5EH  no room in the input buffer: a character is lost" in lines) == (1, True)
+    assert "'wait' before it waits for that" in errors
+    assert typed("k\n", f"{twin.pty},chip=7")[0] == 0
+    assert twin.command("stop", "-d", f"{twin.pty},chip=7").returncode == 0

@@ -39,7 +39,7 @@ def opened(device: str | None, *, observe: bool = True, log_frames: bool = False
 
     address = parse_device(device or DEFAULT)
     if address.kind != "mic488":
-        raise Misuse("this command is for the MIC488; an M1486 has info, get, set, watch, move, stop and send")
+        raise Misuse("this command is for the MIC488; an M1486 has info, get, set, watch, move, stop, send and terminal")
     mic = Mic488(
         address.place,
         address.unit,

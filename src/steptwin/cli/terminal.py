@@ -1,6 +1,6 @@
 """``steptwin terminal``: talk to a controller line by line.
 
-From Python: `steptwin.host.Mic488.get_shown` and `set`.
+From Python: `steptwin.host.Mic488.get_shown` and `set`. An M1486's is `steptwin.cli.terminal_chip`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from steptwin.cli.chip import chip_address
 from steptwin.cli.device import Device, LogFrames, complain, opened, shown
+from steptwin.cli.terminal_chip import chip_terminal
 from steptwin.errors import Misuse, SteptwinError
 
 if TYPE_CHECKING:
@@ -27,7 +29,14 @@ help, quit"""
 
 
 def terminal(device: Device = None, log_frames: LogFrames = False) -> None:
-    """Talk to a controller line by line: names read, NAME=VALUE writes. 'help' lists the rest. Lines may come from a pipe."""
+    """Talk to a controller line by line: names read, NAME=VALUE writes. 'help' lists the rest. Lines may come from a pipe.
+
+    To an M1486 its own commands are typed, and what it sends is told in words.
+    """
+    chip = chip_address(device)
+    if chip is not None:
+        chip_terminal(chip, log_frames=log_frames)
+        return
     with opened(device, log_frames=log_frames) as mic:
         interactive = sys.stdin.isatty()
         if interactive:
