@@ -61,6 +61,22 @@ def test_what_was_waited_for_in_vain_is_a_warning(tmp_path: Path) -> None:
     assert told["overdue"] == [{"time_s": 0.5, "what": "hand waited in vain for a.M1.position > 3"}]
 
 
+def test_what_is_doubtful_in_files_of_a_world_is_shown(tmp_path: Path) -> None:
+    world = tmp_path / "w.toml"
+    (tmp_path / "m.cfg").write_text("[Axis0]\nGear=10\nColour=3\n[Oven]\nHeat=1\n")
+    table = '[[mic488]]\nname = "{}"\nconfig = "m.cfg"\n'
+    world.write_text(table.format("a") + table.format("b"))
+    result = runner.invoke(app, ["run", str(world), "--for", "1s"], catch_exceptions=False)
+    assert result.exit_code == 0
+    told = [line for line in result.stderr.splitlines() if line.startswith("m.cfg")]
+    assert told == [
+        "m.cfg:3:1: warning C005: [Axis0] Colour is not known and has no effect",
+        "m.cfg:4:1: warning C005: the section [Oven] is not known and has no effect",
+        "m.cfg:5:1: warning C005: [Oven] Heat is not known and has no effect",
+    ]
+    assert "C005" not in result.stdout
+
+
 def test_a_fault_that_cannot_happen_is_refused() -> None:
     with pytest.raises(Misuse, match="fault crc happens on Modbus RTU: line 'bus' carries Modbus TCP, where gap, split"):
         invoke("run", str(FEEDER), "--fault", "crc nth=2")

@@ -216,6 +216,11 @@ def test_one_error(text: str, code: str, message: str, hint: str) -> None:
     [
         ("[Axis0]\nGaer=100", "C005", "[Axis0] Gaer is not known; did you mean Gear?"),
         ("[Axsi0]\nGear=100", "C005", "the section [Axsi0] is not known; did you mean [Axis0]?"),
+        ("[Axis0]\nMotCurrent=x", "C005", "[Axis0] MotCurrent is not known and has no effect"),
+        # Gear is there, so Gears is somebody else's key.
+        ("[Axis0]\nGear=2\nGears=3", "C005", "[Axis0] Gears is not known and has no effect"),
+        ("[Vision]", "C005", "the section [Vision] is not known and has no effect"),
+        ("[IN20]\nLevel=1", "C005", "the section [IN20] is not known; did you mean [IN2]?"),
         ("[Axis0]\nsomething", "C001", "'something' has no effect"),
         ("Gear=1\n[Axis0]", "C001", "'Gear=1' stands before the first [section] and has no effect"),
         ("[Axis0]\nGear=1\ngear=2", "C003", "[Axis0] gear is repeated; the first one counts"),
@@ -232,8 +237,6 @@ def test_one_warning(text: str, code: str, message: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "[Axis0]\nMotCurrent=x\n[Vision]\nGaer=1",
-        "[Axis0]\nGear=2\nGears=3",  # Gear is there, so Gears is somebody else's key
         "[Axis0]\nInKL=8",  # an encoder nobody uses as such
         "; comment\n# comment\n// comment\n\n  \n[Axis0] ; comment",
         "[AIN1]\nID=many",
@@ -291,6 +294,18 @@ def test_a_misspelt_key_comes_with_the_repair() -> None:
     span = found.fix.span
     repaired = file.source.text[: span.start] + found.fix.text + file.source.text[span.end :]
     assert repaired == "[Axis0]\nGear=100"
+
+
+def test_every_unknown_name_is_told_with_its_line() -> None:
+    file = IniFile.parse(VENDOR, "m.cfg")
+    found = examine_config(file)[1]
+    told = [(row["line"], row["code"], row["message"]) for row in to_json(file.source, found)]
+    assert told == [
+        (18, "C005", "[Axis0] MotCurrent is not known and has no effect"),
+        (39, "C005", "the section [Vision] is not known and has no effect"),
+        (40, "C005", "[Vision] Camera is not known and has no effect"),
+        (41, "C001", "'last line without end' has no effect"),
+    ]
 
 
 def test_utf_16_is_named() -> None:

@@ -178,7 +178,7 @@ def _run_world(file: Path, options: Options) -> bool:
         trace=options.trace,
         as_json=options.as_json,
     )
-    return run_world(wanted, typer.echo)
+    return run_world(wanted, typer.echo, lambda text: typer.echo(text, err=True))
 
 
 #: What runs each kind of file; True when nothing went wrong.

@@ -1,9 +1,9 @@
 """The configuration of a MIC488, and how the vendor's ``.cfg`` file says it.
 
 The file itself is an `IniFile`, which loses nothing; here its values get types, ranges and meaning. Missing keys have their
-defaults (MIC-27), keys that are not known mean nothing. Numbers take a decimal point or a decimal comma.
+defaults (MIC-27); names that are not known mean nothing and are told. Numbers take a decimal point or a decimal comma.
 
-Diagnostics: C001–C004 form of the file; C005 name that looks misspelt; C006 no number; C007 no whole number; C008 not
+Diagnostics: C001–C004 form of the file; C005 name that is not known; C006 no number; C007 no whole number; C008 not
 permitted; C009 limit switch on an encoder input of an axis that uses its encoder; C010 limit switch on a channel of an encoder
 that another axis uses. C001, C003, C005 and C010 are warnings.
 """
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from steptwin.diagnostics import Diagnostic, Fix, Severity, Source, in_order, render
+from steptwin.diagnostics import Diagnostic, Fix, Severity, Source, Span, in_order, render
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, REAL_MAX
 from steptwin.mic488.inifile import Entry, IniFile
@@ -244,7 +244,7 @@ def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tupl
         program=ProgramConfig(**reader.values("WBC_PROGRAM", _program_keys(firmware(firmware_name)))),
     )
     reader.ignore("AIN1", ADDRESS_KEY)
-    findings = [*file.findings, *reader.findings, *_switch_conflicts(file, config), *reader.misspelt()]
+    findings = [*file.findings, *reader.findings, *_switch_conflicts(file, config), *reader.unknown()]
     return config, in_order(findings)
 
 
@@ -297,28 +297,36 @@ class _Reader:
         message = f"[{entry.section}] {entry.key} = {entry.value} {why}"
         self.findings.append(Diagnostic(code, Severity.ERROR, entry.value_span, message, key.hint))
 
-    def misspelt(self) -> Iterator[Diagnostic]:
-        """Names nobody asked for that look like one that is missing."""
-        import difflib
-
+    def unknown(self) -> Iterator[Diagnostic]:
+        """Sections and keys nobody asked for; with a repair where one looks like one that is missing."""
         file, known = self._file, self._known
         by_lower = {section.lower(): section for section in known}
         present = {header.section.lower() for header in file.headers}
         missing = [section for section in known if section.lower() not in present]
+        meant: set[str] = set()
         for header in file.headers:
-            near = difflib.get_close_matches(header.section, missing, n=1, cutoff=0.75)
-            if header.section.lower() not in by_lower and near:
-                message = f"the section [{header.section}] is not known; did you mean [{near[0]}]?"
-                yield Diagnostic("C005", Severity.WARNING, header.span, message, fix=Fix(header.span, f"[{near[0]}]"))
+            if header.section.lower() not in by_lower:
+                near = _near(header.section, missing)
+                yield _unknown(header.span, f"the section [{header.section}]", None if near is None else f"[{near}]")
+                meant |= set() if near is None else {header.section.lower()}
         for entry in file.entries:
             section = by_lower.get(entry.section.lower())
-            if section is None or entry.key.lower() in {key.lower() for key in known[section]}:
-                continue
-            open_keys = [key for key in known[section] if file.find(section, key) is None]
-            near = difflib.get_close_matches(entry.key, sorted(open_keys), n=1, cutoff=0.75)
-            if near:
-                message = f"[{section}] {entry.key} is not known; did you mean {near[0]}?"
-                yield Diagnostic("C005", Severity.WARNING, entry.key_span, message, fix=Fix(entry.key_span, near[0]))
+            names = known[section] if section is not None else set()
+            if entry.section.lower() not in meant and entry.key.lower() not in {name.lower() for name in names}:
+                near = _near(entry.key, sorted(name for name in names if file.find(entry.section, name) is None))
+                yield _unknown(entry.key_span, f"[{section or entry.section}] {entry.key}", near)
+
+
+def _near(name: str, there: list[str]) -> str | None:
+    import difflib
+
+    return next(iter(difflib.get_close_matches(name, there, n=1, cutoff=0.75)), None)
+
+
+def _unknown(span: Span, what: str, near: str | None) -> Diagnostic:
+    if near is None:
+        return Diagnostic("C005", Severity.WARNING, span, f"{what} is not known and has no effect")
+    return Diagnostic("C005", Severity.WARNING, span, f"{what} is not known; did you mean {near}?", fix=Fix(span, near))
 
 
 def encoder_channel(number: int) -> tuple[int, str] | None:

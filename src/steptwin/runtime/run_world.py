@@ -42,9 +42,14 @@ class WorldRun:
     as_json: bool = False
 
 
-def run(options: WorldRun, say: Say) -> bool:
-    """Run a world and say what happened; whether all expectations held. Raises `Misuse` for what cannot be run."""
+def run(options: WorldRun, say: Say, warn: Say) -> bool:
+    """Run a world and say what happened; whether all expectations held. ``warn`` is told what is doubtful in its files.
+
+    Raises `Misuse` for what cannot be run.
+    """
     world = World.load(options.world, keep_trace=options.trace is not None or not options.as_json)
+    for warning in world.plan.warnings:
+        warn(warning)
     _arrange(world, options)
     limit = options.limit if options.limit is not None else USUAL_LIMIT_NS
     begin = time.perf_counter()

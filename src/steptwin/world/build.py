@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from math import floor
 
-from steptwin.diagnostics import Severity, Source, render
+from steptwin.diagnostics import Diagnostic, Severity, Source, render
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.eeprom import image_of
@@ -16,7 +16,7 @@ from steptwin.m1486.lines import interface
 from steptwin.m1486.syntax import parse as parse_m1486
 from steptwin.m1486.variants import Store, Variant, variant
 from steptwin.machine import Nanos
-from steptwin.mic488.config import ControllerConfig, read_config
+from steptwin.mic488.config import ConfigError, ControllerConfig, examine_config
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
@@ -82,6 +82,8 @@ class Plan:
     """Line and unit (or address) of a machine."""
     axes: dict[str, Fitted] = field(default_factory=dict)
     buttons: dict[str, tuple[Button, Kernel]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    """What is doubtful in the files that the description names, for people."""
 
 
 def build(spec: WorldSpec, files: Files, record: Recorder) -> Plan:
@@ -143,10 +145,19 @@ class _Builder:
         except UnicodeDecodeError:
             return data.decode("latin-1")
 
+    def _warn(self, source: Source, findings: Iterable[Diagnostic]) -> None:
+        shown = [finding for finding in findings if finding.severity is Severity.WARNING]
+        if shown and (text := render(source, shown)) not in self.plan.warnings:
+            self.plan.warnings.append(text)
+
     def _mic488(self, spec: Mic488Spec) -> Mic488:
         base = ControllerConfig()
         if spec.config is not None:
-            base = read_config(IniFile.parse(self.files[spec.config], spec.config), spec.firmware)
+            file = IniFile.parse(self.files[spec.config], spec.config)
+            base, found = examine_config(file, spec.firmware)
+            if any(finding.severity is Severity.ERROR for finding in found):
+                raise ConfigError(file.source, found)
+            self._warn(file.source, found)
         config = config_of(spec, base)
         positions: dict[int, PositionTable] = {}
         programs: dict[int, LoadedProgram] = {}
@@ -155,12 +166,14 @@ class _Builder:
             errors = [finding for finding in findings if finding.severity is Severity.ERROR]
             if errors or table is None:
                 raise Misuse(f"positions do not check:\n{render(Source(spec.positions, self._text(spec.positions)), errors)}")
+            self._warn(Source(spec.positions, self._text(spec.positions)), findings)
             positions[0] = table
         if spec.program is not None:
             checked = check(self._text(spec.program), positions.get(0), _setup(config), dialect_for(spec.firmware))
             if checked.errors:
                 shown = render(Source(spec.program, self._text(spec.program)), checked.errors)
                 raise Misuse(f"the program does not check:\n{shown}")
+            self._warn(Source(spec.program, self._text(spec.program)), checked.diagnostics)
             programs[0] = load(checked, spec.program)
         statement_time = STATEMENT_TIME if spec.statement_time is None else spec.statement_time
         return Mic488(
