@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import socket
 import sys
 
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
+from steptwin.runtime.descriptors import descriptors
 from steptwin.runtime.tcp import Clients, Connection
 from steptwin.wire.slave import TcpSlavePort
 from steptwin.world.kernel import Kernel
@@ -20,21 +22,23 @@ RUN = [bytes.fromhex("10") + (10068 + 2 * axis).to_bytes(2, "big") + bytes.fromh
 
 
 async def main(port: int) -> None:
-    loop = asyncio.get_running_loop()
     clock = Clock()
     config = ControllerConfig()
     clients = Clients()
-    clients = Clients()
+    listener = socket.create_server(("127.0.0.1", port), backlog=1024)
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def connect() -> Connection:
+    def accept() -> None:
+        client = listener.accept()[0]
+        client.setblocking(False)
         kernel = Kernel(clock.now())
         device = Mic488(config)
         kernel.add("1", device)
         for request in (ENABLE_ALL, *RUN):
             device.execute(request, kernel.now)
-        return Connection(Cell(kernel, clock), lambda: TcpSlavePort({1: device}), clients)
+        Connection(client, Cell(kernel, clock), TcpSlavePort({1: device}), clients)
 
-    await loop.create_server(connect, "127.0.0.1", port, backlog=1024)
+    descriptors().await_input(listener.fileno(), accept)
     gc.freeze()
     gc.disable()
     print("ready", flush=True)
@@ -44,9 +48,6 @@ async def main(port: int) -> None:
 if __name__ == "__main__":
     import resource
 
-    import uvloop
-
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-        runner.run(main(int(sys.argv[1])))
+    asyncio.run(main(int(sys.argv[1])))

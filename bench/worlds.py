@@ -1,11 +1,11 @@
 """The goal of worlds: 1000 MIC488, every axis on a point-to-point move each second, ten virtual minutes on one core.
 
-``python -m bench.worlds [CONTROLLERS [SECONDS]]``
+``CONTROLLERS`` and ``SECONDS`` in the environment make it smaller.
 """
 
 from __future__ import annotations
 
-import sys
+import os
 import time
 
 from steptwin.runtime.world import World
@@ -49,8 +49,8 @@ def described(n: int) -> str:
 
 
 def main() -> None:
-    controllers = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    seconds = int(sys.argv[2]) if len(sys.argv) > 2 else 600
+    controllers = int(os.environ.get("CONTROLLERS", "1000"))
+    seconds = int(os.environ.get("SECONDS", "600"))
     text = "".join(described(n) for n in range(controllers))
     begin = time.perf_counter()
     world = World.from_toml(text, keep_trace=False)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
 import json
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -187,31 +189,35 @@ def test_a_port_is_one_that_talks(run: Run) -> None:
 def test_a_client_that_does_not_read_loses_what_is_said(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """A chip that talks for ever must not fill the memory for a client that has fallen asleep."""
 
-    async def scene() -> tuple[int, int]:
+    async def scene() -> tuple[int, int, int]:
         loop: Any = asyncio.get_running_loop()
         served = line(addresses="F")
         cell = Cell(served.kernel, loop.clock())
         clients = Clients()
         link = TcpLink(cell, Address("127.0.0.1", 0), served.client_port, clients)
         address = await link.open()
-        reader, writer = await asyncio.open_connection(*address)
-        await asyncio.sleep(0.1)
-        (client,) = clients.present
-        client.pause_writing()
-        Feed(cell, served.port("typist"), Told()).take(b"[\r@1\ru20\rj1\r]\r")
-        await asyncio.sleep(1)
-        asleep = client._transport.get_write_buffer_size()
-        client.resume_writing()
-        await asyncio.sleep(0.1)
-        heard = len(await reader.read(1000))
-        writer.close()
+        with socket.create_connection(address) as sleeper:
+            await asyncio.sleep(0.1)
+            (client,) = clients.present
+            while not client.waiting:
+                client.write(bytes(65536))
+            full = client.waiting
+            Feed(cell, served.port("typist"), Told()).take(b"[\r@1\ru20\rj1\r]\r")
+            await asyncio.sleep(1)
+            asleep = client.waiting
+            sleeper.setblocking(False)
+            heard = b""
+            while not heard.strip(b"\0"):
+                await asyncio.sleep(0.01)
+                with contextlib.suppress(BlockingIOError):
+                    heard += sleeper.recv(1 << 20)
         await link.close()
         cell.close()
-        return asleep, heard
+        return full, asleep, len(heard.lstrip(b"\0"))
 
-    asleep, heard = run(scene())
-    assert asleep == 0
-    assert 0 < heard <= 60
+    full, asleep, heard = run(scene())
+    assert asleep == full
+    assert 0 < heard < 500, "in the second of its sleep it would have been 600"
 
 
 # ---------------------------------------------------------------------- characters in words

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import errno
 import re
 import socket
 from collections.abc import Awaitable, Callable
@@ -11,9 +13,10 @@ from typing import Any
 import pytest
 
 from steptwin.errors import LineFailure, Misuse
+from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.runtime.cell import Cell
-from steptwin.runtime.tcp import READ_BYTES, Address, BufferedConnection, Clients, Connection, TcpLink, parse_address
+from steptwin.runtime.tcp import RETRY_S, Address, Clients, TcpLink, parse_address
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 
 Run = Callable[..., Any]
@@ -72,7 +75,8 @@ class Scene:
         self.cell, self.device = make_cell()
         self.notices: list[str] = []
         self.clients = Clients(most, self.notices.append)
-        self.link = TcpLink(self.cell, Address("127.0.0.1", 0), lambda: TcpSlavePort({1: self.device}), self.clients)
+        self.executed = 0
+        self.link = TcpLink(self.cell, Address("127.0.0.1", 0), lambda: TcpSlavePort({1: self}), self.clients)
         self._writers: list[asyncio.StreamWriter] = []
 
     async def __aenter__(self) -> Scene:
@@ -84,6 +88,10 @@ class Scene:
         self.cell.close()
         for writer in self._writers:
             writer.close()
+
+    def execute(self, pdu: bytes, now: Nanos) -> bytes:
+        self.executed += 1
+        return self.device.execute(pdu, now)
 
     async def fallen_to(self, count: int) -> int:
         """How many clients there are, as soon as it is ``count``."""
@@ -172,27 +180,131 @@ def test_clients_beyond_the_limit_are_turned_away_and_places_become_free(run: Ru
     assert in_scene(run, make_cell, play, most=2) == ([ONE] * 4, ["more than 2 clients at once are turned away"])
 
 
+def deafen(scene: Scene) -> socket.socket:
+    """A client that reads only when it is told to, and little room for what it does not read."""
+    assert scene.link._listener is not None
+    scene.link._listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    deaf = socket.socket()
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    deaf.connect(scene.address)
+    deaf.setblocking(False)
+    return deaf
+
+
+def pour(client: socket.socket, requests: bytes) -> None:
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            client.send(requests)
+
+
 def test_a_client_that_never_reads_costs_bounded_memory_and_hinders_nobody(run: Run, make_cell: Make) -> None:
     async def play(scene: Scene) -> tuple[list[bytes], int]:
         other = await scene.client()
-        deaf = socket.create_connection(scene.address)
-        deaf.setblocking(False)
+        deaf = deafen(scene)
         answers, waiting = [], 0
         for _ in range(300):
-            try:
-                while True:
-                    deaf.send(READ_MANY * 1000)
-            except BlockingIOError:
-                pass
+            pour(deaf, READ_MANY * 1000)
             answers.append(await ask(other))
-            connections = [c for c in scene.clients.present if isinstance(c, Connection)]
-            waiting = max(waiting, *(c._transport.get_write_buffer_size() for c in connections))
+            waiting = max(waiting, *(connection.waiting for connection in scene.clients.present))
         deaf.close()
         return answers, waiting
 
     answers, waiting = in_scene(run, make_cell, play)
     assert answers == [ONE] * 300
     assert 0 < waiting < 200_000
+
+
+def test_while_answers_wait_nothing_is_executed_and_all_are_sent_then(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[int, int, int]:
+        deaf = deafen(scene)
+        sent = 0
+        while not any(connection.waiting for connection in scene.clients.present):
+            with contextlib.suppress(BlockingIOError):
+                sent += deaf.send(READ_MANY * 10)
+            await asyncio.sleep(0)
+        executed = scene.executed
+        for _ in range(100):
+            await asyncio.sleep(0)
+        still = scene.executed
+        received = 0
+        expected = sent // len(READ_MANY) * (9 + 250)
+        while received < expected:
+            await asyncio.sleep(0)
+            with contextlib.suppress(BlockingIOError):
+                received += len(deaf.recv(1 << 20))
+        deaf.close()
+        return still - executed, received - expected, scene.executed - sent // len(READ_MANY)
+
+    assert in_scene(run, make_cell, play) == (0, 0, 0)
+
+
+def test_what_was_answered_before_a_wrong_header_is_sent_though_it_has_to_wait(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[int, int, list[str]]:
+        deaf = deafen(scene)
+        while not any(connection.waiting for connection in scene.clients.present):
+            with contextlib.suppress(BlockingIOError):
+                assert deaf.send(READ_MANY) == len(READ_MANY)
+            await asyncio.sleep(0)
+        deaf.send(b"\xff" * 12)
+        received = 0
+        while True:
+            await asyncio.sleep(0)
+            with contextlib.suppress(BlockingIOError):
+                data = deaf.recv(1 << 20)
+                if not data:
+                    break
+                received += len(data)
+        deaf.close()
+        return received // (9 + 250), scene.executed, scene.notices
+
+    answers, executed, notices = in_scene(run, make_cell, play)
+    assert answers == executed
+    assert len(notices) == 1
+
+
+def test_after_a_wrong_header_the_rest_of_a_flood_is_not_executed(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[int, int]:
+        _, writer = await scene.client()
+        writer.write(READ_ONE + b"\xff" * 12 + READ_ONE * 1000)
+        await asyncio.sleep(0.1)
+        return scene.executed, await scene.fallen_to(0)
+
+    assert in_scene(run, make_cell, play) == (1, 0)
+
+
+def test_a_system_without_room_for_clients_is_asked_again(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[list[str], bytes]:
+        listener = scene.link._listener
+        assert listener is not None
+        scene.link._listener = full = Full(listener)  # type: ignore[assignment]
+        client = await scene.client()
+        for _ in range(100):
+            await asyncio.sleep(0)
+        full.full = False
+        return scene.notices, await ask(client)
+
+    notices, answer = in_scene(run, make_cell, play)
+    assert notices == [f"no client is accepted on 127.0.0.1:0 for {RETRY_S:g} s: too many open files"]
+    assert answer == ONE
+
+
+class Full:
+    """A listening socket of a system that has no room."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        self.full = True
+
+    def accept(self) -> Any:
+        if self.full:
+            raise OSError(errno.EMFILE, "Too many open files")
+        return self._listener.accept()
+
+    def fileno(self) -> int:
+        return self._listener.fileno()
+
+    def close(self) -> None:
+        self._listener.close()
 
 
 def test_a_flood_is_served_in_slices_between_the_requests_of_others(run: Run, make_cell: Make) -> None:
@@ -248,88 +360,3 @@ def test_a_port_that_is_taken(run: Run, make_cell: Make) -> None:
                 await second.open()
 
     run(scene())
-
-
-# ---------------------------------------------------------------------- without sockets: what a transport tells a connection
-
-
-class Transport:
-    """Records what a connection does."""
-
-    def __init__(self) -> None:
-        self.written = b""
-        self.reading = True
-        self.closing = False
-
-    def write(self, data: bytes) -> None:
-        self.written += data
-
-    def pause_reading(self) -> None:
-        self.reading = False
-
-    def resume_reading(self) -> None:
-        self.reading = True
-
-    def close(self) -> None:
-        self.closing = True
-
-    def is_closing(self) -> bool:
-        return self.closing
-
-    def get_extra_info(self, name: str) -> None:
-        return None
-
-
-def connected(make_cell: Make, kind: type[Connection] = Connection) -> tuple[Connection, Transport]:
-    cell, device = make_cell()
-    transport: Any = Transport()
-    connection = kind(cell, lambda: TcpSlavePort({1: device}), Clients())
-    connection.connection_made(transport)
-    return connection, transport
-
-
-def test_while_answers_wait_nothing_is_executed(run: Run, make_cell: Make) -> None:
-    async def scene() -> tuple[int, bool, int, bool, int, bool]:
-        connection, transport = connected(make_cell)
-        connection.data_received(READ_ONE * 1000)
-        first = len(transport.written)
-        connection.pause_writing()
-        await asyncio.sleep(1.0)
-        paused = len(transport.written)
-        reading = transport.reading
-        connection.resume_writing()
-        await asyncio.sleep(1.0)
-        return first, reading, paused, transport.reading, len(transport.written), transport.closing
-
-    first, reading_while_paused, paused, reading_again, total, closing = run(scene())
-    assert first == paused == 2048 // len(READ_ONE) * len(ONE)
-    assert not reading_while_paused
-    assert (reading_again, total, closing) == (True, 1000 * len(ONE), False)
-
-
-def test_after_a_wrong_header_the_rest_of_a_flood_is_not_executed(run: Run, make_cell: Make) -> None:
-    async def scene() -> tuple[bytes, bool]:
-        cell, device = make_cell()
-        transport: Any = Transport()
-        transport.get_extra_info = lambda name: ("127.0.0.1", 1) if name == "peername" else None
-        connection = Connection(cell, lambda: TcpSlavePort({1: device}), Clients())
-        connection.connection_made(transport)
-        connection.data_received(READ_ONE + b"\xff" * 12 + READ_ONE * 1000)
-        await asyncio.sleep(1.0)
-        return transport.written, transport.closing
-
-    assert run(scene()) == (ONE, True)
-
-
-def test_the_kept_receive_buffer(run: Run, make_cell: Make) -> None:
-    async def scene() -> bytes:
-        connection, transport = connected(make_cell, BufferedConnection)
-        assert isinstance(connection, BufferedConnection)
-        for part in (READ_ONE[:4], READ_ONE[4:] + READ_ONE):
-            buffer = connection.get_buffer(-1)
-            assert len(buffer) == READ_BYTES
-            buffer[: len(part)] = part
-            connection.buffer_updated(len(part))
-        return transport.written
-
-    assert run(scene()) == ONE * 2

@@ -14,7 +14,7 @@ from steptwin.mic488.reads import compile_read
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.writes import WritePlan, compile_coil, compile_registers
-from steptwin.wire.pdu import WRITE_MULTIPLE_REGISTERS, ModbusException, Read, WriteCoil, decode_request
+from steptwin.wire.pdu import WRITE_MULTIPLE_REGISTERS, WRITE_SINGLE_REGISTER, ModbusException, Read, WriteCoil, decode_request
 
 if TYPE_CHECKING:
     from steptwin.mic488.device import Mic488
@@ -45,13 +45,15 @@ class Slave:
     def answer(self, device: Mic488, pdu: bytes) -> bytes:
         """The response to ``pdu``; a request that cannot be served is answered with its exception."""
         data_type = device.data_type
-        plan = self._whole[data_type].get(pdu)
-        if plan is not None:
-            return plan(device)
         try:
-            writing = self._heads[data_type].get(pdu[: 6 if pdu[:1] == _MANY else 3])
-            if writing is not None and writing.length == len(pdu):
-                return writing(device, pdu)
+            if pdu[:1] in _REGISTER_WRITES:
+                writing = self._heads[data_type].get(pdu[: 6 if pdu[:1] == _MANY else 3])
+                if writing is not None and writing.length == len(pdu):
+                    return writing(device, pdu)
+            else:
+                plan = self._whole[data_type].get(pdu)
+                if plan is not None:
+                    return plan(device)
             return self._compiled(DataType(data_type), pdu)(device)
         except ModbusException as refusal:
             return refusal.pdu
@@ -70,7 +72,8 @@ class Slave:
         return plan
 
 
-_MANY = bytes((WRITE_MULTIPLE_REGISTERS,))
+_ONE, _MANY = bytes((WRITE_SINGLE_REGISTER,)), bytes((WRITE_MULTIPLE_REGISTERS,))
+_REGISTER_WRITES = (_MANY, _ONE)
 
 
 def _keep(plans: dict, key: bytes, plan: object) -> None:

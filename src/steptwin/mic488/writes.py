@@ -47,8 +47,11 @@ def compile_coil(registers: RegisterMap, request: WriteCoil, pdu: bytes, *, leni
         raise ModbusException(WRITE_SINGLE_COIL, ILLEGAL_DATA_ADDRESS)
     action, number, on = _COILS[register.key], (register.index or 1) - 1, request.on
     key = (register.key, register.index)
+    is_output = register.key == "OUT"
 
     def plan(device: Mic488) -> bytes:
+        if is_output and device.outputs[number] is on:
+            return pdu  # masters write outputs again and again; nothing happens
         try:
             action(device, number, on, device.now)
         except ModbusException as refusal:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.runtime.clock import Clock
+from steptwin.runtime.descriptors import descriptors
 
 LONGEST_WAIT_S = 3600.0
 """Event loops take no arbitrarily distant timer; a longer wait is waited in parts."""
@@ -34,18 +35,28 @@ class Cell:
     by how much.
     """
 
-    __slots__ = ("_armed_for", "_loop", "_timer", "clock", "kernel", "on_lag")
+    __slots__ = ("_armed_for", "_batch", "_descriptors", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
 
     def __init__(self, kernel: Advancing, clock: Clock) -> None:
         self.kernel = kernel
         self.clock = clock
         self.on_lag: Callable[[Nanos], None] | None = None
         self._loop = asyncio.get_running_loop()
+        self._descriptors = descriptors()
+        self._batch = 0
+        """That the machines have been brought to the present for."""
+        self.moments = 0
+        """Counts on whenever time may have passed or signals have settled."""
         self._timer: asyncio.TimerHandle | None = None
         self._armed_for: Nanos | None = None
 
     def enter(self) -> Nanos:
         """Bring the machines to the present; inputs may be applied at the moment returned, then call `leave`."""
+        batch = self._descriptors.batch
+        if batch and batch == self._batch:
+            return self.kernel.now
+        self._batch = batch
+        self.moments += 1
         now = self.clock.now()
         due = self._armed_for
         if due is not None and now - due > LONGEST_DELAY_NS:
@@ -56,6 +67,8 @@ class Cell:
     def leave(self) -> None:
         """Let signals settle after an input and wake up for what it leads to."""
         if self.kernel.stale:
+            self._batch = 0  # something may be due at once
+            self.moments += 1
             self._arm(self.kernel.deadline())
 
     def _held_up(self, due: Nanos, now: Nanos) -> Nanos:

@@ -25,11 +25,12 @@ from steptwin.runtime.lines import Happening
 from steptwin.runtime.links import Port
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.programbanks import Banks
+from steptwin.runtime.sharedreads import share_reads
 from steptwin.runtime.vision import Com1Link, uses_vision
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
-from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
+from steptwin.wire.slave import Device, RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
 from steptwin.world.faults import FaultyPort, Line, Mic488Body
 from steptwin.world.kernel import Kernel
@@ -86,16 +87,21 @@ class Mic488Line:
         self.faults = FaultDesk(self.kernel, {str(u): partial(Mic488Body, d, u) for u, d in self.devices.items()})
         numbers = ", ".join(map(str, units))
         self.title = f"MIC488 firmware {firmware}, unit{'s' if len(units) > 1 else ''} {numbers}"
+        self._served: Mapping[int, Device] = self.devices
         self._connections = count(1)
         # WBC-15; nobody else pays for it.
         self._hears_records = len(units) == 1 and any(map(uses_vision, banks.programs.values()))
 
     # ------------------------------------------------------------------ ports
 
+    def share_reads(self, cell: Cell) -> None:
+        """From now on ports are for many clients that ``cell`` serves."""
+        self._served = share_reads(self.devices, cell)
+
     def tcp_port(self) -> Port:
         """A port for one more client."""
         link = f"tcp-{next(self._connections)}"
-        port = TcpSlavePort(self.devices, on_frame=self.frames.observer(link, tcp=True) if self.options.frames else None)
+        port = TcpSlavePort(self._served, on_frame=self.frames.observer(link, tcp=True) if self.options.frames else None)
         return FaultyPort(port, link, self.faults.faults, Line.TCP, framed=port, units=tuple(self.devices))
 
     def rtu_port(self, link: str, gap_ns: Nanos = BURSTY_GAP_NS) -> Port:
@@ -104,9 +110,9 @@ class Mic488Line:
         port: RtuSlavePort | TimedRtuSlavePort
         if self.options.timing:
             timing = LineTiming(SerialLine(self.options.baud))
-            port = TimedRtuSlavePort(self.devices, timing, gap_ns=gap_ns, on_frame=observer)
+            port = TimedRtuSlavePort(self._served, timing, gap_ns=gap_ns, on_frame=observer)
         else:
-            port = RtuSlavePort(self.devices, gap_ns=gap_ns, on_frame=observer)
+            port = RtuSlavePort(self._served, gap_ns=gap_ns, on_frame=observer)
         shared = Com1Link(Com1Port(self._only_device(), port)) if self._hears_records else port
         watched = WatchedRtuPort(shared, self.frames, link) if self.options.frames else shared
         return FaultyPort(watched, link, self.faults.faults, Line.RTU, framed=port, units=tuple(self.devices))

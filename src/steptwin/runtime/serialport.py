@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from typing import cast
 
 import serialx
 
 from steptwin.errors import LineFailure
 from steptwin.runtime.cell import Cell
-from steptwin.runtime.links import Port, where
-from steptwin.runtime.tcp import Clients, Connection
+from steptwin.runtime.links import Feed, Port, where
 
 RETRY_S = 1.0
 """How often a device that has disappeared is looked for."""
@@ -28,7 +28,7 @@ class SerialLink:
         self._baud = baud
         self._make_port = make_port
         self._notice = notice
-        self._clients = Clients()
+        self._transport: serialx.BaseSerialTransport | None = None
         self._search: asyncio.Task[None] | None = None
         self._closing = False
 
@@ -36,16 +36,17 @@ class SerialLink:
         """Open the port. Raises `LineFailure` naming it."""
         loop = asyncio.get_running_loop()
         try:
-            await serialx.create_serial_connection(loop, self._line, self._device, self._baud)
+            self._transport, _ = await serialx.create_serial_connection(loop, self._make_line, self._device, self._baud)
         except (OSError, serialx.SerialException) as error:
             reason = where(error) if isinstance(error, OSError) else str(error)
             raise LineFailure(f"cannot open serial port {self._device} at {self._baud} bit/s: {reason}") from error
         return self._device
 
-    def _line(self) -> Connection:
-        return _Line(self._cell, self._make_port, self._clients, self._lost)
+    def _make_line(self) -> _Line:
+        return _Line(self._cell, self._make_port(), self._lost)
 
     def _lost(self, error: Exception | None) -> None:
+        self._transport = None
         if not self._closing:
             reason = where(error) if isinstance(error, OSError) else str(error or "closed")
             self._notice(f"serial port {self._device} is gone ({reason}); it is looked for")
@@ -65,17 +66,33 @@ class SerialLink:
         self._closing = True
         if self._search is not None:
             self._search.cancel()
-        for line in list(self._clients.present):
-            line.abort()
+        if self._transport is not None:
+            self._transport.abort()
 
 
-class _Line(Connection):
-    def __init__(
-        self, cell: Cell, make_port: Callable[[], Port], clients: Clients, lost: Callable[[Exception | None], None]
-    ) -> None:
-        super().__init__(cell, make_port, clients)
+class _Line(asyncio.Protocol):
+    """While nobody takes what is sent nothing is read either."""
+
+    def __init__(self, cell: Cell, port: Port, lost: Callable[[Exception | None], None]) -> None:
+        self._cell = cell
+        self._port = port
         self._lost = lost
 
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+        self._feed = Feed(self._cell, self._port, self._transport)
+
+    def data_received(self, data: bytes) -> None:
+        self._feed.take(data)
+
+    def pause_writing(self) -> None:
+        self._feed.is_read = False
+        self._transport.pause_reading()
+
+    def resume_writing(self) -> None:
+        self._feed.is_read = True
+        self._transport.resume_reading()
+
     def connection_lost(self, exc: Exception | None) -> None:
-        super().connection_lost(exc)
+        self._feed.close()
         self._lost(exc)

@@ -24,7 +24,7 @@ from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.output import Output
 from steptwin.runtime.rfc2217 import over_network
 from steptwin.runtime.server import Server, clear_ready_file
-from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop, shows_live_view
+from steptwin.runtime.serving import check_line_timing, check_name, shows_live_view
 from steptwin.runtime.tcp import parse_address
 from steptwin.runtime.textfiles import read_text
 
@@ -75,8 +75,7 @@ def serve(options: M1486Options) -> None:
     image = None if options.program is None else program_image(options.program, chain)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    with asyncio.Runner(loop_factory=fastest_loop()) as runner:
-        runner.run(_serve(options, chain, image))
+    asyncio.run(_serve(options, chain, image))
 
 
 def program_image(path: Path, chain: ChainOptions) -> bytes:

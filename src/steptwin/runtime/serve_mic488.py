@@ -24,7 +24,7 @@ from steptwin.runtime.output import Output
 from steptwin.runtime.programbanks import Banks, Findings, ProgramErrors, parse_banks, read_banks
 from steptwin.runtime.rfc2217 import over_network
 from steptwin.runtime.server import Server, clear_ready_file
-from steptwin.runtime.serving import check_line_timing, check_name, fastest_loop, shows_live_view
+from steptwin.runtime.serving import check_line_timing, check_name, shows_live_view
 from steptwin.runtime.tcp import parse_address
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
@@ -90,8 +90,7 @@ def serve(options: Mic488Options) -> None:
     banks = _load_banks(options, config)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    with asyncio.Runner(loop_factory=fastest_loop()) as runner:
-        runner.run(_serve(options, config, units, banks))
+    asyncio.run(_serve(options, config, units, banks))
 
 
 def load_config(path: Path, firmware: str) -> ControllerConfig:
@@ -163,6 +162,7 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
             options=LineOptions(baud=baud, timing=options.line_timing == "real", frames=live or options.log_frames),
         )
         cell = Cell(line.kernel, Clock())
+        line.share_reads(cell)
         face = _live_view(line, cell, output) if live else Lines(line, output, frames=options.log_frames)
         server = Server(cell, face.notice)
         line.faults.tell(face.notice)

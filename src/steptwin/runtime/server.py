@@ -20,12 +20,12 @@ from steptwin.runtime.cell import Cell
 from steptwin.runtime.control import ControlEndpoint, Handler
 from steptwin.runtime.links import Link, Port, where
 from steptwin.runtime.pty import PtyLink
-from steptwin.runtime.tcp import BACKLOG_OF_STDLIB, Address, Clients, TcpLink
+from steptwin.runtime.tcp import Address, Clients, TcpLink
 
 MOST_FILES = 65536
 """Every client is an open file; the usual limit of 1024 is for programs with few."""
-OTHER_FILES = 32 + BACKLOG_OF_STDLIB
-"""Files that are no clients, or not yet."""
+OTHER_FILES = 32
+"""Files that are no clients."""
 REPEAT_S = 1.0
 """The same notice is not given again within this time."""
 

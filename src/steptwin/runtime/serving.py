@@ -1,10 +1,8 @@
-"""What the commands that serve twins have in common: options that mean the same for all, the event loop, the choice of a face."""
+"""What the commands that serve twins have in common: options that mean the same for all, the choice of a face."""
 
 from __future__ import annotations
 
-import asyncio
 import os
-from collections.abc import Callable
 
 from steptwin.errors import Misuse
 from steptwin.runtime.output import Output
@@ -21,15 +19,6 @@ def check_name(name: str) -> None:
 def check_line_timing(wanted: str) -> None:
     if wanted not in ("real", "off"):
         raise Misuse(f"--line-timing {wanted}: permitted are 'real' and 'off'")
-
-
-def fastest_loop() -> Callable[[], asyncio.AbstractEventLoop] | None:
-    """The event loop to serve with; None is that of the standard library."""
-    try:
-        import uvloop
-    except ImportError:
-        return None
-    return uvloop.new_event_loop
 
 
 def shows_live_view(output: Output, *, log_frames: bool) -> bool:

@@ -7,17 +7,20 @@ import ipaddress
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple, cast
+from typing import NamedTuple
+from weakref import WeakSet
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.runtime.cell import Cell
+from steptwin.runtime.descriptors import descriptors
 from steptwin.runtime.links import SLICE_BYTES, Feed, Port, where
 
 LOOPBACK = "127.0.0.1"
-READ_BYTES = 65536
 BACKLOG = 1024
-BACKLOG_OF_STDLIB = 128
-"""The loop of the standard library accepts as many at once before it serves the first: each of them is an open file."""
+AT_ONCE = 64
+"""Clients that are accepted before those that are there are served."""
+RETRY_S = 1.0
+"""How long nobody is accepted when the system has no room for one more."""
 
 
 class Address(NamedTuple):
@@ -67,93 +70,83 @@ class Clients:
     present: set[Connection] = field(default_factory=set)
 
 
-class Connection(asyncio.Protocol):
-    """One client of a port. Its answers wait when it does not read; its flood is served in slices."""
+class Connection:
+    """One client of a port. While it does not read its answers no request of it is read; its flood is served in slices."""
 
-    def __init__(self, cell: Cell, make_port: Callable[[], Port], clients: Clients) -> None:
-        self._cell = cell
-        self.make_port = make_port
+    __slots__ = ("__weakref__", "_clients", "_descriptors", "_ending", "_feed", "_receive", "_send", "_socket", "_unsent", "port")
+
+    def __init__(self, client: socket.socket, cell: Cell, port: Port, clients: Clients) -> None:
+        self.port = port
+        self._socket = client
+        self._receive = client.recv
+        self._send = client.send
         self._clients = clients
-        self._backlog = b""
-        self._writable = True
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        # uvloop's transports are no subclasses of asyncio's.
-        self._transport = transport = cast(asyncio.Transport, transport)
-        self._port = self.make_port()
-        self._feed = Feed(self._cell, self._port, transport)
-        clients = self._clients
+        self._unsent = b""
+        self._ending = False
+        self._feed = Feed(cell, port, self)
+        self._descriptors = descriptors()
+        self._descriptors.await_input(client.fileno(), self._serve)
         clients.present.add(self)
-        if len(clients.present) > clients.most:
-            clients.notice(f"more than {clients.most} clients at once are turned away")
-            transport.abort()
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that the client has no room for."""
+        return len(self._unsent)
+
+    def _serve(self) -> None:
+        try:
+            data = self._receive(SLICE_BYTES)
+        except BlockingIOError:
             return
-        connected = transport.get_extra_info("socket")
-        if connected is not None:
-            connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._clients.present.discard(self)
-        self._feed.close()
-        self._backlog = b""
-
-    def data_received(self, data: bytes) -> None:
-        if self._backlog or len(data) > SLICE_BYTES:
-            self._backlog += data
-            self._transport.pause_reading()
-            self._serve_backlog()
-        else:
-            self._serve(data)
-
-    def _serve(self, data: bytes) -> None:
+        except OSError:
+            data = b""
+        if not data:
+            self.close()
+            return
         self._feed.take(data)
-        if self._port.broken is not None and not self._transport.is_closing():
-            self._clients.notice(f"client {_peer(self._transport)}: {self._port.broken}; its connection is closed")
-            self._transport.close()
+        if self.port.broken is not None and self._socket.fileno() >= 0:
+            client = Address(*self._socket.getpeername()[:2])
+            self._clients.notice(f"client {client}: {self.port.broken}; its connection is closed")
+            self._ending = True
+            if not self._unsent:
+                self.close()
 
-    def _serve_backlog(self) -> None:
-        if self._transport.is_closing() or not self._writable:
+    def write(self, data: bytes) -> None:
+        """Send; what finds no room waits for it."""
+        if self._unsent:
+            self._unsent += data
             return
-        data, self._backlog = self._backlog[:SLICE_BYTES], self._backlog[SLICE_BYTES:]
-        self._serve(data)
-        if self._backlog:
-            asyncio.get_running_loop().call_soon(self._serve_backlog)
-        elif self._writable and not self._transport.is_closing():
-            self._transport.resume_reading()
+        try:
+            sent = self._send(data)
+        except BlockingIOError:
+            sent = 0
+        except OSError:
+            self.close()
+            return
+        if sent < len(data):
+            self._unsent = data[sent:]
+            self._feed.is_read = False
+            self._descriptors.await_room(self._socket.fileno(), self._send_rest)
 
-    def pause_writing(self) -> None:
-        self._writable = self._feed.is_read = False
-        self._transport.pause_reading()
-
-    def resume_writing(self) -> None:
-        self._writable = self._feed.is_read = True
-        if self._backlog:
-            asyncio.get_running_loop().call_soon(self._serve_backlog)
+    def _send_rest(self) -> None:
+        rest, self._unsent = self._unsent, b""
+        self.write(rest)
+        if self._unsent or self._socket.fileno() < 0:
+            return
+        if self._ending:
+            self.close()
         else:
-            self._transport.resume_reading()
+            self._feed.is_read = True
+            self._descriptors.await_input(self._socket.fileno(), self._serve)
 
-    def abort(self) -> None:
-        self._transport.abort()
-
-
-def _peer(transport: asyncio.Transport) -> Address:
-    host, port, *_ = transport.get_extra_info("peername")
-    return Address(host, port)
-
-
-class BufferedConnection(Connection, asyncio.BufferedProtocol):
-    """A `Connection` that keeps its receive buffer: the loop of the standard library makes a new one for each read else."""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._buffer = bytearray(READ_BYTES)
-        self._view = memoryview(self._buffer)
-        super().connection_made(transport)
-
-    def get_buffer(self, sizehint: int) -> bytearray:
-        return self._buffer
-
-    def buffer_updated(self, nbytes: int) -> None:
-        self.data_received(bytes(self._view[:nbytes]))
+    def close(self) -> None:
+        """Nothing more is read or sent. A closed connection may be closed again."""
+        if self._socket.fileno() >= 0:
+            self._descriptors.forget(self._socket.fileno())
+            self._socket.close()
+            self._unsent = b""
+            self._clients.present.discard(self)
+            self._feed.close()
 
 
 class TcpLink:
@@ -164,27 +157,61 @@ class TcpLink:
         self._asked = address
         self._make_port = make_port
         self._clients = clients
-        self._server: asyncio.Server | None = None
+        self._connections: WeakSet[Connection] = WeakSet()
+        self._listener: socket.socket | None = None
+        self._retry: asyncio.TimerHandle | None = None
 
     async def open(self) -> Address:
         """Listen; returns the address with the port in use. Raises `LineFailure` naming the address."""
-        loop = asyncio.get_running_loop()
-        of_stdlib = type(loop).__module__.startswith("asyncio")
-        kind, backlog = (BufferedConnection, BACKLOG_OF_STDLIB) if of_stdlib else (Connection, BACKLOG)
-        host, port = self._asked
         try:
-            self._server = await loop.create_server(
-                lambda: kind(self._cell, self._make_port, self._clients), host, port, backlog=backlog
-            )
+            self._listener = listener = await _listening(self._asked)
         except OSError as error:
             raise LineFailure(f"cannot listen on {self._asked}: {where(error)}") from error
-        return Address(host, self._server.sockets[0].getsockname()[1])
+        self._listen()
+        return Address(self._asked.host, listener.getsockname()[1])
+
+    def _listen(self) -> None:
+        if self._listener is not None:
+            descriptors().await_input(self._listener.fileno(), self._accept)
+
+    def _accept(self) -> None:
+        if self._listener is None:
+            return
+        try:
+            for _ in range(AT_ONCE):
+                self._welcome(self._listener.accept()[0])
+        except (BlockingIOError, ConnectionAbortedError):
+            return
+        except OSError as error:
+            self._clients.notice(f"no client is accepted on {self._asked} for {RETRY_S:g} s: {where(error)}")
+            descriptors().forget(self._listener.fileno())
+            self._retry = asyncio.get_running_loop().call_later(RETRY_S, self._listen)
+
+    def _welcome(self, client: socket.socket) -> None:
+        if len(self._clients.present) >= self._clients.most:
+            self._clients.notice(f"more than {self._clients.most} clients at once are turned away")
+            client.close()
+            return
+        client.setblocking(False)
+        self._connections.add(Connection(client, self._cell, self._make_port(), self._clients))
 
     async def close(self) -> None:
-        if self._server is not None:
-            self._server.close()
-            for client in list(self._clients.present):
-                if client.make_port is self._make_port:
-                    client.abort()
-            await self._server.wait_closed()
-            self._server = None
+        if self._retry is not None:
+            self._retry.cancel()
+        if self._listener is not None:
+            descriptors().forget(self._listener.fileno())
+            self._listener.close()
+            self._listener = None
+        for connection in list(self._connections):
+            connection.close()
+
+
+async def _listening(address: Address) -> socket.socket:
+    loop = asyncio.get_running_loop()
+    family, _, _, _, where_ = (await loop.getaddrinfo(*address, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE))[0]
+    listener = socket.create_server(where_[:2], family=family, backlog=BACKLOG)
+    listener.setblocking(False)
+    # What is accepted inherits these.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    return listener

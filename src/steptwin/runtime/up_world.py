@@ -23,7 +23,7 @@ from steptwin.runtime.mic488 import state_of
 from steptwin.runtime.output import Output
 from steptwin.runtime.run_world import describe, is_told
 from steptwin.runtime.server import Server, clear_ready_file
-from steptwin.runtime.serving import check_name, fastest_loop
+from steptwin.runtime.serving import check_name
 from steptwin.runtime.tcp import parse_address
 from steptwin.runtime.world import World
 from steptwin.world import script as do
@@ -133,6 +133,8 @@ def up(options: UpOptions) -> bool:
     name = options.name or options.world.stem
     check_name(name)
     world = World.load(options.world, keep_trace=options.trace is not None)
+    for warning in world.plan.warnings:
+        sys.stderr.write(f"{warning}\n")
     speed = _speed(options.speed)
     outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
     if speed is None and outside:
@@ -143,8 +145,7 @@ def up(options: UpOptions) -> bool:
                 parse_address(address, listen_any=options.listen_any)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    with asyncio.Runner(loop_factory=fastest_loop()) as runner:
-        runner.run(_serve(options, world, speed, name))
+    asyncio.run(_serve(options, world, speed, name))
     return not world.failures
 
 
@@ -359,9 +360,12 @@ def _fault(world: World, request: Mapping[str, Any]) -> object:
     from steptwin.world.faults import read
 
     faults = world.plan.faults
+    wanted = [read(line) for line in request.get("set") or []]
+    for fault in wanted:
+        world.rigging.check(fault)
     unwanted = request.get("clear") or []
     for name in [active.name for active in faults.active] if unwanted is True else unwanted:
         world.outside(do.ClearFault(name))
-    for line in request.get("set") or []:
-        world.outside(do.SetFault(read(line)))
+    for fault in wanted:
+        world.outside(do.SetFault(fault))
     return [{"name": a.name, "fault": str(a.fault), "happened": a.struck} for a in faults.active]

@@ -184,8 +184,12 @@ class TcpSlavePort(Stateful):
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         # Nearly always one whole request comes alone; this is that case without a framer.
         framer = self._framer
-        if not framer.held and 8 <= len(data) == data[5] + 6 <= mbap.MAX_FRAME and data[2:5] == _PLAIN and framer.broken is None:
-            return self._answer(data, now)
+        size = len(data)
+        if 8 <= size <= mbap.MAX_FRAME and data[2:5] == _PLAIN and data[5] == size - 6 and not framer.held and not framer.broken:
+            device = self._devices.get(data[6])
+            if device is not None and self.on_frame is None:
+                pdu = device.execute(data[7:], now)
+                return data[:4] + (len(pdu) + 1).to_bytes(2, "big") + data[6:7] + pdu
         return b"".join([self._answer(frame.raw, now) for frame in framer.feed(data)])
 
     def _answer(self, raw: bytes, now: Nanos) -> bytes:

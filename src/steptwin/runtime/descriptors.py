@@ -1,0 +1,106 @@
+"""What the links of a process wait for: file descriptors in one epoll set, served in turns.
+
+An event loop takes a transport, a handle and often a sleep for every request. Here a loop is woken once, then everything that
+is ready is served until nothing is, so that a request costs little more than reading it and writing its answer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import select
+import time
+from collections.abc import Callable
+from typing import TypeAlias
+from weakref import WeakKeyDictionary
+
+Serve: TypeAlias = Callable[[], None]
+"""Called while a descriptor is ready, again and again; it may await or forget any descriptor, and must not block."""
+
+TURN_NS = 1_000_000
+"""After this long a loop's timers and other descriptors have their turn too."""
+BATCH = 128
+"""Descriptors served before the others are asked for."""
+LINGER_NS = 50_000
+"""Who has an answer often asks again at once. To wait for him awake spares him the time it takes to wake up."""
+MOST_SKIPPED = 1023
+
+
+class Descriptors:
+    """The set of an event loop. One descriptor is awaited for one thing at a time: input, or room for output."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.batch = 0
+        """While descriptors are served that were found ready together, the number of their batch: what they bring happens at
+        one moment. Between batches 0."""
+        self._batches = 0
+        self._epoll = select.epoll()
+        self._serve: dict[int, Serve] = {}
+        # Lingering that was in vain is not repeated for so many turns, and then longer still: slow masters cost nothing,
+        # and where there is one processor only nobody could ask meanwhile.
+        self._skipped = 0
+        self._to_skip = 0
+        loop.add_reader(self._epoll.fileno(), self._turn)
+
+    def await_input(self, descriptor: int, serve: Serve) -> None:
+        """Call ``serve`` while there is something to read, or the other end is gone."""
+        self._await(descriptor, select.EPOLLIN, serve)
+
+    def await_room(self, descriptor: int, serve: Serve) -> None:
+        """Call ``serve`` while there is room to write, or the other end is gone."""
+        self._await(descriptor, select.EPOLLOUT, serve)
+
+    def _await(self, descriptor: int, events: int, serve: Serve) -> None:
+        if descriptor in self._serve:
+            self._epoll.modify(descriptor, events)
+        else:
+            self._epoll.register(descriptor, events)
+        self._serve[descriptor] = serve
+
+    def forget(self, descriptor: int) -> None:
+        """No longer await anything of a descriptor, which is still open; nothing when it was not awaited."""
+        if self._serve.pop(descriptor, None) is not None:
+            self._epoll.unregister(descriptor)
+
+    def _turn(self) -> None:
+        poll, serving, now = self._epoll.poll, self._serve, time.monotonic_ns
+        end = now() + TURN_NS
+        ready = poll(0, BATCH)
+        while ready:
+            self._batches = self.batch = self._batches + 1
+            try:
+                for descriptor, _ in ready:
+                    serve = serving.get(descriptor)
+                    if serve is not None:  # one served before it has not ended it
+                        serve()
+            finally:
+                self.batch = 0
+            if now() > end:
+                return
+            ready = poll(0, BATCH) or self._linger()
+
+    def _linger(self) -> list[tuple[int, int]]:
+        if self._skipped < self._to_skip:
+            self._skipped += 1
+            return []
+        self._skipped = 0
+        poll, now = self._epoll.poll, time.monotonic_ns
+        end = now() + LINGER_NS
+        while now() < end:
+            ready = poll(0, BATCH)
+            if ready:
+                self._to_skip = 0
+                return ready
+        self._to_skip = min(2 * self._to_skip + 1, MOST_SKIPPED)
+        return []
+
+
+_of_loops: WeakKeyDictionary[asyncio.AbstractEventLoop, Descriptors] = WeakKeyDictionary()
+
+
+def descriptors() -> Descriptors:
+    """The set of the running loop, which lives as long as the loop."""
+    loop = asyncio.get_running_loop()
+    found = _of_loops.get(loop)
+    if found is None:
+        found = _of_loops[loop] = Descriptors(loop)
+    return found
