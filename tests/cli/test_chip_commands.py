@@ -60,6 +60,26 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert "error M110: V 99 999 is out of range" in run("send", str(program), code=2)
 
 
+def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: Path) -> None:
+    """The file says who gets what; only what stands before its first X needs a chip in the address."""
+    twin = serve_m1486("--variant", "B", "--chain", "0,7")
+    program = tmp_path / "both.m1486"
+
+    def sent(text: str, address: str) -> tuple[int, str]:
+        program.write_text(text)
+        done = twin.command("send", str(program), "-d", f"{twin.pty},{address}")
+        return done.returncode, done.stdout or done.stderr
+
+    assert sent("x0\n[\nf640\nr\n]\nx7\n[\nb64\nr\n]\n", "kind=m1486") == (0, f"{program} is in chips 0, 7 (M1486B)\n")
+    assert sent("f64\nr\nx0\nr\n", "chip=7")[0] == 0
+    code, told = sent("f64\nr\nx0\nr\n", "kind=m1486")
+    assert (code, "what stands before its first X is for which chip?" in told) == (2, True)
+    assert [twin.command("get", "counter", "-d", f"{twin.pty},chip={chip}").stdout.split()[1] for chip in "07"] == ["1280", "0"]
+    code, told = sent("x3\nr\n", "kind=m1486")
+    assert (code, "chip 3 does not echo" in told) == (1, True)
+    assert sent("xg\nr\n", "kind=m1486")[0] == 2
+
+
 def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) -> None:
     """Both kinds of device, and a server of Modbus TCP, which hangs up when it hears characters."""
     chips, controller = serve_m1486("--variant", "B", "--chain", "1,B"), serve("--demo")

@@ -216,15 +216,35 @@ def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
 
 
 def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
-    """Download a program; it runs from its ``]`` on."""
+    """Download a program into the chips it names by ``X``, or the one meant; it runs from its ``]`` on."""
+    from steptwin.host.m1486 import M1486, M1486Line
+    from steptwin.host.m1486.sync import download_to
+
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise Misuse(f"cannot read {file}: {getattr(error, 'strerror', None) or error}") from None
-    with opened_chip(address, log_frames=log_frames) as chip, _progress(file.name) as tell:
-        uploaded = chip.download(text, progress=tell, name=str(file))
-        title = chip.variant.title
-    typer.echo(f"{file} is in the {title}" + (f"; it uploaded {uploaded.hex(' ')}" if uploaded else ""))
+    addresses = _addressed(text, address.chip, file)
+    with M1486Line(address.place, baud=address.baud, log=complain if log_frames else None) as line:
+        chips = {a: M1486(line, a, variant=address.variant, timeout_s=address.timeout) for a in addresses}
+        for chip in chips.values():
+            chip.open()
+        with _progress(file.name) as tell:
+            uploaded = download_to(chips.values(), text, first=chips.get(address.chip), progress=tell, name=str(file))
+    title = next(iter(chips.values())).variant.title
+    where = f"the {title}" if len(addresses) == 1 else f"chips {', '.join(f'{a:X}' for a in addresses)} ({title})"
+    typer.echo(f"{file} is in {where}" + (f"; it uploaded {uploaded.hex(' ')}" if uploaded else ""))
+
+
+def _addressed(text: str, chip: int | None, file: Path) -> list[int | None]:
+    """The chips a program is for: those it names by X, and ``chip`` for what stands before. What is wrong in it is told later."""
+    from steptwin.host.m1486.download import parts
+    from steptwin.m1486.syntax import parse
+
+    named = dict.fromkeys(chip if address is None else address for address, _ in parts(parse(text).program))
+    if None in named and len(named) > 1:
+        raise Misuse(f"{file} is not sent: what stands before its first X is for which chip? Give it: --device ADDRESS,chip=N")
+    return list(named) or [chip]
 
 
 @contextlib.contextmanager

@@ -22,7 +22,6 @@ from steptwin.host.m1486 import (
     Restarted,
     WrongType,
 )
-from steptwin.host.m1486.driver import download_to as async_download_to
 from steptwin.host.m1486.sync import download_to
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.machine import SECOND
@@ -304,7 +303,21 @@ def test_example_6_of_the_manual_needs_both_its_chips() -> None:
     assert (wire.true(0), wire.true(7)) == (64 + 128 + 192, 640)
     with pytest.raises(Misuse, match="there is no chip 7, which it names"):
         download_to(chips[:1], text)
-    assert async_download_to.__doc__
+    with pytest.raises(Misuse, match="no X before F64 says which chip it is for"):
+        download_to(chips, "f64\nr\nx0\nr\n")
+    download_to(chips, "f64\nr\nx0\nr\n", first=chips[1])
+    assert [chip.wait().reason for chip in chips] == [ChipReason.DONE] * 2
+    assert (wire.true(0), wire.true(7)) == (2 * 192 + 128 + 64, 704)
+
+
+def test_a_program_is_for_chips_of_one_type() -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = [M1486(line, 0, variant="B"), M1486(line, 7, variant="B2x")]
+    for chip in chips:
+        chip.open()
+    with pytest.raises(Misuse, match="chip 0 is an M1486B, chip 7 an M1486B2x"):
+        download_to(chips, "x0\nr\nx7\nr\n")
 
 
 def test_a_chip_that_has_no_room_refuses_and_the_command_is_named() -> None:

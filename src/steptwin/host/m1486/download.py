@@ -60,12 +60,17 @@ async def send_program(
     outside ``[ ]``.
     """
     first = next(iter(units.values()))
+    other = next((unit for unit in units.values() if unit.variant is not first.variant), None)
+    if other is not None:
+        kinds = f"{first.name} is an {first.variant.title}, {other.name} an {other.variant.title}"
+        raise Misuse(f"{name} is not sent: {kinds}; a program is checked for one type: send each its own")
     program = checked_program(text, first.variant, first.notes.interface or STEP_DIRECTION, name)
     found = parts(program)
     for address, commands in found:
         if address not in units:
-            missing = f"chip {address:X}, which it names" if address is not None else f"a chip for {commands[0]}: no X before it"
-            raise Misuse(f"{name} is not sent: there is no {missing}")
+            if address is None:
+                raise Misuse(f"{name} is not sent: no X before {commands[0]} says which chip it is for")
+            raise Misuse(f"{name} is not sent: there is no chip {address:X}, which it names")
     total = sum(len(commands) for _, commands in found)
     done = 0
     uploaded = b""

@@ -522,8 +522,18 @@ class AsyncM1486:
 
 
 async def download_to(
-    chips: Iterable[AsyncM1486], text: str, *, progress: Progress | None = None, name: str = "program"
+    chips: Iterable[AsyncM1486],
+    text: str,
+    *,
+    first: AsyncM1486 | None = None,
+    progress: Progress | None = None,
+    name: str = "program",
 ) -> bytes:
-    """Type a program that names its chips with ``X`` into chips on one line, all of one type."""
+    """Type a program that names its chips with ``X`` into chips on one line, all of one type.
+
+    ``first`` gets what stands before any ``X``. Errors as of `AsyncM1486.download`.
+    """
     units = {chip.address: chip._unit for chip in chips}
+    if first is not None:
+        units[None] = first._unit
     return await send_program(units, text, progress=progress, name=name)

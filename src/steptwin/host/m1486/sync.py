@@ -150,6 +150,9 @@ class M1486(Blocking):
         self.close()
 
 
-def download_to(chips: Iterable[M1486], text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
+def download_to(
+    chips: Iterable[M1486], text: str, *, first: M1486 | None = None, progress: Progress | None = None, name: str = "program"
+) -> bytes:
     """Type a program that names its chips with ``X`` into chips on one line; see `steptwin.host.m1486.driver.download_to`."""
-    return finish(async_download_to([chip._driver for chip in chips], text, progress=progress, name=name))
+    drivers = [chip._driver for chip in chips]
+    return finish(async_download_to(drivers, text, first=None if first is None else first._driver, progress=progress, name=name))
