@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -71,6 +72,59 @@ def test_what_python_code_did_is_in_the_session_and_the_code_is_not(tmp_path: Pa
     session = session_of(world)
     assert len(session.inputs) == 4
     assert session.replay().trace.digest() == session.digest
+
+
+def test_requests_of_python_are_in_the_session() -> None:
+    def operator() -> Steps:
+        yield do.Wait(SECOND)
+        answer = yield do.Request("bus", 1, bytes.fromhex("05 07 d0 ff 00"), SECOND)
+        assert answer == bytes.fromhex("05 07 d0 ff 00")
+
+    world = World.load(EXAMPLES / "feeder.toml")
+    world.script(operator)
+    world.run(for_=2)
+    session = session_of(world)
+    assert [type(given.what).__name__ for given in session.inputs] == ["Bytes"]
+    assert session.replay().trace.digest() == session.digest
+
+
+TICKING = """
+    [[mic488]]
+    name = "a"
+    [[event]]
+    when = "a.IN2"
+    do = [{ note = "after that" }]
+    [[script]]
+    name = "first"
+    steps = [{ wait = "1 s" }, { set = { "a.IN1" = 1 } }, { stop = "enough" }, { note = "gone on" }]
+    [[script]]
+    name = "second"
+    steps = [{ until = "a.IN1" }, { set = { "a.IN2" = 1 } }]
+"""
+
+
+@pytest.mark.parametrize("how", [{"for_": 5}, {"until": "a.IN1"}])
+def test_runs_that_were_stopped_replay(how: dict[str, Any]) -> None:
+    """What happens at a moment has happened when a run ends there, whatever the order of the scripts."""
+    world = World.from_toml(TICKING)
+    assert world.run(**how) == "enough"
+    assert [record.value for record in world.trace if record.subject == "note"] == ["after that"]
+    stopped = session_of(world)
+    assert stopped.until == SECOND
+    assert stopped.replay().trace.digest() == stopped.digest
+    world.mic488["a"].set_pin("IN3", 1)
+    assert world.run(for_=2) is None
+    assert [record.value for record in world.trace if record.subject == "note"] == ["after that", "gone on"]
+    assert session_of(world).replay().trace.digest() == session_of(world).digest
+
+
+def test_a_world_that_was_stopped_goes_on_from_a_snapshot() -> None:
+    world = World.from_toml(TICKING)
+    world.run(for_=5)
+    branch = world.branch()
+    world.run(for_=2)
+    branch.run(for_=2)
+    assert branch.trace.digest() == world.trace.digest()
 
 
 def test_another_run_has_another_digest() -> None:

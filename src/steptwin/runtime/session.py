@@ -61,12 +61,18 @@ class Session:
         for time, what in self.inputs:
             if time > self.until:
                 raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")
-            if time > world.now:
-                world.advance(time)
+            _bring(world, time)
             world.outside(what)
-        world.advance(self.until)
+        _bring(world, self.until)
         world.settle_all()
         return world
+
+
+def _bring(world: World, moment: Nanos) -> None:
+    """To a moment, past those at which runs were stopped."""
+    while world.now < moment:
+        world.go_on()
+        world.advance(moment)
 
 
 def session_of(world: World) -> Session:

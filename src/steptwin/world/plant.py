@@ -21,7 +21,7 @@ from steptwin.mic488.device import Mic488
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
-from steptwin.world.actions import Outside, act
+from steptwin.world.actions import Bytes, Outside, act
 from steptwin.world.build import Files, Fitted, Plan, build
 from steptwin.world.contacts import Button
 from steptwin.world.expression import Condition
@@ -30,7 +30,7 @@ from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import SCRIPTS, Line
 from steptwin.world.references import check_scripts
 from steptwin.world.rigging import Rigging
-from steptwin.world.running import Script, ScriptState, Waiting
+from steptwin.world.running import NEXT_RUN, Script, ScriptState, Waiting
 from steptwin.world.signals import find_signal
 from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.trace import Mark, Record, Trace
@@ -179,13 +179,15 @@ class Plant:
             if step is None:
                 return
             value = None
-            waiting = self._waits(step)
+            if isinstance(step, do.Stop):
+                self.stopped = step.reason if self.stopped is None else self.stopped
+                script.waiting = NEXT_RUN
+                return
+            waiting = self._waits(step, script)
             if waiting is not None:
                 self._wait(script, waiting)
                 return
             value = self._gives(step, script)
-            if self.stopped is not None:
-                return
         raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self.now} ns")
 
     def _wait(self, script: Script, waiting: Waiting) -> None:
@@ -196,7 +198,7 @@ class Plant:
             self._watching.append(script)
             self._watching.sort(key=lambda one: one.number)
 
-    def _waits(self, step: do.Step) -> Waiting | None:
+    def _waits(self, step: do.Step, script: Script) -> Waiting | None:
         if isinstance(step, do.Wait):
             return Waiting(self.now + step.duration) if step.duration > 0 else None
         if isinstance(step, do.At):
@@ -205,9 +207,9 @@ class Plant:
             return Waiting(None if step.within is None else self.now + step.within, self.condition(step.condition))
         if isinstance(step, do.Request):
             line = self.line_called(step.line)
-            self.touch(step.line)
-            line.connect(SCRIPTS).received.clear()
-            line.receive(SCRIPTS, encode_frame(step.unit, step.pdu), self.now)
+            place = line.connect(SCRIPTS)
+            place.received.clear()
+            self._do(script, Bytes(step.line, SCRIPTS, place.kind, encode_frame(step.unit, step.pdu)))
             return Waiting(self.now + step.within, answer=line)
         return None
 
@@ -218,13 +220,15 @@ class Plant:
             return self.read(step.signal)
         if isinstance(step, do.Call):
             step.function()
-        elif isinstance(step, do.Stop):
-            self.stopped = step.reason
-        elif script.is_outside:
-            self.outside(step)
         else:
-            self.perform(step)
+            self._do(script, step)
         return None
+
+    def _do(self, script: Script, what: Outside) -> None:
+        if script.is_outside:
+            self.outside(what)
+        else:
+            self.perform(what)
 
     def expect(self, text: str) -> None:
         """Tell it where a condition does not hold."""
@@ -324,11 +328,14 @@ class Plant:
         return due
 
     def advance(self, now: Nanos) -> None:
-        """Bring the scripts, and the kernels they need, to ``now``, or to where a script stops the run."""
+        """Bring the scripts, and the kernels they need, to ``now``, or to the end of the moment at which a script stops the run.
+
+        What ends at a moment has seen all of it, so that how long it ran tells what happened.
+        """
         if now < self.now:
             raise TimeReversal(self.now, now)
         rounds, at = 0, -1
-        while self.stopped is None and (due := self.next()) is not None and due <= now:
+        while (due := self.next()) is not None and due <= (now if self.stopped is None else self.now):
             self.now = max(due, self.now)
             rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
             if rounds > MOST_STEPS_PER_INSTANT:
@@ -338,13 +345,13 @@ class Plant:
             self.now = now
 
     def _run_scripts(self) -> None:
-        while self._timed and self._timed[0][0] <= self.now and self.stopped is None:
+        while self._timed and self._timed[0][0] <= self.now:
             _, number = heappop(self._timed)
             self._resume(self._scripts[number], None)
         for script in [script for script in self._watching if script.waiting is not None]:
             waiting = script.waiting
-            if self.stopped is not None or waiting is None:
-                return
+            if waiting is None:
+                continue
             found, value = self._come(waiting)
             if found or (waiting.until is not None and waiting.until <= self.now):
                 self._watching.remove(script)
@@ -378,7 +385,7 @@ class Plant:
 
     def run(self, end: Nanos, until: str | None = None) -> str | None:
         """Run to the moment ``end``, or until a condition is true; gives why it ended before ``end``, else None."""
-        self.stopped = None
+        self.go_on()
         watch = None
         if until is not None:
             steps = (do.Until(until), do.Stop(until))
@@ -388,6 +395,15 @@ class Plant:
             self._forget(watch)
         self.settle_all()
         return self.stopped
+
+    def go_on(self) -> None:
+        """What has stopped goes on: scripts that stopped it take their next step."""
+        if self.stopped is None:
+            return
+        self.stopped = None
+        for script in self._scripts:
+            if script.waiting is NEXT_RUN:
+                self._wait(script, Waiting(self.now))
 
     def _forget(self, script: Script) -> None:
         script.ended = True
@@ -434,6 +450,9 @@ class Plant:
             script.replay(state.sent)
             script.ended = state.ended
             if state.ended:
+                continue
+            if state.until is state.condition is state.answer is None:
+                self._wait(script, Waiting(self.now))  # it stopped the run
                 continue
             condition = None if state.condition is None else self.condition(state.condition)
             self._wait(script, Waiting(state.until, condition, None if state.answer is None else self.lines[state.answer]))

@@ -136,7 +136,7 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """The run ends here."""
+    """The run ends when all scripts have done what they do at this moment; steps after it are for the next run."""
 
     reason: str
 
