@@ -7,11 +7,12 @@ import dataclasses
 import pytest
 from host_rig import Wire, driver
 
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
+from steptwin.mic488.registers import register_map
 from steptwin.runtime.devicesession import Step, carry_out, carry_out_one, differences, from_text, steps_of, to_text
 
 SESSION = """
-set M1_EN=1            # the drive
+set M1_EN=on           # the drive
 set M1_POS_ABS=8
 wait M1
 get M1_POS_ACT M1_STATUS
@@ -21,12 +22,12 @@ sleep 0
 
 
 def recorded(wire: Wire) -> list[Step]:
-    return list(carry_out(driver(wire), steps_of(SESSION)))
+    return list(carry_out(driver(wire), steps_of(SESSION, register_map())))
 
 
 def test_a_session() -> None:
     steps = recorded(Wire())
-    assert [step.line for step in steps][:2] == ["set M1_EN=1", "set M1_POS_ABS=8"]
+    assert [step.line for step in steps][:2] == ["set M1_EN=on", "set M1_POS_ABS=8"]
     assert [step.result for step in steps] == [
         {},
         {},
@@ -49,13 +50,17 @@ def test_a_refusal_is_a_result() -> None:
     ("line", "text"),
     [
         ("jump", "expected get NAME"),
-        ("get", "get without names"),
-        ("set M1_ACC", "expected NAME=VALUE with a number"),
-        ("set M1_ACC=x", "expected NAME=VALUE with a number"),
+        ("get", "'get': no name"),
+        ("get M1_STOP", "M1_STOP can only be written"),
+        ("set M1_ACC", "expected set NAME=VALUE"),
+        ("set M1_ACC=x", "'set M1_ACC=x': 'x' is no number"),
+        ("set M1_ACC=-5", "M1_ACC = -5 u/s²: permitted > 0"),
+        ("set M1_POS_ABS=nan", "M1_POS_ABS = nan"),
+        ("set M1_STATUS=1", "M1_STATUS can only be read"),
         ("sleep", "expected seconds"),
         ("sleep -1", "expected seconds"),
         ("wait X", "expected axes"),
-        ("wait 7", "no axis 7"),
+        ("wait 7", "expected axes, 1 to 4"),
         ("raw 0", "hexadecimal"),
         ("raw 63 00", "raw 63 00"),
         ("get M1_X", "no register named 'M1_X'"),
@@ -67,8 +72,17 @@ def test_what_is_no_step(line: str, text: str) -> None:
 
 
 def test_a_session_is_read_before_it_is_begun() -> None:
-    with pytest.raises(Misuse, match="line 2: 'fly M1': expected get NAME"):
-        steps_of("get M1_ACC\nfly M1\n")
+    for line in ("fly M1", "set M1_ACC=x", "set M1_ACC=0", "get M1_NONE", "raw 99"):
+        with pytest.raises(Misuse, match=f"line 2: '{line}': "):
+            steps_of(f"get M1_ACC\n{line}\n", register_map())
+    with pytest.raises(Misuse, match="there is no step: expected get NAME"):
+        steps_of("# nothing\n", register_map())
+
+
+def test_a_step_that_those_before_it_make_senseless() -> None:
+    steps = carry_out(driver(Wire()), steps_of("set M1_EN=1\nset M1_VEL_ABS=5\nwait 1", register_map()))
+    with pytest.raises(Refusal, match="'wait 1': M1 runs in velocity mode and does not end by itself"):
+        list(steps)
 
 
 def test_two_recordings() -> None:

@@ -14,7 +14,7 @@ import typer
 
 from steptwin.cli.chip import chip_address, set_values
 from steptwin.cli.chip import get as chip_get
-from steptwin.cli.device import Device, Json, LogFrames, number_of, opened, print_json, shown, table
+from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, shown, table
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from steptwin.mic488.registermap import Register, RegisterMap
 
 _RUN = re.compile(r"(?P<head>\w+\[)(?P<first>\d+)-(?P<last>\d+)(?P<tail>\].*)")
-_SWITCHES = {"ON": 1.0, "TRUE": 1.0, "OFF": 0.0, "FALSE": 0.0}
 
 
 def names_from(incomplete: str) -> list[str]:
@@ -79,10 +78,15 @@ def set_(
     if chip is not None:
         set_values(chip, changes, log_frames=log_frames)
         return
+    from steptwin.host.mic488.values import encoded, named
+    from steptwin.mic488.registermap import DataType
+
     given = [_change(change) for change in changes]
     with opened(device, log_frames=log_frames) as mic:
         registers = map_of(mic)
         wanted = {name: value_of(registers.named(name.partition("[")[0]), text, change) for name, text, change in given}
+        for name, value in wanted.items():  # all of them before the first is written
+            encoded(named(registers, name), value, DataType.REAL)
         for name, value in wanted.items():
             mic.set(name, value)
         kept = [name for name in wanted if _holds(registers.named(name.partition("[")[0]))]
@@ -126,13 +130,13 @@ def _change(text: str) -> tuple[str, str, str]:
 
 
 def value_of(register: Register, value: str, whole: str) -> float:
-    """A value as typed: a number, ON or OFF, or the text of an enumerated value. Raises `Misuse`."""
-    if value.upper() in _SWITCHES:
-        return _SWITCHES[value.upper()]
-    for number, text in register.values.items():
-        if text.lower() == value.lower():
-            return number
-    return number_of(value, whole)
+    """A value as typed: a number, ON or OFF, or the text of an enumerated value. Raises `Misuse` naming ``whole``."""
+    from steptwin.host.mic488 import values
+
+    try:
+        return values.value_of(register, value)
+    except Misuse as error:
+        raise Misuse(f"{whole!r}: {error}") from None
 
 
 def _holds(register: Register) -> bool:

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from steptwin.cli.device import Device, Json, LogFrames, complain, opened, print_json
+from steptwin.cli.get import map_of
 from steptwin.errors import LineFailure, Misuse
 
 
@@ -24,24 +25,31 @@ def record(
     device: Device = None,
     log_frames: LogFrames = False,
 ) -> None:
-    """Carry a session out on a controller and keep what came of it. On Ctrl-C and on failures all axes are stopped."""
+    """Carry a session out on a controller and keep what came of it. On Ctrl-C and on failures all axes are stopped.
+
+    All lines are checked before the first is carried out.
+    """
     from steptwin.runtime.devicesession import carry_out, steps_of, to_text
 
-    lines = steps_of(_read(session))
+    text = _read(session)
     with opened(device, observe=False, log_frames=log_frames) as mic:
+        try:
+            steps = steps_of(text, map_of(mic))
+        except Misuse as error:
+            raise Misuse(f"{session}: {error}") from None
         about = {"device": mic.place, "unit": mic.unit, "firmware": mic.firmware, "session": session.name}
         kept: list[str] = []
         try:
-            for text in to_text(carry_out(mic, lines), about):
-                kept.append(text)
+            for line in to_text(carry_out(mic, steps), about):
+                kept.append(line)
                 if output is None:
-                    typer.echo(text)
+                    typer.echo(line)
         except BaseException:
             mic.stop_all()
             complain("all axes were stopped")
             raise
         finally:
-            if output is not None:
+            if output is not None and kept[1:]:  # an earlier recording is not given up for none
                 _write(output, kept)
 
 

@@ -14,10 +14,11 @@ from textual.widgets import DataTable, Footer, Input, RichLog, Static, TabbedCon
 
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.host.mic488.frames import Heard
+from steptwin.host.mic488.values import value_of
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.registermap import DataType, Register, Type
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
-from steptwin.monitor.groups import USER, USER_SHOWN, groups_of, permitted, shown, value_of
+from steptwin.monitor.groups import USER, USER_SHOWN, groups_of, permitted, shown
 from steptwin.monitor.session import Picture, Session
 from steptwin.wire.slave import Direction
 

@@ -1,10 +1,9 @@
-"""How the monitor shows registers: in which groups, and what people type for a value."""
+"""How the monitor shows registers: in which groups, and what it says of their values."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.errors import Misuse
 from steptwin.host.mic488.values import Value
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type
 
@@ -12,8 +11,6 @@ AXES = "M"
 CONTROLLER, INPUTS, OUTPUTS, USER = "Controller", "Inputs", "Outputs", "User"
 USER_SHOWN = 32
 """So many user registers at a time."""
-
-_ON, _OFF = ("on", "1", "true"), ("off", "0", "false")
 
 
 def groups_of(registers: RegisterMap) -> Mapping[str, list[Register]]:
@@ -43,21 +40,6 @@ def shown(register: Register, value: Value) -> str:
     if register.values:
         return f"{register.values.get(int(value), 'unknown')} ({value})"
     return f"{value:.7g}" if isinstance(value, float) else str(value)
-
-
-def value_of(register: Register, typed: str) -> float:
-    """What was typed as a number: with a point or a comma, hexadecimal, ``on``, or the name of a value. Raises `Misuse`."""
-    text = typed.strip()
-    for number, name in register.values.items():
-        if text.lower() == name.lower():
-            return number
-    if register.type is Type.BIT and text.lower() in _ON + _OFF:
-        return float(text.lower() in _ON)
-    try:
-        return int(text, 16) if text.lower().startswith("0x") else float(text.replace(",", "."))
-    except ValueError:
-        names = f", or {', '.join(register.values.values())}" if register.values else ""
-        raise Misuse(f"{text!r} is no number{names}") from None
 
 
 def permitted(register: Register, data_type: DataType, unit: str) -> str:

@@ -3,7 +3,7 @@
 | line | does |
 |---|---|
 | ``get NAME...`` | reads registers at one moment |
-| ``set NAME=VALUE`` | writes one |
+| ``set NAME=VALUE`` | writes one: a number, ON, OFF or the name of a value |
 | ``sleep SECONDS`` | waits |
 | ``wait AXIS...`` | waits until axes have come to rest, and says why they have |
 | ``raw HEX`` | sends a PDU (function and data) |
@@ -21,6 +21,9 @@ from typing import Any
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.host import Mic488
+from steptwin.host.mic488.values import encoded, named, plan, value_of
+from steptwin.mic488.registermap import DataType, RegisterMap
+from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu
 
 FORM = "expected get NAME..., set NAME=VALUE, sleep SECONDS, wait AXIS... or raw HEX"
@@ -36,86 +39,123 @@ class Step:
     result: dict[str, Any] = field(default_factory=dict)
 
 
-def steps_of(text: str) -> list[str]:
-    """The lines of a session without comments. Raises `Misuse` naming the first that is no step."""
-    lines = []
+Action = Callable[[Mic488], dict[str, Any]]
+"""Carries a step out, and tells what came of it."""
+
+
+def steps_of(text: str, registers: RegisterMap) -> list[tuple[str, Action]]:
+    """The lines of a session for a controller with these registers. Raises `Misuse` naming the first that is no step."""
+    steps = []
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.partition("#")[0].strip()
         if line:
-            if line.split()[0] not in _STEPS:
-                raise Misuse(f"line {number}: {line!r}: {FORM}")
-            lines.append(line)
-    return lines
+            try:
+                steps.append((line, action_of(line, registers)))
+            except Misuse as error:
+                raise Misuse(f"line {number}: {error}") from None
+    if not steps:
+        raise Misuse(f"there is no step: {FORM}")
+    return steps
 
 
-def carry_out(mic: Mic488, lines: Iterable[str]) -> Iterator[Step]:
-    """Each step after the other. Raises `Misuse` for a step that makes no sense and `LineFailure`."""
+def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[Step]:
+    """Each step after the other. Raises `Refusal` for one that makes no sense after those before it, and `LineFailure`."""
     begin = time.monotonic()
-    for line in lines:
-        yield Step(line, time.monotonic() - begin, carry_out_one(mic, line))
+    for line, action in steps:
+        try:
+            yield Step(line, time.monotonic() - begin, _result(mic, action))
+        except Misuse as error:
+            raise Refusal(f"{line!r}: {error}") from error
 
 
 def carry_out_one(mic: Mic488, line: str) -> dict[str, Any]:
-    """What came of one step."""
-    word, *rest = line.split()
-    step = _STEPS.get(word)
-    if step is None:
-        raise Misuse(f"{line!r}: {FORM}")
+    """What came of one step. Raises `Misuse` for one that makes no sense and `LineFailure`."""
+    return _result(mic, action_of(line, register_map(mic.firmware)))
+
+
+def _result(mic: Mic488, action: Action) -> dict[str, Any]:
     try:
-        return step(mic, rest)
+        return action(mic)
     except Misuse:
         raise
     except Refusal as refusal:
         return {"refused": str(refusal).removeprefix(f"{mic.place}: ")}
 
 
-def _get(mic: Mic488, names: list[str]) -> dict[str, Any]:
-    if not names:
-        raise Misuse(f"get without names: {FORM}")
-    return mic.get(*names)
-
-
-def _set(mic: Mic488, rest: list[str]) -> dict[str, Any]:
-    name, _, value = "".join(rest).partition("=")
+def action_of(line: str, registers: RegisterMap) -> Action:
+    """What a line does. Raises `Misuse` for one that makes no sense, so that it is known before anything is sent."""
+    word, *rest = line.split()
+    step = _STEPS.get(word)
+    if step is None:
+        raise Misuse(f"{line!r}: {FORM}")
     try:
-        number = float(value.replace(",", "."))
-    except ValueError:
-        raise Misuse(f"set {' '.join(rest)}: expected NAME=VALUE with a number") from None
-    mic.set(name, number)
-    return {}
+        return step(rest, registers)
+    except Misuse as error:
+        raise Misuse(f"{line!r}: {error}") from None
 
 
-def _sleep(mic: Mic488, rest: list[str]) -> dict[str, Any]:
+def _get(names: list[str], registers: RegisterMap) -> Action:
+    if not names:
+        raise Misuse("no name of a register is given")
+    plan(registers, [named(registers, name) for name in names])
+    return lambda mic: mic.get(*names)
+
+
+def _set(rest: list[str], registers: RegisterMap) -> Action:
+    name, equals, typed = "".join(rest).partition("=")
+    if not equals:
+        raise Misuse("expected set NAME=VALUE")
+    item = named(registers, name)
+    value = value_of(item.register, typed)
+    encoded(item, value, DataType.REAL)
+
+    def write(mic: Mic488) -> dict[str, Any]:
+        mic.set(name, value)
+        return {}
+
+    return write
+
+
+def _sleep(rest: list[str], registers: RegisterMap) -> Action:
     try:
         (text,) = rest
         seconds = float(text)
         if not 0.0 <= seconds <= 3600.0:
             raise ValueError
     except ValueError:
-        raise Misuse(f"sleep {' '.join(rest)}: expected seconds from 0 to 3600") from None
-    time.sleep(seconds)
-    return {}
+        raise Misuse("expected seconds from 0 to 3600") from None
+
+    def sleep(mic: Mic488) -> dict[str, Any]:
+        time.sleep(seconds)
+        return {}
+
+    return sleep
 
 
-def _wait(mic: Mic488, rest: list[str]) -> dict[str, Any]:
-    axes = [int(text.upper().removeprefix("M") or 0) for text in rest if text.upper().removeprefix("M").isdecimal()]
-    if len(axes) != len(rest):
-        raise Misuse(f"wait {' '.join(rest)}: expected axes, 1 to 4 or M1 to M4")
-    ends = mic.wait(*axes, check=False)
-    return {f"M{axis}": {"reason": end.reason.value, "position": end.position_u} for axis, end in ends.items()}
+def _wait(rest: list[str], registers: RegisterMap) -> Action:
+    numbers = [text.upper().removeprefix("M") for text in rest]
+    if not all(number in ("1", "2", "3", "4") for number in numbers):
+        raise Misuse("expected axes, 1 to 4 or M1 to M4")
+    axes = [int(number) for number in numbers]
+
+    def wait(mic: Mic488) -> dict[str, Any]:
+        ends = mic.wait(*axes, check=False)
+        return {f"M{axis}": {"reason": end.reason.value, "position": end.position_u} for axis, end in ends.items()}
+
+    return wait
 
 
-def _raw(mic: Mic488, rest: list[str]) -> dict[str, Any]:
+def _raw(rest: list[str], registers: RegisterMap) -> Action:
     try:
         request = pdu.decode_request(bytes.fromhex("".join(rest)))
     except ValueError:
-        raise Misuse(f"raw {' '.join(rest)}: expected hexadecimal digits") from None
+        raise Misuse("expected hexadecimal digits") from None
     except pdu.ModbusException as exception:
-        raise Misuse(f"raw {' '.join(rest)}: {exception.detail or exception}") from None
-    return {"answer": pdu.encode_response(mic.request(request)).hex(" ")}
+        raise Misuse(exception.detail or str(exception)) from None
+    return lambda mic: {"answer": pdu.encode_response(mic.request(request)).hex(" ")}
 
 
-_STEPS: dict[str, Callable[[Mic488, list[str]], dict[str, Any]]] = {
+_STEPS: dict[str, Callable[[list[str], RegisterMap], Action]] = {
     "get": _get,
     "set": _set,
     "sleep": _sleep,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
-from steptwin.host.mic488.values import Item, named, plan, repeatable
+from steptwin.host.mic488.values import Item, named, plan, repeatable, value_of
 from steptwin.mic488.registermap import DataType, Space, Type
 from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu
@@ -54,6 +54,22 @@ def test_what_can_only_be_written_is_not_read() -> None:
     only = next(register for register in MAP if not register.reads)
     with pytest.raises(Misuse, match=f"{only.name} can only be written"):
         plan(MAP, [Item(only)])
+
+
+def test_values_as_people_type_them() -> None:
+    control, output, acc = MAP.named("PROGRAM_CTRL"), MAP.named("OUT1"), MAP.named("M1_ACC")
+    assert value_of(control, "start") == 1
+    assert value_of(output, " ON ") == 1.0
+    assert value_of(output, "false") == 0.0
+    assert value_of(acc, "12,5") == 12.5
+    assert value_of(acc, "0x10") == 16
+    for register, typed, text in (
+        (control, "often", "'often' is no number, or STOP, START, PAUSE"),
+        (output, "up", "'up' is no number, or on, off"),
+        (acc, "on", "'on' is no number$"),
+    ):
+        with pytest.raises(Misuse, match=text):
+            value_of(register, typed)
 
 
 REPEATED = [

@@ -22,6 +22,7 @@ _MOST = {Space.HOLDING: pdu.MAX_REGISTERS, Space.COIL: pdu.MAX_BITS, Space.INPUT
 _READS = {Space.HOLDING: pdu.READ_HOLDING_REGISTERS, Space.COIL: pdu.READ_COILS, Space.INPUT: pdu.READ_DISCRETE_INPUTS}
 _SPACES = {space: number for number, space in enumerate(Space)}
 _NAME = re.compile(r"(?P<name>\w+?)(?:\[(?P<cell>\d{1,5})\])?(?::(?P<view>\w+))?\Z")
+_SWITCHES = {"on": 1.0, "true": 1.0, "off": 0.0, "false": 0.0}
 FORM = "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD"
 
 
@@ -106,6 +107,22 @@ def user_item(registers: RegisterMap, number: int, view: View, count: int = 1) -
     if view.size == 2 and number % 2:
         raise Misuse(f"user register {number} as {view.name}: {view.name}s begin at even registers")
     return Item(register, number, view)
+
+
+def value_of(register: Register, typed: str) -> float:
+    """What was typed as a number: with a point or a comma, hexadecimal, ``on``, or the name of a value. Raises `Misuse`."""
+    text = typed.strip()
+    for number, name in register.values.items():
+        if text.lower() == name.lower():
+            return number
+    if register.type is Type.BIT and text.lower() in _SWITCHES:
+        return _SWITCHES[text.lower()]
+    try:
+        return int(text, 16) if text.lower().startswith("0x") else float(text.replace(",", "."))
+    except ValueError:
+        names = ("on", "off") if register.type is Type.BIT else tuple(register.values.values())
+        others = f", or {', '.join(names)}" if names else ""
+        raise Misuse(f"{text!r} is no number{others}") from None
 
 
 # ---------------------------------------------------------------------- values and words
