@@ -57,6 +57,22 @@ def test_not_held_any_more_it_stops_by_itself_within_its_reach() -> None:
         assert 0 < wire.position() - held <= REACH * 100 + 1
 
 
+def test_a_killed_jog_leaves_an_axis_slower_and_the_next_one_tells() -> None:
+    wire, mic = ready()
+    mic.axis(1).jog(5.0).__enter__()
+    wire.rest()
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 5.0}
+    with pytest.raises(
+        NotReady, match=r"a jog of M1 at 10 mm/s is faster than its VMAX, 5 mm/s \(which a program that was killed"
+    ):
+        mic.axis(1).jog(10.0).__enter__()
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 5.0}
+    assert not wire.moving()
+    mic.axis(1).set_ramp(velocity=10.1)
+    with mic.axis(1).jog(-10.1) as jog:
+        assert jog.hold()
+
+
 def test_a_program_that_was_away_does_not_find_it_running_on() -> None:
     wire, mic = ready()
     with mic.axis(1).jog(5.0) as jog:

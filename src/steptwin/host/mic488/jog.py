@@ -4,6 +4,9 @@ The axis is never told to run. Again and again it is told to move a bounded dist
 of the jog), just far enough to run on for the hold time and then brake. Held in time, it runs evenly; not held, because the
 button was let go, the program hangs, was killed or the line was cut, it comes to rest by itself.
 
+Such a move runs at VMAX, whatever its distance, and the controller has no other bounded motion: that is why a jog sets VMAX. To
+leave VMAX alone an axis would have to be told to run (VEL_ABS, the JOG coils), which nothing ends when the program dies.
+
 Suffixes: ``_u`` configured units, ``_s`` seconds, ``_ns`` nanoseconds.
 """
 
@@ -26,6 +29,8 @@ from steptwin.mic488.status import Status
 HOLD_S = 0.4
 """How long an axis runs on after it was held last, before it brakes."""
 HOLD_RANGE_S = (0.2, 2.0)
+SINGLE = 2.0**-23
+"""VMAX is a REAL: what it was set to is known so well."""
 RENEWALS = 4
 """How often it is held in that time."""
 
@@ -35,7 +40,9 @@ class AsyncJog:
 
     `hold` returns after a quarter of the hold time: call it again at once for as long as the axis is to run. It says False when
     the axis has stopped for another reason, which `end` tells. At the end of the block the axis ramps down, and VMAX, which a
-    jog has to change, is what it was. (A killed program cannot put it back: VMAX stays the velocity of the jog.)
+    jog has to change, is what it was. A killed program cannot put it back: VMAX stays the velocity of the jog then. It is never
+    raised, so that what is left behind is an axis that is slower than it was set to, not a faster one: a jog faster than VMAX
+    raises `NotReady`.
     """
 
     def __init__(
@@ -75,6 +82,12 @@ class AsyncJog:
             self._told(Kind.DISTANCE, self._velocity_u, control)
             _, _, _, dec, vmax = await dynamics(unit, axis)
             speed = abs(self._velocity_u)
+            if speed > vmax * (1.0 + SINGLE):
+                name = unit.unit_name(axis)
+                raise NotReady(
+                    f"{unit.place}: a jog of M{axis} at {speed:g} {name}/s is faster than its VMAX, {vmax:g} {name}/s (which a "
+                    "program that was killed while it jogged leaves at the velocity of its jog): set VMAX first"
+                )
             self._reach_u = speed * self._hold_s + speed * speed / (2.0 * dec)
             if vmax != speed:
                 self._vmax_u = vmax
