@@ -128,6 +128,7 @@ def test_who_does_not_answer(twin: Any, shell: Shell, monkeypatch: pytest.Monkey
     assert "gateway target failed to respond" in shell.errors
     shell("info", "--device", f"rtu-tcp://127.0.0.1:{twin.rtu_tcp_port},unit=9,timeout=0.01")
     assert "no answer to 'unit 9: read the control registers of firmware" in shell.errors
+    assert "If these are M1486 chips, put ',kind=m1486' behind the address" in shell.errors
     monkeypatch.delenv("STEPTWIN_DEVICE")
     monkeypatch.setattr("steptwin.host.address.DEFAULT", "tcp://127.0.0.1:1")
     shell("info")

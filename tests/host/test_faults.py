@@ -174,3 +174,21 @@ def test_a_late_byte_anywhere_tcp(name: str) -> None:
     assert len(faults) >= len(TIMES) * 20
     for fault in faults:
         run(OPERATIONS[name], fault, tcp=True)
+
+
+@pytest.mark.parametrize("place", ["function", "address", "count"])
+def test_an_answer_to_something_else_tcp(place: str) -> None:
+    """What a gateway has changed in an answer is found out where the answer says so: as on RTU, it is none."""
+    control, written = 7 + 2 + 28, 7 + {"function": 0, "address": 2, "count": 4}[place]
+    wire, mic = ready(tcp=True)
+    wire.put(Fault("to master", 7, "corrupt"))  # the function of the read before the motion, which is asked again
+    mic.axis(1).move_by(1.0)
+    assert target(wire) == START_P + 100
+    wire.put(Fault("to master", control + written, "corrupt"))
+    with pytest.raises(
+        NoAnswer, match=r"^memory: no answer to 'unit 1: .*M1_POS_REL.*only 00 .* was received.*it is not known"
+    ) as lost:
+        mic.axis(1).move_by(1.0)
+    assert lost.value.uncertain
+    assert target(wire) == START_P + 200
+    check_recovery(wire, mic)

@@ -13,7 +13,6 @@ from steptwin.machine import MICROSECOND
 from steptwin.wire import mbap, rtu
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import (
-    BadResponse,
     ModbusException,
     Read,
     Registers,
@@ -279,7 +278,7 @@ def answered(number: int, pdu: str, unit: int = 1) -> bytes:
 @pytest.fixture
 def tcp() -> Callable[[Read], TcpMaster]:
     def make(request: Read = POSITION) -> TcpMaster:
-        master = TcpMaster()
+        master = TcpMaster("tcp://h:502")
         assert master.start(Query(1, request), 0, urgent=False) == bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 02")
         return master
 
@@ -302,11 +301,25 @@ def test_tcp_late_answers_and_those_of_others_are_passed_over(tcp: Callable[...,
     assert master.receive(answered(2, "03 04 00 03 00 04"), 3) == bytes.fromhex("03 04 00 03 00 04")
 
 
-def test_tcp_refusals_and_wrong_answers(tcp: Callable[..., TcpMaster]) -> None:
-    with pytest.raises(ModbusException):
+def test_tcp_refusals(tcp: Callable[..., TcpMaster]) -> None:
+    with pytest.raises(ModbusException) as refused:
         tcp().receive(answered(1, "83 02"), 1)
-    with pytest.raises(BadResponse):
-        tcp().receive(answered(1, "03 02 00 01"), 1)
+    assert (refused.value.function, refused.value.code) == (3, 2)
+
+
+NO_ANSWERS = ["03 02 00 01", "83", "83 02 00", "86 02", "06 27 24 00 02", "04 04 00 01 00 02", "0D 00", "03"]
+
+
+@pytest.mark.parametrize("pdu", NO_ANSWERS)
+def test_tcp_what_answers_something_else_is_passed_over_and_told(tcp: Callable[..., TcpMaster], pdu: str) -> None:
+    master = tcp()
+    assert master.receive(answered(1, pdu), 1) is None
+    assert master.receive(answered(1, "03 04 00 01 00 02"), 2) == bytes.fromhex("03 04 00 01 00 02")
+    master = tcp()
+    assert master.receive(answered(1, pdu), 1) is None
+    assert master.abandon(2) == answered(1, pdu)
+    master.start(Query(1, POSITION), 3, urgent=False)
+    assert master.abandon(4) == b""
 
 
 def test_tcp_what_is_no_modbus_breaks_the_connection(tcp: Callable[..., TcpMaster]) -> None:
@@ -314,7 +327,7 @@ def test_tcp_what_is_no_modbus_breaks_the_connection(tcp: Callable[..., TcpMaste
         master = tcp()
         if meanwhile:
             master.abandon(1)
-        with pytest.raises(LineLost, match="no Modbus TCP"):
+        with pytest.raises(LineLost, match=r"^tcp://h:502: what came is no Modbus TCP \(MBAP protocol"):
             (master.stray if meanwhile else master.receive)(b"SSH-2.0-OpenSSH\r\n", 1)
         master.reset()
         assert master.receive(b"", 2) is None

@@ -361,7 +361,7 @@ def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchan
         frames.sinks.append(lambda heard: log.append(f"{heard.direction.value if heard.direction else '?'} {heard.meaning}"))
         notes["frames"] = frames
         observer = frames.observe
-    discipline = TcpMaster(on_frame=observer) if wire.tcp else RtuMaster(on_frame=observer)
+    discipline = TcpMaster("memory", on_frame=observer) if wire.tcp else RtuMaster(on_frame=observer)
     return Exchanger(discipline, "memory", interval), notes
 
 

@@ -34,7 +34,7 @@ TIED = "expected AXIS=NUMBER, such as 1=12.5 or M1=12.5"
 @contextlib.contextmanager
 def opened(device: str | None, *, observe: bool = True, log_frames: bool = False) -> Generator[Mic488]:
     """The controller meant. ``observe``: DATA_TYPE is left as it is."""
-    from steptwin.host import LineLost, Mic488
+    from steptwin.host import LineLost, Mic488, NoAnswer
     from steptwin.host.address import DEFAULT, parse_device
 
     address = parse_device(device or DEFAULT)
@@ -59,6 +59,8 @@ def opened(device: str | None, *, observe: bool = True, log_frames: bool = False
                 "--device or STEPTWIN_DEVICE"
             ) from error
         raise
+    except NoAnswer as error:
+        raise LineFailure(f"{error}. If these are M1486 chips, put ',kind=m1486' behind the address") from error
     try:
         yield mic
     finally:

@@ -236,21 +236,27 @@ class RtuMaster:
 
 
 class TcpMaster:
-    """Modbus TCP. Answers carry the number of their request; late ones are known by it and passed over."""
+    """Modbus TCP. Answers carry the number of their request; late ones are known by it and passed over.
 
-    __slots__ = ("_asked", "_framer", "_number", "_number_bytes", "on_frame")
+    So is what has the number but answers something else, as gateways send that mix their lines up: it tells nothing of what
+    the device has done. ``place`` is where the other end is, for people.
+    """
+
+    __slots__ = ("_asked", "_framer", "_no_answer", "_number", "_number_bytes", "_place", "on_frame")
 
     free_ns: Nanos = 0
     wary = False
 
-    def __init__(self, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, place: str = "the connection", *, on_frame: FrameObserver | None = None) -> None:
         self.on_frame = on_frame
+        self._place = place
         self._number = 0
         self._number_bytes = b"\0\0"
         self.reset()
 
     def reset(self) -> None:
         self._asked: Query | None = None
+        self._no_answer = b""  # what came with the number of the request
         self._framer = mbap.TcpFramer()
 
     def allowance_ns(self, request: Query) -> Nanos:
@@ -260,6 +266,7 @@ class TcpMaster:
         self._number = self._number + 1 & 0xFFFF
         self._number_bytes = self._number.to_bytes(2, "big")
         self._asked = request
+        self._no_answer = b""
         frame = self._number_bytes + request.tcp_tail
         if self.on_frame is not None:
             self.on_frame(now, Direction.IN, frame)
@@ -280,21 +287,27 @@ class TcpMaster:
         for frame in self._feed(data):
             if self.on_frame is not None:
                 self.on_frame(now, Direction.OUT, frame.raw)
-            if frame.transaction == self._number and frame.unit == asked.device:
+            if frame.transaction != self._number or frame.unit != asked.device:
+                continue
+            answer = frame.pdu
+            if asked.answered_by(answer):
                 self._asked = None
-                pdu.answer(asked.request, frame.pdu)
-                return frame.pdu
+                return answer
+            if answer[0] == asked.function | pdu.REFUSED and len(answer) == 2:
+                self._asked = None
+                raise pdu.ModbusException(asked.function, answer[1])
+            self._no_answer = frame.raw
         return None
 
     def _feed(self, data: bytes) -> list[mbap.TcpFrame]:
         frames = self._framer.feed(data)
         if self._framer.broken is not None:
-            raise LineLost(f"what came is no Modbus TCP ({self._framer.broken})")
+            raise LineLost(f"{self._place}: what came is no Modbus TCP ({self._framer.broken})")
         return frames
 
     def abandon(self, now: Nanos) -> bytes:
         self._asked = None
-        return self._framer.held
+        return self._no_answer + self._framer.held
 
     def stray(self, data: bytes, now: Nanos) -> None:
         self._feed(data)

@@ -33,8 +33,9 @@ def modbus_exchanger(
         frames.sinks.append(lambda heard: log(str(heard)))
         notes["frames"] = frames
         observer = frames.observe
-    discipline = TcpMaster(on_frame=observer) if place.framed else RtuMaster(place.serial, on_frame=observer)
-    return Exchanger(discipline, str(place.endpoint), interval), notes
+    where = str(place.endpoint)
+    discipline = TcpMaster(where, on_frame=observer) if place.framed else RtuMaster(place.serial, on_frame=observer)
+    return Exchanger(discipline, where, interval), notes
 
 
 class AsyncModbusLine(TaskLine[Query, bytes]):
