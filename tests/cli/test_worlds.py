@@ -84,6 +84,19 @@ def test_a_fault_that_cannot_happen_is_refused() -> None:
     assert "0.500000 s  table      lost-steps: M1 loses 64 pulses" in told
 
 
+def test_a_place_where_nothing_can_be_written_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    program = tmp_path / "w.toml"
+    program.write_text('[[mic488]]\nname = "a"\n')
+    with pytest.raises(Misuse, match=r"out\.foo: formats are jsonl, html"):
+        invoke("run", str(program), "--trace", str(tmp_path / "out.foo"))
+    with pytest.raises(Misuse, match=r"cannot write .*w\.toml/t/trace\.jsonl: Not a directory"):
+        invoke("run", str(program), "--trace", str(program / "t"))
+    with pytest.raises(Misuse, match=r"out\.foo: formats are jsonl, html"):
+        invoke("up", str(program), "--trace", str(tmp_path / "out.foo"))
+    with pytest.raises(Misuse, match=r"cannot write .*: Is a directory"):
+        invoke("up", str(program), "--session", str(tmp_path))
+
+
 def test_options_for_programs_are_refused() -> None:
     with pytest.raises(Misuse, match="--firmware is not for worlds, whose file says all that"):
         invoke("run", str(FEEDER), "--firmware", "1.70")

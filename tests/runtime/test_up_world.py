@@ -14,7 +14,7 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.links import Feed
-from steptwin.runtime.session import session_of
+from steptwin.runtime.session import load, session_of
 from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, begin, handlers_of, up
 from steptwin.runtime.world import World
 from steptwin.wire.crc import with_crc
@@ -102,6 +102,78 @@ def test_answers_come_to_the_client_when_the_line_has_carried_them() -> None:
         assert [type(given.what).__name__ for given in world.inputs] == ["Bytes", "Leave"]
 
     asyncio.run(run())
+
+
+STOPPING = """
+    [[mic488]]
+    name = "a"
+    [[script]]
+    name = "first"
+    steps = [{ wait = "1 s" }, { stop = "enough" }]
+    [[script]]
+    name = "second"
+    repeat = 1000
+    steps = [{ wait = "300 ms" }, { note = "tick" }]
+"""
+
+
+CHIPS = """
+    [[line]]
+    name = "chips"
+    kind = "m1486"
+    rtu_tcp = "127.0.0.1:0"
+    [[m1486]]
+    name = "b"
+    line = "chips"
+"""
+
+
+def test_a_script_that_stops_a_live_world_stops_it_for_all() -> None:
+    live = LiveWorld(World.from_toml(STOPPING))
+    stops: list[Nanos] = []
+    live.on_stop = lambda: stops.append(live.now)
+    live.advance(SECOND - 1)
+    assert stops == []
+    live.advance(3 * SECOND)
+    live.advance(4 * SECOND)
+    assert set(stops) == {SECOND}
+    assert (live.now, live.deadline()) == (SECOND, None)
+
+
+def arguments(tmp_path: Path, text: str) -> UpOptions:
+    world = tmp_path / "stopping.toml"
+    world.write_text(text)
+    return UpOptions(world=world, speed="1000", session=tmp_path / "s.json", trace=tmp_path / "t.jsonl")
+
+
+def test_a_script_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    options = arguments(tmp_path, STOPPING)
+    assert up(options)
+    told = capfd.readouterr().out.splitlines()
+    assert told[-3:-1] == [f"wrote {options.session}", f"wrote {options.trace}"]
+    assert told[-1].startswith("1.000 s, 0 inputs, ended by: enough, digest ")
+    assert load(tmp_path / "s.json").until == SECOND
+
+
+def test_a_trace_that_cannot_be_written_leaves_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> list[Path]:
+        raise Misuse("cannot write the trace: No space left on device")
+
+    monkeypatch.setattr("steptwin.runtime.up_world.write_trace", full)
+    options = arguments(tmp_path, STOPPING)
+    with pytest.raises(Misuse, match="No space left on device"):
+        up(options)
+    assert load(tmp_path / "s.json").until == SECOND
+
+
+def test_what_did_not_begin_overwrites_nothing(tmp_path: Path) -> None:
+    options = arguments(tmp_path, STOPPING + CHIPS)
+    for path in (options.session, options.trace):
+        assert path is not None
+        path.write_text("yesterday")
+    with pytest.raises(Misuse, match="rtu_tcp is for Modbus lines"):
+        up(options)
+    assert [path.read_text() for path in tmp_path.glob("?.json*")] == ["yesterday"] * 2
 
 
 def test_requests_of_the_control_endpoint() -> None:

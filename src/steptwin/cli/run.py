@@ -99,6 +99,10 @@ def run(
     limit = None if duration is None else parse_duration(duration, "--for")
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
+    if trace is not None:
+        from steptwin.runtime.export import check_target
+
+        check_target(trace)
     options = Options(
         limit=limit,
         until=until,

@@ -29,7 +29,7 @@ def up(
     keys: Annotated[bool, typer.Option("--keys", help="Show what a description may say.")] = False,
     form: Annotated[Format, typer.Option("--format", help="How to print the keys.")] = Format.TEXT,
 ) -> None:
-    """Run a world until Ctrl-C, with its lines open to other programs."""
+    """Run a world until Ctrl-C, or until a script of its own stops it, with its lines open to other programs."""
     if keys:
         show(sections(), form)
         return

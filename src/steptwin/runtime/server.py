@@ -111,6 +111,10 @@ class Server:
             raise LineFailure(f"cannot write the ready file {path}: {where(error)}") from error
         self._ready_file = path, text
 
+    def end(self) -> None:
+        """End the server because what it serves is over."""
+        self._ended.set()
+
     def fail(self, reason: str) -> None:
         """End the server because it cannot go on."""
         self._failure = self._failure or reason

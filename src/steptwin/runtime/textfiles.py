@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from errno import EACCES, EISDIR, ENOTDIR
 from pathlib import Path
 
 from steptwin.diagnostics import Source
@@ -34,9 +36,22 @@ def read_bytes(path: Path) -> bytes:
         raise Misuse(f"cannot read {path}: {error.strerror or error}") from error
 
 
+def check_writable(path: Path) -> None:
+    """Whether a file can be written here, before much is done for it; folders on the way can be made. Raises `Misuse`."""
+    place, number = path, EISDIR if path.is_dir() else 0
+    while not number and not place.exists():
+        place = place.parent
+        number = 0 if place.is_dir() or not place.exists() else ENOTDIR
+    if not number and not os.access(place, os.W_OK):
+        number = EACCES
+    if number:
+        raise Misuse(f"cannot write {path}: {os.strerror(number)}")
+
+
 def write_bytes(path: Path, data: bytes) -> None:
-    """Raises `Misuse` when the file cannot be written."""
+    """Write a file, and the folders it is to be in. Raises `Misuse` when it cannot be written."""
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     except OSError as error:
         raise Misuse(f"cannot write {path}: {error.strerror or error}") from error

@@ -18,6 +18,7 @@ from steptwin.runtime import session as sessions
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.control import Handler
+from steptwin.runtime.export import axis_views, check_target, write_trace
 from steptwin.runtime.m1486_state import state_of as state_of_chip
 from steptwin.runtime.mic488 import state_of
 from steptwin.runtime.output import Output
@@ -25,6 +26,7 @@ from steptwin.runtime.run_world import describe, is_told
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_name
 from steptwin.runtime.tcp import parse_address
+from steptwin.runtime.textfiles import check_writable
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Leave
@@ -56,6 +58,8 @@ class LiveWorld:
         self.world = world
         self.stale = True
         """Something was done to it since somebody asked for the deadline."""
+        self.on_stop: Callable[[], None] | None = None
+        """Told when a script has stopped it: nothing happens by itself from then on."""
 
     @property
     def now(self) -> Nanos:
@@ -65,17 +69,23 @@ class LiveWorld:
         world = self.world
         while (due := self._due()) is not None and due <= now:
             world.advance(due)
+            if world.stopped is not None:
+                break
             for kernel in world.kernels:
                 at = kernel.deadline()
                 if at is not None and at <= due:
                     kernel.advance(due)
         world.advance(now)
+        if world.stopped is not None and self.on_stop is not None:
+            self.on_stop()
 
     def deadline(self) -> Nanos | None:
         self.stale = False
         return self._due()
 
     def _due(self) -> Nanos | None:
+        if self.world.stopped is not None:
+            return None
         dues = [due for kernel in self.world.kernels if (due := kernel.deadline()) is not None]
         own = self.world.next()
         return min(dues if own is None else [*dues, own], default=None)
@@ -143,6 +153,10 @@ def up(options: UpOptions) -> bool:
         for address in (line.tcp, line.rtu_tcp):
             if address is not None:
                 parse_address(address, listen_any=options.listen_any)
+    if options.trace is not None:
+        check_target(options.trace)
+    if options.session is not None:
+        check_writable(options.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
     asyncio.run(_serve(options, world, speed, name))
@@ -168,8 +182,11 @@ async def _serve(options: UpOptions, world: World, speed: float | None, name: st
         stack.callback(output.close)
         live = LiveWorld(world)
         server = Server(Cell(live, Clock(speed or 1.0)), output.line)
+        live.on_stop = server.end
+        begun = False
         try:
             await _open(server, live, options, name)
+            begun = True
             _greet(output, server, world, speed)
             world.trace.watchers.append(lambda record: _tell(output, record))
             if speed is None:
@@ -180,8 +197,8 @@ async def _serve(options: UpOptions, world: World, speed: float | None, name: st
                 server.cell.enter()
         finally:
             await server.close()
-            for text in _keep(options, world):
-                output.line(text)
+            if begun:
+                _keep(options, world, output)
 
 
 def begin(cell: Cell) -> None:
@@ -213,20 +230,31 @@ async def _run_freely(server: Server, world: World) -> None:
     ending.cancel()
 
 
-def _keep(options: UpOptions, world: World) -> list[str]:
-    """Write what was asked for when it is over."""
-    told: list[str] = []
+def _keep(options: UpOptions, world: World, output: Output) -> None:
+    """Write what was asked for when it is over. The session first: a trace can be made from it. Raises `Misuse`."""
     session = sessions.session_of(world)
-    if options.trace is not None:
-        from steptwin.runtime.export import axis_views, write_trace
+    failures: list[str] = []
+    for where, write in ((options.session, _write_session), (options.trace, _write_trace)):
+        if where is not None:
+            try:
+                for path in write(where, world, session):
+                    output.line(f"wrote {path}")
+            except Misuse as error:
+                failures.append(str(error))
+    ended = "" if world.stopped is None else f", ended by: {world.stopped}"
+    output.line(f"{world.time:.3f} s, {len(session.inputs)} inputs{ended}, digest {session.digest}")
+    if failures:
+        raise Misuse("\n".join(failures))
 
-        views = axis_views(world.machines, world.axes)
-        written = write_trace(world.trace, options.trace, views=views, title=world.spec.name, ended=world.now)
-        told += [f"wrote {path}" for path in written]
-    if options.session is not None:
-        sessions.save(session, options.session)
-        told.append(f"wrote {options.session}")
-    return [*told, f"{world.time:.3f} s, {len(session.inputs)} inputs, digest {session.digest}"]
+
+def _write_session(where: Path, world: World, session: sessions.Session) -> list[Path]:
+    sessions.save(session, where)
+    return [where]
+
+
+def _write_trace(where: Path, world: World, session: sessions.Session) -> list[Path]:
+    views = axis_views(world.machines, world.axes)
+    return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now)
 
 
 # ---------------------------------------------------------------------- links

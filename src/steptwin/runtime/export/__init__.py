@@ -24,9 +24,10 @@ from steptwin.runtime.export.axes import AxisView, AxisViews, axis_views
 from steptwin.runtime.export.progress import Progress, Watch, bar, unwatched
 from steptwin.runtime.export.recording import Recording, sort_out
 from steptwin.runtime.export.records import SavedTrace, read_records, write_records
+from steptwin.runtime.textfiles import check_writable
 from steptwin.world.trace import Trace
 
-__all__ = ["FORMATS", "AxisView", "AxisViews", "SavedTrace", "axis_views", "bar", "read_trace", "write_trace"]
+__all__ = ["FORMATS", "AxisView", "AxisViews", "SavedTrace", "axis_views", "bar", "check_target", "read_trace", "write_trace"]
 
 NAME = "trace"
 """What files are called in a directory."""
@@ -158,6 +159,12 @@ def write_trace(
         except OSError as error:
             raise Misuse(f"cannot write {path}: {error.strerror or error}") from error
     return [path for _, path in targets]
+
+
+def check_target(where: Path | str) -> None:
+    """Whether `write_trace` can write there, before much is done for it. Raises `Misuse`."""
+    for _, path in _targets(Path(where), None):
+        check_writable(path)
 
 
 def _targets(where: Path, formats: Sequence[str] | None) -> list[tuple[str, Path]]:
