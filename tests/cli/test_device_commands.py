@@ -219,6 +219,15 @@ def test_ports(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
     assert json.loads(shell("ports", "--json"))[0] == {"address": "/dev/ttyUSB7", "what": "FTDI (0403:6001)"}
 
 
+def test_the_ports_of_twins_are_listed_wherever_they_lie(serve: Callable[..., Any], tmp_path: Path) -> None:
+    twin, other = serve(), serve("--name", "other", "--pty", str(tmp_path / "line"))
+    listed = [json.loads(each.command("ports", "--json").stdout)[-1] for each in (twin, other)]
+    assert listed == [
+        {"address": str(twin.pty), "what": "twin mic488, Modbus RTU"},
+        {"address": str(tmp_path / "line"), "what": "twin other, Modbus RTU"},
+    ]
+
+
 def test_the_ports_of_this_system_can_be_listed(shell: Shell) -> None:
     shell("ports", "--json")
     assert shell.code == 0

@@ -25,6 +25,8 @@ Handler = Callable[[Mapping[str, Any]], object]
 LONGEST_REQUEST = 65536
 TIMEOUT_S = 10.0
 SUFFIX = ".control"
+END_POINTS = "end-points"
+"""What every twin is asked for the places where it listens."""
 FORM = 'a request is a line of JSON: {"do": NAME, ...}'
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
-from steptwin.runtime.control import running, runtime_directory
+from steptwin.errors import LineFailure, Refusal
+from steptwin.runtime.control import END_POINTS, ask, running
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,13 @@ def serial_ports() -> list[Place]:
 
 
 def twin_ports() -> list[Place]:
-    """The pseudo terminals of running twins."""
-    links = [(name, runtime_directory() / name) for name in running()]
-    return [Place(str(path), f"twin {name}") for name, path in links if path.exists()]
+    """The pseudo terminals of running twins, as far as they answer."""
+    found = []
+    for name in running():
+        with contextlib.suppress(LineFailure, Refusal):  # gone meanwhile
+            found += [
+                Place(point["path"], f"twin {name}, {point['protocol']}")
+                for point in ask(name, {"do": END_POINTS})
+                if point["kind"] == "pty"
+            ]
+    return found

@@ -17,7 +17,7 @@ from typing import Any
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.machine import SECOND, Nanos
 from steptwin.runtime.cell import Cell
-from steptwin.runtime.control import ControlEndpoint, Handler
+from steptwin.runtime.control import END_POINTS, ControlEndpoint, Handler
 from steptwin.runtime.links import Link, Port, where
 from steptwin.runtime.pty import PtyLink
 from steptwin.runtime.tcp import Address, Clients, TcpLink
@@ -93,14 +93,17 @@ class Server:
         self.end_points.append(EndPoint(kind, str(listening), protocol, details))
 
     async def open_control(self, name: str, handlers: Mapping[str, Handler]) -> None:
-        endpoint = ControlEndpoint(name, handlers)
+        """Listen for a hand at the machine. Every server tells its ``end-points``, besides what ``handlers`` do."""
+        endpoint = ControlEndpoint(name, {**handlers, END_POINTS: lambda _: self._where()})
         await endpoint.open()
         self._links.append(endpoint)
 
+    def _where(self) -> list[dict[str, object]]:
+        return [{"kind": e.kind, "protocol": e.protocol, **e.details} for e in self.end_points]
+
     def write_ready_file(self, path: Path, name: str) -> None:
         """A JSON file with process id and end points; whole or not there at all, gone when the server ends."""
-        end_points = [{"kind": e.kind, "protocol": e.protocol, **e.details} for e in self.end_points]
-        text = json.dumps({"name": name, "pid": os.getpid(), "end_points": end_points}, indent=2) + "\n"
+        text = json.dumps({"name": name, "pid": os.getpid(), "end_points": self._where()}, indent=2) + "\n"
         fresh = path.with_name(f".{path.name}.{os.getpid()}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
