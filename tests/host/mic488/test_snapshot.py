@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from host_rig import Wire, driver
 
@@ -78,3 +80,35 @@ def test_snapshots_are_text() -> None:
             Snapshot.from_json(text)
     with pytest.raises(Misuse, match=r"the snapshot is of firmware 1.70, this controller has 1.23"):
         driver(Wire(firmware="1.23")).restore_snapshot(kept)
+
+
+@pytest.mark.parametrize(
+    ("what", "value", "text"),
+    [
+        ("M1_ACC", "x", 'the snapshot says M1_ACC = "x": expected a number'),
+        ("M1_ACC", None, "the snapshot says M1_ACC = null: expected a number"),
+        ("user", ["7"], r'the snapshot says USER_REGISTER\[0\] = "7": expected a number'),
+        ("user", [1.5], r"the snapshot says USER_REGISTER\[0\] = 1.5: expected a number"),
+        ("M1_ACC", -5, "M1_ACC = -5 u/s²: permitted > 0"),
+        ("M1_ACC", float("nan"), "M1_ACC = nan u/s²: permitted > 0"),
+        ("M1_NONE", 5, "no register named 'M1_NONE'"),
+        ("user", [0, 70000], r"USER_REGISTER\[1\] = 70000: permitted 0…65535"),
+        ("user", [7] * 3001, "the snapshot has 3001 user registers, this controller 2000"),
+    ],
+)
+@pytest.mark.parametrize("dry_run", [True, False])
+def test_a_value_that_is_not_taken_is_found_before_anything_is_written(
+    what: str, value: object, text: str, dry_run: bool
+) -> None:
+    wire = Wire()
+    mic = driver(wire)
+    data = json.loads(mic.take_snapshot().to_json())
+    data["values"]["M4_ACC"] = 7.0
+    if what == "user":
+        data["user_registers"] = value
+    else:
+        data["values"][what] = value
+    wire.sent.clear()
+    with pytest.raises(Misuse, match=text):
+        mic.restore_snapshot(Snapshot.from_json(json.dumps(data)), dry_run=dry_run)
+    assert {frame[1] for _, frame in wire.sent} <= {1, 2, 3}

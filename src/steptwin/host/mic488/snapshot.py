@@ -15,7 +15,7 @@ from steptwin.errors import Misuse
 from steptwin.host.mic488.failures import NotReady
 from steptwin.host.mic488.motion import MOVING, status_text
 from steptwin.host.mic488.unit import Unit
-from steptwin.host.mic488.values import Item, Value, View
+from steptwin.host.mic488.values import Item, Value, View, encoded
 from steptwin.mic488.registermap import DataType, Effect, Register, Type
 
 FORMAT = "steptwin MIC488 snapshot 1"
@@ -44,18 +44,24 @@ class Snapshot:
 
     @classmethod
     def from_json(cls, text: str) -> Snapshot:
-        """Raises `Misuse` for what is no snapshot."""
+        """Raises `Misuse` for what is no snapshot. Whether a controller takes its values is checked before they are put back."""
         try:
             data: dict[str, Any] = json.loads(text)
             if data["format"] != FORMAT:
                 raise Misuse(f"the format is {data['format']!r}, expected {FORMAT!r}")
-            values = {str(name): value for name, value in data["values"].items() if isinstance(value, bool | int | float)}
-            user = tuple(int(word) for word in data["user_registers"])
+            values = {name: _checked(name, value, bool | int | float) for name, value in data["values"].items()}
+            user = tuple(_checked(f"USER_REGISTER[{n}]", word, int) for n, word in enumerate(data["user_registers"]))
             return cls(str(data["firmware"]), DataType[data["data_type"]], values, user)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             if isinstance(error, Misuse):
                 raise
             raise Misuse(f"this is no snapshot of a MIC488 ({type(error).__name__}: {error})") from None
+
+
+def _checked(name: str, value: Any, kind: Any) -> Any:
+    if not isinstance(value, kind):
+        raise Misuse(f"the snapshot says {name} = {json.dumps(value)}: expected a number")
+    return value
 
 
 class Change(NamedTuple):
@@ -90,9 +96,12 @@ async def take(unit: Unit) -> Snapshot:
 
 
 async def changes(unit: Unit, snapshot: Snapshot, *, counters: bool, outputs: bool) -> list[Change]:
-    """What `put_back` would write. Raises `Misuse` for a snapshot of another firmware."""
+    """What `put_back` would write. Raises `Misuse` for a snapshot of another firmware, or with values that are not taken."""
     if snapshot.firmware != unit.registers.firmware.name:
         raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {unit.registers.firmware.name}")
+    memory = unit.registers.of("USER_REGISTER")
+    if len(snapshot.user) > memory.cells:
+        raise Misuse(f"the snapshot has {len(snapshot.user)} user registers, this controller {memory.cells}")
     present = await take(unit)
     left_out = (() if counters else _COUNTERS) + (() if outputs else _OUTPUTS)
     comparable = present.data_type is snapshot.data_type
@@ -106,11 +115,12 @@ async def changes(unit: Unit, snapshot: Snapshot, *, counters: bool, outputs: bo
             found.append(Change(Item(register), old, new))
     # Values mean something only with the DATA_TYPE they were read with.
     found.sort(key=lambda change: change.item.register.key != "DATA_TYPE")
-    memory = unit.registers.of("USER_REGISTER")
     for number in range(max(len(snapshot.user), len(present.user))):
         old, new = (words[number] if number < len(words) else 0 for words in (present.user, snapshot.user))
         if old != new:
             found.append(Change(Item(memory, number), old, new))
+    for change in found:  # all of them before the first is written
+        encoded(change.item, change.new, snapshot.data_type)
     return found
 
 
