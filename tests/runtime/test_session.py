@@ -13,6 +13,7 @@ from steptwin.machine import SECOND
 from steptwin.runtime.session import load, save, session_of
 from steptwin.runtime.world import World
 from steptwin.world import script as do
+from steptwin.world.actions import Bytes, Outside
 from steptwin.world.faults import read
 from steptwin.world.script import Steps
 
@@ -125,6 +126,30 @@ def test_a_world_that_was_stopped_goes_on_from_a_snapshot() -> None:
     world.run(for_=2)
     branch.run(for_=2)
     assert branch.trace.digest() == world.trace.digest()
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        (do.Set((("table", "IN7", 1.0), ("table", "IN99", 1.0))), "no input pin 'IN99'"),
+        (do.Set((("table", "IN7", 1.0), ("drum", "B5", 2.0))), "B5 = 2: a digital input is 0 or 1"),
+        (do.Write((("table", "M1_EN", 1.0), ("drum", "M1_EN", 1.0))), "'drum' is an M1486, which has no registers"),
+        (do.Turn("table", 9, 1), "no axis M9: axes are M1 to M4"),
+        (do.Turn("table", 1, 2**31), "2147483648 encoder counts at once"),
+        (do.Expect("nothing > 1"), "nothing is called 'nothing'"),
+        (do.ClearFault("crc"), "no fault 'crc'"),
+        (do.SetFault(read("stall machine=table axis=9")), "permitted are 1 to 4"),
+        (Bytes("bus", "late", "raw", b"?"), "takes no connection of kind 'raw'"),
+    ],
+)
+def test_what_is_refused_leaves_no_mark(step: Outside, message: str) -> None:
+    world = World.load(EXAMPLES / "feeder.toml")
+    world.run(for_=1)
+    before = world.trace.digest()
+    with pytest.raises(Misuse, match=message):
+        world.outside(step)
+    world.settle_all()
+    assert (world.trace.digest(), world.inputs) == (before, [])
 
 
 def test_another_run_has_another_digest() -> None:

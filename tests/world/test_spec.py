@@ -110,7 +110,7 @@ def test_steps_that_speak_of_what_is_not_there_are_told_before_anything_runs() -
     assert "step 4: firmware 1.70 has no register named 'M1_ENN'" in lines[1]
     assert "step 5: no signal 'table.M1.stat'; there are status" in lines[2]
     assert "step 6: no input pin 'OUT1'" in lines[3]
-    assert "step 1: 'table' has no M5: axes are M1 to M4" in lines[5]
+    assert "step 1: no axis M5: axes are M1 to M4" in lines[5]
     assert "step 2: fault stall: axis = 9: permitted are 1 to 4" in lines[6]
 
 

@@ -30,7 +30,7 @@ from steptwin.m1486.functions import COMPLEMENT, CONTINUE, EDGE, LIMITOFF, OUTPU
 from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface
 from steptwin.m1486.memory import CommandMemory, FileState
 from steptwin.m1486.motor import Motor
-from steptwin.m1486.pins import LINE_PINS, Pins, known_pin
+from steptwin.m1486.pins import LINE_PINS, Pins, settable_pin
 from steptwin.m1486.program import Program
 from steptwin.m1486.receiver import Receiver
 from steptwin.m1486.signals import data_level
@@ -283,9 +283,7 @@ class M1486(Stateful):
 
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         """Pull a pin low (0) or let it go high (1) from outside: B1–B21, JOG, LIMIT, SD, RST, S&D, DUAL."""
-        name = known_pin(pin)
-        if value not in (0.0, 1.0):
-            raise Misuse(f"{name} = {value:g}: a digital input is 0 or 1")
+        name = settable_pin(pin, value)
         self.advance(now)
         level = int(value)
         if name in LINE_PINS:

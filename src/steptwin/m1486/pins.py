@@ -132,5 +132,13 @@ def known_pin(pin: str) -> str:
     return name
 
 
+def settable_pin(pin: str, value: float) -> str:
+    """The pin a name means, as `known_pin`. Raises `Misuse` unless it can take ``value``."""
+    name = known_pin(pin)
+    if value not in (0.0, 1.0):
+        raise Misuse(f"{name} = {value:g}: a digital input is 0 or 1")
+    return name
+
+
 def _number(bits: list[int]) -> int:
     return sum(bit << n for n, bit in enumerate(bits))

@@ -75,6 +75,14 @@ def check_pin(pin: str, value: float) -> None:
         raise Misuse(f"no input pin {pin!r}: inputs are IN1 to IN{INPUTS} and AIN1 to AIN{ANALOG_INPUTS}")
 
 
+def check_turn(axis: int, counts: int) -> None:
+    """`Misuse` unless there is such an axis, whose encoder can be turned by ``counts`` at once."""
+    if not 1 <= axis <= AXES:
+        raise Misuse(f"no axis M{axis}: axes are M1 to M{AXES}")
+    if not DINT_MIN <= counts <= DINT_MAX:
+        raise Misuse(f"M{axis}: {counts} encoder counts at once: permitted {DINT_MIN}…{DINT_MAX}")
+
+
 _NO_BANKS: Mapping[int, Any] = MappingProxyType({})
 
 
@@ -343,8 +351,7 @@ class Mic488(Stateful):
 
     def turn_encoder(self, axis: int, counts: int, now: Nanos) -> None:
         """Turn the shaft of ``axis`` (from 1) by ``counts`` without the drive: a handwheel, or a slip."""
-        if not DINT_MIN <= counts <= DINT_MAX:
-            raise Misuse(f"M{axis}: {counts} encoder counts at once: permitted {DINT_MIN}…{DINT_MAX}")
+        check_turn(axis, counts)
         chosen = self._axis(axis)
         self.advance(now)
         chosen.encoder.turn(counts)

@@ -28,7 +28,7 @@ from steptwin.world.expression import Condition
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import SCRIPTS, Line
-from steptwin.world.references import check_scripts
+from steptwin.world.references import check_scripts, check_step
 from steptwin.world.rigging import Rigging
 from steptwin.world.running import NEXT_RUN, Script, ScriptState, Waiting
 from steptwin.world.signals import find_signal
@@ -248,7 +248,8 @@ class Plant:
     # ------------------------------------------------------------------ what comes from outside
 
     def outside(self, what: Outside) -> None:
-        """Something comes from outside now: it is done, and remembered for a replay."""
+        """Something comes from outside now: it is done, and remembered for a replay. Refused (`Misuse`), it leaves no mark."""
+        check_step(self, what)
         self.perform(what)
         self.inputs.append(Given(self.now, what))
 

@@ -1,4 +1,4 @@
-"""What the scripts of a description speak of is there, and takes what they give it: checked before anything runs."""
+"""What steps speak of is there, and takes what they give it: checked before anything runs, or anything is done."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from steptwin.errors import Misuse
-from steptwin.mic488.device import Mic488, check_pin
+from steptwin.m1486.pins import settable_pin
+from steptwin.mic488.device import Mic488, check_pin, check_turn
 from steptwin.world import script as do
-from steptwin.world.kernel import PinName
 from steptwin.world.reader import Path
 from steptwin.world.spec import ScriptSpec
 
@@ -33,11 +33,18 @@ def _check(plant: Plant, steps: Iterable[do.Step], path: Path) -> None:
     for n, step in enumerate(steps):
         if isinstance(step, do.Repeat):
             _check(plant, step.steps, (*path, n, "steps"))
-        elif (check := _CHECKS.get(type(step))) is not None:
+        else:
             try:
-                check(plant, step)
+                check_step(plant, step)
             except Misuse as error:
                 plant.spec.text.wrong((*path, n), "D009", f"step {n + 1}: {error}")
+
+
+def check_step(plant: Plant, step: object) -> None:
+    """Raises `Misuse` for a step that cannot be taken, or not as a whole."""
+    check = _CHECKS.get(type(step))
+    if check is not None:
+        check(plant, step)
 
 
 def _condition(plant: Plant, step: do.Until | do.Expect) -> None:
@@ -46,10 +53,10 @@ def _condition(plant: Plant, step: do.Until | do.Expect) -> None:
 
 def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, level in step.levels:
-        machine = plant.machine(name)
-        plant.plan.kernel_of[name].check(PinName(name, pin))
-        if isinstance(machine, Mic488):
+        if isinstance(plant.machine(name), Mic488):
             check_pin(pin, level)
+        else:
+            settable_pin(pin, level)
 
 
 def _button(plant: Plant, step: do.Press | do.Release) -> None:
@@ -70,9 +77,8 @@ def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
 
 
 def _turn(plant: Plant, step: do.Turn) -> None:
-    axes = plant.controller(step.machine, "encoder").axes
-    if not 1 <= step.axis <= len(axes):
-        raise Misuse(f"{step.machine!r} has no M{step.axis}: axes are M1 to M{len(axes)}")
+    plant.controller(step.machine, "encoder")
+    check_turn(step.axis, step.counts)
 
 
 def _fault(plant: Plant, step: do.SetFault) -> None:
