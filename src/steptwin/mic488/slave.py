@@ -45,9 +45,10 @@ class Slave:
     def answer(self, device: Mic488, pdu: bytes) -> bytes:
         """The response to ``pdu``; a request that cannot be served is answered with its exception."""
         data_type = device.data_type
+        function = pdu[0] if pdu else 0
         try:
-            if pdu[:1] in _REGISTER_WRITES:
-                writing = self._heads[data_type].get(pdu[: 6 if pdu[:1] == _MANY else 3])
+            if function in _REGISTER_WRITES:
+                writing = self._heads[data_type].get(pdu[:6] if function == WRITE_MULTIPLE_REGISTERS else pdu[:3])
                 if writing is not None and writing.length == len(pdu):
                     return writing(device, pdu)
             else:
@@ -72,8 +73,7 @@ class Slave:
         return plan
 
 
-_ONE, _MANY = bytes((WRITE_SINGLE_REGISTER,)), bytes((WRITE_MULTIPLE_REGISTERS,))
-_REGISTER_WRITES = (_MANY, _ONE)
+_REGISTER_WRITES = frozenset({WRITE_SINGLE_REGISTER, WRITE_MULTIPLE_REGISTERS})
 
 
 def _keep(plans: dict, key: bytes, plan: object) -> None:

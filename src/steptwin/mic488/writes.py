@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from array import array
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
@@ -107,16 +106,17 @@ def _head(function: int) -> int:
 class _MemoryPlan:
     """User registers, which have no neighbours of another kind."""
 
-    __slots__ = ("_place", "_unpack", "head", "length")
+    __slots__ = ("_pack", "_place", "_unpack", "head", "length")
 
     def __init__(self, function: int, address: int, count: int) -> None:
         self.head = _head(function)
         self.length = self.head + 2 * count
-        self._place = slice(address, address + count)
+        self._place = 2 * address
         self._unpack = struct.Struct(f">{count}H").unpack_from
+        self._pack = struct.Struct(f"={count}H").pack_into
 
     def __call__(self, device: Mic488, pdu: bytes) -> bytes:
-        device.user[self._place] = array("H", self._unpack(pdu, self.head))
+        self._pack(device.user, self._place, *self._unpack(pdu, self.head))
         if device.program.state:
             device.touch()
             device.program.registers_written(device.now)
