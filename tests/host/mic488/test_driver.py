@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from host_rig import Wire, driver, spindles, thread_line
+from host_rig import Fault, Wire, driver, spindles, thread_line
 
 from steptwin.errors import Misuse
-from steptwin.host import Mic488, NotReady, ProgramState, Refused, load_config
+from steptwin.host import Mic488, NoAnswer, NotReady, ProgramState, Reason, Refused, Untold, load_config
+from steptwin.host.modbus import Query
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.registermap import DataType
-from steptwin.wire.pdu import Bits, Read, WriteCoil
+from steptwin.wire.pdu import Bits, Read, WriteCoil, WriteRegister
 
 CFG = """[Axis0]
 Unit=3
@@ -136,6 +137,37 @@ def test_axes_begin_together() -> None:
     assert wire.twin.trigger_mode == 0
     with pytest.raises(Misuse, match="no axis is given to be moved"):
         mic.move_together({})
+
+
+def test_no_trigger_mode_is_left_when_its_answer_is_lost() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    control = 3 + 2 * 14 + 2
+    wire.put(*(Fault("to master", control + lost, "cut") for lost in range(3)))
+    with pytest.raises(NoAnswer, match="AXIS_CTR_MODE"):
+        mic.move_together({1: 10.0, 3: 20.0})
+    assert wire.twin.trigger_mode == 0
+    assert not wire.moving(1)
+
+
+def test_a_trigger_mode_that_cannot_be_left_is_told() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    back = Query(1, WriteRegister(10004, 0)).rtu_frame
+
+    def cut(frame: bytes) -> None:
+        wire.severed = wire.severed or frame == back
+
+    wire.before_each = cut
+    with pytest.raises(Untold, match=r"^M1 M3 began to move, but AXIS_CTR_MODE may still be TRIGGER.* \(memory: no answer to"):
+        mic.move_together({1: 100.0, 3: 120.0})
+    wire.severed, wire.before_each = False, None
+    assert (wire.twin.trigger_mode, wire.moving(1), wire.moving(3)) == (1, True, True)
+    assert [end.reason for end in mic.wait(1, 3).values()] == [Reason.TARGET] * 2
+    with pytest.raises(NotReady, match="TRIGGER mode"):
+        mic.axis(1).move_to(1.0)
 
 
 def test_one_that_fails_ends_the_waiting_for_all() -> None:

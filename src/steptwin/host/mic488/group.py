@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 
-from steptwin.errors import Misuse, SteptwinError
+from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.host.mic488.axis import AsyncAxis
+from steptwin.host.mic488.failures import Untold
 from steptwin.host.mic488.motion import Kind
 from steptwin.host.mic488.unit import Unit, check_axis
 
@@ -19,7 +20,10 @@ DIRECT, TRIGGER = 0, 1
 
 
 async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values: Mapping[int, float]) -> None:
-    """Store a value for each axis and start them with one write. The trigger itself is sent once only."""
+    """Store a value for each axis and start them with one write. The trigger itself is sent once only.
+
+    Raises `Untold` when the axes have begun to move, but the controller cannot be told that motions need no trigger any more.
+    """
     if not values:
         raise Misuse("no axis is given to be moved")
     chosen = sorted(check_axis(axis) for axis in values)
@@ -30,8 +34,8 @@ async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values:
     allowed = unit.stop_guard(*chosen)
     async with unit.lock():
         control = await unit.ready(*chosen)
-        await unit.write(mode, TRIGGER, allowed=allowed)
         try:
+            await unit.write(mode, TRIGGER, allowed=allowed)
             for axis in chosen:
                 await unit.set_axis(register, axis, values[axis], control.data_type, allowed=allowed)
             await unit.write(unit.item(starter), sum(1 << axis - 1 for axis in chosen), allowed=allowed)
@@ -41,4 +45,10 @@ async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values:
             raise
         for axis in chosen:
             axes[axis].told(kind, values[axis], control)
-        await unit.write(mode, DIRECT)
+        try:
+            await unit.write(mode, DIRECT)
+        except LineFailure as failure:
+            raise Untold(
+                f"{' '.join(f'M{axis}' for axis in chosen)} began to move, but AXIS_CTR_MODE may still be TRIGGER, in which the "
+                f"controller makes no motion without a trigger: it could not be set back to DIRECT ({failure})"
+            ) from failure
