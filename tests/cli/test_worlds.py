@@ -46,6 +46,27 @@ def test_run_ends_on_a_condition_and_tells_it_as_json() -> None:
     assert told["failures"] == []
 
 
+def test_a_condition_that_never_comes_true_is_waited_for_an_hour_and_told(tmp_path: Path) -> None:
+    world = tmp_path / "w.toml"
+    world.write_text('[[mic488]]\nname = "a"\n')
+    assert "warning: a.M1.position > 3 did not come true in 3600 s\n" in invoke("run", str(world), "--until", "a.M1.position > 3")
+    told = json.loads(invoke("run", str(world), "--until", "a.M1.position > 3", "--for", "2s", "--json"))
+    assert (told["in_vain"], told["ended_by"], told["time_s"]) == ("a.M1.position > 3", None, 2.0)
+    told = json.loads(invoke("run", str(world), "--for", "2s", "--json"))
+    assert told["in_vain"] is None
+
+
+def test_run_writes_a_session_on_its_own(tmp_path: Path) -> None:
+    session = tmp_path / "new" / "s.json"
+    told = invoke(
+        "run", str(FEEDER), "--for", "2s", "--session", str(session), "--fault", "lost-steps machine=table pulses=64 at_s=1"
+    )
+    assert f"wrote {session}\n" in told
+    assert "2 s of bar feeder, 1 inputs: the same" in invoke("replay", str(session))
+    with pytest.raises(Misuse, match="--session is not for WBC programs"):
+        invoke("run", "x.prg", "--session", str(session))
+
+
 def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:
     world = tmp_path / "w.toml"
     world.write_text('[[mic488]]\nname = "a"\n[[event]]\nat = 1\ndo = [{ expect = "a.M1.position > 3" }]\n')
@@ -102,3 +123,5 @@ def test_options_for_programs_are_refused() -> None:
         invoke("run", str(FEEDER), "--firmware", "1.70")
     with pytest.raises(Misuse, match=r"--input IN1: expected MACHINE\.PIN; machines are table, drum"):
         invoke("run", str(FEEDER), "--input", "IN1=1@2s")
+    with pytest.raises(Misuse, match=r"--input table\.IN1: IN1 = 2: a digital input is 0 or 1"):
+        invoke("run", str(FEEDER), "--input", "table.IN1=2@1s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -153,6 +154,17 @@ def test_a_script_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[
     assert told[-3:-1] == [f"wrote {options.session}", f"wrote {options.trace}"]
     assert told[-1].startswith("1.000 s, 0 inputs, ended by: enough, digest ")
     assert load(tmp_path / "s.json").until == SECOND
+
+
+def test_a_world_can_begin_with_faults(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    options = replace(arguments(tmp_path, STOPPING), faults=("lost-steps machine=a axis=1 pulses=64 at_s=0.5",))
+    assert up(options)
+    assert "lost-steps: M1 loses 64 pulses" in capfd.readouterr().out
+    session = load(tmp_path / "s.json")
+    assert len(session.inputs) == 1
+    assert session.replay().trace.digest() == session.digest
+    with pytest.raises(Misuse, match="axis = 9"):
+        up(replace(options, faults=("stall machine=a axis=9",)))
 
 
 def test_a_trace_that_cannot_be_written_leaves_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

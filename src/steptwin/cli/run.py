@@ -37,6 +37,7 @@ class Options:
     travel: list[str] | None = None
     statement_time: str | None = None
     fault: list[str] | None = None
+    session: Path | None = None
 
     @property
     def until_idle(self) -> bool:
@@ -52,7 +53,7 @@ class Options:
 def run(
     file: Annotated[Path, typer.Argument(help="What to run; its suffix says what it is: .prg, .m1486 or .toml.")],
     duration: Annotated[
-        str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until idle.")
+        str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until.")
     ] = None,
     until: Annotated[
         str | None,
@@ -87,6 +88,7 @@ def run(
         list[str] | None,
         typer.Option(help="World: something that goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
     ] = None,
+    session: Annotated[Path | None, typer.Option(help="World: write a session for 'steptwin replay'.")] = None,
 ) -> None:
     """Run a program in virtual time: its moves, waits, outputs and uploads with their times."""
     from steptwin.runtime.timedinputs import parse_duration, parse_inputs
@@ -103,6 +105,10 @@ def run(
         from steptwin.runtime.export import check_target
 
         check_target(trace)
+    if session is not None:
+        from steptwin.runtime.textfiles import check_writable
+
+        check_writable(session)
     options = Options(
         limit=limit,
         until=until,
@@ -118,6 +124,7 @@ def run(
         travel=travel,
         statement_time=statement_time,
         fault=fault,
+        session=session,
     )
     if not runner(file, options):
         raise typer.Exit(1)
@@ -128,7 +135,7 @@ def _run_m1486(file: Path, options: Options) -> bool:
     from steptwin.runtime.run_m1486 import M1486Run
     from steptwin.runtime.run_m1486 import run as run_program
 
-    options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time", "fault")
+    options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time", "fault", "session")
     wanted = M1486Run(
         program=file,
         variant=options.variant or DEFAULT.name,
@@ -150,7 +157,7 @@ def _run_wbc(file: Path, options: Options) -> bool:
     from steptwin.runtime.wbc_bench import parse_travel
     from steptwin.wbc.dialect import DEFAULT
 
-    options.refuse("WBC programs", "variant", "interface", "wire", "fault")
+    options.refuse("WBC programs", "variant", "interface", "wire", "fault", "session")
     wanted = WbcRun(
         program=file,
         positions=options.positions,
@@ -180,6 +187,7 @@ def _run_world(file: Path, options: Options) -> bool:
         inputs=tuple(options.inputs),
         faults=tuple(options.fault or ()),
         trace=options.trace,
+        session=options.session,
         as_json=options.as_json,
     )
     return run_world(wanted, typer.echo, lambda text: typer.echo(text, err=True))

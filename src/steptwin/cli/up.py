@@ -24,6 +24,10 @@ def up(
     ] = None,
     session: Annotated[Path | None, typer.Option(help="Write a session for 'steptwin replay' when it ends.")] = None,
     trace: Annotated[Path | None, typer.Option(help="Write what happened to a file or into a directory when it ends.")] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="What goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
+    ] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
     keys: Annotated[bool, typer.Option("--keys", help="Show what a description may say.")] = False,
@@ -44,6 +48,7 @@ def up(
         name=name,
         session=session,
         trace=trace,
+        faults=tuple(fault or ()),
         ready_file=ready_file,
         listen_any=listen_any,
     )

@@ -14,9 +14,10 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.runtime import session as sessions
 from steptwin.runtime.export import axis_views, bar, write_trace
 from steptwin.runtime.timedinputs import TimedInput
-from steptwin.runtime.world import World
+from steptwin.runtime.world import LONGEST_RUN_NS, World
 from steptwin.world import script as do
 from steptwin.world.faults import read as read_fault
+from steptwin.world.references import check_step
 from steptwin.world.trace import Record
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
@@ -30,7 +31,10 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldRun:
-    """What is to be run. ``until`` is a condition; ``limit`` ends the run where that does not come true."""
+    """What is to be run. ``until`` is a condition; ``limit`` ends the run where that does not come true.
+
+    Without ``limit`` it is a minute, and with ``until`` an hour.
+    """
 
     world: Path
     limit: Nanos | None = None
@@ -51,7 +55,8 @@ def run(options: WorldRun, say: Say, warn: Say) -> bool:
     for warning in world.plan.warnings:
         warn(warning)
     _arrange(world, options)
-    limit = options.limit if options.limit is not None else USUAL_LIMIT_NS
+    usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
+    limit = options.limit if options.limit is not None else usual
     begin = time.perf_counter()
     with bar(f"running {world.spec.name}", 0, limit) as progress:
         reason = world.run(until=options.until, for_=limit / SECOND, watch=progress)
@@ -61,16 +66,18 @@ def run(options: WorldRun, say: Say, warn: Say) -> bool:
     if options.session is not None:
         sessions.save(session, options.session)
         written.append(options.session)
-    outcome = Outcome(reason, wall_s, session.digest, written)
+    in_vain = options.until if reason is None else None
+    outcome = Outcome(reason, in_vain, wall_s, session.digest, written)
     report = _json if options.as_json else _lines
     report(world, outcome, say)
     return not world.failures
 
 
 class Outcome(NamedTuple):
-    """How a run ended; ``reason`` is why before its time."""
+    """How a run ended; ``reason`` is why before its time, ``in_vain`` what did not come true in its time."""
 
     reason: str | None
+    in_vain: str | None
     wall_s: float
     digest: str
     written: list[Path]
@@ -88,7 +95,12 @@ def _arrange(world: World, options: WorldRun) -> None:
         if machine.upper() not in names:
             raise Misuse(f"--input {given.pin}: expected MACHINE.PIN; machines are {', '.join(world.machines)}")
         name = names[machine.upper()]
-        world.at(given.time / SECOND, do.Set(((name, pin.upper(), given.value),)), name=f"--input {given.pin}")
+        step = do.Set(((name, pin.upper(), given.value),))
+        try:
+            check_step(world, step)
+        except Misuse as error:
+            raise Misuse(f"--input {given.pin}: {error}") from None
+        world.at(given.time / SECOND, step, name=f"--input {given.pin}")
     if options.until is not None:
         world.condition(options.until)
 
@@ -145,6 +157,8 @@ def _lines(world: World, outcome: Outcome, say: Say) -> None:
         say(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
     for late in world.overdue:
         say(f"warning: at {late.time / SECOND:g} s {late.value}")
+    if outcome.in_vain is not None:
+        say(f"warning: {outcome.in_vain} did not come true in {world.time:g} s")
     for path in outcome.written:
         say(f"wrote {path}")
     say(f"digest {outcome.digest}")
@@ -157,6 +171,7 @@ def _json(world: World, outcome: Outcome, say: Say) -> None:
         "time_s": world.time,
         "wall_s": round(outcome.wall_s, 3),
         "ended_by": outcome.reason,
+        "in_vain": outcome.in_vain,
         "failures": [{"time_s": f.time / SECOND, "condition": f.value} for f in world.failures],
         "overdue": [{"time_s": late.time / SECOND, "what": late.value} for late in world.overdue],
         "axes": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import count
@@ -30,6 +30,7 @@ from steptwin.runtime.textfiles import check_writable
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Leave
+from steptwin.world.faults import read as read_fault
 from steptwin.world.lines import Place
 from steptwin.world.spec import LineSpec
 from steptwin.world.trace import Record
@@ -47,6 +48,7 @@ class UpOptions:
     name: str | None = None
     session: Path | None = None
     trace: Path | None = None
+    faults: Sequence[str] = ()
     ready_file: Path | None = None
     listen_any: bool = False
 
@@ -145,6 +147,8 @@ def up(options: UpOptions) -> bool:
     world = World.load(options.world, keep_trace=options.trace is not None)
     for warning in world.plan.warnings:
         sys.stderr.write(f"{warning}\n")
+    for fault in options.faults:
+        world.outside(do.SetFault(read_fault(fault)))
     speed = _speed(options.speed)
     outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
     if speed is None and outside:
@@ -385,10 +389,8 @@ def handlers_of(cell: Cell, live: LiveWorld) -> dict[str, Handler]:
 
 
 def _fault(world: World, request: Mapping[str, Any]) -> object:
-    from steptwin.world.faults import read
-
     faults = world.plan.faults
-    wanted = [read(line) for line in request.get("set") or []]
+    wanted = [read_fault(line) for line in request.get("set") or []]
     for fault in wanted:
         world.rigging.check(fault)
     unwanted = request.get("clear") or []
