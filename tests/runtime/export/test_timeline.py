@@ -99,6 +99,22 @@ def test_arcs_are_followed_closely() -> None:
         assert pieces.position(now) == pytest.approx(profile.position(now), abs=0.02)
 
 
+def test_a_page_of_many_machines_stays_small() -> None:
+    trace = Trace()
+    moves = 20
+    for n in range(100):
+        for move in range(moves):
+            for axis in "1234":
+                plan = plan_position(MotionState(move * SECOND, 0, 0.0, 0.0), 100 * move, 5000.0, 5000.0, 1000.0)
+                trace.add(Record(move * SECOND, f"m{n}", "plan", axis, plan))
+    page = page_of(trace)
+    data = data_of(page)
+    assert (len(data["machines"]), len(data["axes"])) == (100, 400)
+    empty = len(page_of(Trace(), until=SECOND))
+    # A move is three segments and a rest, each of eight numbers.
+    assert (len(page) - empty) / (400 * moves) < 4 * 60
+
+
 def test_the_page_needs_nothing_from_outside(mic488: Run) -> None:
     page = page_of(mic488.trace, mic488.views, mic488.until)
     assert not re.search(r"https?:|//[\w-]+\.\w|src=|@import|url\(|<link|<iframe", page)

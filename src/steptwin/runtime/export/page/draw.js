@@ -307,6 +307,30 @@ function drawGrid(pen, view, height) {
   for (let t = first; t <= view.to; t += step) c.fillRect(Math.round(pen.x(t)), 0, 1, height);
 }
 
+// Of a machine that is folded: how fast the fastest of its axes is, and where something happened.
+function drawSummary(pen, { motions, marks }, top, bottom) {
+  const c = pen.context, begin = Math.max(pen.x(0), 0), end = Math.min(pen.x(SPAN), pen.width);
+  c.fillStyle = pen.color("--velocity");
+  c.globalAlpha = 0.45;
+  for (let x = begin; x < end; x += 2) {
+    let speed = 0;
+    for (const { motion, fastest } of motions) {
+      const [least, most] = motion.range(true, pen.t(x), pen.t(Math.min(x + 2, end)));
+      speed = Math.max(speed, -least / fastest, most / fastest);
+    }
+    if (speed > 0) c.fillRect(x, bottom - Math.max(speed * (bottom - top), 1), 2, Math.max(speed * (bottom - top), 1));
+  }
+  c.globalAlpha = 1;
+  let drawn = -1;
+  for (const [t, , kind] of marks) {
+    const x = Math.floor(pen.x(t)), minor = kind === "frame" || kind === "statement";
+    if (t < pen.from || t > pen.to || (x <= drawn && minor)) continue;
+    drawn = x;
+    c.fillStyle = pen.color(MARK_COLORS[kind]);
+    c.fillRect(x, minor ? bottom - 4 : bottom - 8, 1, minor ? 4 : 8);
+  }
+}
+
 // The whole run: how fast the axes are, and where something happened.
 function drawOverview(pen, height) {
   const c = pen.context, motions = DATA.axes.slice(0, 64).map((axis) => new Motion(axis)).filter((motion) => motion.moves());

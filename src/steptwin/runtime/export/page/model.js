@@ -114,6 +114,13 @@ class Pin {
 
 // ---------------------------------------------------------------------- lanes
 
+// What a machine does, for the row of one that is folded.
+function summaryOf(machine) {
+  const motions = DATA.axes.filter((axis) => axis.machine === machine).map((axis) => new Motion(axis)).filter((motion) => motion.moves());
+  const fastest = (motion) => Math.max(...motion.range(true, 0, SPAN).map(Math.abs)) || 1;
+  return { motions: motions.map((motion) => ({ motion, fastest: fastest(motion) })), marks: DATA.marks.filter((mark) => mark[1] === machine) };
+}
+
 const HEIGHTS = { group: 28, position: 62, velocity: 46, step: 26, level: 24, analog: 40, frames: 40, statement: 24, marks: 24 };
 const COLORS = { position: "--position", true: "--true", velocity: "--velocity", step: "--step", level: "--level", analog: "--analog", frames: "--out", statement: "--statement" };
 const MARK_COLORS = { frame: "--in", statement: "--statement", event: "--event", input: "--input", fault: "--fault" };

@@ -6,16 +6,25 @@ const view = { from: 0, to: SPAN, scaled: false };
 let cursor = 0, mark = null, hover = null, chosen = 0, dirty = false, overviewImage = null, lanesKey = "", layout = 0;
 const LEAST_VIEW = 200;
 
-const machines = DATA.machines.map((name) => ({ name, lanes: null, open: DATA.machines.length <= 8 }));
+const machines = DATA.machines.map((name) => ({ name, lanes: null, summary: null, open: DATA.machines.length <= 8 }));
 machines[0] && (machines[0].open = true);
-let lanes = [];
+let lanes = [], wanted = [];
+
+// Lanes with all the wanted words; without any, those of the machines that are not folded.
+function lanesShown(machine) {
+  if (!wanted.length) return machine.open ? machine.lanes ??= lanesOf(machine.name) : [];
+  return (machine.lanes ??= lanesOf(machine.name)).filter((lane) => {
+    const text = `${machine.name} ${lane.name}`.toLowerCase();
+    return wanted.every((word) => text.includes(word));
+  });
+}
 
 function layOut() {
   layout += 1;
   lanes = [];
   for (const machine of machines) {
-    if (machines.length > 1) lanes.push({ kind: "group", name: machine.name, group: machine, height: HEIGHTS.group });
-    if (machine.open) lanes.push(...(machine.lanes ??= lanesOf(machine.name)));
+    if (machines.length > 1 && !wanted.length) lanes.push({ kind: "group", name: machine.name, group: machine, height: HEIGHTS.group });
+    lanes.push(...lanesShown(machine));
   }
   let y = 0;
   lanesElement.replaceChildren(...lanes.map((lane, i) => {
@@ -29,7 +38,7 @@ function layOut() {
     if (lane.group) element.setAttribute("aria-expanded", lane.group.open);
     const name = document.createElement("span"), value = document.createElement("span");
     name.className = "name";
-    name.textContent = name.title = lane.name;
+    name.textContent = name.title = wanted.length && machines.length > 1 ? `${lane.machine}.${lane.name}` : lane.name;
     value.className = "value";
     element.append(name, value);
     element.addEventListener("click", () => { choose(i); if (lane.group) fold(lane.group); });
@@ -40,9 +49,17 @@ function layOut() {
   choose(chosen);
 }
 
-function fold(machine) {
-  machine.open = !machine.open;
+function fold(machine, all = false) {
+  const open = !machine.open;
+  for (const one of all ? machines : [machine]) one.open = open;
   layOut();
+  choose(lanes.findIndex((lane) => lane.group === machine));
+}
+
+function want(text) {
+  wanted = text.toLowerCase().split(/\s+/).filter(Boolean);
+  layOut();
+  saveInAddress();
 }
 
 function choose(i) {
@@ -154,6 +171,7 @@ function paintLanes(pen, scroll, width, height) {
     if (lane.kind === "group") {
       c.fillStyle = color("--panel");
       c.fillRect(0, y, width, lane.height);
+      if (!lane.group.open) drawSummary(pen, lane.group.summary ??= summaryOf(lane.name), y + 5, y + lane.height - 3);
     } else {
       if (i === chosen) {
         c.globalAlpha = 0.5;
@@ -211,8 +229,8 @@ function paintOverview() {
 }
 
 function tell() {
-  const t = hover ?? cursor;
-  for (const lane of lanes) lane.value.textContent = valueText(lane, t);
+  const t = hover ?? cursor, top = lanesElement.scrollTop, bottom = top + lanesElement.clientHeight;
+  for (const lane of lanes) if (lane.y < bottom && lane.y + lane.height > top) lane.value.textContent = valueText(lane, t);
   const parts = [["Cursor", moment(t)]];
   if (mark !== null) {
     const between = t - mark;
@@ -235,7 +253,7 @@ const KEYS = {
   ArrowRight: (e) => moveCursor(cursor + stride(e)),
   ArrowUp: () => choose(chosen - 1),
   ArrowDown: () => choose(chosen + 1),
-  Enter: () => lanes[chosen]?.group && fold(lanes[chosen].group),
+  Enter: (e) => lanes[chosen]?.group && fold(lanes[chosen].group, e.shiftKey),
   "+": () => zoom(1 / 1.6, cursor),
   "=": () => zoom(1 / 1.6, cursor),
   "-": () => zoom(1.6, cursor),
@@ -253,6 +271,7 @@ const KEYS = {
   y: () => $("scale").click(),
   l: () => $("list-toggle").click(),
   "/": () => { openList(true); $("filter").focus(); },
+  ".": () => $("wanted").focus(),
   "?": () => $("help").showModal(),
 };
 
@@ -377,6 +396,7 @@ $("scale").addEventListener("click", () => {
 });
 $("help-toggle").addEventListener("click", () => $("help").showModal());
 $("list-toggle").addEventListener("click", () => openList($("list").hidden));
+$("wanted").addEventListener("input", () => want($("wanted").value));
 $("list-close").addEventListener("click", () => openList(false));
 
 function cursorOrMiddle() { return cursor >= view.from && cursor <= view.to ? cursor : (view.from + view.to) / 2; }
@@ -470,21 +490,23 @@ function saveInAddress() {
   clearTimeout(saving);
   saving = setTimeout(() => {
     const at = ((cursor + DATA.begin) / 1e9).toFixed(9), span = ((view.to - view.from) / 1e9).toPrecision(6);
-    try { history.replaceState(null, "", `#at=${at}&span=${span}`); } catch { /* some viewers do not let pages do this */ }
+    const lanes = wanted.length ? `&lanes=${encodeURIComponent(wanted.join(" "))}` : "";
+    try { history.replaceState(null, "", `#at=${at}&span=${span}${lanes}`); } catch { /* some viewers do not let pages do this */ }
   }, 300);
 }
 
 function readAddress() {
-  const wanted = new URLSearchParams(location.hash.slice(1));
-  const at = Number(wanted.get("at")) * 1e9 - DATA.begin, size = Number(wanted.get("span")) * 1e9;
+  const given = new URLSearchParams(location.hash.slice(1));
+  const at = Number(given.get("at")) * 1e9 - DATA.begin, size = Number(given.get("span")) * 1e9;
+  $("wanted").value = given.get("lanes") ?? "";
+  want($("wanted").value);
   fit();
-  if (!wanted.has("at") || !Number.isFinite(at)) return;
+  if (!given.has("at") || !Number.isFinite(at)) return;
   if (size > 0) show(at - size / 2, at + size / 2);
   moveCursor(at);
-  if (wanted.has("list")) openList(true);
+  if (given.has("list")) openList(true);
 }
 
-layOut();
 readAddress();
 new ResizeObserver(redraw).observe(plot);
 addEventListener("hashchange", readAddress);
