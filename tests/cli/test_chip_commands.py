@@ -45,6 +45,9 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert [values[name]["value"] for name in ("POSITION", "VARIABLE", "FLAGS")] == [10.0, 77, "83"]
     assert "52" not in values["FUNCTIONS"]["value"]
     assert run("move", "1=40") == "chip 7: target reached at 40 step\n"
+    assert "'7=40': an M1486 has one axis: expected 1=NUMBER" in run("move", "7=40", code=2)
+    assert "'1=40 2=3': '40 2=3' is no number" in run("move", "1=40", "2=3", code=2)
+    assert "a time to wait of -1 s is outside" in run("move", "1=40", "--timeout", "-1", code=2)
     assert run("watch", "position", "--count", "1").splitlines()[1].endswith("\t40")
     assert "is nothing an M1486 tells: there are POSITION" in run("get", "M1_POS_ACT", code=2)
     assert "an M1486 has info, get, set" in run("enable", "1", code=2)

@@ -18,7 +18,7 @@ import typer
 from steptwin.cli.chip import chip_address
 from steptwin.cli.chip import move as move_chip
 from steptwin.cli.chip import stop as chip_stop
-from steptwin.cli.device import Axes, Device, Json, LogFrames, axes_of, complain, opened, print_json, tied
+from steptwin.cli.device import Axes, Device, Json, LogFrames, axes_of, complain, number_of, opened, print_json, tied
 from steptwin.errors import Misuse, Refusal
 
 if TYPE_CHECKING:
@@ -107,11 +107,16 @@ def _move_chip(
     json: bool,
     log_frames: bool,
 ) -> None:
-    values = tied(targets)
-    if set(values) != {1}:
-        raise Misuse(f"an M1486 has one axis, 1: {' '.join(targets)}")
+    from steptwin.host.line import check_wait
+
+    check_wait(timeout)
+    given = " ".join(targets)
+    name, _, typed = given.partition("=")
+    if name.strip().upper().removeprefix("M") != "1":
+        raise Misuse(f"{given!r}: an M1486 has one axis: expected 1=NUMBER")
+    value = number_of(typed, given)
     with _interruptible():
-        end = move_chip(chip, values[1], by=by, velocity=velocity, wait=wait, timeout=timeout, log_frames=log_frames)
+        end = move_chip(chip, value, by=by, velocity=velocity, wait=wait, timeout=timeout, log_frames=log_frames)
     if end is None:
         return
     if json:
@@ -151,6 +156,9 @@ def _do(
     json: bool,
     log_frames: bool,
 ) -> None:
+    from steptwin.host.line import check_wait
+
+    check_wait(timeout)
     with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible():
         begun: set[int] = set()
         try:
@@ -202,6 +210,8 @@ def jog(
     ((axis, speed),) = values.items()
     if seconds is None and not sys.stdin.isatty():
         raise Misuse("without a terminal nobody can press a key: give the time, --seconds")
+    if seconds is not None and not seconds > 0.0:
+        raise Misuse(f"--seconds {seconds:g}: permitted are more than 0")
     with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible(), _keys() as pressed:
         held = mic.axis(axis).jog(speed, hold_s=hold)
         try:

@@ -9,8 +9,12 @@ from collections.abc import Hashable
 from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol
 
+from steptwin.errors import Misuse
 from steptwin.host.exchange import A, Job, Q
 from steptwin.machine import Nanos
+
+LONGEST_WAIT_S = 1e6
+"""Nobody waits longer for a motion: eleven days."""
 
 
 class Line(Protocol[Q, A]):
@@ -43,3 +47,9 @@ class Line(Protocol[Q, A]):
         ...
 
     async def close(self) -> None: ...
+
+
+def check_wait(timeout_s: float | None) -> None:
+    """`Misuse` for a time nobody can wait; None is one to be computed."""
+    if timeout_s is not None and not 0.0 <= timeout_s <= LONGEST_WAIT_S:
+        raise Misuse(f"a time to wait of {timeout_s:g} s is outside 0 to {LONGEST_WAIT_S:.0f} s")

@@ -163,6 +163,9 @@ def test_velocity_mode_does_not_end_by_itself() -> None:
     with pytest.raises(Misuse, match="M1 runs in velocity mode and does not end by itself: give the time to wait, timeout_s"):
         mic.axis(1).wait()
     assert mic.axis(1).wait(1.0, check=False).reason is Reason.OVERDUE
+    for seconds in (float("nan"), float("inf"), -1.0):
+        with pytest.raises(Misuse, match=f"a time to wait of {seconds:g} s is outside 0 to 1000000 s"):
+            mic.axis(1).wait(seconds, check=False)
     mic.axis(1).move_velocity(0.0)
     assert mic.axis(1).wait().reason is Reason.REST
 

@@ -139,6 +139,7 @@ def test_a_limit_ends_it() -> None:
             pass
     assert jog.end is not None
     assert jog.end.reason is Reason.LIMIT_L
+    assert str(jog.end) == "M1: stopped at limit L"
     assert wire.position() == -1000
 
 

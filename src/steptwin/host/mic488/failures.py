@@ -46,7 +46,7 @@ class MoveFailed(Refusal):
 
 
 class Untold(LineFailure):
-    """The controller could not be told to stop, not to go on, or what mode it is to be in. What it does then is part of the text."""
+    """The controller could not be told to stop, not to go on, or to leave a mode. What it does then is part of the text."""
 
 
 def untold(who: str, what: str, failure: LineFailure) -> Untold:

@@ -157,7 +157,9 @@ class AsyncJog:
             return False
         motion = Motion(Kind.DISTANCE, self._reach_u, self._held_ns or 0, Status.ON)
         reason = reason_of(status, motion)
-        self._stopped(Reason.NOT_HELD if reason is Reason.TARGET else reason, status_text(status))
+        self._stopped(
+            Reason.NOT_HELD if reason is Reason.TARGET else reason, status_text(status) if reason is Reason.STOPPED else ""
+        )
         return True
 
     def _stopped(self, reason: Reason, detail: str) -> None:

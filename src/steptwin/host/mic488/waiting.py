@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from steptwin.errors import LineFailure, Misuse
+from steptwin.host.line import check_wait
 from steptwin.host.mic488.failures import MoveFailed
 from steptwin.host.mic488.motion import MOVING, Kind, Motion, MoveEnd, Reason, reason_of, status_text, travel_s
 from steptwin.host.mic488.unit import Control, Unit
@@ -30,6 +31,7 @@ class Watch:
         self._unit = unit
         self._axis = axis
         self._motion = motion
+        check_wait(timeout_s)
         self._begin = unit.line.now()
         self._limit: Nanos | None = None if timeout_s is None else self._begin + round(timeout_s * SECOND)
 
