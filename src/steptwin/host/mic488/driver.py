@@ -67,9 +67,9 @@ class AsyncMic488:
     """A MIC488 at an address (``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``) or on a line shared with others.
 
     ``firmware``: found out when not given. ``config``: the vendor tool's ``.cfg`` or what is in it; without it units have no
-    name and pulses are not known. ``observe``: DATA_TYPE is left as it is, so that opening changes nothing; else it is set to REAL
-    where it is not. Motions are made with either. ``log`` is given every frame in words. Nothing is done before `open` (or
-    ``async with``).
+    name and pulses are not known. ``observe``: DATA_TYPE is left as it is, so that opening changes nothing; else it is set
+    to REAL where it is not. Motions are made with either. ``log`` is given every frame in words. Nothing is done before `open`
+    (or ``async with``).
     """
 
     def __init__(
