@@ -59,16 +59,19 @@ def first_million(profile: Profile) -> tuple[int, Callable[[], object]]:
 
 def pulses() -> None:
     move = plan_position(MotionState(0, 0, 0.0, 0.0), MILLION, 2000.0, 2000.0, 64_000.0)
+    cruise = plan_position(MotionState(0, 0, 0.0, 0.0), MILLION, 200_000.0, 200_000.0, 40_000.0)
     from_rest = plan_velocity(MotionState(0, 0, 0.0, 0.0), 1e9, 2000.0, 2000.0)
     linear = plan_endless(0, 0, 1, SpeedCurve(200.0 * STEP, 5000.0 * STEP, 1e9, 40_000.0 * STEP))
     parabolic = plan_endless(0, 0, 1, SpeedCurve(20.0 * STEP, 5000.0 * STEP, 20.0 * STEP, 40_000.0 * STEP))
     steps = plan_distance(0, 0, 100_000 * STEP, SpeedCurve(200.0 * STEP, 20_000.0 * STEP, 2500.0 * STEP, 12_500.0 * STEP))
     train = step_train(steps, 0, Microstepping(STEP // 8, STEP, 1500.0 * STEP))
-    move_end, steps_end = move.end, steps.end
+    move_end, cruise_end, steps_end = move.end, cruise.end, steps.end
     assert move_end is not None
+    assert cruise_end is not None
     assert steps_end is not None
     rows: list[tuple[str, tuple[int, Callable[[], object]]]] = [
         ("whole move, ramps from rest", (MILLION, lambda: pulse_times(move, 0, move_end))),
+        ("whole move, a long cruise", (MILLION, lambda: pulse_times(cruise, 0, cruise_end))),
         ("linear ramp from rest", first_million(from_rest)),
         ("linear ramp from a start speed", first_million(linear)),
         ("parabolic ramp", first_million(parabolic)),
