@@ -59,7 +59,7 @@ def up(
 def sections() -> list[Section]:
     """The tables of a description, for people."""
     from steptwin.world.script import ACTIONS
-    from steptwin.world.spec import KEYS, TABLES
+    from steptwin.world.tables import KEYS, TABLES
 
     found = [
         Section(

@@ -19,9 +19,9 @@ from steptwin.runtime.textfiles import read_bytes, write_bytes
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import ACTIONS, Outside
+from steptwin.world.description import read_world
 from steptwin.world.faults import Fault, parse
 from steptwin.world.plant import Given
-from steptwin.world.spec import read_world
 
 FORMAT = 1
 

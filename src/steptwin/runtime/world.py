@@ -23,10 +23,11 @@ from steptwin.runtime.export.progress import Progress, silent
 from steptwin.runtime.textfiles import read_bytes, read_text
 from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegisters, encode_request
 from steptwin.world import script as do
+from steptwin.world.description import read_world
 from steptwin.world.durations import duration
 from steptwin.world.plant import Plant, PlantSnapshot, Values
 from steptwin.world.running import Script
-from steptwin.world.spec import WorldSpec, read_world
+from steptwin.world.spec import WorldSpec
 from steptwin.world.views import AxisView, LineView, M1486View, Mic488View, Views
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND

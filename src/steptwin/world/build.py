@@ -31,6 +31,7 @@ from steptwin.wire.slave import Device
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Button, Switch, Zone
 from steptwin.world.course import Build
+from steptwin.world.description import config_of
 from steptwin.world.faults import Faults
 from steptwin.world.kernel import Kernel, PinName, Wire
 from steptwin.world.lines import ChipLine, Line, ModbusLine, timing_of
@@ -39,7 +40,7 @@ from steptwin.world.motor import Motor
 from steptwin.world.reader import Path
 from steptwin.world.sources import Constant, Sine, Table, Waveform
 from steptwin.world.sources import Source as AnalogSource
-from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, MotorSpec, SourceSpec, WorldSpec, config_of
+from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, MotorSpec, SourceSpec, WorldSpec
 from steptwin.world.trace import Record, Recorder
 
 DEFAULT_BAUD = 38400

@@ -6,9 +6,9 @@ import pytest
 
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.runtime.world import World
+from steptwin.world.description import read_world
 from steptwin.world.durations import duration
 from steptwin.world.reader import Text, WorldError
-from steptwin.world.spec import read_world
 
 TABLE = '[[mic488]]\nname = "table"\n'
 AXIS = TABLE + '[[axis]]\nname = "x"\ndrive = "table.M1"\n'

@@ -1,0 +1,196 @@
+"""From the TOML file of a world to what it says, or to everything that is wrong with it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from steptwin.errors import Misuse
+from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, ControllerConfig
+from steptwin.mic488.config import Key as ConfigKey
+from steptwin.mic488.registers import AXES
+from steptwin.world.faults import Fault, parse
+from steptwin.world.reader import Key, Path, Text, read_table
+from steptwin.world.script import Step, read_steps
+from steptwin.world.spec import (
+    AxisSpec,
+    ButtonSpec,
+    EncoderSpec,
+    LineSpec,
+    M1486Spec,
+    Mic488Spec,
+    MotorSpec,
+    ScriptSpec,
+    SourceSpec,
+    SwitchSpec,
+    WireSpec,
+    WorldSpec,
+)
+from steptwin.world.tables import KEYS
+
+
+def read_world(name: str, text: str) -> WorldSpec:
+    """The world that a TOML text called ``name`` describes. Raises `WorldError` with everything that is wrong with it."""
+    toml = Text(name, text)
+    data = toml.data
+    known = [key for key in KEYS if key not in ("switch", "encoder", "motor")]
+    for key in data:
+        if key not in known and key != "fault":
+            near = toml.near(key, [*known, "fault"])
+            toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join([*known, 'fault'])}")
+    world = read_table(toml, ("world",), data.get("world", {}), KEYS["world"])
+    spec = WorldSpec(
+        **world,
+        lines=tuple(LineSpec(**row) for row in _rows(toml, "line")),
+        mic488=tuple(_mic488(toml, row, table) for row, table in _tables(toml, "mic488", _CONTROLLER_TABLES)),
+        m1486=tuple(M1486Spec(**row) for row in _rows(toml, "m1486")),
+        axes=tuple(_axis(toml, row, table) for row, table in _tables(toml, "axis", ("switch", "encoder", "motor"))),
+        wires=tuple(WireSpec(**row) for row in _rows(toml, "wire")),
+        buttons=tuple(ButtonSpec(**row) for row in _rows(toml, "button")),
+        sources=tuple(SourceSpec(**row) for row in _rows(toml, "source")),
+        scripts=(*_events(toml), *_scripts(toml)),
+        faults=tuple(_faults(toml)),
+        text=toml,
+    )
+    toml.check()
+    return spec
+
+
+_CONTROLLER_TABLES = (*(f"M{n}" for n in range(1, AXES + 1)), *(f"IN{n}" for n in range(1, INPUTS + 1)))
+
+
+def _tables(toml: Text, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
+    """Values of every ``[[kind]]`` that has all it needs, and the table itself."""
+    found: list[tuple[dict[str, Any], Mapping[str, Any]]] = []
+    tables = toml.data.get(kind, [])
+    if not isinstance(tables, list):
+        toml.wrong((kind,), "D002", f"[{kind}] stands once", f"expected [[{kind}]], for there may be several")
+        tables = []
+    names: set[str] = set()
+    for number_, table in enumerate(tables):
+        path = (kind, number_)
+        values = read_table(toml, path, table, KEYS[kind], also)
+        if any(key.is_required and (key.attribute or key.name) not in values for key in KEYS[kind]):
+            continue
+        if values.get("name") is not None and values["name"] in names:
+            toml.wrong((*path, "name"), "D006", f"there is a [[{kind}]] named {values['name']!r} already")
+        names.add(values.get("name", ""))
+        found.append((values | {"path": path}, table))
+    return found
+
+
+def _rows(toml: Text, kind: str) -> list[dict[str, Any]]:
+    return [row for row, _ in _tables(toml, kind)]
+
+
+def _mic488(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> Mic488Spec:
+    path = row["path"]
+    axes = {n: _config(toml, (*path, f"M{n}"), table, AXIS_KEYS) for n in range(1, AXES + 1) if f"M{n}" in table}
+    inputs = {n: _config(toml, (*path, f"IN{n}"), table, INPUT_KEYS) for n in range(1, INPUTS + 1) if f"IN{n}" in table}
+    return Mic488Spec(**row, axes=axes, inputs=inputs)
+
+
+def _config(toml: Text, path: Path, table: Mapping[str, Any], rows: tuple[ConfigKey, ...]) -> dict[str, Any]:
+    """A table such as ``[mic488.M1]``: keys are attributes of the configuration, choices are numbers or their words."""
+    keys = tuple(Key(row.attribute, _configured(row), row.hint, None) for row in rows)
+    values = read_table(toml, path, table[str(path[-1])], keys)
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _configured(row: ConfigKey) -> Callable[[Any], Any]:
+    words = {text.upper(): number for number, text in row.choices.items() if text}
+
+    def read(value: Any) -> Any:
+        if isinstance(value, str):
+            if row.attribute in ("in_kl", "in_kr") and value.upper().startswith("IN") and value[2:].isdecimal():
+                value = int(value[2:]) - 1
+            elif value.upper() in words:
+                value = words[value.upper()]
+            else:
+                raise Misuse(f"{value!r}: permitted are {', '.join(words)}" if words else f"{value!r} is no number")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not row.permits(value):
+            raise Misuse(f"{value!r} is not permitted")
+        return int(value) if row.whole and value == int(value) else value
+
+    return read
+
+
+def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec:
+    path = row["path"]
+    switches: list[SwitchSpec] = []
+    given = table.get("switch", [])
+    for n, switch in enumerate(given if isinstance(given, list) else [given]):
+        place = (*path, "switch", n)
+        values = read_table(toml, place, switch, KEYS["switch"])
+        if "target" in values:
+            spec = SwitchSpec(**values, path=place)
+            if sum(x is not None for x in (spec.below, spec.above, spec.position)) != 1:
+                toml.wrong(place, "D007", "a switch needs one of below, above and position")
+            switches.append(spec)
+    encoder = motor = None
+    if "encoder" in table:
+        encoder = EncoderSpec(**read_table(toml, (*path, "encoder"), table["encoder"], KEYS["encoder"]), path=(*path, "encoder"))
+    if "motor" in table:
+        values = read_table(toml, (*path, "motor"), table["motor"], KEYS["motor"])
+        if "torque" in values:
+            motor = MotorSpec(**values, path=(*path, "motor"))
+            if motor.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in motor.torque):
+                toml.wrong((*path, "motor", "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
+    if row["pulses_per_unit"] is not None and row["pitch"] is not None:
+        toml.wrong((*path, "pitch"), "D007", "pulses_per_unit and pitch exclude each other")
+    if row["unit"] is None:
+        row["unit"] = "mm" if row["kind"] == "linear" else "degree"
+    if row["travel"] is not None and not row["travel"][0] <= row["start"] <= row["travel"][1]:
+        toml.wrong((*path, "start"), "D007", f"start = {row['start']:g} is outside travel = {list(row['travel'])}")
+    return AxisSpec(**row, switches=tuple(switches), encoder=encoder, motor=motor)
+
+
+def _events(toml: Text) -> list[ScriptSpec]:
+    found: list[ScriptSpec] = []
+    for row, table in _tables(toml, "event", ("do",)):
+        path = row["path"]
+        if sum(row[key] is not None for key in ("at", "every", "when")) != 1:
+            toml.wrong(path, "D007", "an event needs one of at, every and when")
+            continue
+        name = row.pop("name") or f"event-{path[1] + 1}"
+        steps = _steps(toml, (*path, "do"), table)
+        found.append(ScriptSpec(name=name, repeat=1, steps=steps, **row))
+    return found
+
+
+def _scripts(toml: Text) -> list[ScriptSpec]:
+    found: list[ScriptSpec] = []
+    for row, table in _tables(toml, "script", ("steps",)):
+        steps = _steps(toml, (*row["path"], "steps"), table)
+        found.append(ScriptSpec(**row, every=None, when=None, once=True, steps=steps))
+    return found
+
+
+def _steps(toml: Text, path: Path, table: Mapping[str, Any]) -> tuple[Step, ...]:
+    key = str(path[-1])
+    if key not in table:
+        toml.wrong(path, "D005", f"{key} is missing", "a list of steps, such as [{ press = 'start' }, { wait = '1 s' }]")
+        return ()
+    return read_steps(toml, path, table[key])
+
+
+def _faults(toml: Text) -> list[Fault]:
+    found: list[Fault] = []
+    for n, table in enumerate(toml.data.get("fault", [])):
+        try:
+            found.append(parse(table, "[[fault]]"))
+        except Misuse as error:
+            key = re.search(r"(\w+) = ", str(error))
+            toml.wrong(("fault", n, key[1] if key else ""), "D003", str(error))
+    return found
+
+
+def config_of(spec: Mic488Spec, base: ControllerConfig) -> ControllerConfig:
+    """The configuration of a controller: its file's, and what the description changes."""
+    from dataclasses import replace
+
+    axes = tuple(replace(axis, **spec.axes.get(n, {})) for n, axis in enumerate(base.axes, start=1))
+    inputs = tuple(replace(one, **spec.inputs.get(n, {})) for n, one in enumerate(base.inputs, start=1))
+    config = replace(base, axes=axes, inputs=inputs)
+    return replace(config, program=replace(config.program, activate=1)) if spec.start else config
