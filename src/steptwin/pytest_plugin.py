@@ -5,7 +5,9 @@ pytest loads it wherever steptwin is installed, so it brings nothing along until
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
@@ -67,12 +69,36 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     devices = config.stash[_devices]
+    strange = devices.keys() - {"", "mic488", "m1486"}
+    if strange and items:
+        known = {"mic488", "m1486", *_controllers(items)}
+        for name in sorted(strange - known):
+            raise pytest.UsageError(
+                f"--device {name}={devices[name]}: no test here has a device of that name: there are {', '.join(sorted(known))}"
+            )
     used = {name for item in items for name in ("mic488", "m1486") if name in getattr(item, "fixturenames", ())}
     if "" in devices and len(used - set(devices)) > 1:
         raise pytest.UsageError(
             f"--device {devices['']}: these tests are for a MIC488 and for an M1486: say which it is, mic488=ADDRESS or "
             "m1486=ADDRESS, or choose tests with -k"
         )
+
+
+def _controllers(items: list[pytest.Item]) -> set[str]:
+    """Names of the controllers in the worlds of tests."""
+    from steptwin.testing.world import controllers_in
+
+    files = {
+        item.path.parent / marker.args[0]
+        for item in items
+        for marker in item.iter_markers("steptwin_world")
+        if marker.args and isinstance(marker.args[0], str | Path)
+    }
+    names: set[str] = set()
+    for file in files:
+        with contextlib.suppress(Misuse):  # the test tells what is wrong with its world
+            names.update(controllers_in(file))
+    return names
 
 
 @pytest.hookimpl(wrapper=True)

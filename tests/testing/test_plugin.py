@@ -438,6 +438,28 @@ def test_devices_that_cannot_be_meant_are_refused_before_anything_moves(run: Run
     result.stderr.fnmatch_lines([message])
 
 
+def test_a_name_that_no_test_knows_is_refused(run: Run, pytester: pytest.Pytester) -> None:
+    shutil.copy(WORLD, pytester.path)
+    text = """
+        import pytest
+
+        @pytest.mark.steptwin_world("feeder.toml", twin_only=True)
+        def test_feeder(steptwin_world):
+            raise AssertionError
+
+        @pytest.mark.steptwin_world("none.toml")
+        def test_other(steptwin_world):
+            raise AssertionError
+
+        def test_mic(mic488):
+            raise AssertionError
+    """
+    result = run(text, "--device", "mci488=/dev/a", "--device", "m1486=/dev/b")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*--device mci488=/dev/a: no test here has a device of that name: there are drum, *, table"])
+    run(text, "--device", "table=/dev/a", "-k", "feeder").assert_outcomes(skipped=1, deselected=2)
+
+
 def test_a_world_of_several_controllers_asks_which_of_them_is_there(
     run: Run, pytester: pytest.Pytester, serve: Callable[..., Any]
 ) -> None:

@@ -45,6 +45,15 @@ class WorldOptions:
     """Skip the test before it begins where devices stand in the world's place."""
 
 
+def controllers_in(file: Path) -> list[str]:
+    """Names of the controllers in the world that a file describes. Raises `Misuse`."""
+    return _controllers(World.load(file))
+
+
+def _controllers(world: World) -> list[str]:
+    return [spec.name for spec in (*world.spec.mic488, *world.spec.m1486)]
+
+
 class WorldAxis(NamedTuple):
     """The mechanics of an axis at one moment: where it really is."""
 
@@ -74,7 +83,7 @@ class WorldRig(Rig):
         self._addresses: dict[str, str] = {}
         self._channels: dict[str, Channel] = {}
         self._spec = world.spec
-        names = [spec.name for spec in (*world.spec.mic488, *world.spec.m1486)]
+        names = _controllers(world)
         self._given = {name: devices[name] for name in names if name in devices}
         if ANY in devices and not self._given:
             self._given = {names[0]: devices[ANY]} if len(names) == 1 else {ANY: devices[ANY]}
