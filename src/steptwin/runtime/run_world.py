@@ -99,7 +99,7 @@ def _arrange(world: World, options: WorldRun) -> None:
         try:
             check_step(world, step)
         except Misuse as error:
-            raise Misuse(f"--input {given.pin}: {error}") from None
+            raise Misuse(f"--input {name}.{pin}: {error}") from None
         world.at(given.time / SECOND, step, name=f"--input {given.pin}")
     if options.until is not None:
         world.condition(options.until)
