@@ -137,7 +137,7 @@ def run_client(client: Path, server: int, *arguments: object) -> Figures | None:
 def row(name: str, results: dict[str, Figures | None]) -> None:
     cells = [_cell(results[who]) for who in PEERS]
     ratios = [_ratio(results["steptwin"], results[who]) for who in PEERS[1:]]
-    print(f"{name:<17} {'  '.join(cells)}  {' '.join(ratios)}", flush=True)
+    print(f"{name:<22} {'  '.join(cells)}  {' '.join(ratios)}", flush=True)
 
 
 def _cell(figures: Figures | None) -> str:
@@ -170,13 +170,16 @@ def compare_tcp(client: Path, libmodbus: Path, folder: Path, seconds: float, rou
             "libmodbus": (lib_process, lib_port),
             "pymodbus": (py_process, py_port),
         }
-        for connections in (1, 16, 100):
-            for name, (pdu, _) in REQUESTS.items():
-                runs: dict[str, list[Figures | None]] = {who: [] for who in ports}
-                for _ in range(rounds):
-                    for who, (process, port) in ports.items():
-                        runs[who].append(run_client(client, process, "tcp", port, connections, seconds, mbap(pdu).hex()))
-                row(f"tcp {name} ×{connections}", {who: best(r) for who, r in runs.items()})
+        measured = [(f"{name} ×{n}", pdu, n, 1) for n in (1, 16, 100) for name, (pdu, _) in REQUESTS.items()]
+        # What one client reads another need not have computed again, so here they read different things.
+        measured += [(f"FC3x10 ×{n} mixed", REQUESTS["FC3x10"][0], n, 16) for n in (16, 100)]
+        for name, pdu, connections, blocks in measured:
+            runs: dict[str, list[Figures | None]] = {who: [] for who in ports}
+            for _ in range(rounds):
+                for who, (process, port) in ports.items():
+                    arguments = ("tcp", port, connections, seconds, mbap(pdu).hex(), 0, blocks)
+                    runs[who].append(run_client(client, process, *arguments))
+            row(f"tcp {name}", {who: best(r) for who, r in runs.items()})
 
 
 def compare_tty(client: Path, libmodbus: Path, folder: Path, seconds: float, rounds: int) -> None:
@@ -234,7 +237,7 @@ def main() -> None:
             print("Requests per second, p50 and p99 of the answer's time and processor time per request in us;")
             print("then the ratio of requests per second to each peer's, and (of its processor time to ours).")
             print(
-                f"{'':<17} {'steptwin':>31}  {'libmodbus (C, select)':>31}  {'pymodbus (async)':>31}  × libmodbus     × pymodbus"
+                f"{'':<22} {'steptwin':>31}  {'libmodbus (C, select)':>31}  {'pymodbus (async)':>31}  × libmodbus     × pymodbus"
             )
         if "tcp" in options.what:
             compare_tcp(client, libmodbus, folder, options.seconds, options.rounds)

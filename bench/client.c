@@ -5,6 +5,7 @@
  *
  * client tcp PORT CONNECTIONS SECONDS REQUEST_HEX            as fast as answers come
  * client rate PORT CONNECTIONS SECONDS REQUEST_HEX HERTZ     each connection HERTZ times a second
+ * client tcp PORT CONNECTIONS SECONDS REQUEST_HEX 0 BLOCKS   connections read so many different blocks
  * client tty PATH ANSWER_BYTES SECONDS REQUEST_HEX           over a terminal; PATH may be fd:NUMBER, an open one
  *
  * Prints: requests, seconds, p50 us, p99 us.
@@ -89,7 +90,9 @@ static int listen_to(struct connection *c) {
     return c->got >= c->want;
 }
 
-static void tcp(int port, int count, double seconds, const unsigned char *request, int size, double hertz) {
+/* ``blocks`` > 1: connection i reads i % blocks * 2 registers further on, so that not all of them ask for the same. */
+static void tcp(int port, int count, double seconds, const unsigned char *asked, int size, double hertz, int blocks) {
+    unsigned char request[300];
     struct connection *all = calloc((size_t)count, sizeof *all);
     struct epoll_event events[512];
     int ep = epoll_create1(0);
@@ -98,9 +101,11 @@ static void tcp(int port, int count, double seconds, const unsigned char *reques
         struct epoll_event e = {.events = EPOLLIN, .data.u32 = (uint32_t)i};
         epoll_ctl(ep, EPOLL_CTL_ADD, all[i].fd, &e);
     }
+    memcpy(request, asked, (size_t)size);
+#define ASK(i) (request[9] = (unsigned char)(asked[9] + (blocks > 1 ? 2 * ((i) % blocks) : 0)), ask(&all[i], request, size))
     /* Connections that are still being accepted are not what is measured. */
     for (int i = 0; i < count; i++) {
-        ask(&all[i], request, size);
+        ASK(i);
         while (!listen_to(&all[i])) continue;
         all[i].sent = 0;
     }
@@ -109,7 +114,7 @@ static void tcp(int port, int count, double seconds, const unsigned char *reques
     int next = 0;
     for (int i = 0; i < count; i++) {
         if (period) all[i].due = begin + period * (uint64_t)i / (uint64_t)count;
-        else ask(&all[i], request, size);
+        else ASK(i);
     }
     while (now_ns() < end) {
         int wait = 0;
@@ -118,7 +123,7 @@ static void tcp(int port, int count, double seconds, const unsigned char *reques
             uint64_t t = now_ns();
             if (all[next].due > t) { wait = (all[next].due - t) > 2000000 ? 1 : 0; break; }
             struct connection *c = &all[next];
-            if (c->sent == 0) { ask(c, request, size); c->sent = c->due; }
+            if (c->sent == 0) { ASK(next); c->sent = c->due; }
             c->due += period;
             next = (next + 1) % count;
         }
@@ -128,7 +133,7 @@ static void tcp(int port, int count, double seconds, const unsigned char *reques
             if (!listen_to(c)) continue;
             sample(c->sent);
             if (period) c->sent = 0;
-            else ask(c, request, size);
+            else ASK((int)events[i].data.u32);
         }
     }
     report((double)(now_ns() - begin) / 1e9);
@@ -176,6 +181,7 @@ int main(int argc, char **argv) {
     samples = malloc(MOST_SAMPLES * sizeof *samples);
     int size = unhex(argv[5], request);
     if (!strcmp(argv[1], "tty")) tty(argv[2], atoi(argv[3]), atof(argv[4]), request, size);
-    else tcp(atoi(argv[2]), atoi(argv[3]), atof(argv[4]), request, size, argc > 6 ? atof(argv[6]) : 0);
+    else tcp(atoi(argv[2]), atoi(argv[3]), atof(argv[4]), request, size, argc > 6 ? atof(argv[6]) : 0,
+        argc > 7 ? atoi(argv[7]) : 1);
     return 0;
 }
