@@ -75,6 +75,9 @@ def test_rotor_and_load_are_where_a_simulation_has_them(  # noqa: PLR0917
     for now in sorted(looks):
         _, rotor, load = [step for step in way if step[0] <= now][-1]
         assert course.at(now)[:2] == (rotor, load)
+        # What a trace is told, in the pulses of the drive.
+        _, follows, pulses = [said for said in course.carried() if said.begin <= now][-1]
+        assert (pulses + (plan.count(now) if follows else 0)) * sign == load
 
 
 @settings(max_examples=60, deadline=None)

@@ -91,6 +91,8 @@ def write_plot(recording: Recording, path: Path, form: str, progress: Progress) 
             progress(begin + (until - begin) * (i + 1) // (len(axes) + 1))
         if rows:
             _lanes(panels[-1], rows, recording)
+        if not panels:
+            figure.text(left / _WIDTH_IN, 0.5, "nothing moved or changed", color=_FRAME)
         if any(left_out):
             note = f"not shown: {left_out[0]} axes, {left_out[1]} lanes"
             figure.text(1 - _RIGHT_IN / _WIDTH_IN, 0.12 / figure.get_figheight(), note, ha="right", color=_FRAME)
