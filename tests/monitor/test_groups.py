@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 
 import pytest
@@ -37,7 +38,19 @@ def test_without_textual_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
         monitor(None, 5.0)
 
 
-@pytest.mark.parametrize(("device", "hz"), [("tcp://127.0.0.1:1", 0.0), ("tcp://127.0.0.1:1", 50.0), ("nonsense:", 5.0)])
-def test_what_cannot_be_meant_is_refused_before_the_screen_is_taken(device: str, hz: float) -> None:
-    with pytest.raises(Misuse):
+@pytest.mark.parametrize(
+    ("device", "hz", "text"),
+    [
+        ("tcp://127.0.0.1:1", 0.0, "--hz 0: permitted are"),
+        ("tcp://127.0.0.1:1", 50.0, "--hz 50: permitted are"),
+        ("nonsense:", 5.0, "'nonsense:' is no address"),
+        ("tcp://127.0.0.1:1,chip=7", 5.0, "the monitor shows a MIC488; of an M1486 'steptwin watch'"),
+        ("tcp://127.0.0.1:1", 5.0, "the monitor needs a terminal"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_before_the_screen_is_taken(
+    monkeypatch: pytest.MonkeyPatch, device: str, hz: float, text: str
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    with pytest.raises(Misuse, match=text):
         monitor(device, hz)

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
-from steptwin.errors import SteptwinError
+import sys
+
+from steptwin.errors import Misuse, SteptwinError
 
 
 class NoTextual(SteptwinError):
@@ -21,4 +23,7 @@ def monitor(device: str | None, hz: float) -> None:
     from steptwin.monitor.app import Monitor
     from steptwin.monitor.session import session_at
 
-    Monitor(session_at(device, hz)).run()
+    session = session_at(device, hz)
+    if not all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr)):
+        raise Misuse("the monitor needs a terminal to draw on and keys to be pressed; 'steptwin watch' prints lines")
+    Monitor(session).run()

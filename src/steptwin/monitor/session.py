@@ -190,6 +190,8 @@ class _Jogging:
 def session_at(device: str | None, hz: float) -> Session:
     """A session with the controller at an address as `steptwin … --device` takes it. Raises `Misuse`."""
     address = parse_device(device or DEFAULT)
+    if address.kind != "mic488":
+        raise Misuse("the monitor shows a MIC488; of an M1486 'steptwin watch', 'info' and 'terminal' tell")
     mic = AsyncMic488(
         address.place,
         address.unit,

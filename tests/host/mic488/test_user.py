@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import assert_type
+
 import pytest
 from host_rig import Wire, driver
 
@@ -20,6 +22,14 @@ def test_views_of_the_same_registers() -> None:
     assert mic.user.words.read(104) == 0xFFFD
     assert (mic.user.reals.read(100), mic.user.dints.read(102), mic.user.ints.read(104)) == (12.5, -2, -3)
     assert mic.user.words.read_many(100, 5) == [0, 0x4148, 0xFFFE, 0xFFFF, 0xFFFD]
+
+
+def test_numbers_have_their_type() -> None:
+    """`make types` checks this: a blocking view gives what an asynchronous one does."""
+    mic = driver(Wire())
+    assert assert_type(mic.user.words.read(0), int) == 0
+    assert assert_type(mic.user.reals.read(0), float) == 0.0
+    assert assert_type(mic.user.dints.read_many(0, 1), list[int]) == [0]
 
 
 def test_many_values_take_few_frames() -> None:

@@ -5,10 +5,10 @@ Calls may come from any thread. While one waits for the controller, a stop from 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Generic, Self
 
 from steptwin.host.blocking import Blocking, blocking, finish
 from steptwin.host.line import Line
@@ -18,7 +18,7 @@ from steptwin.host.mic488.jog import HOLD_S, AsyncJog
 from steptwin.host.mic488.lines import FRAMES_PER_SECOND, ThreadModbusLine
 from steptwin.host.mic488.motion import MoveEnd
 from steptwin.host.mic488.program import AsyncProgram
-from steptwin.host.mic488.user import AsyncUserRegisters, AsyncUserView
+from steptwin.host.mic488.user import AsyncUserRegisters, AsyncUserView, Number
 from steptwin.host.modbus import Query
 from steptwin.host.threads import ThreadLine
 from steptwin.mic488.config import ControllerConfig
@@ -133,13 +133,29 @@ class Program(Blocking):
     stop = blocking(AsyncProgram.stop)
 
 
-class UserView(Blocking):
+class UserView(Blocking, Generic[Number]):
     """User registers as numbers of one type; see `AsyncUserView`."""
 
-    read = blocking(AsyncUserView.read)
-    read_many = blocking(AsyncUserView.read_many)
-    write = blocking(AsyncUserView.write)
-    write_many = blocking(AsyncUserView.write_many)
+    # `blocking` would lose the type of the numbers.
+    _driver: AsyncUserView[Number]
+
+    def __init__(self, driver: AsyncUserView[Number]) -> None:
+        super().__init__(driver)
+
+    def read(self, number: int) -> Number:
+        """The value at user register ``number``."""
+        return finish(self._driver.read(number))
+
+    def read_many(self, number: int, count: int) -> list[Number]:
+        """``count`` values from user register ``number`` on."""
+        return finish(self._driver.read_many(number, count))
+
+    def write(self, number: int, value: Number) -> None:
+        finish(self._driver.write(number, value))
+
+    def write_many(self, number: int, values: Sequence[Number]) -> None:
+        """Write values from user register ``number`` on, up to 61 DINTs or REALs or 122 others at one moment."""
+        finish(self._driver.write_many(number, values))
 
 
 class UserRegisters(Blocking):
@@ -149,10 +165,10 @@ class UserRegisters(Blocking):
 
     def __init__(self, driver: AsyncUserRegisters) -> None:
         super().__init__(driver)
-        self.words = UserView(driver.words)
-        self.ints = UserView(driver.ints)
-        self.dints = UserView(driver.dints)
-        self.reals = UserView(driver.reals)
+        self.words: UserView[int] = UserView(driver.words)
+        self.ints: UserView[int] = UserView(driver.ints)
+        self.dints: UserView[int] = UserView(driver.dints)
+        self.reals: UserView[float] = UserView(driver.reals)
 
     save = blocking(AsyncUserRegisters.save)
     load = blocking(AsyncUserRegisters.load)
