@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
@@ -77,7 +79,6 @@ def test_what_python_code_did_is_in_the_session_and_the_code_is_not(tmp_path: Pa
 
 def test_requests_of_python_are_in_the_session() -> None:
     def operator() -> Steps:
-        yield do.Wait(SECOND)
         answer = yield do.Request("bus", 1, bytes.fromhex("05 07 d0 ff 00"), SECOND)
         assert answer == bytes.fromhex("05 07 d0 ff 00")
 
@@ -128,6 +129,51 @@ def test_a_world_that_was_stopped_goes_on_from_a_snapshot() -> None:
     assert branch.trace.digest() == world.trace.digest()
 
 
+CHAIN = """
+    [[mic488]]
+    name = "t"
+    [[event]]
+    when = "t.IN3"
+    do = [{ set = { "t.IN4" = 1 } }]
+    [[event]]
+    when = "t.IN4 and not t.IN1"
+    do = [{ note = "IN4 before IN1" }]
+    [[event]]
+    when = "t.IN1 and t.IN2"
+    do = [{ note = "both" }, { set = { "t.IN2" = 0 } }]
+    [[script]]
+    name = "s"
+    steps = [{ wait = "1 s" }, { set = { "t.IN3" = 1 } }, { wait = "2 s" }, { note = "x" }]
+"""
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 3), st.lists(st.tuples(st.sampled_from(["IN1", "IN2", "IN3"]), st.integers(0, 1)), max_size=3)),
+        max_size=6,
+    ),
+    st.lists(st.integers(0, 3), max_size=3),
+)
+def test_what_comes_at_the_nanosecond_of_other_steps_replays(changes: list[Any], pauses: list[int]) -> None:
+    """Scripts from outside come when those of the description have nothing to do at a moment, also in a replay."""
+    world = World.from_toml(CHAIN)
+
+    def pin(name: str, level: int) -> do.Set:
+        return do.Set((("t", name, float(level)),))
+
+    for second, pins in changes:
+        world.at(second, tuple(pin(*one) for one in pins))
+    world.when("t.IN4", pin("IN2", 1))
+    for seconds in pauses:
+        world.run(for_=seconds)
+        world.mic488["t"].set_pin("IN1", 1)
+        world.mic488["t"].set_pin("IN2", 1)
+    world.run(for_=4)
+    session = session_of(world)
+    assert list(session.replay().trace) == list(world.trace)
+    assert session.replay().inputs == world.inputs
+
+
 @pytest.mark.parametrize(
     ("step", "message"),
     [
@@ -155,7 +201,7 @@ def test_what_is_refused_leaves_no_mark(step: Outside, message: str) -> None:
 def test_another_run_has_another_digest() -> None:
     session = session_of(busy())
     world = session.world()
-    for time, what in session.inputs[:-1]:
+    for time, what, _ in session.inputs[:-1]:
         world.advance(time)
         world.outside(what)
     world.run(until=session.until / SECOND)

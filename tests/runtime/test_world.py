@@ -301,6 +301,16 @@ def test_a_request_gives_its_answer_in_the_time_of_the_line() -> None:
 # ---------------------------------------------------------------------- snapshots and branches
 
 
+def test_a_snapshot_of_another_world_is_refused() -> None:
+    snapshot = small().snapshot()
+    small().restore(snapshot)
+    other = small('[[axis.switch]]\nabove = 100.0\nto = "a.IN2"\n')
+    with pytest.raises(Misuse, match="the snapshot is of another world"):
+        other.restore(snapshot)
+    with pytest.raises(Misuse, match="the snapshot is of another world"):
+        World.from_toml("[[mic488]]\nname = 'a'\n").restore(World.from_toml("[[m1486]]\nname = 'a'\n").snapshot())
+
+
 def test_a_snapshot_is_gone_back_to_with_its_scripts() -> None:
     world = small(
         '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1 } }, { repeat = 9, steps = ['

@@ -58,10 +58,12 @@ class Session:
     def replay(self) -> World:
         """The world after all of it. Raises `Misuse` where inputs do not fit the world."""
         world = self.world()
-        for time, what in self.inputs:
+        for time, what, settled in self.inputs:
             if time > self.until:
                 raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")
             _bring(world, time)
+            if settled:
+                world.advance(time)
             world.outside(what)
         _bring(world, self.until)
         world.settle_all()
@@ -103,7 +105,10 @@ def save(session: Session, path: Path) -> None:
         "digest": session.digest,
         "world": session.text,
         "files": {name: b64encode(content).decode() for name, content in session.files.items()},
-        "inputs": [{"time_ns": time, "do": type(what).__name__, **_plain(what)} for time, what in session.inputs],
+        "inputs": [
+            {"time_ns": time, "settled": settled, "do": type(what).__name__, **_plain(what)}
+            for time, what, settled in session.inputs
+        ],
     }
     write_bytes(path, (json.dumps(data, ensure_ascii=False, indent=1) + "\n").encode())
 
@@ -147,11 +152,11 @@ def _value(value: Any) -> Any:
 
 def _given(item: dict[str, Any]) -> Given:
     kind = _STEPS[item["do"]]
-    values = {key: _back(value) for key, value in item.items() if key not in ("time_ns", "do")}
+    values = {key: _back(value) for key, value in item.items() if key not in ("time_ns", "settled", "do")}
     if kind is do.SetFault:
         fault = {key: tuple(value) if isinstance(value, list) else value for key, value in item["fault"].items()}
         values = {"fault": parse({key: value for key, value in fault.items() if value != ""})}
-    return Given(item["time_ns"], kind(**values))  # type: ignore[arg-type]
+    return Given(item["time_ns"], kind(**values), item["settled"])  # type: ignore[arg-type]
 
 
 def _back(value: Any) -> Any:

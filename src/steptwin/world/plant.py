@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from heapq import heappop, heappush
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, NamedTuple, TypeAlias
@@ -22,6 +21,7 @@ from steptwin.wbc.nearmiss import NearMiss
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Outside, act
+from steptwin.world.agenda import Agenda
 from steptwin.world.build import Files, Fitted, Plan, build
 from steptwin.world.contacts import Button
 from steptwin.world.expression import Condition
@@ -49,16 +49,18 @@ MOST_ENCODED = 10_000
 
 
 class Given(NamedTuple):
-    """Something from outside, and when it came."""
+    """Something from outside, and when it came. ``settled``: the scripts of the description had done what they had to do then."""
 
     time: Nanos
     what: Outside
+    settled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class PlantSnapshot:
     """All state of a world at a moment."""
 
+    description: tuple[str, Files]
     now: Nanos
     kernels: tuple[KernelState, ...]
     faults: tuple[tuple[Fault, str, Nanos], ...]
@@ -66,6 +68,7 @@ class PlantSnapshot:
     faults_state: Any
     scripts: tuple[ScriptState, ...]
     inputs: tuple[Given, ...]
+    is_settled: bool
     failures: tuple[Record, ...]
     overdue: tuple[Record, ...]
     trace: Mark
@@ -89,11 +92,13 @@ class Plant:
         """What scripts of the description waited for in vain."""
         self.inputs: list[Given] = []
         """Everything from outside so far."""
+        self._is_settled = False
+        """Whether the scripts of the description have done what they had to do since the last of that."""
         self.encode = encode
         self._encoded: dict[object, tuple[bytes, ...]] = {}
         self._scripts: list[Script] = []
-        self._timed: list[tuple[Nanos, int]] = []
-        self._watching: list[Script] = []
+        self._own, self._guests = Agenda(), Agenda()
+        """The scripts of the description, and those from outside: they come when the others have nothing to do at a moment."""
         self.rigging = Rigging(self.plan)
         for n, fault in enumerate(spec.faults):
             try:
@@ -191,12 +196,10 @@ class Plant:
         raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self.now} ns")
 
     def _wait(self, script: Script, waiting: Waiting) -> None:
-        script.waiting = waiting
-        if waiting.is_timed and waiting.until is not None:
-            heappush(self._timed, (waiting.until, script.number))
-        else:
-            self._watching.append(script)
-            self._watching.sort(key=lambda one: one.number)
+        self._agenda_of(script).add(script, waiting)
+
+    def _agenda_of(self, script: Script) -> Agenda:
+        return self._guests if script.is_outside else self._own
 
     def _waits(self, step: do.Step, script: Script) -> Waiting | None:
         if isinstance(step, do.Wait):
@@ -251,7 +254,8 @@ class Plant:
         """Something comes from outside now: it is done, and remembered for a replay. Refused (`Misuse`), it leaves no mark."""
         check_step(self, what)
         self.perform(what)
-        self.inputs.append(Given(self.now, what))
+        self.inputs.append(Given(self.now, what, self._is_settled))
+        self._is_settled = False
 
     def perform(self, what: Outside) -> None:
         """Do something at the present moment. Raises `Misuse` for what is not there."""
@@ -310,8 +314,11 @@ class Plant:
 
     def next(self) -> Nanos | None:
         """When something happens to a script."""
-        due = self._timed[0][0] if self._timed else None
-        for script in self._watching:
+        return _first(self._due(self._own), self._due(self._guests))
+
+    def _due(self, agenda: Agenda) -> Nanos | None:
+        due = agenda.moment()
+        for script in agenda.watching:
             waiting = script.waiting
             if waiting is None:
                 continue
@@ -336,26 +343,34 @@ class Plant:
         if now < self.now:
             raise TimeReversal(self.now, now)
         rounds, at = 0, -1
-        while (due := self.next()) is not None and due <= (now if self.stopped is None else self.now):
+        while True:
+            own, guests = self._due(self._own), self._due(self._guests)
+            due = _first(own, guests)
+            if due is None or due > (now if self.stopped is None else self.now):
+                break
             self.now = max(due, self.now)
             rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
             if rounds > MOST_STEPS_PER_INSTANT:
                 raise Runaway(f"scripts go round for ever at {self.now} ns")
-            self._run_scripts()
+            if own is not None and own <= self.now:
+                self._run_scripts(self._own)
+            else:
+                self._is_settled = True
+                self._run_scripts(self._guests)
+        self._is_settled = True
         if self.stopped is None:
             self.now = now
 
-    def _run_scripts(self) -> None:
-        while self._timed and self._timed[0][0] <= self.now:
-            _, number = heappop(self._timed)
-            self._resume(self._scripts[number], None)
-        for script in [script for script in self._watching if script.waiting is not None]:
+    def _run_scripts(self, agenda: Agenda) -> None:
+        for script in agenda.take(self.now):
+            self._resume(script, None)
+        for script in [script for script in agenda.watching if script.waiting is not None]:
             waiting = script.waiting
             if waiting is None:
                 continue
             found, value = self._come(waiting)
             if found or (waiting.until is not None and waiting.until <= self.now):
-                self._watching.remove(script)
+                agenda.watching.remove(script)
                 if not found:
                     self._tell_overdue(script, waiting)
                 self._resume(script, value)
@@ -393,7 +408,8 @@ class Plant:
             watch = self.start("until", lambda: do.run_through(steps))
         self.advance(end)
         if watch is not None and not watch.ended:
-            self._forget(watch)
+            watch.ended = True
+            self._own.remove(watch)
         self.settle_all()
         return self.stopped
 
@@ -406,35 +422,34 @@ class Plant:
             if script.waiting is NEXT_RUN:
                 self._wait(script, Waiting(self.now))
 
-    def _forget(self, script: Script) -> None:
-        script.ended = True
-        script.waiting = None
-        self._watching = [one for one in self._watching if one is not script]
-        self._timed = [entry for entry in self._timed if entry[1] != script.number]
-
     # ------------------------------------------------------------------ snapshots
 
     def snapshot(self) -> PlantSnapshot:
         """Everything at the present moment."""
         self.settle_all()
         return PlantSnapshot(
+            self._description(),
             self.now,
             tuple(kernel.snapshot() for kernel in self.kernels),
             tuple((active.fault, active.name, active.since) for active in self.plan.faults.active),
             self.plan.faults.copy_state(),
             tuple(script.state() for script in self._scripts),
             tuple(self.inputs),
+            self._is_settled,
             tuple(self.failures),
             tuple(self.overdue),
             self.trace.mark(),
         )
+
+    def _description(self) -> tuple[str, Files]:
+        return self.spec.text.source.text, self.files
 
     def restore(self, snapshot: PlantSnapshot) -> None:
         """Go on where a snapshot of this world, or of one with the same description, was taken.
 
         Raises `Misuse` for a snapshot of another world.
         """
-        if [len(state.machines) for state in snapshot.kernels] != [len(kernel.machines) for kernel in self.kernels]:
+        if snapshot.description != self._description():
             raise Misuse("the snapshot is of another world")
         self.now = snapshot.now
         self.stopped = None
@@ -442,9 +457,9 @@ class Plant:
         self.rigging.put_back(snapshot.faults, snapshot.faults_state)
         for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
             kernel.restore(state)
-        self.inputs = list(snapshot.inputs)
+        self.inputs, self._is_settled = list(snapshot.inputs), snapshot.is_settled
         self.failures, self.overdue = list(snapshot.failures), list(snapshot.overdue)
-        self._scripts, self._timed, self._watching = [], [], []
+        self._scripts, self._own, self._guests = [], Agenda(), Agenda()
         for number, state in enumerate(snapshot.scripts):
             script = Script(number, state.name, state.make, is_outside=state.is_outside)
             self._scripts.append(script)
@@ -457,3 +472,7 @@ class Plant:
                 continue
             condition = None if state.condition is None else self.condition(state.condition)
             self._wait(script, Waiting(state.until, condition, None if state.answer is None else self.lines[state.answer]))
+
+
+def _first(one: Nanos | None, other: Nanos | None) -> Nanos | None:
+    return other if one is None else one if other is None else min(one, other)
