@@ -31,7 +31,12 @@ def export(
         Path | None, typer.Option("--output", "-o", help="File or directory; default: beside the trace, named alike.")
     ] = None,
     begin: Annotated[str, typer.Option("--from", metavar="TIME", help="Where to begin: 9.5, 500ms, 2min.")] = "0",
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="Where to end. Default: the end of the run; of pictures, shortly after the last change.")] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME", help="Where to end. Default: the end of the run; of pictures, shortly after the last change."
+        ),
+    ] = None,
     machine: Annotated[list[str] | None, typer.Option(help="Only this machine; may be given more than once.")] = None,
     period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
 ) -> None:
