@@ -11,7 +11,7 @@ from chip_rig import ChipWire, chip_line, chip_task_line, run_in
 
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.host import Overtaken
-from steptwin.host.m1486 import M1486, AsyncM1486, ChipReason
+from steptwin.host.m1486 import M1486, AsyncM1486, ChipReason, PositionUnknown
 from steptwin.machine import MILLISECOND, SECOND
 
 KNOWN = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
@@ -135,3 +135,129 @@ def test_a_chip_without_address_is_alone() -> None:
     M1486(line, 7)
     with pytest.raises(Misuse, match="a chip without address has to be the only one on its line"):
         M1486(line)
+
+
+# ---------------------------------------------------------------------- why each move ended
+
+
+def moving(wire: ChipWire, *steps: float) -> list[M1486]:
+    """Drivers of the chips, each told to move so far."""
+    line = chip_line(wire)
+    chips = [M1486(line, address) for address in wire.chips]
+    for chip in chips:
+        chip.open()
+        chip.configure(**KNOWN)
+    for chip, distance in zip(chips, steps, strict=True):
+        chip.move_by(distance)
+    return chips
+
+
+def limit(wire: ChipWire, address: int) -> Callable[[], None]:
+    return lambda: wire.chips[address].set_pin("LIMIT", 0, wire.now)
+
+
+@pytest.mark.parametrize("kind", ["A", "B"])
+@pytest.mark.parametrize("stopped", [0, 7])
+@pytest.mark.parametrize("after", [0.05, 0.5, 1.2, 1.7])
+def test_each_of_two_moves_says_why_it_ended(kind: str, stopped: int, after: float) -> None:
+    """The same move of both, so that their ends are as close as can be; LIMIT stops one of them."""
+    wire = ChipWire(kind, (0, 7))
+    chips = moving(wire, 2000.0, -2000.0)
+    wire.at(after, limit(wire, stopped))
+    ends = {chip.address: chip.wait(check=False) for chip in chips}
+    assert ends[stopped].reason is ChipReason.EARLY, ends
+    assert ends[7 - stopped].reason is ChipReason.TARGET, ends
+    assert abs(wire.true(7 - stopped)) == 128_000
+    assert chips[0].counter() == 128_000  # M-16: what it was told
+
+
+@pytest.mark.parametrize("after", [0.3, 1.5])
+def test_moves_of_different_length_say_why_they_ended_whoever_is_waited_for_first(after: float) -> None:
+    """The short one ends while the long one is waited for."""
+    wire = ChipWire("B", (1, 2, 3))
+    chips = moving(wire, 4000.0, 1900.0, 1500.0)
+    wire.at(after, limit(wire, 2))
+    ends = [chip.wait(check=False) for chip in chips]
+    assert [end.reason for end in ends] == [ChipReason.TARGET, ChipReason.EARLY, ChipReason.TARGET]
+    with pytest.raises(PositionUnknown):
+        chips[1].position()
+    assert (chips[0].position(), chips[2].position()) == (4000.0, 1500.0)
+
+
+@pytest.mark.parametrize("kind", ["C", "E1"])
+@pytest.mark.parametrize("stopped", [(1, 2, 3), (), (2,), (1, 3)])
+def test_three_at_once(kind: str, stopped: tuple[int, ...]) -> None:
+    """E types take half a second for whatever they are told or asked."""
+    wire = ChipWire(kind, (1, 2, 3))
+    chips = moving(wire, 30_000.0, 30_000.0, 30_000.0)
+    for address in stopped:
+        wire.at(1.0, limit(wire, address))
+    ends = [chip.wait(check=False) for chip in chips]
+    assert [end.reason is ChipReason.EARLY for end in ends] == [address in stopped for address in (1, 2, 3)]
+    assert all(end.reason in (ChipReason.EARLY, ChipReason.TARGET) for end in ends)
+    for address in stopped:
+        wire.chips[address].set_pin("LIMIT", 1, wire.now)
+    for chip in chips:
+        chip.move_by(-10.0)
+    assert [chip.wait().reason for chip in chips] == [ChipReason.TARGET] * 3
+
+
+def test_tasks_that_wait_for_their_chips_are_told_why_each_ended() -> None:
+    """A third chip is used meanwhile: the line is kept from it only where a move is about to end."""
+    wire = ChipWire("B", (0, 7, 9))
+    line = chip_task_line(wire)
+    ends = {}
+    asked = [0]
+
+    async def use(address: int) -> None:
+        chip = AsyncM1486(line, address)
+        await chip.open()
+        await chip.configure(**KNOWN)
+        await chip.move_by(4000.0)
+        ends[address] = await chip.wait(check=False)
+
+    async def ask() -> None:
+        chip = AsyncM1486(line, 9)
+        await chip.open()
+        while len(ends) < 2:
+            assert await chip.counter() == 0
+            asked[0] += 1
+            await asyncio.sleep(0.05)
+
+    async def main() -> None:
+        await line.open()
+        wire.at(2.0, limit(wire, 7))
+        await asyncio.gather(use(0), use(7), ask())
+        await line.close()
+
+    run_in(wire, main())
+    assert (ends[0].reason, ends[7].reason) == (ChipReason.TARGET, ChipReason.EARLY)
+    assert asked[0] > 5
+
+
+def test_a_chip_that_is_late_or_stopped_does_not_hold_up_the_others() -> None:
+    wire = ChipWire("B", (0, 7, 9))
+    chips = moving(wire, 2000.0, 2500.0, 3000.0)
+    wire.at(1.0, limit(wire, 0))
+    wire.sleep(1.2)
+    chips[1].stop()
+    ends = [chip.wait(check=False) for chip in chips]
+    assert [end.reason for end in ends] == [ChipReason.EARLY, ChipReason.STOPPED, ChipReason.TARGET]
+
+
+def test_a_chip_held_by_limit_is_overdue_and_the_other_arrives() -> None:
+    """Function 51 OFF: its program stands still until LIMIT is high again."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = [M1486(line, 0), M1486(line, 7)]
+    for chip in chips:
+        chip.open()
+        chip.configure(**KNOWN)
+    chips[0].set_function(51, False)
+    for chip in chips:
+        chip.move_by(1000.0)
+    wire.at(0.5, limit(wire, 0))
+    assert chips[0].wait(check=False).reason is ChipReason.OVERDUE
+    assert chips[1].wait(check=False).reason is ChipReason.TARGET
+    wire.chips[0].set_pin("LIMIT", 1, wire.now)
+    assert chips[0].counter() == 64_000

@@ -200,7 +200,10 @@ async def begin(
         if kind is ChipMotion.BLOCK:
             notes.settings = ChipSettings()
             unit.talk.uploads = bytearray()
-        notes.motion = Told(kind, unit.line.now(), notes.stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0))
+        # What an E type is told it does when it has written it.
+        notes.motion = Told(
+            kind, unit.line.now() + unit.write_ns, notes.stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0)
+        )
 
     notes.motion = None
     try:

@@ -456,7 +456,8 @@ class AsyncM1486:
         """Wait until the chip has done what it was told, and say why a motion ended.
 
         Without ``timeout_s`` the time is computed from the motion where all its settings are known, else it is a minute. With
-        other chips on the line it is left to them for the computed time; a wait of unknown length keeps it, but for stops.
+        other chips on the line it is left to them until shortly before the computed end, and the ends of their moves are watched
+        too; a wait of unknown length keeps it, but for stops.
         Raises `ChipMoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
         reported as the end.
         """

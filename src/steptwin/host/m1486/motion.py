@@ -43,7 +43,7 @@ class ChipMotion(enum.Enum):
     BLOCK = "a block of commands"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Told:
     """A motion a chip was told. ``target_u``: the counter after it, where that is known (minimum microsteps)."""
 
@@ -54,6 +54,8 @@ class Told:
     duration_s: float | None = None
     spoilt: int = 0
     """Lines the chip was made to drop before."""
+    over_at: Nanos | None = None
+    """When its end was seen."""
 
     def is_over(self, now: Nanos) -> bool:
         """Whether it has ended for certain, although nobody has looked."""

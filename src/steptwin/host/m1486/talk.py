@@ -11,7 +11,7 @@ Commands are typed in lower case, so that no echo looks like the type letter of 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from steptwin.errors import Misuse
 from steptwin.host.exchange import More
@@ -43,6 +43,7 @@ class Sort(enum.Enum):
     SELECT = "only the selection of the chip"
     KILL = "at once, with its CR; the echo is looked at afterwards"
     LISTEN = "nothing is said: an answer is owed"
+    LETTER = "nothing is said: letters are owed by several chips"
     BLIND = "said to chips that do not echo yet; nobody waits for an answer"
 
 
@@ -105,7 +106,10 @@ class CharacterTalk:
         """How many lines each chip was made to drop: that ends a program of its (M-11)."""
         self.uploads: bytearray | None = None
         """What a program in a chip uploads, while one may run."""
-        self._surplus = 0  # type letters that may come although nobody waits for them any more
+        self.letters: int | None = None
+        """Letters that came, whosever they are, while several chips are watched (`steptwin.host.m1486.watching`)."""
+        self.surplus = 0
+        """Type letters that may come although nobody waits for them any more."""
         self.dirty = False
         """Whether characters of a command that was given up may lie in front of the next one."""
         self.nearly_full = False
@@ -120,9 +124,13 @@ class CharacterTalk:
     wary = True
 
     def allowance_ns(self, request: Say) -> Nanos:
-        if request.sort is Sort.LISTEN:
+        if request.sort in (Sort.LISTEN, Sort.LETTER):
             return 0
         return self._serial.duration(2 * len(request.text) + 16)
+
+    def wire_ns(self, characters: int) -> Nanos:
+        """Time that characters take on the line."""
+        return self._serial.duration(characters)
 
     def knows(self, address: int | None) -> bool:
         return address in self.echoing
@@ -139,7 +147,16 @@ class CharacterTalk:
 
     def settle(self, address: int | None) -> None:
         """The chip has answered: what it still owes comes right now or was lost."""
-        self._surplus += self.owed.pop(address, 0)
+        self.surplus += self.owed.pop(address, 0)
+
+    def end_watch(self, owed: Mapping[int | None, int], surplus: int) -> None:
+        """Letters are again those of the only chip that owes one: what each owes, and how many come that nobody waits for."""
+        self.letters = None
+        self.surplus += surplus
+        for address, count in owed.items():
+            self.owed.pop(address, None)
+            if count:
+                self.owed[address] = count
 
     # ------------------------------------------------------------------ saying
 
@@ -153,7 +170,7 @@ class CharacterTalk:
         spoiler = [SPOILER] if self.dirty else []
         text = request.text.encode("ascii")
         match request.sort:
-            case Sort.LISTEN:
+            case Sort.LISTEN | Sort.LETTER:
                 request.committed = True
                 return self._put(b"", now)
             case Sort.BLIND:
@@ -202,6 +219,9 @@ class CharacterTalk:
     def _take(self, request: Say, byte: int, rest: bytes, now: Nanos) -> bytes | More | None:
         if request.sort is Sort.LISTEN:
             return self._take_owed(request, byte)
+        if request.sort is Sort.LETTER:
+            came = sum(self._absorb(one) for one in (byte, *rest) if one in LETTERS)
+            return self._done(bytes((byte,))) if came else None
         if self._sent.startswith(self._heard) and len(self._heard) < len(self._sent):
             return self._echo(request, byte, rest, now)
         # All has come back, and an answer is waited for.
@@ -245,13 +265,15 @@ class CharacterTalk:
 
     def _absorb(self, letter: int) -> bool:
         """A type letter has come that is not the answer waited for; whether one was to be expected."""
-        if self.owed:
+        if self.letters is not None and self.owed:
+            self.letters += 1
+        elif self.owed:
             address = next(iter(self.owed))
             self.came[address] = letter
             self.settle(address)
-            self._surplus -= 1
-        elif self._surplus:
-            self._surplus -= 1
+            self.surplus -= 1
+        elif self.surplus:
+            self.surplus -= 1
         else:
             return False
         return True
@@ -306,7 +328,7 @@ class CharacterTalk:
         if request is not None and request.sort is not Sort.BLIND:
             self.dirty = True
             if request.text == WHO and request.committed:
-                self._surplus += 1
+                self.surplus += 1
             if self._lines and self._lines[0].startswith(b"x") and self._sent == _END:
                 self.selected = ALL  # a selection that may have been taken or not
                 self.echoing.clear()
@@ -320,7 +342,7 @@ class CharacterTalk:
         if request is None:
             return b""
         awaits_answer = request.committed and request.answers and not self._sent and not self._lines
-        if request.sort is Sort.LISTEN or request.sort is Sort.BLIND or awaits_answer:
+        if request.sort in (Sort.LISTEN, Sort.LETTER, Sort.BLIND) or awaits_answer:
             self._done(b"")
             return b""
         self._give_up(now)

@@ -29,6 +29,8 @@ STOP_TRIES = 5
 """How often a stop is said before it is given up."""
 PAUSES_NS: tuple[Nanos, ...] = (40 * MILLISECOND, 1300 * MILLISECOND)
 """Time for ``t41`` to be done; the other is for chips that write commands into an EEPROM."""
+WAKE_COMMANDS = 5
+"""What `Unit.wake` has typed when all goes well, and a question."""
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Whoever listens for an answer that is owed lets a stop go first this often."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
@@ -99,6 +101,11 @@ class Unit:
     def is_alone(self) -> bool:
         """Whether no driver of another chip is on the line."""
         return len(self.line.notes["m1486 chips"]) == 1
+
+    @property
+    def write_ns(self) -> Nanos:
+        """What an EEPROM takes for a command; 0 where there is none, or nobody knows."""
+        return 0 if self.notes.variant is None else self.notes.variant.write_ns
 
     @property
     def variant(self) -> Variant:
@@ -237,9 +244,9 @@ class Unit:
         raise failure
 
     def _patience(self, answers: bool) -> Nanos:
-        """An answer may have to wait for the EEPROM, of a chip whose type is not known for several commands."""
+        """An answer may have to wait for the EEPROM, of a chip whose type is not known for all that `wake` has typed."""
         variant = self.notes.variant
-        write_ns = 3 * max(one.write_ns for one in VARIANTS) if variant is None else variant.write_ns
+        write_ns = WAKE_COMMANDS * max(one.write_ns for one in VARIANTS) if variant is None else variant.write_ns
         return self.timeout_ns + write_ns if answers else self.timeout_ns
 
     def checked(self, text: str) -> str:
@@ -259,17 +266,29 @@ class Unit:
         """The type letter, once the chip has done all it was told; None if it has not within ``patience_ns`` or a time-out."""
         patience_ns = max(patience_ns, self._patience(True))
         if not self.talk.owes(self.address):
-            await self._ask()
+            await self.ask()
         letter = await self._listen(patience_ns)
         if letter is None and self.talk.owes(self.address) == 1:
-            await self._ask()  # the answer may have been lost
+            await self.ask()  # the answer may have been lost
             letter = await self._listen(self._patience(True))
         if letter is not None:
+            await self._hear_rest()
             self.notes.is_killed = False
             self.talk.uploads = None
         return letter
 
-    async def _ask(self) -> None:
+    async def _hear_rest(self) -> None:
+        """A chip that was asked twice answers twice: the second letter must not be taken for what it is asked next."""
+        talk = self.talk
+        if talk.surplus:
+            listening = Say(self.address, WHO, sort=Sort.LISTEN, acts=False)
+            with suppress(NoAnswer):
+                while talk.surplus:
+                    await self._exchange(listening, timeout_ns=self._patience(True))
+            talk.surplus = 0  # lost, or of a chip that is asked no more
+
+    async def ask(self) -> None:
+        """Ask for the type letter, which comes when the chip has done all it was told."""
         self.talk.came.pop(self.address, None)
         await self.say(WHO)
 
@@ -285,6 +304,11 @@ class Unit:
                 if self.line.now() >= limit:
                     return talk.came.pop(self.address, None)
         return talk.came.pop(self.address)
+
+    async def hear_letter(self, patience_ns: Nanos) -> None:
+        """Listen for a letter that any chip owes (`CharacterTalk.letters`)."""
+        with suppress(NoAnswer):
+            await self._exchange(Say(self.address, WHO, sort=Sort.LETTER, acts=False), timeout_ns=patience_ns)
 
     async def rest(self) -> None:
         """Raises `Busy` unless the chip has done all it was told, `WrongType` if it is another one."""

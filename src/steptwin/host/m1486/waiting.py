@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from steptwin.errors import LineFailure, Misuse
-from steptwin.host.m1486.motion import EARLY, EARLY_S, MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
+from steptwin.host.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
 from steptwin.host.m1486.unit import SLICE_NS, Unit
+from steptwin.host.m1486.watching import early_ns, watch
 from steptwin.machine import SECOND, Nanos
 
 
@@ -26,23 +27,23 @@ async def wait_for(
         return ChipMoveEnd(unit.address, reason, position, unit_name, seconds, detail, cause)
 
     limit = begin + round((_time_out_s(unit, motion) if timeout_s is None else timeout_s) * SECOND)
-    is_watched = unit.is_alone
     try:
-        if motion is not None and motion.duration_s is not None and not is_watched:
-            await _sleep_until(unit, min(limit, motion.at + round(motion.duration_s * SECOND)), motion)
+        if motion is not None and not unit.is_alone:
+            await watch(unit, motion, limit)
         async with unit.turn():
-            letter = await unit.asks_who(max(limit - unit.line.now(), SLICE_NS))
-            over_at = unit.line.now()
-            if letter is None:
-                is_stopped = motion is not None and motion.stops != notes.stops
-                return ended(ChipReason.STOPPED if is_stopped else ChipReason.OVERDUE, None, unit.why_busy())
+            if motion is None or motion.over_at is None:
+                letter = await unit.asks_who(max(limit - unit.line.now(), SLICE_NS))
+                if letter is None:
+                    is_stopped = motion is not None and motion.stops != notes.stops
+                    return ended(ChipReason.STOPPED if is_stopped else ChipReason.OVERDUE, None, unit.why_busy())
+            over_at = unit.line.now() - unit.write_ns if motion is None or motion.over_at is None else motion.over_at
             counter = await unit.read_number(1, rests=True)
             notes.motion = None
     except LineFailure as failure:
         if check:
             raise
         return ended(ChipReason.COMMUNICATION, None, str(failure), failure)
-    reason, detail = _reason(unit, motion, counter, over_at if is_watched else None)
+    reason, detail = _reason(unit, motion, counter, over_at)
     if reason is ChipReason.DIVERTED and motion is not None and motion.target_u is not None:
         detail = f"the target was {shown(motion.target_u):g} {unit_name}"
     if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
@@ -58,17 +59,11 @@ def _time_out_s(unit: Unit, motion: Told | None) -> float:
     return UNKNOWN_S if motion.duration_s is None else MARGIN * motion.duration_s + MARGIN_S
 
 
-async def _sleep_until(unit: Unit, moment: Nanos, motion: Told) -> None:
-    """Leave the line to others, unless the chip is stopped meanwhile."""
-    while (rest := moment - unit.line.now()) > 0 and motion.stops == unit.notes.stops:
-        await unit.line.sleep(min(rest, 2 * SLICE_NS) / SECOND)
-
-
 _ENDS = {ChipMotion.ENDLESS: ChipReason.LIMIT, ChipMotion.SEEK: ChipReason.SOUGHT}
 
 
-def _reason(unit: Unit, motion: Told | None, counter: int, over_at: Nanos | None) -> tuple[ChipReason, str]:
-    """Why it ended, and more of it. ``over_at`` is the moment of its end where that was watched."""
+def _reason(unit: Unit, motion: Told | None, counter: int, over_at: Nanos) -> tuple[ChipReason, str]:
+    """Why it ended, and more of it. ``over_at``: when it was seen to have ended."""
     if motion is None:
         return ChipReason.REST, ""
     if motion.stops != unit.notes.stops:
@@ -80,8 +75,6 @@ def _reason(unit: Unit, motion: Told | None, counter: int, over_at: Nanos | None
         return _ENDS[motion.kind], ""
     if motion.target_u is not None and counter != motion.target_u:
         return ChipReason.DIVERTED, ""
-    if over_at is not None and motion.duration_s is not None:
-        took_s = (over_at - motion.at) / SECOND
-        if took_s < EARLY * motion.duration_s - EARLY_S:
-            return ChipReason.EARLY, f"after {took_s:.2f} s of {motion.duration_s:.2f} s"
+    if motion.duration_s is not None and over_at < early_ns(motion):
+        return ChipReason.EARLY, f"after at most {(over_at - motion.at) / SECOND:.2f} s of {motion.duration_s:.2f} s"
     return ChipReason.TARGET, ""
