@@ -107,6 +107,12 @@ def test_a_run_ends_at_a_moment_a_duration_or_a_condition() -> None:
     assert world.run(until="idle") == "idle"
     assert world.axis["x"].position == 60.0
     assert world.run(until="b.IN3", for_=5) is None
+    assert world.run(until=90, for_=1) is None
+    assert world.run(until=90.5, for_=60) is None
+    assert world.time == 90.5
+    for moment, message in ((90, r"until 90 s: this world is at 90\.5 s already"), (float("nan"), "nan is no time")):
+        with pytest.raises(Misuse, match=message):
+            world.run(until=moment)
     with pytest.raises(Misuse, match="run needs until or for_"):
         world.run()
 
@@ -299,6 +305,22 @@ def test_a_request_gives_its_answer_in_the_time_of_the_line() -> None:
 
 
 # ---------------------------------------------------------------------- snapshots and branches
+
+
+@pytest.mark.parametrize(
+    ("step", "values"),
+    [
+        (do.Wait, [0.5]),
+        (do.Wait, [-1]),
+        (do.At, [1.0]),
+        (do.Until, ["idle", 2.0]),
+        (do.Press, ["go", 0.1]),
+        (do.Request, ["bus", 1, b"", 0.5]),
+    ],
+)
+def test_steps_take_whole_nanoseconds(step: Any, values: list[Any]) -> None:
+    with pytest.raises(Misuse, match="steps take whole nanoseconds"):
+        step(*values)
 
 
 def test_a_snapshot_of_another_world_is_refused() -> None:

@@ -63,6 +63,30 @@ def wrong(text: str) -> str:
         (TABLE + "[[event]]\nat = 1\ndo = [{ until = 'a >' }]\n", "condition 'a >' ends too early"),
         (TABLE + '[[line]]\nname = "bus"\n', "w.toml:3:1: error D009: nothing is on this line"),
         (TABLE + 'line = "bus"\n[[line]]\nname = "bus"\nkind = "m1486"\n', "'table' cannot be on a line of kind m1486"),
+        (
+            "x = " + "[" * 3000 + "]" * 3000,
+            "w.toml:1:1: error D001: this is no TOML of a world: tables and lists are nested too deeply",
+        ),
+        (TABLE + '[fault]\nkind = "crc"\n', "w.toml:3:1: error D002: [fault] stands once"),
+        ('fault = ["crc"]\n' + TABLE, "w.toml:1:1: error D002: [[fault]] is 'crc'"),
+        (
+            TABLE + '[[source]]\nto = "table.AIN1"\nkind = "ramp"\nover = 1\nrepeat = 0\n',
+            "w.toml:7:1: error D003: [source]: repeat: 0",
+        ),
+        (
+            TABLE + '[[source]]\nto = "table.AIN1"\nperiod = "0 s"\n',
+            "w.toml:5:1: error D003: [source]: period: '0 s': must be more than",
+        ),
+        (TABLE + "[[event]]\nevery = 0\ndo = []\n", "w.toml:4:1: error D003: [event]: every: 0: must be more than 0"),
+        (TABLE + 'config = "no.cfg"\n', "w.toml:1:1: error D009: the content of the file 'no.cfg' is not given"),
+        (TABLE + 'program = "no.prg"\n', "w.toml:1:1: error D009: the content of the file 'no.prg' is not given"),
+        (TABLE + TABLE.replace("table", "Table"), "w.toml:4:1: error D006: 'Table' is taken by [[mic488]] 'table'"),
+        (AXIS.replace('"x"', '"table"'), "w.toml:4:1: error D006: 'table' is taken by [[mic488]] 'table'"),
+        (
+            TABLE + '[[button]]\nname = "Idle"\nto = "table.IN1"\n',
+            "w.toml:4:1: error D006: 'Idle' is a signal: choose another name",
+        ),
+        (TABLE.replace("table", "world"), "w.toml:2:1: error D006: 'world' is what events of the whole world are recorded under"),
         ("[[fault]]\nkind = 'crcc'\n", "kind = 'crcc': permitted are"),
     ],
 )
@@ -124,13 +148,20 @@ def test_keys_of_nested_tables_have_their_lines() -> None:
 
 @pytest.mark.parametrize(
     ("value", "nanoseconds"),
-    [("5 ms", 5 * MILLISECOND), ("1.5s", SECOND * 3 // 2), (2, 2 * SECOND), (0.25, SECOND // 4), ("10 min", 600 * SECOND)],
+    [
+        ("5 ms", 5 * MILLISECOND),
+        ("1.5s", SECOND * 3 // 2),
+        (2, 2 * SECOND),
+        (0.25, SECOND // 4),
+        ("10 min", 600 * SECOND),
+        (1e-5, 10_000),
+    ],
 )
 def test_durations(value: object, nanoseconds: int) -> None:
     assert duration(value) == nanoseconds
 
 
-@pytest.mark.parametrize("value", ["", "ms", "5 parsec", "-1 s", True, None, "9999 h", [1]])
+@pytest.mark.parametrize("value", ["", "ms", "5 parsec", "-1 s", True, None, "9999 h", [1], -1e-5, float("inf"), float("nan")])
 def test_what_is_no_duration_is_misuse(value: object) -> None:
     with pytest.raises(ValueError, match=r"is no time|is too long"):
         duration(value)

@@ -65,6 +65,8 @@ SIGNALS = {
         ("m.M1.position > -4.2e1", True),
         ("a != b", True),
         ("NOT b AND a", True),
+        ("b < .5 and " + "(" * 64 + "a" + ")" * 64, True),
+        (" and ".join(["not not (a)"] * 100), True),
     ],
 )
 def test_conditions(text: str, truth: bool) -> None:
@@ -85,6 +87,8 @@ def test_conditions(text: str, truth: bool) -> None:
         ("not", "ends too early"),
         ("a < and", "found 'and', expected a signal or a number"),
         ("- a", "found 'a', expected a number"),
+        ("not " * 3000 + "a", "'not' and parentheses are nested more than 64 deep"),
+        ("(" * 3000 + "a" + ")" * 3000, "'not' and parentheses are nested more than 64 deep"),
     ],
 )
 def test_what_is_no_condition_is_misuse(text: str, message: str) -> None:

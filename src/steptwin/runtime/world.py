@@ -98,13 +98,18 @@ class World(Plant):
     ) -> str | None:
         """Run ``for_`` a time, or ``until`` a moment (seconds) or a condition (text, such as ``"idle"``) for an hour at most.
 
+        With both it is whichever comes first. Raises `Misuse` for a moment that has passed.
+
         Gives the condition, or the reason of a script, that ended the run before its time; else None. ``watch`` is told how far
         it is.
         """
         end = self.now + (LONGEST_RUN_NS if for_ is None else duration(for_))
         condition = until if isinstance(until, str) else None
         if isinstance(until, int | float):
-            end = round(until * SECOND)
+            moment = duration(until)
+            if moment < self.now:
+                raise Misuse(f"until {until:g} s: this world is at {self.time:g} s already")
+            end = moment if for_ is None else min(moment, end)
         elif until is None and for_ is None:
             raise Misuse("run needs until or for_: a moment, a condition, or a duration")
         if watch is silent:

@@ -133,14 +133,18 @@ class _Builder:
             self._told(chip.path, partial(self._add_machine, chip, self._m1486))
 
     def _add_machine(self, spec: Mic488Spec | M1486Spec, make: Callable[..., Mic488 | M1486]) -> None:
-        if spec.name in self.plan.machines or any(spec.name == line.name for line in self.spec.lines):
-            raise Misuse(f"{spec.name!r} is the name of something else")
         machine = make(spec)
         self.plan.machines[spec.name] = machine
         machine.on_event = partial(_record_event, self.plan.record, spec.name)
 
+    def _data(self, name: str) -> bytes:
+        found = self.files.get(name)
+        if found is None:
+            raise Misuse(f"the content of the file {name!r} is not given with the description")
+        return found
+
     def _text(self, name: str) -> str:
-        data = self.files[name].removeprefix(b"\xef\xbb\xbf")
+        data = self._data(name).removeprefix(b"\xef\xbb\xbf")
         try:
             return data.decode()
         except UnicodeDecodeError:
@@ -154,7 +158,7 @@ class _Builder:
     def _mic488(self, spec: Mic488Spec) -> Mic488:
         base = ControllerConfig()
         if spec.config is not None:
-            file = IniFile.parse(self.files[spec.config], spec.config)
+            file = IniFile.parse(self._data(spec.config), spec.config)
             base, found = examine_config(file, spec.firmware)
             if any(finding.severity is Severity.ERROR for finding in found):
                 raise ConfigError(file.source, found)

@@ -11,6 +11,7 @@ from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, ControllerConf
 from steptwin.mic488.config import Key as ConfigKey
 from steptwin.mic488.registers import AXES
 from steptwin.world.faults import Fault, parse
+from steptwin.world.names import check_names
 from steptwin.world.reader import Key, Path, Text, read_table
 from steptwin.world.script import Step, read_steps
 from steptwin.world.spec import (
@@ -53,6 +54,7 @@ def read_world(name: str, text: str) -> WorldSpec:
         faults=tuple(_faults(toml)),
         text=toml,
     )
+    check_names(spec)
     toml.check()
     return spec
 
@@ -177,7 +179,14 @@ def _steps(toml: Text, path: Path, table: Mapping[str, Any]) -> tuple[Step, ...]
 
 def _faults(toml: Text) -> list[Fault]:
     found: list[Fault] = []
-    for n, table in enumerate(toml.data.get("fault", [])):
+    tables = toml.data.get("fault", [])
+    if not isinstance(tables, list):
+        toml.wrong(("fault",), "D002", "[fault] stands once", "expected [[fault]], for there may be several")
+        tables = []
+    for n, table in enumerate(tables):
+        if not isinstance(table, Mapping):
+            toml.wrong(("fault", n), "D002", f"[[fault]] is {table!r}", "expected a table")
+            continue
         try:
             found.append(parse(table, "[[fault]]"))
         except Misuse as error:

@@ -15,7 +15,10 @@ _DURATION = re.compile(r"(\d+(?:\.\d+)?) *([a-z]*)\Z", re.ASCII)
 
 def duration(value: object) -> Nanos:
     """Nanoseconds of a text or of a number of seconds. Raises `Misuse` with what is permitted."""
-    text = f"{value}" if isinstance(value, int | float) and not isinstance(value, bool) else value
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < float("inf"):
+        text: object = f"{Decimal(str(value)):f}"
+    else:
+        text = value
     match = _DURATION.match(text.strip().lower()) if isinstance(text, str) else None
     unit = UNITS.get(match[2] or "s") if match else None
     if match is None or unit is None:

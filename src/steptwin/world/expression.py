@@ -23,9 +23,12 @@ from steptwin.machine import Nanos
 FARTHEST_NS: Nanos = 1 << 55
 """What lies more than a year ahead is never."""
 
+MOST_NESTED = 64
+"""Nobody writes deeper conditions, and reading them is recursive."""
+
 _COMPARE: dict[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][\w&-]*(?:\.[\w&-]+)*)|(?P<sign>[=!<>]=|[<>()-])|(?P<wrong>\S))"
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][\w&-]*(?:\.[\w&-]+)*)|(?P<sign>[=!<>]=|[<>()-])|(?P<wrong>\S))"
 )
 
 
@@ -100,6 +103,7 @@ class _Parser:
         self._text = text
         self._tokens = [(m.lastgroup or "", m[m.lastgroup or 0], m.start(m.lastgroup or 0)) for m in _TOKEN.finditer(text)]
         self._at = 0
+        self._depth = 0
 
     def whole(self) -> Node:
         node = self._condition()
@@ -135,12 +139,12 @@ class _Parser:
         return parts[0] if len(parts) == 1 else Both(tuple(parts))
 
     def _negation(self) -> Node:
-        if self._accept("not"):
-            return Not(self._negation())
-        if self._accept("("):
-            node = self._condition()
-            if not self._accept(")"):
-                raise self._wrong("')'")
+        if self._peek().lower() in ("not", "("):
+            self._depth += 1
+            if self._depth > MOST_NESTED:
+                raise Misuse(f"condition {self._text[:40]!r}...: 'not' and parentheses are nested more than {MOST_NESTED} deep")
+            node = self._nested()
+            self._depth -= 1
             return node
         left = self._operand()
         if self._peek() in _COMPARE:
@@ -150,6 +154,15 @@ class _Parser:
         if isinstance(left, Number):
             raise self._wrong(f"one of {' '.join(_COMPARE)}")
         return Comparison(left, "!=", Number(0.0))
+
+    def _nested(self) -> Node:
+        if self._accept("not"):
+            return Not(self._negation())
+        self._accept("(")
+        node = self._condition()
+        if not self._accept(")"):
+            raise self._wrong("')'")
+        return node
 
     def _operand(self) -> Number | Name:
         minus = self._accept("-")

@@ -52,6 +52,9 @@ class Text:
             message = str(error).split(" (at ")[0]
             self.wrong_at(Span(start, min(start + 1, len(text))), "D001", f"this is no TOML: {message}")
             raise self.error() from None
+        except RecursionError:
+            self.wrong_at(Span(0, 0), "D001", "this is no TOML of a world: tables and lists are nested too deeply")
+            raise self.error() from None
         self._spans = _spans(text)
 
     def wrong_at(self, span: Span, code: str, message: str, hint: str | None = None) -> None:
@@ -264,6 +267,13 @@ def word(*words: str) -> Callable[[Any], str]:
 
 def time_value(value: Any) -> int:
     return duration(value)
+
+
+def positive_time(value: Any) -> int:
+    found = duration(value)
+    if found == 0:
+        raise Misuse(f"{value!r}: must be more than 0")
+    return found
 
 
 def pair(value: Any) -> tuple[float, float]:

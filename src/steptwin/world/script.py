@@ -1,4 +1,5 @@
-"""What operators do: steps, one after another. A script is a generator of steps, which are plain values.
+"""What operators do: steps, one after another. A script is a generator of steps, which are plain values. Their times are whole
+nanoseconds: ``Wait(SECOND // 2)``, or ``Wait(duration("500 ms"))`` with `steptwin.world.durations`.
 
 A generator is sent what a step gives: for `Read` a number, for `Request` the answer (bytes), for `Until` whether the condition
 came true in time. It touches nothing by itself, so that it can be restored by sending it the same again.
@@ -29,11 +30,20 @@ from steptwin.world.reader import (
 )
 
 
+def _check_ns(value: object) -> None:
+    """`Misuse` unless a time of a step is whole nanoseconds; the rest of the interface takes seconds."""
+    if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
+        raise Misuse(f"{value!r}: steps take whole nanoseconds, such as SECOND // 2, or duration('500 ms')")
+
+
 @dataclass(frozen=True, slots=True)
 class Wait:
     """Nothing for so long."""
 
     duration: Nanos
+
+    def __post_init__(self) -> None:
+        _check_ns(self.duration)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +52,9 @@ class At:
 
     time: Nanos
 
+    def __post_init__(self) -> None:
+        _check_ns(self.time)
+
 
 @dataclass(frozen=True, slots=True)
 class Until:
@@ -49,6 +62,9 @@ class Until:
 
     condition: str
     within: Nanos | None = None
+
+    def __post_init__(self) -> None:
+        _check_ns(self.within)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +80,9 @@ class Press:
 
     button: str
     duration: Nanos | None = None
+
+    def __post_init__(self) -> None:
+        _check_ns(self.duration)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +113,9 @@ class Request:
     unit: int
     pdu: bytes
     within: Nanos
+
+    def __post_init__(self) -> None:
+        _check_ns(self.within)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,20 @@ from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import MILLISECOND
 from steptwin.mic488.registers import FIRMWARES
 from steptwin.wire.rtu import MAX_UNIT
-from steptwin.world.reader import Key, flag, name_value, number, pair, pin_name, points, text_value, time_value, whole, word
+from steptwin.world.reader import (
+    Key,
+    flag,
+    name_value,
+    number,
+    pair,
+    pin_name,
+    points,
+    positive_time,
+    text_value,
+    time_value,
+    whole,
+    word,
+)
 
 _positive = number(0.0, above=True)
 _not_negative = number(0.0)
@@ -151,13 +164,13 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(number(), "begin", "ramp: volts at first", 0.0),
         _optional(number(), "end", "ramp: volts in the end", 0.0),
         _optional(time_value, "over", "ramp: how long it takes", 0, "ramp_time"),
-        _optional(time_value, "repeat", "begins anew after this time"),
-        _optional(time_value, "period", "how often the voltage is renewed", 10 * MILLISECOND),
+        _optional(positive_time, "repeat", "begins anew after this time"),
+        _optional(positive_time, "period", "how often the voltage is renewed", 10 * MILLISECOND),
     ),
     "event": (
         _optional(name_value, "name", "for the trace"),
         _optional(time_value, "at", "when"),
-        _optional(time_value, "every", "again and again"),
+        _optional(positive_time, "every", "again and again"),
         _optional(text_value, "when", "a condition, such as 'x.position > 100'"),
         _optional(flag, "once", "only the first time the condition comes true", False),
     ),

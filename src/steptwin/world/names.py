@@ -1,0 +1,34 @@
+"""Names in a description: what conditions, scripts and people at the shell call by the same kind of name must differ."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from steptwin.world.spec import WorldSpec
+
+RESERVED = {
+    "time": "a signal",
+    "idle": "a signal",
+    "world": "what events of the whole world are recorded under",
+    "and": "a word of conditions",
+    "or": "a word of conditions",
+    "not": "a word of conditions",
+}
+"""Names that mean something already."""
+
+
+def check_names(spec: WorldSpec) -> None:
+    """Tell names of lines, machines, axes and buttons that hide each other. Case does not tell them apart, at the shell."""
+    text = spec.text
+    taken: dict[str, str] = {}
+    for one in (*spec.lines, *spec.mic488, *spec.m1486, *spec.axes, *spec.buttons):
+        path = (*one.path, "name")
+        kind = one.path[0]
+        key = one.name.lower()
+        owner = f"[[{kind}]] {one.name!r}"
+        if key in RESERVED:
+            text.wrong(path, "D006", f"{one.name!r} is {RESERVED[key]}: choose another name")
+        elif key in taken and taken[key] != owner:  # the very same is told already
+            text.wrong(path, "D006", f"{one.name!r} is taken by {taken[key]}", "upper and lower case are the same here")
+        taken.setdefault(key, owner)
