@@ -20,11 +20,12 @@ LONGEST_LINE = 256
 UPLOADS_WAITING = 1000
 """Bytes announced and not seen on the line: they may have been lost there."""
 
-_TOLD = {
+REPORTS = {
     NO_ROOM: "no room in the input buffer: a character is lost",
     EMPTY: "the input buffer is empty",
     THREE_FREE: "three places are free in the input buffer",
 }
+"""What chips say by themselves."""
 
 
 class CharacterLog:
@@ -54,8 +55,8 @@ class CharacterLog:
             for _ in range(upload):
                 self._uploads.popleft()  # lost on the line
             return f"{self._uploads.popleft()[1]} = {byte}"
-        if byte in _TOLD:
-            return _TOLD[byte]
+        if byte in REPORTS:
+            return REPORTS[byte]
         if byte > 0x7F:
             return f"{chr(~byte & 0xFF)!r} inverted: it took one of the last three places of the input buffer"
         return f"echo of {chr(byte)!r}"

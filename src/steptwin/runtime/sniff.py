@@ -14,21 +14,26 @@ from steptwin.errors import LineFailure, Misuse
 from steptwin.host.mic488.frames import FrameWords
 from steptwin.host.mic488.listening import RtuListener, TcpListener
 from steptwin.host.place import Place
+from steptwin.m1486.receiver import CR
 from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.registers import register_map
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.frames import FrameLine
 from steptwin.runtime.links import Port
-from steptwin.runtime.m1486_characters import CharacterLog, LineSplitter
+from steptwin.runtime.m1486_characters import REPORTS, CharacterLog, LineSplitter
 from steptwin.runtime.pty import PtyLink
 from steptwin.runtime.tcp import Address, Clients, TcpLink
 from steptwin.wire.slave import Direction
 from steptwin.world.kernel import Kernel
 
 Sink = Callable[[FrameLine], None]
+QUIET_NS: Nanos = 100 * MILLISECOND
+"""After this silence of the chips nothing belongs to what they have said before."""
+MOST_TYPED = 4096
+"""Characters whose echo is waited for: far more than an input buffer holds."""
 ARROWS = {Direction.IN: "→", Direction.OUT: "←"}
 
 
@@ -65,7 +70,8 @@ class ModbusDecoder:
 class M1486Decoder:
     """Commands and answers of M1486 chips. On one wire everything is taken for commands.
 
-    The first byte that comes after a command U is taken for what it uploads.
+    The bytes of the chips do not say what they are. What repeats the characters typed, in their order and to the CR, is their
+    echo (function 41); else what comes after a command U is taken for what it uploads.
     """
 
     def __init__(self, sink: Sink, kind: str) -> None:
@@ -73,31 +79,78 @@ class M1486Decoder:
         self._log = CharacterLog(variant(kind))
         self._log.sinks.append(self._told)
         self._lines = LineSplitter(self._log, "")
-        self._uploads: deque[int] = deque()
+        self._typed: deque[int] = deque(maxlen=MOST_TYPED)  # whose echo may come
+        self._count = 0  # of all characters typed
+        self._uploads: deque[tuple[int, int]] = deque()  # numbers, with the count of characters up to their CR
+        self._repeated = b""  # what came and repeats what was typed
+        self._repeated_ns: Nanos = 0
 
     def _told(self, line: FrameLine) -> None:
         upload = re.match(rb"\s*[Uu]\s*(\d+)\s*\r", line.raw) if line.direction is Direction.IN else None
         if upload is not None:
-            self._uploads.append(int(upload[1]))
+            self._uploads.append((int(upload[1]), self._count))
         self._sink(line)
 
     def heard(self, data: bytes, now: Nanos, direction: Direction | None) -> None:
-        if direction is Direction.OUT:
-            for byte in data:
-                if self._uploads:
-                    number = self._uploads.popleft()
-                    meaning = f"U{number} {UPLOADS.get(number, 'reserved')} = {byte}"
-                    self._sink(FrameLine(now, "", Direction.OUT, bytes((byte,)), meaning))
-                else:
-                    self._log.sent(now, byte)
+        for byte in data:
+            if direction is Direction.OUT:
+                self._came(byte, now)
+                continue
+            if direction is Direction.IN:
+                self._typed.append(byte)
+                self._count += 1
+            self._lines.take(bytes((byte,)), now)
+
+    def _came(self, byte: int, now: Nanos) -> None:
+        if not self._uploads and byte in self._typed:
+            while byte != self._typed[0]:
+                self._typed.popleft()  # typed before function 41 was ON
+        if self._typed and byte == self._typed[0]:
+            self._typed.popleft()
+            self._repeated += bytes((byte,))
+            self._repeated_ns = now
+            if byte == CR:
+                self._is_echo()
+            return
+        self._settle()
+        if self._uploads:
+            self._is_upload(byte, now)
+        elif self._typed and byte not in REPORTS and byte < 0x80:
+            typed = chr(self._typed.popleft())
+            meaning = f"{chr(byte)!r} where {typed!r} was typed: a garbled echo, or that of several chips at once"
+            self._sink(FrameLine(now, "", Direction.OUT, bytes((byte,)), meaning))
         else:
-            self._lines.take(data, now)
+            self._log.sent(now, byte)
+
+    def _settle(self) -> None:
+        """Nothing more repeats what was typed."""
+        if self._uploads:
+            for byte in self._repeated:
+                self._is_upload(byte, self._repeated_ns)
+            self._repeated = b""
+        elif self._repeated:
+            self._is_echo()
+
+    def _is_echo(self) -> None:
+        echo, self._repeated = self._repeated, b""
+        self._sink(FrameLine(self._repeated_ns, "", Direction.OUT, echo, f"echo of {echo.decode('latin-1')!r}"))
+
+    def _is_upload(self, byte: int, now: Nanos) -> None:
+        if not self._uploads:
+            self._log.sent(now, byte)
+            return
+        number, count = self._uploads.popleft()
+        while len(self._typed) > self._count - count:
+            self._typed.popleft()  # an echo would have come before
+        meaning = f"U{number} {UPLOADS.get(number, 'reserved')} = {byte}"
+        self._sink(FrameLine(now, "", Direction.OUT, bytes((byte,)), meaning))
 
     def deadline(self) -> Nanos | None:
-        return None
+        return self._repeated_ns + QUIET_NS if self._repeated else None
 
     def expire(self, now: Nanos) -> None:
-        """Lines end by their CR only."""
+        if self._repeated and now >= self._repeated_ns + QUIET_NS:
+            self._settle()
 
 
 class _Between:
