@@ -56,7 +56,10 @@ def wrong(text: str) -> str:
             "table.IN1 is driven already, from line 7",
         ),
         (AXIS + "[axis.motor]\ntorque = [[1, 1]]\n", "w.toml:7:1: error D003: a torque curve begins at 0 rev/min"),
-        (AXIS + 'unit = "degree"\n[axis.motor]\nmass = 1\ntorque = [[0, 1]]\n', "mass and forces need a unit of mm, cm, m"),
+        (
+            AXIS + 'unit = "degree"\npitch = 1\n[axis.motor]\nmass = 1\ntorque = [[0, 1]]\n',
+            "mass and forces need a unit of mm, cm, m",
+        ),
         (TABLE + "[[event]]\ndo = []\n", "an event needs one of at, every and when"),
         (TABLE + '[[event]]\nat = "5 sec"\ndo = []\n', "w.toml:4:1: error D003: [event]: at: '5 sec' is no time"),
         (TABLE + "[[event]]\nat = 1\ndo = [{ wiat = 1 }]\n", "step 1 has 'wiat'; did you mean 'wait'?"),

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
-from math import floor
 
 from steptwin.diagnostics import Diagnostic, Severity, Source, render
 from steptwin.errors import Misuse
@@ -21,7 +20,6 @@ from steptwin.mic488.device import Mic488
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
 from steptwin.mic488.program import LoadedProgram, load
-from steptwin.motion.trig import PI
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
@@ -36,15 +34,14 @@ from steptwin.world.faults import Faults
 from steptwin.world.kernel import Kernel, PinName, Wire
 from steptwin.world.lines import ChipLine, Line, ModbusLine, timing_of
 from steptwin.world.mechanics import EncoderBuild, Mechanism, RotorMark
-from steptwin.world.motor import Motor
 from steptwin.world.reader import Path
+from steptwin.world.scale import Scale, motor_of, scale_of
 from steptwin.world.sources import Constant, Sine, Table, Waveform
 from steptwin.world.sources import Source as AnalogSource
-from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, MotorSpec, SourceSpec, WorldSpec
+from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, SourceSpec, WorldSpec
 from steptwin.world.trace import Record, Recorder
 
 DEFAULT_BAUD = 38400
-METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0}
 
 Files = Mapping[str, bytes]
 """Contents of the files a description names."""
@@ -57,14 +54,10 @@ class Fitted:
     spec: AxisSpec
     kernel: Kernel
     mechanism: Mechanism
-    pulses_per_unit: Fraction
-
-    def pulses(self, units: float) -> int:
-        """The pulse nearest to a position."""
-        return floor(Fraction(units) * self.pulses_per_unit + Fraction(1, 2))
+    scale: Scale
 
     def units(self, pulses: int) -> float:
-        return float(pulses / self.pulses_per_unit)
+        return float(pulses / self.scale.pulses_per_unit)
 
 
 @dataclass(slots=True)
@@ -304,15 +297,15 @@ class _Builder:
         if taken:
             raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
         kernel = plan.kernel_of[machine]
-        scale = self._scale(spec, number)
-        pulses = partial(_nearest, scale)
+        scale = scale_of(spec, plan.machines[machine], number)
+        pulses = scale.nearest
         build = Build(
             sign=-1 if spec.inverted else 1,
             zero=pulses(spec.start),
             low=None if spec.travel is None else pulses(spec.travel[0]),
             high=None if spec.travel is None else pulses(spec.travel[1]),
             play=pulses(spec.backlash),
-            motor=None if spec.motor is None else _motor(spec, spec.motor, scale),
+            motor=None if spec.motor is None else motor_of(spec.motor, spec.kind, scale),
         )
         mechanism = Mechanism(kernel, machine, number, build, spec.name)
         kernel.add_part(mechanism)
@@ -339,17 +332,6 @@ class _Builder:
             )
             kernel.add_part(part)
 
-    def _scale(self, spec: AxisSpec, number: int) -> Fraction:
-        """Pulses per unit of an axis; without any, those the controller is told."""
-        if spec.pulses_per_unit is not None:
-            return Fraction(spec.pulses_per_unit)
-        if spec.pitch is not None:
-            return Fraction(spec.pulses_per_rev) / Fraction(str(spec.pitch))
-        machine = self.plan.machines[spec.drive[0]]
-        if isinstance(machine, Mic488):
-            return Fraction(machine.axes[number - 1].gear)
-        return Fraction(spec.pulses_per_rev, 1 if spec.unit == "rev" else 360) if spec.kind == "rotary" else Fraction(1)
-
     def _fit_encoder(self, spec: AxisSpec) -> None:
         plan = self.plan
         fitted = plan.axes.get(spec.name)
@@ -374,9 +356,9 @@ class _Builder:
             turned = other
         counts: Fraction | None = None
         if encoder.counts_per_unit is not None:
-            counts = Fraction(str(encoder.counts_per_unit)) / turned.pulses_per_unit
+            counts = Fraction(str(encoder.counts_per_unit)) / turned.scale.pulses_per_unit
         elif encoder.counts_per_rev is not None:
-            counts = Fraction(encoder.counts_per_rev, turned.spec.pulses_per_rev)
+            counts = Fraction(encoder.counts_per_rev, turned.scale.pulses_per_rev)
         if encoder.slip:
             if counts is None:
                 own = machine.axes[mechanism.number - 1].encoder
@@ -386,8 +368,8 @@ class _Builder:
         numerator, denominator = (None, 1) if counts is None else (counts.numerator, counts.denominator)
         turned.mechanism.fit(EncoderBuild(machine, mechanism.number, on_load, numerator, denominator), now)
         if encoder.index:
-            low = fitted.pulses(encoder.offset)
-            period = spec.pulses_per_rev
+            low = fitted.scale.nearest(encoder.offset)
+            period = fitted.scale.pulses_per_rev
             target = self._input((spec.drive[0], f"IN{index_input(mechanism.number - 1) + 1}"), (*encoder.path, "index"))
             zone = Zone(low, low + encoder.index_width - 1, 0, period)
             fitted.kernel.add_part(Switch(fitted.kernel, RotorMark(turned.mechanism), zone, target))
@@ -432,10 +414,6 @@ def _record_event(record: Recorder, machine: str, event: object) -> None:
     record(Record(event.time, machine, "event", event.code, event.text))  # type: ignore[attr-defined]
 
 
-def _nearest(scale: Fraction, units: float) -> int:
-    return floor(Fraction(str(units)) * scale + Fraction(1, 2))
-
-
 def _setup(config: ControllerConfig) -> Setup:
     return Setup(
         gears=tuple(axis.gear for axis in config.axes),
@@ -453,27 +431,6 @@ def _image(text: str, name: str, kind: Variant) -> bytes:
     if kind.store is not Store.EEPROM:
         raise Misuse(f"program: {kind.title} forgets its program when it is switched off; send it over the line")
     return image_of(parsed.program, kind)
-
-
-def _motor(spec: AxisSpec, motor: MotorSpec, scale: Fraction) -> Motor:
-    """Torques at the motor; speeds and accelerations in pulses."""
-    per_rev = float(spec.pulses_per_rev)
-    arm = 0.0
-    if spec.kind == "linear" and (motor.mass or motor.force or motor.friction_force):
-        metres = METRES.get(spec.unit)
-        if metres is None:
-            raise Misuse(f"motor: mass and forces need a unit of {', '.join(METRES)}, not {spec.unit!r}")
-        # Metres per radian of the motor.
-        arm = per_rev / float(scale) * metres / (2.0 * PI)
-    inertia = motor.inertia + motor.mass * arm * arm
-    return Motor(
-        curve=tuple((speed / 60.0 * per_rev, torque) for speed, torque in motor.torque),
-        inertia=inertia * 2.0 * PI / per_rev,
-        friction=motor.friction + motor.friction_force * arm,
-        load=motor.load + motor.force * arm,
-        start_p=None if motor.start_speed is None else motor.start_speed / 60.0 * per_rev,
-        period_p=max(1, round(4 * per_rev / motor.full_steps)),
-    )
 
 
 def _waveform(spec: SourceSpec) -> Waveform:

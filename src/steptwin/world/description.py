@@ -141,8 +141,6 @@ def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec
                 toml.wrong((*path, "motor", "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
     if row["pulses_per_unit"] is not None and row["pitch"] is not None:
         toml.wrong((*path, "pitch"), "D007", "pulses_per_unit and pitch exclude each other")
-    if row["unit"] is None:
-        row["unit"] = "mm" if row["kind"] == "linear" else "degree"
     if row["travel"] is not None and not row["travel"][0] <= row["start"] <= row["travel"][1]:
         toml.wrong((*path, "start"), "D007", f"start = {row['start']:g} is outside travel = {list(row['travel'])}")
     return AxisSpec(**row, switches=tuple(switches), encoder=encoder, motor=motor)

@@ -97,7 +97,7 @@ class MotorSpec:
     load: float
     force: float
     start_speed: float | None
-    full_steps: int
+    full_steps: int | None
     path: Path = ()
 
 
@@ -106,10 +106,10 @@ class AxisSpec:
     name: str
     drive: tuple[str, str]
     kind: str
-    unit: str
+    unit: str | None
     pulses_per_unit: float | None
     pitch: float | None
-    pulses_per_rev: int
+    pulses_per_rev: int | None
     inverted: bool
     travel: tuple[float, float] | None
     start: float

@@ -101,10 +101,12 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         Key("name", name_value, "how scripts and conditions name it"),
         Key("drive", pin_name, "what drives it: MACHINE.M1 to M4 of a MIC488, MACHINE.M1 of an M1486"),
         _optional(word("linear", "rotary"), "kind", "linear or rotary", "linear"),
-        _optional(text_value, "unit", "unit of its positions: mm, cm, m, degree, rev, or anything"),
-        _optional(_positive, "pulses_per_unit", "pulses (M1486: minimum microsteps) per unit"),
+        _optional(text_value, "unit", "unit of its positions: mm, cm, m, degree, rev, or anything; default that of its scale"),
+        _optional(
+            _positive, "pulses_per_unit", "pulses (M1486: minimum microsteps) per unit; else by pitch, by revolution, by gear"
+        ),
         _optional(_positive, "pitch", "units per motor revolution, instead of pulses_per_unit"),
-        _optional(whole(1, 10_000_000), "pulses_per_rev", "pulses per motor revolution", 3200),
+        _optional(whole(1, 10**7), "pulses_per_rev", "pulses per motor revolution; default mot_resol; M1486: 64 × full_steps"),
         _optional(flag, "inverted", "whether positive pulses go down", False),
         _optional(pair, "travel", "[low, high]: hard stops"),
         _optional(number(), "start", "where it stands when the world begins", 0.0),
@@ -139,7 +141,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(number(), "load", "constant N·m; positive pulls towards lower positions", 0.0),
         _optional(number(), "force", "constant N on a linear axis; positive pulls towards lower positions", 0.0),
         _optional(_not_negative, "start_speed", "rev/min it starts with at once and is caught at; default any, caught at rest"),
-        _optional(whole(4, 10_000), "full_steps", "full steps per revolution", 200),
+        _optional(whole(4, 10_000), "full_steps", "full steps per revolution; default 200"),
     ),
     "wire": (
         Key("from", pin_name, "the output: MACHINE.PIN", attribute="source"),

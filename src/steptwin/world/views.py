@@ -214,7 +214,7 @@ class AxisView:
 
     @property
     def unit(self) -> str:
-        return self._fitted.spec.unit
+        return self._fitted.scale.unit
 
     @property
     def position(self) -> float:

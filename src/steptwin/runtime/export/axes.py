@@ -106,5 +106,5 @@ def axis_views(machines: Mapping[str, object], axes: Mapping[str, Fitted] = NOTH
 def _mechanics(fitted: Fitted) -> Mechanics:
     spec, build = fitted.spec, fitted.mechanism.build
     slips = spec.encoder is not None and spec.encoder.slip != 0.0
-    scale = build.sign * float(fitted.pulses_per_unit)
-    return Mechanics(spec.name, spec.unit, scale, build.sign * build.zero, build.ideal and not slips)
+    scale = build.sign * float(fitted.scale.pulses_per_unit)
+    return Mechanics(spec.name, fitted.scale.unit, scale, build.sign * build.zero, build.ideal and not slips)
