@@ -214,13 +214,54 @@ def test_another_run_has_another_digest() -> None:
         ("{", "is no session of a world"),
         ("[]", "is no session of a world"),
         ('{"steptwin_session": 99}', "is a session of format 99: this version reads 1"),
-        ('{"steptwin_session": 1}', "is no session of a world"),
+        ('{"steptwin_session": 1}', "is no session of a world: 'until_ns' is missing"),
+        ("[" * 100_000, "is no session of a world: it is nested too deeply"),
     ],
 )
 def test_what_is_no_session_is_misuse(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "s.json"
     path.write_text(text)
     with pytest.raises(Misuse, match=message):
+        load(path)
+
+
+def put(**levels: object) -> dict[str, object]:
+    return {"time_ns": 5, "settled": True, "do": "Set"} | levels
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"until_ns": "5"}, "until_ns is '5'"),
+        ({"until_ns": 6e9}, "until_ns is 6000000000.0"),
+        ({"until_ns": 10**30}, "until_ns is 10+: permitted are 0 to"),
+        ({"name": 5}, "name is 5"),
+        ({"world": 5}, "world is 5"),
+        ({"files": []}, r"files is \[\]"),
+        ({"firmware": {"table": 5}}, "firmware of table is 5"),
+        ({"inputs": 5}, "inputs is 5"),
+        ({"inputs": [5]}, "an input is 5"),
+        ({"inputs": [put(time_ns="5", levels=[])]}, "time_ns is '5'"),
+        ({"inputs": [put(time_ns=-1, levels=[])]}, "not in order"),
+        ({"inputs": [put(time_ns=7, levels=[]), put(levels=[])]}, "not in order"),
+        ({"inputs": [put(do="Call")]}, "'Call' is missing"),
+        ({"inputs": [put(level=3)]}, "unexpected keyword argument 'level'"),
+        ({"inputs": [put(levels=5)]}, "levels of Set is 5"),
+        ({"inputs": [put(levels=[[5, 5, 5]])]}, "levels of Set is"),
+        ({"inputs": [put(levels=[["t", "IN1"]])]}, "levels of Set is"),
+        ({"inputs": [put(levels=[["t", "IN1", "x"]])]}, "levels of Set is"),
+        ({"inputs": [put(do="Expect", condition=5)]}, "condition of Expect is 5"),
+        ({"inputs": [put(do="SetFault", fault=5)]}, "fault of SetFault is 5"),
+        ({"inputs": [put(do="Press", button="b", duration=0.5)]}, "duration of Press is 0.5"),
+    ],
+)
+def test_a_damaged_session_is_misuse(tmp_path: Path, change: dict[str, Any], message: str) -> None:
+    path = tmp_path / "s.json"
+    whole = {"steptwin_session": 1, "version": "0", "name": "n", "seed": 0, "firmware": {}, "until_ns": 9, "digest": ""}
+    path.write_text(json.dumps(whole | {"world": "", "files": {}, "inputs": [put(levels=[["t", "IN1", 1]])]}))
+    load(path)
+    path.write_text(json.dumps(whole | {"world": "", "files": {}, "inputs": []} | change))
+    with pytest.raises(Misuse, match=rf"s\.json is no session of a world: .*{message}"):
         load(path)
 
 
