@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import socket
 import subprocess
@@ -15,7 +16,8 @@ import pytest
 import serial
 
 from steptwin.errors import LineFailure
-from steptwin.host import Mic488
+from steptwin.host import AsyncMic488, Mic488
+from steptwin.host.m1486 import M1486, M1486Line
 
 READ_POSITION = bytes.fromhex("01 03 27 24 00 02 8E B4")
 AT_ZERO = bytes.fromhex("01 03 04 00 00 00 00 FA 33")
@@ -108,6 +110,40 @@ def test_ser2net_passes_the_port_on(serve: Callable[..., Any], ser2net: Callable
         passed_on.baudrate = 19200
         passed_on.write(READ_POSITION)
         assert passed_on.read(len(AT_ZERO)) == AT_ZERO
+
+
+def test_our_drivers_use_a_port_of_ser2net(serve: Callable[..., Any], ser2net: Callable[[str, str], None]) -> None:
+    """It does not confirm SET-MODEMSTATE-MASK."""
+    twin = serve("--demo")
+    port = free_port()
+    ser2net(f"telnet(rfc2217),tcp,127.0.0.1,{port}", f"serialdev,{twin.pty.resolve()},9600n81,local")
+    address = f"rfc2217://127.0.0.1:{port}"
+    with connected(address) as mic:
+        mic.user.words.write_many(0, [0xFFFF, 0x00FF] * 10)
+
+    async def read() -> list[int]:
+        async with AsyncMic488(address, timeout_s=2.0) as mic:
+            return await mic.user.words.read_many(0, 4)
+
+    assert asyncio.run(read()) == [0xFFFF, 0x00FF, 0xFFFF, 0x00FF]
+
+
+@pytest.mark.peers
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")
+def test_chips_behind_a_port_are_talked_to_by_pyserial_and_by_our_driver(serve_m1486: Callable[..., Any]) -> None:
+    """They speak unasked: what U uploads comes when a move has ended."""
+    twin = serve_m1486("--variant", "B", "--chain", "0,7", "--rfc2217", "127.0.0.1:0")
+    address = f"rfc2217://127.0.0.1:{network_port(twin)}"
+    with serial.serial_for_url(address, 4800, timeout=20) as port:
+        port.write(b"x7\rf16320\rr\ru1\r")
+        assert port.read(1) == bytes([16320 & 0xFF])
+    with M1486Line(address) as line:
+        chip = M1486(line, 7)
+        chip.open()
+        assert chip.counter() == 16320
+        chip.move_by(-255.0)
+        assert chip.wait().ok
+        assert chip.counter() == 0
 
 
 def opened(address: str) -> serial.Serial:

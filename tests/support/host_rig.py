@@ -314,7 +314,8 @@ class MemoryTransport(asyncio.Transport):
         self._loop.call_soon(self._protocol.connection_lost, error)
 
     def close(self) -> None:
-        self._closed = True
+        if not self._closed:
+            self.lose()
         if self._timer is not None:
             self._timer.cancel()
 

@@ -18,7 +18,7 @@ from steptwin.host.exchange import LineLost
 from steptwin.wire.line import SerialLine
 
 if TYPE_CHECKING:
-    from serialx import BaseSerial
+    from serialx import BaseSerial, BaseSerialTransport
 
 CONNECT_S = 3.0
 MODBUS_PORT = 502
@@ -186,11 +186,20 @@ class SerialEndpoint:
     def __str__(self) -> str:
         return self.device
 
+    @property
+    def is_network(self) -> bool:
+        return self.device.startswith("rfc2217://")
+
     def open(self) -> Channel:
         import serialx
 
         try:
-            port = serialx.serial_for_url(self.device, self.baud)
+            if self.is_network:
+                from steptwin.host.rfc2217 import NetworkSerial
+
+                port: BaseSerial = NetworkSerial(self.device, self.baud)
+            else:
+                port = serialx.serial_for_url(self.device, self.baud)
             port.open()
         except (OSError, serialx.SerialException, ValueError) as error:
             raise self._failed(error) from error
@@ -200,8 +209,13 @@ class SerialEndpoint:
         import serialx
 
         loop = asyncio.get_running_loop()
+        kind: type[BaseSerialTransport] | None = None
+        if self.is_network:
+            from steptwin.host.rfc2217 import NetworkSerialTransport
+
+            kind = NetworkSerialTransport
         try:
-            transport, _ = await serialx.create_serial_connection(loop, make, self.device, self.baud)
+            transport, _ = await serialx.create_serial_connection(loop, make, self.device, self.baud, transport_cls=kind)
         except (OSError, serialx.SerialException, ValueError) as error:
             raise self._failed(error) from error
         return cast(asyncio.Transport, transport)

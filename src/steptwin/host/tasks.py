@@ -11,6 +11,9 @@ from steptwin.host.exchange import A, Exchanger, Job, LineLost, Q
 from steptwin.host.place import Endpoint, reason
 from steptwin.machine import SECOND, Nanos
 
+CLOSE_S = 1.0
+"""How long the other end is given for the end of a connection."""
+
 
 class TaskLine(Generic[Q, A]):
     """See `steptwin.host.line.Line`. It belongs to one event loop."""
@@ -21,6 +24,8 @@ class TaskLine(Generic[Q, A]):
         self._engine = exchanger
         self._loop: asyncio.AbstractEventLoop | None = None
         self._transport: asyncio.Transport | None = None
+        self._connection: _Connection | None = None
+        self._ended = asyncio.Event()  # set when that is no more
         self._opening: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._timer_ns: Nanos = 0
@@ -47,7 +52,9 @@ class TaskLine(Generic[Q, A]):
             await self._open()
 
     async def _open(self) -> None:
-        transport = await self._endpoint.connect(lambda: _Connection(self))
+        connection = self._connection = _Connection(self)
+        self._ended.clear()
+        transport = await self._endpoint.connect(lambda: connection)
         self._loop = asyncio.get_running_loop()
         if self._closed:
             transport.abort()
@@ -120,6 +127,8 @@ class TaskLine(Generic[Q, A]):
         self._run()
 
     def lost(self, connection: _Connection, error: Exception | None) -> None:
+        if connection is self._connection:
+            self._ended.set()
         if self._transport is not connection.transport:
             return
         self._transport = None
@@ -145,7 +154,12 @@ class TaskLine(Generic[Q, A]):
         transport, self._transport = self._transport, None
         if transport is not None:
             transport.close()
-            await asyncio.sleep(0)
+            try:
+                # A network serial port first hears from its server that all has gone out.
+                async with asyncio.timeout(CLOSE_S):
+                    await self._ended.wait()
+            except TimeoutError:
+                transport.abort()
         error = LineLost(f"the line {self.place} was closed")
         self._engine.lost(error)
         self._engine.fail_all(error)
