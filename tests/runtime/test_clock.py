@@ -56,3 +56,21 @@ def test_lag_takes_time_back(speed: float) -> None:
 def test_impossible_speeds(speed: float) -> None:
     with pytest.raises(Misuse, match="must be finite and greater than 0"):
         Clock(speed)
+
+
+def test_it_stands_where_it_is_stopped_and_goes_on_from_there() -> None:
+    wall = Wall()
+    clock = Clock(2.0, wall, begin=7_000)
+    wall.ns += 1_000
+    assert clock.now() == 9_000
+    clock.stop(9_000)
+    wall.ns += 1_000_000
+    assert clock.now() == 9_000
+    assert clock.wait_s(9_001) == math.inf
+    assert clock.wait_s(9_000) == 0.0
+    clock.stop(20_000)
+    clock.run(10.0)
+    assert clock.now() == 20_000
+    wall.ns += 1_000
+    assert clock.now() == 30_000
+    assert clock.wait_s(1_000_030_000) == pytest.approx(0.1)

@@ -198,6 +198,44 @@ def test_what_is_refused_leaves_no_mark(step: Outside, message: str) -> None:
     assert (world.trace.digest(), world.inputs) == (before, [])
 
 
+def test_a_session_has_the_seed_it_ran_with(tmp_path: Path) -> None:
+    world = World.load(EXAMPLES / "feeder.toml", seed=8)
+    world.run(for_=30)
+    session = session_of(world)
+    assert session.digest != GOLDEN["feeder"]
+    save(session, tmp_path / "s.json")
+    assert load(tmp_path / "s.json").replay().trace.digest() == session.digest
+    assert world.branch().spec.seed == 8
+    with pytest.raises(Misuse, match="seed -1: permitted are whole numbers from 0 to"):
+        World.load(EXAMPLES / "feeder.toml", seed=-1)
+    with pytest.raises(Misuse, match="the snapshot is of another world"):
+        World.load(EXAMPLES / "feeder.toml").restore(world.snapshot())
+
+
+def test_a_session_goes_another_way_from_any_moment() -> None:
+    session = session_of(busy())
+    moment = 3 * SECOND
+    world = session.replay(moment)
+    assert world.now == moment
+    assert [given.time for given in world.inputs] == [given.time for given in session.inputs if given.time <= moment]
+    world.mic488["table"].set_pin("IN9", 0)
+    world.run(for_=2)
+    other = session_of(world)
+    assert other.digest != session.digest
+    assert other.replay().trace.digest() == other.digest
+    with pytest.raises(Misuse, match=r"the session ends at 10\.25 s, before 11 s"):
+        session.replay(11 * SECOND)
+
+
+def test_a_session_ends_when_what_its_last_input_led_to_has_happened() -> None:
+    world = World.from_toml(TICKING)
+    world.run(for_=0.5)
+    world.mic488["a"].set_pin("IN2", 1)
+    session = session_of(world)
+    assert [record.value for record in world.trace if record.subject == "note"] == ["after that"]
+    assert session.replay().trace.digest() == session.digest
+
+
 def test_another_run_has_another_digest() -> None:
     session = session_of(busy())
     world = session.world()
@@ -268,7 +306,7 @@ def test_a_damaged_session_is_misuse(tmp_path: Path, change: dict[str, Any], mes
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"seed": 8}, "the session says seed 8, its world 7"),
+        ({"seed": -8}, "seed -8: permitted are whole numbers from 0 to"),
         ({"firmware": {"table": "1.40"}}, "the session says that table runs firmware 1.40, its world 1.70"),
         ({"until_ns": SECOND}, "the session ends at 1000000000 ns, before what came at 2000000000 ns"),
     ],

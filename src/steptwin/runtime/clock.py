@@ -4,34 +4,51 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from math import inf
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 
 
 class Clock:
-    """Virtual time that runs ``speed`` times as fast as the wall's, from 0 on.
+    """Virtual time that runs ``speed`` times as fast as the wall's, from ``begin`` on; it can be stopped.
 
     ``wall_ns`` must never go back; the monotonic clock, which is the default, does not.
     """
 
-    __slots__ = ("_start_ns", "_wall_ns", "speed")
+    __slots__ = ("_from_ns", "_start_ns", "_wall_ns", "is_stopped", "speed")
 
-    def __init__(self, speed: float = 1.0, wall_ns: Callable[[], Nanos] = time.monotonic_ns) -> None:
-        if not 0.0 < speed < float("inf"):
-            raise Misuse(f"speed = {speed:g}: must be finite and greater than 0")
-        self.speed = speed
+    def __init__(self, speed: float = 1.0, wall_ns: Callable[[], Nanos] = time.monotonic_ns, begin: Nanos = 0) -> None:
         self._wall_ns = wall_ns
-        self._start_ns = wall_ns()
+        self._from_ns = begin
+        self.run(speed)
 
     def now(self) -> Nanos:
+        if self.is_stopped:
+            return self._from_ns
         passed = self._wall_ns() - self._start_ns
-        return passed if self.speed == 1.0 else int(passed * self.speed)
+        return self._from_ns + (passed if self.speed == 1.0 else int(passed * self.speed))
 
     def wait_s(self, moment: Nanos) -> float:
-        """Wall seconds until virtual ``moment``, at least 0."""
-        return max((moment - self.now()) / self.speed, 0) / SECOND
+        """Wall seconds until virtual ``moment``, at least 0; for ever while the clock is stopped."""
+        ahead = moment - self.now()
+        if self.is_stopped:
+            return inf if ahead > 0 else 0.0
+        return max(ahead / self.speed, 0) / SECOND
 
     def lag(self, by: Nanos) -> None:
         """From now on virtual time is ``by`` behind what it would have been; nobody may have seen the time taken back."""
-        self._start_ns += by if self.speed == 1.0 else int(by / self.speed)
+        self._from_ns -= by
+
+    def stop(self, moment: Nanos) -> None:
+        """Stand at ``moment``. No time that somebody has seen may come after it."""
+        self._from_ns = moment
+        self.is_stopped = True
+
+    def run(self, speed: float) -> None:
+        """Go on at ``speed`` from the moment at which the clock was made or stopped. Raises `Misuse` for an impossible one."""
+        if not 0.0 < speed < inf:
+            raise Misuse(f"speed = {speed:g}: must be finite and greater than 0")
+        self.speed = speed
+        self._start_ns = self._wall_ns()
+        self.is_stopped = False

@@ -15,7 +15,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from steptwin import __version__
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import SECOND, Nanos
 from steptwin.runtime.textfiles import read_bytes, write_bytes
 from steptwin.runtime.world import World
 from steptwin.world import script as do
@@ -45,10 +45,8 @@ class Session:
     version: str = __version__
 
     def world(self) -> World:
-        """The world at its beginning. Raises `WorldError`, and `Misuse` where seed or firmware are not the description's."""
-        world = World(read_world(self.name, self.text), self.files)
-        if world.spec.seed != self.seed:
-            raise Misuse(f"the session says seed {self.seed!r}, its world {world.spec.seed}")
+        """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
+        world = World(read_world(self.name, self.text, self.seed), self.files)
         ran = {name: view.device.firmware.name for name, view in world.mic488.items()}
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
@@ -57,18 +55,26 @@ class Session:
                 )
         return world
 
-    def replay(self) -> World:
-        """The world after all of it. Raises `Misuse` where inputs do not fit the world."""
+    def replay(self, until: Nanos | None = None) -> World:
+        """The world after all of it, or after what had come by the moment ``until``, from which it may go another way.
+
+        Raises `Misuse` where inputs do not fit the world, and for a moment after the session's end.
+        """
+        end = self.until if until is None else until
+        if end > self.until:
+            raise Misuse(f"the session ends at {self.until / SECOND:g} s, before {end / SECOND:g} s")
         world = self.world()
         for time, what, settled in self.inputs:
             if time > self.until:
                 raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")
+            if time > end:
+                break
             _bring(world, time)
             if settled:
                 world.advance(time)
             world.outside(what)
-        _bring(world, self.until)
-        world.settle_all()
+        _bring(world, end)
+        _settle(world)
         return world
 
 
@@ -79,9 +85,15 @@ def _bring(world: World, moment: Nanos) -> None:
         world.advance(moment)
 
 
+def _settle(world: World) -> None:
+    """A session ends when everything of its last moment has happened."""
+    world.advance(world.now)
+    world.settle_all()
+
+
 def session_of(world: World) -> Session:
     """The session of a world up to now. What Python code did to the world is in it, the code is not."""
-    world.settle_all()
+    _settle(world)
     spec = world.spec
     return Session(
         spec.text.source.name,

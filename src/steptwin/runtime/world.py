@@ -66,10 +66,13 @@ class World(Plant):
     # ------------------------------------------------------------------ making one
 
     @classmethod
-    def load(cls, path: str | Path, *, keep_trace: bool = True) -> Self:
-        """The world described by a TOML file; other files are looked for beside it. Raises `WorldError` (a `Misuse`)."""
+    def load(cls, path: str | Path, *, seed: int | None = None, keep_trace: bool = True) -> Self:
+        """The world described by a TOML file; other files are looked for beside it. Raises `WorldError` (a `Misuse`).
+
+        With ``seed`` chance is another than the description says.
+        """
         place = Path(path)
-        spec = read_world(str(path), read_text(place).source.text)
+        spec = read_world(str(path), read_text(place).source.text, seed)
         files = {name: read_bytes(place.parent / name) for name in spec.files()}
         return cls(spec, files, keep_trace=keep_trace)
 
@@ -166,7 +169,7 @@ class World(Plant):
 
         Scripts go along. Functions given to `at` and `when` do what they did: those that name this world act on this one.
         """
-        other = type(self)(read_world(self.spec.text.source.name, self.spec.text.source.text), self.files)
+        other = type(self)(read_world(self.spec.text.source.name, self.spec.text.source.text, self.spec.seed), self.files)
         other.restore(self.snapshot() if snapshot is None else snapshot)
         return other
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from steptwin.errors import Misuse
@@ -28,11 +29,14 @@ from steptwin.world.spec import (
     WireSpec,
     WorldSpec,
 )
-from steptwin.world.tables import KEYS
+from steptwin.world.tables import KEYS, SEED
 
 
-def read_world(name: str, text: str) -> WorldSpec:
-    """The world that a TOML text called ``name`` describes. Raises `WorldError` with everything that is wrong with it."""
+def read_world(name: str, text: str, seed: int | None = None) -> WorldSpec:
+    """The world that a TOML text called ``name`` describes. Raises `WorldError` with everything that is wrong with it.
+
+    ``seed`` takes the place of the text's; `Misuse` where it is no seed.
+    """
     toml = Text(name, text)
     data = toml.data
     known = [key for key in KEYS if key not in ("switch", "encoder", "motor")]
@@ -56,7 +60,14 @@ def read_world(name: str, text: str) -> WorldSpec:
     )
     check_names(spec)
     toml.check()
-    return spec
+    return spec if seed is None else replace(spec, seed=_seed(seed))
+
+
+def _seed(value: object) -> int:
+    try:
+        return SEED(value)
+    except Misuse as error:
+        raise Misuse(f"seed {error}") from None
 
 
 _CONTROLLER_TABLES = (*(f"M{n}" for n in range(1, AXES + 1)), *(f"IN{n}" for n in range(1, INPUTS + 1)))

@@ -60,7 +60,7 @@ class Given(NamedTuple):
 class PlantSnapshot:
     """All state of a world at a moment."""
 
-    description: tuple[str, Files]
+    description: tuple[str, int, Files]
     now: Nanos
     kernels: tuple[KernelState, ...]
     faults: tuple[tuple[Fault, str, Nanos], ...]
@@ -441,8 +441,8 @@ class Plant:
             self.trace.mark(),
         )
 
-    def _description(self) -> tuple[str, Files]:
-        return self.spec.text.source.text, self.files
+    def _description(self) -> tuple[str, int, Files]:
+        return self.spec.text.source.text, self.spec.seed, self.files
 
     def restore(self, snapshot: PlantSnapshot) -> None:
         """Go on where a snapshot of this world, or of one with the same description, was taken.

@@ -60,10 +60,12 @@ _BOUNCE = (
     _optional(whole(1, 100), "bounces", "how often it opens again meanwhile", 3),
 )
 
+SEED = whole(0, 2**63 - 1)
+
 KEYS: Mapping[str, tuple[Key, ...]] = {
     "world": (
         _optional(text_value, "name", "a name for people", "world"),
-        _optional(whole(0, 2**63 - 1), "seed", "where all chance comes from", 0),
+        _optional(SEED, "seed", "where all chance comes from", 0),
     ),
     "line": (
         Key("name", name_value, "how controllers and scripts name it"),
