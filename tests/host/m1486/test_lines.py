@@ -11,7 +11,7 @@ from chip_rig import ChipWire, chip_line, chip_task_line, run_in
 
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.host import Overtaken
-from steptwin.host.m1486 import M1486, AsyncM1486, ChipReason, PositionUnknown
+from steptwin.host.m1486 import M1486, AsyncM1486, ChipReason, NoEcho, PositionUnknown, Restarted
 from steptwin.machine import MILLISECOND, SECOND
 
 KNOWN = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
@@ -261,3 +261,33 @@ def test_a_chip_held_by_limit_is_overdue_and_the_other_arrives() -> None:
     assert chips[1].wait(check=False).reason is ChipReason.TARGET
     wire.chips[0].set_pin("LIMIT", 1, wire.now)
     assert chips[0].counter() == 64_000
+
+
+def test_a_chip_that_is_absent_or_off_makes_no_other_one_restarted() -> None:
+    """Nobody echoes the selection of a chip while the one selected before is not there."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    x, y = M1486(line, 0), M1486(line, 7)
+    x.open()
+    y.open()
+    y.configure(**KNOWN)
+    y.move_by(20.0)
+    y.wait()
+    known = y.settings
+    with pytest.raises(NoEcho, match="chip 5 does not echo"):
+        M1486(line, 5).open()
+    assert y.position() == 20.0
+    x.flags()
+    wire.chips[0].power_off(wire.now)
+    assert y.position() == 20.0
+    with pytest.raises(NoEcho, match="chip 0 does not echo"):
+        x.flags()
+    assert y.position() == 20.0
+    assert y.settings == known
+    wire.chips[0].power_cycle(wire.now)
+    with pytest.raises(Restarted, match="chip 0 was"):
+        x.flags()
+    wire.chips[7].power_cycle(wire.now)
+    with pytest.raises(Restarted, match="chip 7 was"):
+        y.position()
+    assert x.flags() == y.flags()

@@ -31,6 +31,8 @@ PAUSES_NS: tuple[Nanos, ...] = (40 * MILLISECOND, 1300 * MILLISECOND)
 """Time for ``t41`` to be done; the other is for chips that write commands into an EEPROM."""
 WAKE_COMMANDS = 5
 """What `Unit.wake` has typed when all goes well, and a question."""
+EVERYBODY = "xg\rxg\r"
+"""All chips listen from now on. The first may meet the rest of something else."""
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Whoever listens for an answer that is owed lets a stop go first this often."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
@@ -146,7 +148,7 @@ class Unit:
             try:
                 if self.address is not None:
                     # Everybody is to echo, so that the selection is verified by whoever hears it.
-                    await self._blind(f"{rest}xg\rxg\rt{RETURN}\r", pause)
+                    await self._blind(f"{rest}{EVERYBODY}t{RETURN}\r", pause)
                     rest = ""
                     await self._exchange(Say(self.address, "", sort=Sort.SELECT, acts=False))
                 await self._blind_echo(rest, pause)
@@ -160,7 +162,8 @@ class Unit:
             self.notes.was_awake = True
             self._written()
             return
-        await self._blind(rest, PAUSES_NS[0])
+        # Nobody else is left deaf because of a chip that is not there.
+        await self._blind(rest if self.address is None else f"{rest}{EVERYBODY}", PAUSES_NS[0])
         raise NoEcho(self.place, self.name, failure) from failure
 
     async def _blind_echo(self, rest: str, pause: Nanos) -> None:
@@ -189,6 +192,9 @@ class Unit:
             raise Restarted(self.place, self.name)
 
     async def _still_echoes(self) -> bool:
+        if self.address is not None:
+            # Nobody echoes the selection where the chip selected before is off.
+            await self._blind(EVERYBODY, PAUSES_NS[0])
         for _ in range(TRIES):
             try:
                 await self._exchange(Say(self.address, f"t{RETURN}", acts=False))
