@@ -260,3 +260,90 @@ def test_a_fault_that_can_happen_is_taken(world: str, fault: str) -> None:
     found = World.from_toml(world)
     found.put_fault(read(fault))
     assert [str(active.fault) for active in found.plan.faults.active] == [fault]
+
+
+# ---------------------------------------------------------------------- faults of one line alone
+
+TWO_LINES = """
+[[line]]
+name = "a"
+{timing}
+[[line]]
+name = "b"
+{timing}
+[[mic488]]
+name = "s"
+line = "a"
+[[mic488]]
+name = "t"
+line = "b"
+[[line]]
+name = "chips"
+kind = "m1486"
+[[m1486]]
+name = "drum"
+line = "chips"
+address = 3
+"""
+READ = bytes.fromhex("01 03 27 24 00 02 8e b4")
+
+
+def answers(world: World, line: str) -> list[bytes]:
+    found = []
+    for _ in range(3):
+        world.line[line].send(READ)
+        world.run(for_=0.5)
+        found.append(world.line[line].received())
+    return found
+
+
+@pytest.mark.parametrize("timing", ["", 'timing = "real"'])
+@pytest.mark.parametrize(
+    "fault", ["crc", "delay for_ms=900", "no-answer", "no-answer lost=request", "busy", "exception", "drop", "split for_ms=300"]
+)
+def test_a_fault_of_one_line_leaves_the_others_alone(fault: str, timing: str) -> None:
+    text = TWO_LINES.format(timing=timing)
+    sound, spoilt = World.from_toml(text), World.from_toml(text)
+    spoilt.put_fault(read(f"{fault} line=b"))
+    assert answers(spoilt, "a") == answers(sound, "a")
+    assert list(spoilt.trace.faults()) == []
+    assert answers(spoilt, "b") != answers(sound, "b")
+    assert {record.machine for record in spoilt.trace.faults()} in ({"b"}, {"t"})
+
+
+def test_bytes_of_chips_are_spared_by_a_fault_of_a_modbus_line() -> None:
+    world = World.from_toml(TWO_LINES.format(timing=""))
+    world.put_fault(read("drop line=a direction=in"))
+    world.line["chips"].send(b"x3\rf12800\rr\r")
+    world.run(until="idle")
+    assert world.read("drum.position") == 12800
+    world.put_fault(read("drop line=chips direction=in"))
+    world.line["chips"].send(b"f12800\rr\r")
+    world.run(for_=2.0)
+    assert world.read("drum.position") == 12800
+    first = next(world.trace.faults())
+    assert (first.machine, first.value) == ("chips", "python, towards the twin, byte 1 of 9: 66 is lost")
+
+
+def test_the_link_of_a_fault_is_kept_on_a_line_that_takes_its_time() -> None:
+    world = World.from_toml(TWO_LINES.format(timing='timing = "real"'))
+    world.put_fault(read("busy link=script line=a"))
+    world.line["a"].send(READ)
+    world.run(for_=0.5)
+    assert world.line["a"].received()[1] == 3
+    assert list(world.trace.faults()) == []
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("crc line=c", "fault crc: line = 'c': there are a, b, chips"),
+        ("crc line=chips", "fault crc happens on Modbus RTU: line 'chips' carries M1486, where flip"),
+        ("busy line=a unit=2", "fault busy: unit = 2: served are 1"),
+        ("busy line=a link=tcp", "fault busy: link = 'tcp': there are script"),
+    ],
+)
+def test_a_fault_of_a_line_that_is_not_there_or_cannot_have_it_is_refused(fault: str, message: str) -> None:
+    with pytest.raises(Misuse) as refused:
+        World.from_toml(TWO_LINES.format(timing="")).put_fault(read(fault))
+    assert str(refused.value).startswith(message)

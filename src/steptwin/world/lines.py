@@ -92,10 +92,18 @@ class Line(Stateful):
             raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
         port = self._port(place, kind)
         if hasattr(port, "on_output"):
-            faulty: FaultyPort = FaultyTalkingPort(port, place, self._faults, self.fault_kinds[kind])
+            faulty: FaultyPort = FaultyTalkingPort(port, place, self._faults, self.fault_kinds[kind], line_name=self.name)
             port.on_output = self._kernel.mark
         else:
-            faulty = FaultyPort(port, place, self._faults, self.fault_kinds[kind], framed=self._framed(port), units=self.units)
+            faulty = FaultyPort(
+                port,
+                place,
+                self._faults,
+                self.fault_kinds[kind],
+                framed=self._framed(port),
+                units=self.units,
+                line_name=self.name,
+            )
         found = self.places[place] = Place(kind, faulty, port)
         return found
 

@@ -55,7 +55,8 @@ class Rigging:
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.axes.values() if axis.spec.drive[0] == name}
         body: Mic488Body | M1486Body
         if isinstance(machine, Mic488):
-            body = Mic488Body(machine, plan.line_of[name][1] if name in plan.line_of else LINELESS_UNIT)
+            line, unit = plan.line_of.get(name, (None, LINELESS_UNIT))
+            body = Mic488Body(machine, unit, "" if line is None else line.name)
             for number, mechanism in mechanisms.items():
                 body.shafts[number - 1] = mechanism
         else:
@@ -70,7 +71,7 @@ def _wires(plan: Plan) -> Iterator[Wire]:
         serial, network = line.fault_kinds[line.kinds[0]], line.fault_kinds[line.kinds[-1]]
         name = f"line {spec.name!r} carries"
         outside = [
-            Wire(name, kind, link, line.units)
+            Wire(name, kind, link, line.units, on=spec.name)
             for link, kind, is_open in (
                 ("pty", serial, spec.pty),
                 ("serial", serial, spec.serial),
@@ -81,9 +82,9 @@ def _wires(plan: Plan) -> Iterator[Wire]:
         ]
         for place, there in line.places.items():
             if place != SCRIPTS and not any(wire.is_called(place) for wire in outside):
-                outside.append(Wire(name, line.fault_kinds[there.kind], place, line.units))
+                outside.append(Wire(name, line.fault_kinds[there.kind], place, line.units, on=spec.name))
         yield from outside
-        yield Wire(name, serial, SCRIPTS, line.units, is_usual=not outside)
+        yield Wire(name, serial, SCRIPTS, line.units, is_usual=not outside, on=spec.name)
     for name, machine in plan.machines.items():
         if isinstance(machine, Mic488) and name not in plan.line_of:
             yield Wire(f"{name!r} is on no line", None, units=(LINELESS_UNIT,))

@@ -76,7 +76,7 @@ REFUSED = {
     "crcc": "fault: kind = 'crcc': permitted are flip, drop, insert,",
     "crc nth": "fault 'crc nth': 'nth' is not NAME=VALUE",
     "crc nth=1 nth=2": "fault 'crc nth=1 nth=2': nth is given twice",
-    "crc units=1": "fault (crc): there is no 'units': parameters are unit, function, address, link, nth,",
+    "crc units=1": "fault (crc): there is no 'units': parameters are unit, function, address, link, line, nth,",
     "crc nth=0": "fault (crc): nth = 0: permitted are whole numbers 1 and more",
     "crc nth=x": "fault (crc): nth = 'x': permitted are whole numbers 1 and more",
     "crc nth=1.5": "fault (crc): nth = '1.5': permitted are whole numbers 1 and more",

@@ -119,9 +119,10 @@ class Active(Stateful):
         touched = addresses(pdu)
         return touched is not None and touched.start <= span[1] and span[0] < touched.stop
 
-    def is_on(self, link: str) -> bool:
-        wanted = self.fault.get("link")
-        return wanted is None or wanted == link
+    def is_on(self, link: str, line: str) -> bool:
+        """Whether it is meant for ``link`` (empty: not known) of ``line`` (empty: not one of a world)."""
+        get = self.fault.get
+        return (not link or get("link") in (None, link)) and get("line") in (None, line)
 
 
 def addresses(pdu: bytes) -> range | None:

@@ -289,13 +289,13 @@ class FaultyMachine(Stateful):
 
     # ------------------------------------------------------------------ what the body asks
 
-    def refusal(self, unit: int, pdu: bytes, now: Nanos) -> bytes | None:
-        """The answer to a request that is not to be carried out; None lets it through."""
+    def refusal(self, unit: int, line: str, pdu: bytes, now: Nanos) -> bytes | None:
+        """The answer to a request on ``line`` that is not to be carried out; None lets it through."""
         function = pdu[0] if pdu else 0
         if self._off_until is not None:
             return exception_pdu(function, NEVER_SENT)
         for active in self._faults.refusing():
-            if active.matches(unit, pdu) and (not self._faults.link or active.is_on(self._faults.link)) and active.strikes(now):
+            if active.matches(unit, pdu) and active.is_on(self._faults.link, line) and active.strikes(now):
                 if active.fault.kind.layer is Layer.FRAMES:
                     self._tell(active, now, f"request lost on its way: {pdu.hex(' ')}")
                     return exception_pdu(function, NEVER_SENT)

@@ -31,11 +31,13 @@ class EncoderShaft:
 
 
 class Mic488Body:
-    """``unit`` is the one under which the controller is served. Without mechanics its encoders are all that its axes move."""
+    """``unit`` and ``line`` are those under which the controller is served. Without mechanics its encoders are all that its axes
+    move."""
 
-    def __init__(self, device: Mic488, unit: int) -> None:
+    def __init__(self, device: Mic488, unit: int, line: str = "") -> None:
         self._device = device
         self._unit = unit
+        self._line = line
         self.shafts: list[Shaft] = [EncoderShaft(device, axis.number) for axis in device.axes]
 
     @property
@@ -48,7 +50,7 @@ class Mic488Body:
 
     def watch(self, owner: FaultyMachine) -> None:
         device = self._device
-        device.slave = _Watched(device.slave, self._unit, owner)
+        device.slave = _Watched(device.slave, self._unit, self._line, owner)
         device.store = _keeping(device, device.store, owner)
 
     def pin_name(self, pin: str) -> str:
@@ -67,13 +69,14 @@ class Mic488Body:
 class _Watched:
     """In front of the slave."""
 
-    def __init__(self, slave: Serving, unit: int, owner: FaultyMachine) -> None:
+    def __init__(self, slave: Serving, unit: int, line: str, owner: FaultyMachine) -> None:
         self._slave = slave
         self._unit = unit
+        self._line = line
         self._owner = owner
 
     def answer(self, device: Mic488, pdu: bytes) -> bytes:
-        refusal = self._owner.refusal(self._unit, pdu, device.now)
+        refusal = self._owner.refusal(self._unit, self._line, pdu, device.now)
         if refusal is not None:
             return refusal
         answer = self._slave.answer(device, pdu)

@@ -21,6 +21,8 @@ class Wire(NamedTuple):
     units: tuple[int, ...] = ()
     is_usual: bool = True
     """Whether a fault that names no link is meant for it."""
+    on: str = ""
+    """What a fault calls the line of a world that it is on."""
 
     def lets_happen(self, fault: Fault) -> bool:
         if self.line is None:
@@ -45,6 +47,12 @@ def check_place(fault: Fault, wires: Sequence[Wire]) -> None:
     kind, link, unit = fault.kind, fault.get("link"), fault.get("unit")
     if kind.layer is Layer.PHYSICS:
         return
+    line = fault.get("line")
+    if line is not None:
+        there = ", ".join(dict.fromkeys(wire.on for wire in wires if wire.on)) or "none"
+        wires = [wire for wire in wires if wire.on == line]
+        if not wires:
+            raise Misuse(f"fault {kind.name}: line = {line!r}: there are {there}")
     meant = [wire for wire in wires if (wire.is_usual if link is None else wire.is_called(str(link)))]
     if link is not None and not meant:
         there = ", ".join(dict.fromkeys(wire.link for wire in wires if wire.link)) or "none"

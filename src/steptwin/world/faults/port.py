@@ -57,7 +57,8 @@ class FaultyPort(Stateful):
     done here: `exchange`, `to_send` and `deadline` are the inner port's own else.
 
     ``framed`` is the slave port that tells of frames, inside ``port``; without it bytes alone can go wrong. ``units`` are the
-    units it serves (MIC-23: on TCP a single one is addressed by 0 and 255 too).
+    units it serves (MIC-23: on TCP a single one is addressed by 0 and 255 too). ``line_name`` is the line of a world it is on:
+    what goes wrong is recorded there, else at the link.
     """
 
     __slots__ = (
@@ -76,6 +77,7 @@ class FaultyPort(Stateful):
         "_units",
         "deadline",
         "exchange",
+        "line_name",
         "link",
         "to_send",
     )
@@ -91,6 +93,7 @@ class FaultyPort(Stateful):
             "_units",
             "deadline",
             "exchange",
+            "line_name",
             "link",
             "to_send",
         }
@@ -109,6 +112,7 @@ class FaultyPort(Stateful):
         *,
         framed: FramedPort | None = None,
         units: tuple[int, ...] = (),
+        line_name: str = "",
     ) -> None:
         self._inner = port
         self._faults = faults
@@ -116,6 +120,7 @@ class FaultyPort(Stateful):
         self._framed = framed
         self._units = units
         self.link = link
+        self.line_name = line_name
         self._before: FrameObserver | None = None
         self._now: Nanos = 0  # of the present call: an answer may have left before it
         self._asked: deque[bytes] = deque(maxlen=_ASKED)
@@ -183,7 +188,10 @@ class FaultyPort(Stateful):
 
     def _to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         self._deliver(now)
-        self._take(self._inner.to_send(now), now)
+        self._faults.link = self.link
+        sent = self._inner.to_send(now)
+        self._faults.link = ""
+        self._take(sent, now)
         out = []
         while self._leaving and self._leaving[0][0] <= now:
             out.append(self._leaving.popleft())
@@ -268,10 +276,12 @@ class FaultyPort(Stateful):
         ]
 
     def _is_for(self, active: Active) -> bool:
-        return self._line in active.fault.kind.lines and active.is_on(self.link)
+        return self._line in active.fault.kind.lines and active.is_on(self.link, self.line_name)
 
     def _teller(self, which: str) -> Callable[[Active, str], None]:
-        return lambda active, text: self._faults.tell(active, self.link, self._now, f"{which}, {text}" if which else text)
+        words = [*([self.link] if self.line_name else []), *([which] if which else [])]
+        place = self.line_name or self.link
+        return lambda active, text: self._faults.tell(active, place, self._now, ", ".join([*words, text]))
 
 
 class FaultyTalkingPort(FaultyPort):
@@ -280,8 +290,8 @@ class FaultyTalkingPort(FaultyPort):
     __slots__ = ("_talking",)
     FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_talking"}
 
-    def __init__(self, port: InnerTalkingPort, link: str, faults: Faults, line: Line) -> None:
-        super().__init__(port, link, faults, line)
+    def __init__(self, port: InnerTalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "") -> None:
+        super().__init__(port, link, faults, line, line_name=line_name)
         self._talking = port
 
     @property

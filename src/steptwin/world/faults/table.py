@@ -136,6 +136,7 @@ _MOMENTS = (
     _WINDOW[1],
 )
 _LINK = Parameter("link", Form.TEXT, "On this link alone, such as tcp-1, rtu-1, pty, serial.", otherwise="all")
+_LINE = Parameter("line", Form.TEXT, "On this line of a world alone.", otherwise="all")
 _MACHINE = Parameter("machine", Form.TEXT, "Which machine; for a served twin its unit.", otherwise="the only one")
 _AXIS = _whole("axis", "Which axis.", 1, 16, default=1)
 _PIN = Parameter("pin", Form.TEXT, "Which input.", is_required=True)
@@ -144,11 +145,13 @@ _ADDRESSED = (
     _whole("function", "Requests with this function code.", 1, 127, otherwise="all"),
     Parameter("address", Form.SPAN, "Requests that touch these addresses.", 0, 65535, otherwise="all"),
     _LINK,
+    _LINE,
 )
 _WHERE: dict[Layer, tuple[Parameter, ...]] = {
     Layer.BYTES: (
         Parameter("direction", Form.WORD, "Towards the twin, or from it.", words=("in", "out"), default="out"),
         _LINK,
+        _LINE,
     ),
     Layer.FRAMES: _ADDRESSED,
     Layer.PROTOCOL: _ADDRESSED,
