@@ -13,6 +13,9 @@ from steptwin.world.reader import Text, WorldError
 TABLE = '[[mic488]]\nname = "table"\n'
 AXIS = TABLE + '[[axis]]\nname = "x"\ndrive = "table.M1"\n'
 
+CHIP = '[[m1486]]\nname = "chip"\n'
+BUS = TABLE + 'line = "bus"\n[[line]]\nname = "bus"\n'
+
 
 def wrong(text: str) -> str:
     with pytest.raises(WorldError) as caught:
@@ -30,6 +33,9 @@ def wrong(text: str) -> str:
         (TABLE + '[[fault]]\nkind = "stall"\naxis = 9\n', "w.toml:3:1: error D009: fault stall: axis = 9: permitted are 1 to 4"),
         ("world = 3\n", "w.toml:1:1: error D002: [world] is 3"),
         ("[mic488]\nname = 't'\n", "w.toml:1:1: error D002: [mic488] stands once"),
+        ("[[mic488]]\nname = 'ось'\n", "'ось' is no name: expected a letter from A to Z, then letters, digits, '-' and '_'"),
+        ("[[mic488]]\nname = 'tür'\n", "'tür' is no name: expected a letter from A to Z"),
+        (TABLE + "[[event]]\nat = 1\ndo = [{ send = 'bus', text = '→' }]\n", "text: '→': '→' is no character of a line"),
         ("[[mic488]]\nunit = 3\n", "w.toml:1:1: error D005: [mic488]: name is missing"),
         (TABLE + "unti = 3\n", "w.toml:3:1: error D004: [mic488] has no 'unti'; did you mean 'unit'?"),
         (TABLE + "unit = 300\n", "w.toml:3:1: error D003: [mic488]: unit: 300: permitted are whole numbers from 1 to 247"),
@@ -45,7 +51,7 @@ def wrong(text: str) -> str:
             TABLE + '[[wire]]\nfrom = "tabel.OUT1"\nto = "table.IN1"\n',
             "w.toml:3:1: error D009: nothing is called 'tabel'; did you mean 'table'?",
         ),
-        (TABLE + '[[wire]]\nfrom = "table.OUT9"\nto = "table.IN1"\n', "'table' has no pin 'OUT9': pins are IN1"),
+        (TABLE + '[[wire]]\nfrom = "table.OUT9"\nto = "table.IN1"\n', "table.OUT9 is no output: outputs of 'table' are OUT1, "),
         (AXIS + "travel = [3, 1]\n", "w.toml:6:1: error D003: [axis]: travel: [3, 1]: the first must be below the second"),
         (AXIS + "travel = [1, 3]\n", "start = 0 is outside travel = [1.0, 3.0]"),
         (AXIS.replace("M1", "M5"), "drive = 'table.M5': table has M1, M2, M3, M4"),
@@ -90,6 +96,47 @@ def wrong(text: str) -> str:
             "w.toml:4:1: error D006: 'Idle' is a signal: choose another name",
         ),
         (TABLE.replace("table", "world"), "w.toml:2:1: error D006: 'world' is what events of the whole world are recorded under"),
+        (
+            TABLE + '[[wire]]\nfrom = "table.IN1"\nto = "table.IN2"\n',
+            "w.toml:3:1: error D009: table.IN1 is no output: outputs of 'table'",
+        ),
+        (
+            TABLE + '[[wire]]\nfrom = "table.OUT1"\nto = "table.AIN1"\n',
+            "table.AIN1 is no digital input: digital inputs of 'table' are IN1",
+        ),
+        (TABLE + '[[button]]\nname = "b"\nto = "table.AIN2"\n', "w.toml:3:1: error D009: table.AIN2 is no digital input"),
+        (AXIS + '[[axis.switch]]\nto = "table.AIN1"\nbelow = 0\n', "w.toml:6:1: error D009: table.AIN1 is no digital input"),
+        (TABLE + '[[source]]\nto = "table.IN3"\n', "table.IN3 is no analog input: analog inputs of 'table' are AIN1, AIN2"),
+        (CHIP + '[[source]]\nto = "chip.B1"\n', "chip.B1 is no analog input: analog inputs of 'chip' are none"),
+        (CHIP + '[[wire]]\nfrom = "chip.JOG"\nto = "chip.B2"\n', "chip.JOG is no output: outputs of 'chip' are B1, B2"),
+        (BUS + '[[wire]]\nfrom = "bus.OUT1"\nto = "table.IN1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
+        (BUS + '[[axis]]\nname = "x"\ndrive = "bus.M1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
+        (TABLE + '[[source]]\nto = "table.AIN1"\nvalue = 12\n', "value = 12 V: an analog input takes 0 to 10 V"),
+        (
+            TABLE + '[[source]]\nto = "table.AIN1"\nphase = 1\n',
+            "w.toml:5:1: error D007: phase means nothing for kind = 'constant'",
+        ),
+        (
+            TABLE + '[[source]]\nto = "table.AIN1"\nkind = "sine"\nover = 1\n',
+            "w.toml:6:1: error D007: over means nothing for kind = 'sine'",
+        ),
+        (
+            AXIS + '[[axis.switch]]\nto = "table.IN1"\nbelow = 0\nwidth = 1\n',
+            "w.toml:9:1: error D007: width means nothing without position",
+        ),
+        (
+            AXIS + "[axis.encoder]\ncounts_per_rev = 1\ncounts_per_unit = 1\n",
+            "w.toml:8:1: error D007: counts_per_rev and counts_per_unit excl",
+        ),
+        (AXIS + "encoder = 3\n", "w.toml:6:1: error D002: [axis.encoder] is 3"),
+        (AXIS + "[[axis.encoder]]\noffset = 1\n", "error D002: [axis.encoder] is [{'offset': 1}]"),
+        (AXIS + "[axis.encoder]\noffset = 1\n", "w.toml:7:1: error D007: offset means nothing without index"),
+        (AXIS + "pitch = 1\npulses_per_unit = 1\n", "w.toml:6:1: error D007: pulses_per_unit and pitch exclude each other"),
+        (
+            AXIS + 'kind = "rotary"\n[axis.motor]\nmass = 1\ntorque = [[0, 1]]\n',
+            "w.toml:8:1: error D007: mass means nothing for kind =",
+        ),
+        (TABLE + "[[event]]\nat = 1\nonce = true\ndo = []\n", "w.toml:5:1: error D007: once means nothing without when"),
         ("[[fault]]\nkind = 'crcc'\n", "kind = 'crcc': permitted are"),
     ],
 )

@@ -36,9 +36,10 @@ from steptwin.world.lines import ChipLine, Line, ModbusLine, timing_of
 from steptwin.world.mechanics import EncoderBuild, Mechanism, RotorMark
 from steptwin.world.reader import Path
 from steptwin.world.scale import Scale, motor_of, scale_of
-from steptwin.world.sources import Constant, Sine, Table, Waveform
+from steptwin.world.sources import HIGHEST_V, LOWEST_V, Constant, Sine, Table, Waveform
 from steptwin.world.sources import Source as AnalogSource
-from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, SourceSpec, WorldSpec
+from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, SourceSpec, SwitchSpec, WorldSpec
+from steptwin.world.terminals import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, check_terminal
 from steptwin.world.trace import Record, Recorder
 
 DEFAULT_BAUD = 38400
@@ -290,7 +291,7 @@ class _Builder:
         plan = self.plan
         machine, drive = spec.drive
         number = int(drive[1:]) if drive.startswith("M") and drive[1:].isdecimal() else 0
-        axes = len(plan.machines[machine].axes)
+        axes = len(self._machine(machine).axes)
         if not 1 <= number <= axes:
             raise Misuse(f"drive = '{machine}.{drive}': {machine} has {', '.join(f'M{n}' for n in range(1, axes + 1))}")
         taken = [axis.spec.name for axis in plan.axes.values() if axis.spec.drive == spec.drive]
@@ -311,26 +312,30 @@ class _Builder:
         kernel.add_part(mechanism)
         plan.axes[spec.name] = Fitted(spec, kernel, mechanism, scale)
         for switch in spec.switches:
-            zone = Zone(None, None)
-            if switch.below is not None:
-                zone = Zone(None, pulses(switch.below), pulses(switch.hysteresis))
-            elif switch.above is not None:
-                zone = Zone(pulses(switch.above), None, pulses(switch.hysteresis))
-            elif switch.position is not None:
-                half = 0.5 * switch.width
-                zone = Zone(pulses(switch.position - half), pulses(switch.position + half), pulses(switch.hysteresis))
-            target = self._input(switch.target, (*switch.path, "to"))
-            part = Switch(
-                kernel,
-                mechanism,
-                zone,
-                target,
-                normally_closed=switch.contact == "NC",
-                bounce_ns=switch.bounce,
-                bounces=switch.bounces,
-                chance=Chance(self.spec.seed, f"bounce {target}"),
-            )
-            kernel.add_part(part)
+            self._told(switch.path, partial(self._switch, plan.axes[spec.name], switch))
+
+    def _switch(self, axis: Fitted, spec: SwitchSpec) -> None:
+        pulses = axis.scale.nearest
+        zone = Zone(None, None)
+        if spec.below is not None:
+            zone = Zone(None, pulses(spec.below), pulses(spec.hysteresis))
+        elif spec.above is not None:
+            zone = Zone(pulses(spec.above), None, pulses(spec.hysteresis))
+        elif spec.position is not None:
+            half = 0.5 * spec.width
+            zone = Zone(pulses(spec.position - half), pulses(spec.position + half), pulses(spec.hysteresis))
+        target = self._input(spec.target, (*spec.path, "to"))
+        part = Switch(
+            axis.kernel,
+            axis.mechanism,
+            zone,
+            target,
+            normally_closed=spec.contact == "NC",
+            bounce_ns=spec.bounce,
+            bounces=spec.bounces,
+            chance=Chance(self.spec.seed, f"bounce {target}"),
+        )
+        axis.kernel.add_part(part)
 
     def _fit_encoder(self, spec: AxisSpec) -> None:
         plan = self.plan
@@ -376,18 +381,26 @@ class _Builder:
 
     # ------------------------------------------------------------------ wires, buttons, sources
 
-    def _input(self, name: tuple[str, str], path: Path) -> PinName:
+    def _machine(self, name: str) -> Mic488 | M1486:
+        """What has pins and axes: no line."""
+        found = self.plan.machines.get(name)
+        if found is None:
+            raise Misuse(f"{name!r} is a line; machines are {', '.join(self.plan.machines)}")
+        return found
+
+    def _input(self, name: tuple[str, str], path: Path, kind: str = DIGITAL_INPUT) -> PinName:
         """An input that nothing else drives."""
         target = PinName(*name)
         text = self.spec.text
         if target in self._driven:
             raise Misuse(f"{target} is driven already, from line {text.line(self._driven[target])}")
-        self.plan.kernel_of[target.machine].check(target)
+        check_terminal(self._machine(target.machine), target, kind)
         self._driven[target] = path
         return target
 
     def _wire(self, source: tuple[str, str], target: tuple[str, str], path: Path, inverted: bool, delay: Nanos) -> None:
         kernel = self.plan.kernel_of[source[0]]
+        check_terminal(self._machine(source[0]), PinName(*source), OUTPUT)
         kernel.connect(Wire(PinName(*source), self._input(target, path), inverted, delay))
 
     def _button(self, spec: ButtonSpec) -> None:
@@ -407,7 +420,8 @@ class _Builder:
 
     def _source(self, spec: SourceSpec) -> None:
         kernel = self.plan.kernel_of[spec.target[0]]
-        kernel.add_part(AnalogSource(kernel, self._input(spec.target, spec.path), _waveform(spec), spec.period))
+        target = self._input(spec.target, spec.path, ANALOG_INPUT)
+        kernel.add_part(AnalogSource(kernel, target, _waveform(spec), spec.period))
 
 
 def _record_event(record: Recorder, machine: str, event: object) -> None:
@@ -436,6 +450,8 @@ def _image(text: str, name: str, kind: Variant) -> bytes:
 def _waveform(spec: SourceSpec) -> Waveform:
     repeat = None if spec.repeat is None else spec.repeat / 1e9
     if spec.kind == "constant":
+        if not LOWEST_V <= spec.value <= HIGHEST_V:
+            raise Misuse(f"value = {spec.value:g} V: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V")
         return Constant(spec.value)
     if spec.kind == "sine":
         return Sine(spec.value, spec.amplitude, spec.frequency, spec.phase)

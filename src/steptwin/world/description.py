@@ -15,6 +15,7 @@ from steptwin.world.faults import Fault, parse
 from steptwin.world.names import check_names
 from steptwin.world.reader import Key, Path, Text, read_table
 from steptwin.world.script import Step, read_steps
+from steptwin.world.sense import check_sense
 from steptwin.world.spec import (
     AxisSpec,
     ButtonSpec,
@@ -86,6 +87,7 @@ def _tables(toml: Text, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dic
         values = read_table(toml, path, table, KEYS[kind], also)
         if any(key.is_required and (key.attribute or key.name) not in values for key in KEYS[kind]):
             continue
+        check_sense(toml, path, kind, table)
         if values.get("name") is not None and values["name"] in names:
             toml.wrong((*path, "name"), "D006", f"there is a [[{kind}]] named {values['name']!r} already")
         names.add(values.get("name", ""))
@@ -137,6 +139,7 @@ def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec
         place = (*path, "switch", n)
         values = read_table(toml, place, switch, KEYS["switch"])
         if "target" in values:
+            check_sense(toml, place, "switch", switch)
             spec = SwitchSpec(**values, path=place)
             if sum(x is not None for x in (spec.below, spec.above, spec.position)) != 1:
                 toml.wrong(place, "D007", "a switch needs one of below, above and position")
@@ -144,14 +147,14 @@ def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec
     encoder = motor = None
     if "encoder" in table:
         encoder = EncoderSpec(**read_table(toml, (*path, "encoder"), table["encoder"], KEYS["encoder"]), path=(*path, "encoder"))
+        check_sense(toml, encoder.path, "encoder", table["encoder"])
     if "motor" in table:
         values = read_table(toml, (*path, "motor"), table["motor"], KEYS["motor"])
         if "torque" in values:
             motor = MotorSpec(**values, path=(*path, "motor"))
+            check_sense(toml, motor.path, "motor", table["motor"], table.get("kind", "linear"))
             if motor.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in motor.torque):
                 toml.wrong((*path, "motor", "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
-    if row["pulses_per_unit"] is not None and row["pitch"] is not None:
-        toml.wrong((*path, "pitch"), "D007", "pulses_per_unit and pitch exclude each other")
     if row["travel"] is not None and not row["travel"][0] <= row["start"] <= row["travel"][1]:
         toml.wrong((*path, "start"), "D007", f"start = {row['start']:g} is outside travel = {list(row['travel'])}")
     return AxisSpec(**row, switches=tuple(switches), encoder=encoder, motor=motor)

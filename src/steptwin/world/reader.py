@@ -216,12 +216,12 @@ def text_value(value: Any) -> str:
     return value
 
 
-_NAME = re.compile(r"[A-Za-z_][\w-]*\Z")
+_NAME = re.compile(r"[A-Za-z_][\w-]*\Z", re.ASCII)
 
 
 def name_value(value: Any) -> str:
     if not isinstance(value, str) or not _NAME.match(value):
-        raise Misuse(f"{value!r} is no name: expected a letter, then letters, digits, '-' and '_'")
+        raise Misuse(f"{value!r} is no name: expected a letter from A to Z, then letters, digits, '-' and '_'")
     return value
 
 

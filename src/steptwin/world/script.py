@@ -265,8 +265,13 @@ def _turned(value: Any) -> tuple[str, int]:
     return machine, int(axis[1:])
 
 
-def _send(line: str, text: str) -> Send:
-    return Send(line, text.encode("latin-1", "replace"))
+def _characters(value: Any) -> bytes:
+    if not isinstance(value, str) or not value:
+        raise Misuse(f"{value!r}: expected characters")
+    try:
+        return value.encode("latin-1")
+    except UnicodeEncodeError as error:
+        raise Misuse(f"{value!r}: {value[error.start]!r} is no character of a line, which has 8 bits for each") from None
 
 
 def _turn(axis: tuple[str, int], counts: int) -> Turn:
@@ -303,8 +308,8 @@ ACTIONS: Mapping[str, Action] = dict(
         _action(Key("write", _levels, "{ 'MACHINE.REGISTER' = VALUE }"), Write),
         _action(
             Key("send", name_value, "a line of M1486 chips"),
-            _send,
-            Key("text", text_value, "characters; \\r ends a command line"),
+            Send,
+            Key("text", _characters, "characters; \\r ends a command line", attribute="data"),
         ),
         _action(Key("power_cycle", name_value, "a machine"), PowerCycle),
         _action(
