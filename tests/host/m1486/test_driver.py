@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from chip_rig import ChipWire, chip_driver, chip_line
 
-from steptwin.errors import Misuse
+from steptwin.errors import LineFailure, Misuse
 from steptwin.host import Untold
 from steptwin.host.m1486 import (
     M1486,
@@ -260,6 +260,40 @@ def test_a_program_is_downloaded_runs_and_is_ended() -> None:
     assert wire.codes().count("moves") > count + 2
     chip.reset(force=True)
     assert chip.position() == 0.0
+
+
+def test_what_a_program_uploads_is_read() -> None:
+    """Its position after each move, and every byte there is: 7FH and 7EH are none of function 57 here."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    with pytest.raises(Misuse, match="no program of the chip was started here"):
+        chip.uploaded()
+    chip.download("[\n@1\nf640\nr\nu1\nw300\nj1\n]\n")
+    assert chip.uploaded(3) == bytes((640 * move & 0xFF) for move in (1, 2, 3))
+    wire.sleep(10.0)
+    assert chip.uploaded(2, 0.0) == bytes((640 * move & 0xFF) for move in (4, 5))
+    chip.stop_program()
+    chip.download("[\n:32382\nu4\nu5\n]\n")
+    assert chip.wait().ok
+    with pytest.raises(LineFailure, match="the chip uploaded 2 of 3 bytes within 1 s"):
+        chip.uploaded(3, 1.0)
+    assert chip.uploaded(2) == bytes((0x7E, 0x7E))
+    assert chip.variable() == 0x7E7E
+    with pytest.raises(Misuse, match="0 bytes: at least 1"):
+        chip.uploaded(0)
+
+
+def test_uploads_of_two_programs_cannot_be_told_apart() -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = [M1486(line, 0), M1486(line, 7)]
+    for chip in chips:
+        chip.open()
+        chip.download("[\n@1\nw900\nu1\nj1\n]\n")
+    with pytest.raises(Misuse, match="another chip runs a program too"):
+        chips[0].uploaded()
+    chips[0].stop_program()
+    assert chips[1].uploaded() == b"\0"
 
 
 def test_a_file_for_an_eeprom_is_paced_and_kept() -> None:

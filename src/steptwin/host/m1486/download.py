@@ -199,7 +199,7 @@ async def begin(
     def told(target_u: int | None, duration_s: float | None) -> None:
         if kind is ChipMotion.BLOCK:
             notes.settings = ChipSettings()
-            unit.talk.uploads = bytearray()
+            unit.talk.uploads = notes.uploads = bytearray()
         # What an E type is told it does when it has written it.
         notes.motion = Told(
             kind, unit.line.now() + unit.write_ns, notes.stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0)

@@ -8,7 +8,7 @@ from math import isfinite
 from types import TracebackType
 from typing import Self
 
-from steptwin.errors import Misuse
+from steptwin.errors import LineFailure, Misuse
 from steptwin.host.line import Line
 from steptwin.host.m1486.download import Progress, begin, reset, send_program, type_file
 from steptwin.host.m1486.failures import Busy, ChipMoveFailed, PositionUnknown
@@ -16,7 +16,7 @@ from steptwin.host.m1486.lines import BAUD, AsyncM1486Line
 from steptwin.host.m1486.motion import UNKNOWN_S, ChipMotion, ChipMoveEnd, Told
 from steptwin.host.m1486.settings import COMMANDS, ChipSettings, checked_number
 from steptwin.host.m1486.talk import Say
-from steptwin.host.m1486.unit import Unit
+from steptwin.host.m1486.unit import SLICE_NS, Unit
 from steptwin.host.m1486.waiting import wait_for
 from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.functions import CARRY, FUNCTIONS, LIMITOFF, RECOVER, REPORT, RETURN, USER_FLAGS
@@ -512,6 +512,33 @@ class AsyncM1486:
             await unit.rest()
             await type_file(unit, ["[", *typed, "]"], guard, lambda count: None)
         return await self.wait(timeout_s if timeout_s is not None else UNKNOWN_S)
+
+    async def uploaded(self, count: int = 1, timeout_s: float = 10.0) -> bytes:
+        """The next bytes that the program of the chip uploads, in their order: ``U`` among its commands sends one each time it is
+        met (manual chapter VII, Upload).
+
+        The program has to have been started by this driver, and by it alone on this line, for bytes do not say whose they are:
+        else `Misuse`. Raises `LineFailure` when so many have not come in time; those that have are kept for the next call.
+        """
+        unit = self._unit
+        if count < 1:
+            raise Misuse(f"{count} bytes: at least 1")
+        kept = unit.notes.uploads
+        if kept is None:
+            raise Misuse(f"{self.line.place}: no program of {unit.name} was started here: download, start_program or run_block")
+        if any(notes.motion is not None and notes.motion.kind is ChipMotion.BLOCK for notes in unit.others()):
+            raise Misuse(
+                f"{self.line.place}: another chip runs a program too, and bytes do not say whose they are: wait for its end"
+            )
+        limit = self.line.now() + round(timeout_s * SECOND)
+        while len(kept) < count:
+            async with unit.turn():
+                await unit.hear_upload(SLICE_NS)
+            if len(kept) < count and self.line.now() >= limit:
+                raise LineFailure(f"{self.line.place}: {unit.name} uploaded {len(kept)} of {count} bytes within {timeout_s:g} s")
+        found = bytes(kept[:count])
+        del kept[:count]
+        return found
 
     async def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
         """Type a program into the chip: a file in ``[ ]``, which runs from ``]`` on and which an E type keeps, or plain commands.

@@ -141,6 +141,7 @@ class M1486(Blocking):
     wait = blocking(AsyncM1486.wait)
     command = blocking(AsyncM1486.command)
     run_block = blocking(AsyncM1486.run_block)
+    uploaded = blocking(AsyncM1486.uploaded)
 
     def __enter__(self) -> Self:
         self.open()

@@ -44,7 +44,11 @@ class Sort(enum.Enum):
     KILL = "at once, with its CR; the echo is looked at afterwards"
     LISTEN = "nothing is said: an answer is owed"
     LETTER = "nothing is said: letters are owed by several chips"
+    UPLOAD = "nothing is said: a program uploads"
     BLIND = "said to chips that do not echo yet; nobody waits for an answer"
+
+
+_SILENT = (Sort.LISTEN, Sort.LETTER, Sort.UPLOAD)
 
 
 class Say:
@@ -105,7 +109,7 @@ class CharacterTalk:
         self.spoilt: dict[int | None, int] = {}
         """How many lines each chip was made to drop: that ends a program of its (M-11)."""
         self.uploads: bytearray | None = None
-        """What a program in a chip uploads, while one may run."""
+        """Where what a program in a chip uploads is kept, while one may run."""
         self.letters: int | None = None
         """Letters that came, whosever they are, while several chips are watched (`steptwin.host.m1486.watching`)."""
         self.surplus = 0
@@ -124,7 +128,7 @@ class CharacterTalk:
     wary = True
 
     def allowance_ns(self, request: Say) -> Nanos:
-        if request.sort in (Sort.LISTEN, Sort.LETTER):
+        if request.sort in _SILENT:
             return 0
         return self._serial.duration(2 * len(request.text) + 16)
 
@@ -170,7 +174,7 @@ class CharacterTalk:
         spoiler = [SPOILER] if self.dirty else []
         text = request.text.encode("ascii")
         match request.sort:
-            case Sort.LISTEN | Sort.LETTER:
+            case Sort.LISTEN | Sort.LETTER | Sort.UPLOAD:
                 request.committed = True
                 return self._put(b"", now)
             case Sort.BLIND:
@@ -222,6 +226,10 @@ class CharacterTalk:
         if request.sort is Sort.LETTER:
             came = sum(self._absorb(one) for one in (byte, *rest) if one in LETTERS)
             return self._done(bytes((byte,))) if came else None
+        if request.sort is Sort.UPLOAD:
+            for one in (byte, *rest):
+                self._uploaded(one)
+            return self._done(bytes((byte,)))
         if self._sent.startswith(self._heard) and len(self._heard) < len(self._sent):
             return self._echo(request, byte, rest, now)
         # All has come back, and an answer is waited for.
@@ -229,6 +237,7 @@ class CharacterTalk:
 
     def _take_owed(self, request: Say, byte: int) -> bytes | None:
         if byte not in LETTERS:
+            self._uploaded(byte)
             return None
         self.owed[request.address] = self.owes(request.address) - 1
         self.settle(request.address)
@@ -250,9 +259,8 @@ class CharacterTalk:
                 return self._echo(request, expected, rest, now)
             self._give_up(now)
             raise NoRoom(self._place, request)
-        if byte in (EMPTY, THREE_FREE):
-            return None  # function 57
-        if byte in LETTERS and self._absorb(byte):
+        # What a program uploads comes in between. A wrong echo looks the same, and is missed then: nothing is taken without it.
+        if self._uploaded(byte) or byte in (EMPTY, THREE_FREE):
             return None
         raise self._garbled(request, self._heard + bytes((byte,)) + rest, now)
 
@@ -284,8 +292,7 @@ class CharacterTalk:
             self.selected = request.address
             return self._done(b"")
         if self._sent != _END:
-            extra = bytes(byte for byte in rest if byte != ~self._heard[-1] & 0xFF)
-            if extra:
+            if not all(byte == ~self._heard[-1] & 0xFF or self._uploaded(byte) for byte in rest):
                 raise self._garbled(request, self._heard + rest, now)
             self.nearly_full |= bool(rest)
             request.committed |= len(self._lines) == 1 and request.sort is Sort.LINE
@@ -304,10 +311,10 @@ class CharacterTalk:
         if request.text == WHO and not request.answers:
             # Its answer may be long in coming: others may have to go first meanwhile.
             self.owed[request.address] = self.owes(request.address) + 1
-            for byte in rest:
-                if byte in LETTERS:
-                    self._absorb(byte)
         if not request.answers:
+            for byte in rest:
+                if byte != ~self._heard[-1] & 0xFF:
+                    self._uploaded(byte)
             return self._done(b"")
         for byte in rest:
             answer = self._take(request, byte, b"", now)
@@ -320,6 +327,15 @@ class CharacterTalk:
         self._request = None
         self._lines = []
         return answer
+
+    def _uploaded(self, byte: int) -> bool:
+        """A byte that belongs to no exchange: whether it is a letter that was to be expected, or of a program."""
+        if byte in LETTERS and self._absorb(byte):
+            return True
+        if self.uploads is None:
+            return False
+        self.uploads.append(byte)
+        return True
 
     # ------------------------------------------------------------------ what goes wrong
 
@@ -342,7 +358,7 @@ class CharacterTalk:
         if request is None:
             return b""
         awaits_answer = request.committed and request.answers and not self._sent and not self._lines
-        if request.sort in (Sort.LISTEN, Sort.LETTER, Sort.BLIND) or awaits_answer:
+        if request.sort in _SILENT or request.sort is Sort.BLIND or awaits_answer:
             self._done(b"")
             return b""
         self._give_up(now)
@@ -352,11 +368,7 @@ class CharacterTalk:
         if self._on_bytes is not None and data:
             self._on_bytes(now, Direction.OUT, data)
         for byte in data:
-            if (byte in LETTERS and self._absorb(byte)) or byte in (EMPTY, THREE_FREE):
-                continue
-            if self.uploads is not None:
-                self.uploads.append(byte)
-            else:
+            if not self._uploaded(byte) and byte not in (EMPTY, THREE_FREE):
                 self.dirty = True  # the echo of something that now stands in front of the next command
         if now < self._busy_until:
             self.free_ns = min(now + QUIET_NS, self._busy_until)

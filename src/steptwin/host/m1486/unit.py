@@ -57,6 +57,8 @@ class Notes:
         """How often it was stopped: a motion asked for before must not begin after."""
         self.is_killed = False
         """Whether Kill may hold the program (function 51 OFF)."""
+        self.uploads: bytearray | None = None
+        """What the program that was started last has uploaded and nobody has read."""
         self.ready_at: Nanos = 0
         """An EEPROM is being written until then."""
 
@@ -65,6 +67,7 @@ class Notes:
         self.settings = ChipSettings()
         self.functions = sum(function.default << bit for bit, function in enumerate(TABLE)) | 1 << (RETURN - FUNCTIONS.start)
         self.motion = None
+        self.uploads = None
         self.is_position_valid = False
         self.is_killed = False
 
@@ -280,7 +283,8 @@ class Unit:
         if letter is not None:
             await self._hear_rest()
             self.notes.is_killed = False
-            self.talk.uploads = None
+            if self.talk.uploads is self.notes.uploads:
+                self.talk.uploads = None
         return letter
 
     async def _hear_rest(self) -> None:
@@ -315,6 +319,15 @@ class Unit:
         """Listen for a letter that any chip owes (`CharacterTalk.letters`)."""
         with suppress(NoAnswer):
             await self._exchange(Say(self.address, WHO, sort=Sort.LETTER, acts=False), timeout_ns=patience_ns)
+
+    async def hear_upload(self, patience_ns: Nanos) -> None:
+        """Listen for what a program uploads."""
+        with suppress(NoAnswer):
+            await self._exchange(Say(self.address, "", sort=Sort.UPLOAD, acts=False), timeout_ns=patience_ns)
+
+    def others(self) -> list[Notes]:
+        """What is known of the other chips on the line."""
+        return [self.line.notes[("m1486", address)] for address in self.line.notes["m1486 chips"] if address != self.address]
 
     async def rest(self) -> None:
         """Raises `Busy` unless the chip has done all it was told, `WrongType` if it is another one."""
