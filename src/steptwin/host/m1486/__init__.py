@@ -6,7 +6,8 @@ chips share an `M1486Line` or `AsyncM1486Line`. Errors as of `steptwin.host`; wh
 
 from __future__ import annotations
 
-from steptwin.host.m1486.driver import AsyncM1486, ChipStatus
+from steptwin.host.m1486.chip import ChipStatus
+from steptwin.host.m1486.driver import AsyncM1486
 from steptwin.host.m1486.failures import (
     Busy,
     ChipMoveFailed,

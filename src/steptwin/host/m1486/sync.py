@@ -11,8 +11,9 @@ from typing import Self
 
 from steptwin.host.blocking import Blocking, blocking, finish
 from steptwin.host.line import Line
+from steptwin.host.m1486.chip import TIMEOUT_S
 from steptwin.host.m1486.download import Progress
-from steptwin.host.m1486.driver import TIMEOUT_S, AsyncM1486
+from steptwin.host.m1486.driver import AsyncM1486
 from steptwin.host.m1486.driver import download_to as async_download_to
 from steptwin.host.m1486.lines import BAUD, ThreadM1486Line
 from steptwin.host.m1486.settings import ChipSettings

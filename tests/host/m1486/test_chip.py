@@ -1,0 +1,54 @@
+"""What a driver finds out about a chip in virtual time, and how it switches what a chip has."""
+
+from __future__ import annotations
+
+import pytest
+from chip_rig import ChipWire, chip_driver
+
+from steptwin.host.m1486 import WrongType
+from steptwin.m1486.lines import DUAL_DAC
+
+
+@pytest.mark.parametrize(
+    ("kind", "title"), [("A", "M1486A"), ("B", "M1486B"), ("C", "M1486C"), ("E1", "M1486E1"), ("E2", "M1486E2")]
+)
+def test_the_type_is_found(kind: str, title: str) -> None:
+    chip = chip_driver(ChipWire(kind, interface=DUAL_DAC))
+    status = chip.status()
+    assert (chip.variant.title, status.type, status.interface, status.series) == (title, title, "Dual DAC", 1)
+
+
+def test_another_type_than_expected_is_refused() -> None:
+    with pytest.raises(WrongType, match="the chip says it is an M1486B, not M1486A"):
+        chip_driver(ChipWire("B"), variant="A")
+    assert chip_driver(ChipWire("B2x"), variant="B2x").variant.clock == 2
+
+
+def test_reading() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire, steps_per_unit=40.0, unit="mm", origin_u=64_000)
+    wire.chip.drive.set_counter(0x123456, wire.now)
+    wire.chip.unit.variable = 0xABCDEF
+    wire.chip.unit.flags[3] = True
+    assert chip.counter() == 0x123456
+    assert chip.position() == (0x123456 - 64_000) / 64 / 40
+    assert chip.variable() == 0xABCDEF
+    assert [flag for flag, on in chip.flags().items() if on] == [83]
+    assert [number for number, on in chip.functions().items() if on] == [41, *range(48, 56)]
+    wire.chip.set_pin("B2", 0, wire.now)
+    assert chip.inputs(1, 4) == (True, False, True, True)
+
+
+def test_switches() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.set_output(6, False)
+    chip.set_flag(85, True)
+    chip.set_limit(False)
+    assert wire.chip.pins()["B6"] == 0
+    assert chip.flags()[85]
+    assert chip.functions()[42]
+    chip.set_variable(77)
+    assert chip.variable() == 77
+    chip.command("T6")
+    assert wire.chip.pins()["B6"] == 1
