@@ -23,6 +23,9 @@ class Level:
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         return iter(())
 
+    def version(self) -> object:
+        return None
+
 
 class Moving:
     """The count or velocity of a profile that goes there and back."""
@@ -39,6 +42,9 @@ class Moving:
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         return (self.profile.start + int(end) for end in self.profile.ends if self.profile.start + end > now)
+
+    def version(self) -> object:
+        return self.profile
 
 
 SIGNALS = {
@@ -134,3 +140,31 @@ def test_a_condition_says_when_it_may_come_true() -> None:
     assert below == profile.pulse_time(-1, 0)
     assert moving.due(below) == below
     assert Condition("b", SIGNALS.__getitem__).due(5) is None
+
+
+class Replanned(Moving):
+    """A profile that can be replaced by a slower one; counts how often its turns are looked for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.looked = 0
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        self.looked += 1
+        return super().turns(now)
+
+    def replace(self) -> None:
+        self.profile = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 200.0, 300.0, 40.0)
+
+
+def test_a_crossing_is_found_once_while_the_signal_goes_on_as_it_did() -> None:
+    moving, limit = Replanned(), Level(60.0)
+    condition = Condition("x.position > limit or x.position < -20", {"x.position": moving, "limit": limit}.__getitem__)
+    assert {condition.due(now) for now in range(SECOND // 2, SECOND * 3 // 2, SECOND // 20)} == {1_650_000_000}
+    assert moving.looked == 2
+    moving.replace()
+    assert condition.due(0) == 1_600_000_000  # 4 pulses in 0.2 s, then 56 at 40 pulses/s
+    assert moving.looked == 4
+    limit.level = 50.0
+    assert condition.due(0) == 1_350_000_000
+    assert moving.looked == 5

@@ -58,7 +58,8 @@ class Fitted:
     scale: Scale
 
     def units(self, pulses: int) -> float:
-        return float(pulses / self.scale.pulses_per_unit)
+        scale = self.scale.pulses_per_unit
+        return pulses * scale.denominator / scale.numerator
 
 
 @dataclass(slots=True)

@@ -15,7 +15,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from operator import eq, ge, gt, le, lt, ne
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -40,6 +40,10 @@ class Signal(Protocol):
     def value(self, now: Nanos) -> float: ...
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         """Moments after ``now``, in order, between which (and after the last of which) the value goes one way only."""
+        ...
+
+    def version(self) -> object:
+        """What its values to come depend on: another one when they may have changed. None: that is not known."""
         ...
 
 
@@ -177,10 +181,19 @@ class _Parser:
         raise self._wrong("a number" if minus else "a signal or a number")
 
 
+class _Crossing(NamedTuple):
+    """When a signal crosses a level; found again at ``until``."""
+
+    version: object
+    level: float
+    due: Nanos | None
+    until: Nanos
+
+
 class Condition:
     """A condition with its signals."""
 
-    __slots__ = ("_comparisons", "_node", "_signals", "text")
+    __slots__ = ("_comparisons", "_crossings", "_node", "_signals", "text")
 
     def __init__(self, text: str, signals: Signals) -> None:
         """Raises `Misuse` for text that is no condition, and where two signals are compared that change between events."""
@@ -188,6 +201,8 @@ class Condition:
         self._node = parse(text)
         self._signals = {name: signals(name) for name in names(self._node)}
         self._comparisons = list(self._moving(self._node))
+        self._crossings: list[_Crossing | None] = [None] * len(self._comparisons)
+        """As found last."""
 
     @property
     def signals(self) -> list[str]:
@@ -226,8 +241,18 @@ class Condition:
         """When the condition may come true while no event happens: ``now`` where it does; None: not without one."""
         if self.holds(now):
             return now
-        dues = [due for signal, side in self._comparisons if (due := crossing(signal, self._value(side, now), now)) is not None]
+        dues = [due for n in range(len(self._comparisons)) if (due := self._crossing(n, now)) is not None]
         return min(dues, default=None)
+
+    def _crossing(self, n: int, now: Nanos) -> Nanos | None:
+        """When a comparison changes, which need not be looked for anew while its signal goes on as it did."""
+        signal, side = self._comparisons[n]
+        version, level, known = signal.version(), self._value(side, now), self._crossings[n]
+        if known is not None and version is not None and known[:2] == (version, level) and now < known.until:
+            return known.due
+        due = crossing(signal, level, now)
+        self._crossings[n] = _Crossing(version, level, due, now + FARTHEST_NS // 2 if due is None else due)
+        return due
 
 
 def crossing(signal: Signal, level: float, now: Nanos) -> Nanos | None:

@@ -25,6 +25,7 @@ class SignalOf:
     kernels: tuple[Kernel, ...]
     read: Callable[[Nanos], float]
     turning: Callable[[Nanos], Iterable[Nanos]] | None = None
+    versions: Callable[[], object] | None = None
 
     @property
     def continuous(self) -> bool:
@@ -36,11 +37,14 @@ class SignalOf:
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         yield from () if self.turning is None else self.turning(now)
 
+    def version(self) -> object:
+        return None if self.versions is None else self.versions()
+
 
 def find_signal(plan: Plan, name: str) -> SignalOf:
     """The signal called ``name``. `Misuse` with what there is."""
     if name == "time":
-        return SignalOf((), lambda now: now / SECOND, lambda now: ())
+        return SignalOf((), lambda now: now / SECOND, lambda now: (), lambda: name)
     if name == "idle":
         return SignalOf(tuple(plan.kernels), lambda now: float(_all_idle(plan, now)))
     owner, _, rest = name.partition(".")
@@ -112,12 +116,16 @@ def _of_mic488(device: Mic488, kernel: Kernel, rest: str, name: str) -> SignalOf
 
 def _mic488_axis(axis: Axis, kernel: Kernel) -> dict[str, SignalOf]:
     turning = _turns_of(lambda: axis.profile)
+
+    def version() -> object:
+        return axis.revision, axis.offset_p
+
     return {
         "status": SignalOf((kernel,), lambda now: float(axis.status)),
         "enabled": SignalOf((kernel,), lambda now: float(axis.enabled)),
-        "moving": SignalOf((kernel,), lambda now: float(axis.profile.moving(now)), turning),
-        "position": SignalOf((kernel,), lambda now: axis.coordinate_p(now) / axis.gear, turning),
-        "velocity": SignalOf((kernel,), lambda now: axis.profile.velocity(now) / axis.gear, turning),
+        "moving": SignalOf((kernel,), lambda now: float(axis.profile.moving(now)), turning, version),
+        "position": SignalOf((kernel,), lambda now: axis.coordinate_p(now) / axis.gear, turning, version),
+        "velocity": SignalOf((kernel,), lambda now: axis.profile.velocity(now) / axis.gear, turning, version),
         "encoder": SignalOf((kernel,), lambda now: float(axis.encoder_counts(now)), turning),
     }
 
@@ -126,10 +134,13 @@ def _of_m1486(chip: M1486, kernel: Kernel, rest: str, name: str) -> SignalOf:
     def velocity(now: Nanos) -> float:
         return chip.drive.profile.velocity(now)
 
+    def version() -> object:
+        return chip.drive.revision
+
     turning = _turns_of(lambda: chip.drive.profile)
     known = {
-        "position": SignalOf((kernel,), lambda now: float(chip.drive.true_u(now)), turning),
-        "velocity": SignalOf((kernel,), velocity, turning),
+        "position": SignalOf((kernel,), lambda now: float(chip.drive.true_u(now)), turning, version),
+        "velocity": SignalOf((kernel,), velocity, turning, version),
         "counter": SignalOf((kernel,), lambda now: float(chip.drive.counter_u(now)), turning),
         "moving": SignalOf((kernel,), lambda now: float(chip.drive.is_busy)),
         "variable": SignalOf((kernel,), lambda now: float(chip.unit.variable)),
@@ -147,8 +158,8 @@ def _of_axis(axis: Fitted, rest: str, name: str) -> SignalOf:
 
     kernel = (axis.kernel,)
     known = {
-        "position": SignalOf(kernel, lambda now: axis.units(mechanism.place(now)), turning),
-        "lost": SignalOf(kernel, lambda now: float(mechanism.lost(now)), turning),
-        "stalled": SignalOf(kernel, lambda now: float(mechanism.at(now).stalled), turning),
+        "position": SignalOf(kernel, lambda now: axis.units(mechanism.place(now)), turning, mechanism.version),
+        "lost": SignalOf(kernel, lambda now: float(mechanism.lost(now)), turning, mechanism.version),
+        "stalled": SignalOf(kernel, lambda now: float(mechanism.at(now).stalled), turning, mechanism.version),
     }
     return _chosen(known, rest, name)
