@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.runtime.world import World
 from steptwin.world.faults import read
+from steptwin.world.script import ClearFault
 
 PLANT = """
 [world]
@@ -347,3 +348,32 @@ def test_a_fault_of_a_line_that_is_not_there_or_cannot_have_it_is_refused(fault:
     with pytest.raises(Misuse) as refused:
         World.from_toml(TWO_LINES.format(timing="")).put_fault(read(fault))
     assert str(refused.value).startswith(message)
+
+
+# ---------------------------------------------------------------------- faults that steps set and clear
+
+STEPS = '[[mic488]]\nname = "m"\n[[fault]]\nkind = "busy"\nfrom_s = 9\n[[script]]\nname = "s"\nsteps = [\n{steps}\n]\n'
+
+
+@pytest.mark.parametrize("name", ["slipp", "slip-a", "stall", "slip-2"])
+def test_a_fault_that_is_never_set_cannot_be_cleared(name: str) -> None:
+    sets = '{ fault = { kind = "slip", name = "mine" } },\n{ fault = { kind = "lost-steps" } },\n'
+    steps = f'{sets}{{ clear_fault = "{name}" }},'
+    with pytest.raises(Misuse) as refused:
+        World.from_toml(STEPS.replace("{steps}", steps))
+    assert f"world.toml:11:1: error D009: step 3: no fault {name!r}: set are busy" in str(refused.value)
+
+
+def test_what_steps_set_and_the_file_sets_can_be_cleared_by_name_or_kind_and_again() -> None:
+    steps = """
+      { clear_fault = "busy" }, { fault = { kind = "slip", name = "mine" } }, { fault = { kind = "lost-steps" } },
+      { repeat = 2, steps = [{ fault = { kind = "stall", for_s = 9 } }] }, { wait = "1 s" },
+      { repeat = 2, steps = [{ clear_fault = "mine" }, { clear_fault = "stall-2" }] }, { note = "done" },
+    """
+    world = World.from_toml(STEPS.replace("{steps}", steps))
+    world.run(for_=2)
+    assert [active.name for active in world.plan.faults.active] == ["lost-steps", "stall"]
+    assert [record.value for record in world.trace if record.subject == "note"] == ["done"]
+    with pytest.raises(Misuse, match=r"no fault 'mine': set are lost-steps, stall"):
+        world.outside(ClearFault("mine"))
+    assert world.inputs == []

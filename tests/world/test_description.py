@@ -39,7 +39,16 @@ def wrong(text: str) -> str:
         ("[[mic488]]\nunit = 3\n", "w.toml:1:1: error D005: [mic488]: name is missing"),
         (TABLE + "unti = 3\n", "w.toml:3:1: error D004: [mic488] has no 'unti'; did you mean 'unit'?"),
         (TABLE + "unit = 300\n", "w.toml:3:1: error D003: [mic488]: unit: 300: permitted are whole numbers from 1 to 247"),
-        (TABLE + 'firmware = "1.7"\n', "firmware: '1.7': permitted are 1.23, 1.40, 1.70"),
+        (TABLE + 'firmware = "1.8"\n', "firmware: '1.8': permitted are 1.23, 1.40, 1.70"),
+        (TABLE + "firmware = 1.8\n", "firmware: '1.8': permitted are 1.23, 1.40, 1.70"),
+        (TABLE + "firmware = true\n", "firmware: True: permitted are 1.23, 1.40, 1.70"),
+        (BUS + 'tcp = "foo"\n', "w.toml:6:1: error D003: [line]: tcp: 'foo' is no address: expected HOST:PORT"),
+        (BUS + 'tcp = "127.0.0.1:99999"\n', "w.toml:6:1: error D003: [line]: tcp: '127.0.0.1:99999' is no address"),
+        (BUS + 'rtu_tcp = "here"\n', "w.toml:6:1: error D003: [line]: rtu_tcp: 'here' is no address"),
+        (
+            CHIP + 'line = "bus"\n[[line]]\nname = "bus"\nkind = "m1486"\nrtu_tcp = "127.0.0.1:0"\n',
+            "w.toml:7:1: error D007: rtu_tcp means nothing for kind = 'm1486'",
+        ),
         (TABLE + TABLE, "w.toml:4:1: error D006: there is a [[mic488]] named 'table' already"),
         (TABLE + "[mic488.M1]\nacc = -1\n", "w.toml:4:1: error D003: [mic488.M1]: acc: -1 is not permitted"),
         (TABLE + '[mic488.M1]\nhome_mode = "HOME9"\n', "permitted are HOME0, HOME1, HOME2, HOME3, HOME4"),
@@ -111,7 +120,19 @@ def wrong(text: str) -> str:
         (CHIP + '[[wire]]\nfrom = "chip.JOG"\nto = "chip.B2"\n', "chip.JOG is no output: outputs of 'chip' are B1, B2"),
         (BUS + '[[wire]]\nfrom = "bus.OUT1"\nto = "table.IN1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
         (BUS + '[[axis]]\nname = "x"\ndrive = "bus.M1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
-        (TABLE + '[[source]]\nto = "table.AIN1"\nvalue = 12\n', "value = 12 V: an analog input takes 0 to 10 V"),
+        (
+            TABLE + '[[source]]\nto = "table.AIN1"\nvalue = 12\n',
+            "w.toml:3:1: error D009: source of table.AIN1: 12 V: an analog input",
+        ),
+        (
+            TABLE + '[[source]]\nto = "table.AIN1"\nkind = "ramp"\nover = 1\nbegin = -3\nend = 5\n',
+            "source of table.AIN1: -3 to 5 V: an analog input takes 0 to 10 V",
+        ),
+        (
+            TABLE + '[[source]]\nto = "table.AIN1"\nkind = "table"\npoints = [[0, 9], [1, 11]]\n',
+            "table.AIN1: 9 to 11 V: an analog",
+        ),
+        (TABLE + '[[source]]\nto = "table.AIN1"\nkind = "sine"\nvalue = 3\namplitude = -5\n', "table.AIN1: -2 to 8 V: an analog"),
         (
             TABLE + '[[source]]\nto = "table.AIN1"\nphase = 1\n',
             "w.toml:5:1: error D007: phase means nothing for kind = 'constant'",
@@ -223,3 +244,10 @@ def test_the_configuration_of_a_controller_takes_words_and_numbers() -> None:
     )
     assert spec.mic488[0].axes == {2: {"unit": 3, "gear": 100.0, "in_kl": 2, "limit_mode": 3}}
     assert spec.mic488[0].inputs == {3: {"level": 1}}
+
+
+@pytest.mark.parametrize(
+    ("written", "firmware"), [("1.7", "1.70"), ('"1.7"', "1.70"), ('"1.70"', "1.70"), ("1.4", "1.40"), ("1.23", "1.23")]
+)
+def test_a_firmware_is_a_text_or_a_number(written: str, firmware: str) -> None:
+    assert read_world("w", f"{TABLE}firmware = {written}\n").mic488[0].firmware == firmware

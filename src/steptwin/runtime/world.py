@@ -72,7 +72,7 @@ class World(Plant):
         With ``seed`` chance is another than the description says.
         """
         place = Path(path)
-        spec = read_world(str(path), read_text(place).source.text, seed)
+        spec = _described(str(path), read_text(place).source.text, seed)
         files = {name: read_bytes(place.parent / name) for name in spec.files()}
         return cls(spec, files, keep_trace=keep_trace)
 
@@ -81,7 +81,7 @@ class World(Plant):
         cls, text: str, files: Mapping[str, bytes] | None = None, *, name: str = "world.toml", keep_trace: bool = True
     ) -> Self:
         """The world described by a text. ``files`` are the contents of the files it names. Raises `WorldError`."""
-        return cls(read_world(name, text), files, keep_trace=keep_trace)
+        return cls(_described(name, text), files, keep_trace=keep_trace)
 
     def __enter__(self) -> Self:
         return self
@@ -172,6 +172,24 @@ class World(Plant):
         other = type(self)(read_world(self.spec.text.source.name, self.spec.text.source.text, self.spec.seed), self.files)
         other.restore(self.snapshot() if snapshot is None else snapshot)
         return other
+
+
+def _described(name: str, text: str, seed: int | None = None) -> WorldSpec:
+    """What a text describes. Raises `WorldError`, also for addresses that are none."""
+    spec = read_world(name, text, seed)
+    addresses = [
+        (line, key, given) for line in spec.lines for key in ("tcp", "rtu_tcp") if (given := getattr(line, key)) is not None
+    ]
+    if addresses:
+        from steptwin.runtime.tcp import parse_address
+
+        for line, key, given in addresses:
+            try:
+                parse_address(given, listen_any=True)
+            except Misuse as error:
+                spec.text.wrong((*line.path, key), "D003", f"[line]: {key}: {error}")
+        spec.text.check()
+    return spec
 
 
 def _steps(reaction: Reaction) -> tuple[do.Step, ...]:

@@ -130,8 +130,10 @@ def _set_fault(plant: Plant, step: do.SetFault) -> None:
 
 
 def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
-    plant.settle_all()
-    plant.plan.faults.remove(step.name, plant.now)
+    faults = plant.plan.faults
+    if step.name in (active.name for active in faults.active):  # else it has been cleared already, or is not set yet
+        plant.settle_all()
+        faults.remove(step.name, plant.now)
 
 
 def _expect(plant: Plant, step: do.Expect) -> None:

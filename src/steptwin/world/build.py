@@ -36,7 +36,7 @@ from steptwin.world.lines import ChipLine, Line, ModbusLine, timing_of
 from steptwin.world.mechanics import EncoderBuild, Mechanism, RotorMark
 from steptwin.world.reader import Path
 from steptwin.world.scale import Scale, motor_of, scale_of
-from steptwin.world.sources import HIGHEST_V, LOWEST_V, Constant, Sine, Table, Waveform
+from steptwin.world.sources import Constant, Sine, Table, Waveform
 from steptwin.world.sources import Source as AnalogSource
 from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, SourceSpec, SwitchSpec, WorldSpec
 from steptwin.world.terminals import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, check_terminal
@@ -451,8 +451,6 @@ def _image(text: str, name: str, kind: Variant) -> bytes:
 def _waveform(spec: SourceSpec) -> Waveform:
     repeat = None if spec.repeat is None else spec.repeat / 1e9
     if spec.kind == "constant":
-        if not LOWEST_V <= spec.value <= HIGHEST_V:
-            raise Misuse(f"value = {spec.value:g} V: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V")
         return Constant(spec.value)
     if spec.kind == "sine":
         return Sine(spec.value, spec.amplitude, spec.frequency, spec.phase)

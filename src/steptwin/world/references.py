@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from steptwin.errors import Misuse
 from steptwin.m1486.pins import settable_pin
 from steptwin.mic488.device import Mic488, check_pin, check_turn
 from steptwin.world import script as do
+from steptwin.world.faults import Fault
 from steptwin.world.reader import Path
 from steptwin.world.spec import ScriptSpec
 
@@ -16,28 +17,45 @@ if TYPE_CHECKING:
     from steptwin.world.plant import Plant
 
 
-def check_scripts(plant: Plant, scripts: Iterable[ScriptSpec]) -> None:
+def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
     """Raises `WorldError` with every step that cannot be taken."""
     text = plant.spec.text
+    set_somewhere = [step.fault for script in scripts for step in _all(script.steps) if isinstance(step, do.SetFault)]
     for script in scripts:
         if script.when is not None:
             try:
                 plant.condition(script.when)
             except Misuse as error:
                 text.wrong((*script.path, "when"), "D009", str(error))
-        _check(plant, script.steps, (*script.path, "steps" if script.path[0] == "script" else "do"))
+        _check(plant, script.steps, (*script.path, "steps" if script.path[0] == "script" else "do"), set_somewhere)
     text.check()
 
 
-def _check(plant: Plant, steps: Iterable[do.Step], path: Path) -> None:
+def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
+    for step in steps:
+        if isinstance(step, do.Repeat):
+            yield from _all(step.steps)
+        else:
+            yield step
+
+
+def _check(plant: Plant, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
     for n, step in enumerate(steps):
         if isinstance(step, do.Repeat):
-            _check(plant, step.steps, (*path, n, "steps"))
+            _check(plant, step.steps, (*path, n, "steps"), set_somewhere)
+        elif isinstance(step, do.ClearFault) and any(_may_be_called(fault, step.name) for fault in set_somewhere):
+            pass
         else:
             try:
                 check_step(plant, step)
             except Misuse as error:
                 plant.spec.text.wrong((*path, n), "D009", f"step {n + 1}: {error}")
+
+
+def _may_be_called(fault: Fault, name: str) -> bool:
+    """Whether a fault can get this name: its own, or its kind and a number where it has none."""
+    kind, _, number = name.rpartition("-")
+    return name == fault.name or (not fault.name and fault.kind.name in (name, kind if number.isdecimal() else name))
 
 
 def check_step(plant: Plant, step: object) -> None:
@@ -85,6 +103,10 @@ def _fault(plant: Plant, step: do.SetFault) -> None:
     plant.rigging.check(step.fault)
 
 
+def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
+    plant.plan.faults.called(step.name)
+
+
 _CHECKS: dict[type, Callable[[Plant, Any], None]] = {
     do.Until: _condition,
     do.Expect: _condition,
@@ -96,4 +118,5 @@ _CHECKS: dict[type, Callable[[Plant, Any], None]] = {
     do.PowerCycle: _power_cycle,
     do.Turn: _turn,
     do.SetFault: _fault,
+    do.ClearFault: _clear_fault,
 }

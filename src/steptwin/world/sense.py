@@ -19,6 +19,7 @@ _EXCLUDE: Mapping[str, tuple[tuple[str, str], ...]] = {
 }
 """Keys that say the same in two ways."""
 _ONLY: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "line": {"rtu_tcp": ("modbus",)},
     "source": {
         "value": ("constant", "sine"),
         "amplitude": ("sine",),
@@ -34,7 +35,7 @@ _ONLY: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "motor": {"mass": ("linear",), "friction_force": ("linear",), "force": ("linear",)},
 }
 """Keys that some kinds only have."""
-_USUAL = {"source": "constant"}
+_USUAL = {"line": "modbus", "source": "constant"}
 
 
 def check_sense(text: Text, path: Path, name: str, table: object, kind: object = None) -> None:

@@ -18,6 +18,11 @@ RESOLUTION_V = 0.001
 
 
 class Waveform(Protocol):
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest voltage."""
+        ...
+
     def volts(self, t_s: float) -> float: ...
     def rests(self, t_s: float) -> bool:
         """Whether nothing changes from ``t_s`` on."""
@@ -27,6 +32,10 @@ class Waveform(Protocol):
 @dataclass(frozen=True, slots=True)
 class Constant:
     value: float
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        return self.value, self.value
 
     def volts(self, t_s: float) -> float:
         return self.value
@@ -49,6 +58,11 @@ class Table:
         times = [time for time, _ in self.points]
         if not times or times != sorted(set(times)):
             raise Misuse("the points of a table need times that grow")
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        volts = [volts for _, volts in self.points]
+        return min(volts), max(volts)
 
     def volts(self, t_s: float) -> float:
         if self.repeat_s is not None:
@@ -74,6 +88,10 @@ class Sine:
     frequency: float
     phase: float = 0.0
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        return self.mean - abs(self.amplitude), self.mean + abs(self.amplitude)
+
     def volts(self, t_s: float) -> float:
         return self.mean + self.amplitude * sine(4.0 * (self.frequency * t_s + self.phase / 360.0))
 
@@ -82,7 +100,7 @@ class Sine:
 
 
 class Source(Stateful):
-    """Gives an analog input the voltage of a waveform once in a ``period``, within what the input takes."""
+    """Gives an analog input the voltage of a waveform once in a ``period``."""
 
     __slots__ = ("_due", "_kernel", "_waveform", "period", "target")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "_waveform", "period", "target"})
@@ -91,6 +109,10 @@ class Source(Stateful):
         kernel.check(target)
         if period < 1:
             raise Misuse(f"source of {target}: a period of {period} ns is not positive")
+        lowest, highest = waveform.bounds
+        if not LOWEST_V <= lowest <= highest <= HIGHEST_V:
+            volts = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
+            raise Misuse(f"source of {target}: {volts} V: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V")
         self._kernel = kernel
         self._waveform = waveform
         self.target = target
@@ -101,6 +123,7 @@ class Source(Stateful):
         if self._due is None or self._due > now:
             return
         t_s = now / SECOND
+        # Its bounds are permitted: only rounding can go beyond.
         volts = min(max(self._waveform.volts(t_s), LOWEST_V), HIGHEST_V)
         self._kernel.drive(self.target, int(volts / RESOLUTION_V + 0.5) * RESOLUTION_V)
         self._due = None if self._waveform.rests(t_s) else now + self.period

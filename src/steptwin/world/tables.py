@@ -41,7 +41,10 @@ def _texts(value: Any) -> str:
 
 
 def _firmware(value: Any) -> str:
-    return word(*FIRMWARES)(f"{value:.2f}" if isinstance(value, float) else value)
+    """A number as well, and without the last zero."""
+    text = str(value) if isinstance(value, float) else value
+    short = [name for name in FIRMWARES if name.removesuffix("0") == text]
+    return short[0] if short else word(*FIRMWARES)(text)
 
 
 def _variant(value: Any) -> str:

@@ -178,13 +178,18 @@ class Faults(Stateful):
 
     def remove(self, name: str, now: Nanos) -> Active:
         """Take a fault away; what it holds is let go. `Misuse` with the names there are."""
-        active = self._named(name)
-        if active is None:
-            raise Misuse(f"no fault {name!r}: set are {', '.join(a.name for a in self.active) or 'none'}")
+        active = self.called(name)
         self.active = tuple(a for a in self.active if a is not active)
         if active.fault.kind.layer is Layer.PHYSICS:
             self._machine(active.fault).end(active, now)
         self._changed()
+        return active
+
+    def called(self, name: str) -> Active:
+        """A fault that is set. `Misuse` with the names there are."""
+        active = self._named(name)
+        if active is None:
+            raise Misuse(f"no fault {name!r}: set are {', '.join(a.name for a in self.active) or 'none'}")
         return active
 
     def clear(self, now: Nanos) -> None:
