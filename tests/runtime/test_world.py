@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse, Runaway
 from steptwin.machine import SECOND
 from steptwin.mic488.status import Status
+from steptwin.runtime.session import session_of
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.script import Steps
@@ -135,6 +136,21 @@ def test_a_delayed_wire_and_a_button() -> None:
     assert world.mic488["b"].pins["IN4"] == 1.0
     world.run(for_="1 s")
     assert world.mic488["b"].pins["IN4"] == 0.0
+
+
+def test_the_last_hand_on_a_button_says_when_it_is_released() -> None:
+    world = small()
+    levels = []
+    world.at("0.5 s", lambda: world.press("go", 1))
+    world.at("2 s", lambda: world.press("go", 1))
+    world.at("2.4 s", lambda: world.release("go"))
+    world.at("2.7 s", lambda: world.press("go"))
+    world.press("go", 1)
+    for _ in range(20):
+        levels.append(int(world.mic488["b"].pins["IN4"]))
+        world.run(for_=0.2)
+    assert levels == [1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 1, 1, 1, 1]
+    assert session_of(world).replay().trace.digest() == world.trace.digest()
 
 
 def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:

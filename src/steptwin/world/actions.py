@@ -60,15 +60,21 @@ def _press(plant: Plant, step: do.Press) -> None:
     _move_button(plant, step.button, pressed=True)
     if step.duration is not None:
         later = (do.Wait(step.duration), do.Release(step.button))
-        plant.start(f"release {step.button}", lambda: do.run_through(later))
+        plant.start(_releasing(step.button), lambda: do.run_through(later))
 
 
 def _release(plant: Plant, step: do.Release) -> None:
     _move_button(plant, step.button, pressed=False)
 
 
+def _releasing(button: str) -> str:
+    """The script that releases a button after a time; no script of a description has a blank in its name."""
+    return f"release {button}"
+
+
 def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
     button, kernel = plant.button(name)
+    plant.call_off(_releasing(name))
     kernel.advance(plant.now)
     _record(plant, button.target.machine, name, "pressed" if pressed else "released")
     button.press(pressed, plant.now)

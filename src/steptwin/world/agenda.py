@@ -35,6 +35,10 @@ class Agenda:
         self._timed = [entry for entry in self._timed if entry[2] is not script]
         heapify(self._timed)
 
+    def called(self, name: str) -> list[Script]:
+        """Those of this name that wait for a moment."""
+        return [entry[2] for entry in self._timed if entry[2].name == name]
+
     def moment(self) -> Nanos | None:
         """The first moment that is waited for."""
         return self._timed[0][0] if self._timed else None

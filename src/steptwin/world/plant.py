@@ -408,10 +408,18 @@ class Plant:
             watch = self.start("until", lambda: do.run_through(steps))
         self.advance(end)
         if watch is not None and not watch.ended:
-            watch.ended = True
-            self._own.remove(watch)
+            self._end(watch)
         self.settle_all()
         return self.stopped
+
+    def call_off(self, name: str) -> None:
+        """What was to be done later under a name is not done."""
+        for script in self._own.called(name):
+            self._end(script)
+
+    def _end(self, script: Script) -> None:
+        script.ended = True
+        self._agenda_of(script).remove(script)
 
     def go_on(self) -> None:
         """What has stopped goes on: scripts that stopped it take their next step."""
