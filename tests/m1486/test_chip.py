@@ -129,6 +129,16 @@ def test_an_e_type_runs_its_stored_file_at_power_up() -> None:
     assert again.run(0.5) == b"\x45"
 
 
+def test_m_37_commands_outside_a_file_are_not_kept() -> None:
+    kept: list[bytes] = []
+    bench = Bench("E1")
+    bench.chip.store = kept.append
+    bench.do("u20")
+    bench.do("[", "u20", "w1000", "]")
+    bench.do("u20", "v2000")
+    assert kept == [image("E1", "u20", "w1000")] == [bench.chip.image]
+
+
 def test_power_off_loses_a_program_in_ram() -> None:
     bench = Bench("B")
     bench.file("@1", "u20", "w1000", "j1")

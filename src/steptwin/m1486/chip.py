@@ -397,7 +397,7 @@ class M1486(Stateful):
             return
         self.event("file", f"a file of {8 * len(file.code)} bits")
         if self.variant.store is Store.EEPROM:
-            self._keep(pack(file))
+            self._keep(pack(file))  # M-37: nothing else is kept
 
     def software_reset(self) -> None:
         """``\\``: defaults; an E type erases its EEPROM. Address and baud rate stay."""

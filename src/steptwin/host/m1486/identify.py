@@ -5,7 +5,8 @@ What is said, and what it does to whoever hears it:
 * ``X`` chooses who listens. It acts when received, at any time, and only that.
 * ``U20`` asks for the type letter. Like every question it takes its turn, so a chip that moves, waits or runs a program does
   not answer, and like every command it passes through the command memory, 16 bits of it (chapter II, Memory); an E type needs
-  half a second for that. It changes no setting, no line and no position. A chip that was busy answers when it is done.
+  half a second for that (and keeps nothing of it, M-37). It changes no setting, no line and no position. A chip that was busy
+  answers when it is done.
 * To a MIC488 it is rubbish: a frame needs a right CRC, and none of these characters is one of its functions.
 
 The other way round, a Modbus frame is rubbish to a chip: no frame is a command, but a line of rubbish is wrong data, which ends
