@@ -76,7 +76,7 @@ class Set:
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """Press a button, for ``duration`` or until it is released; who presses it again or releases it meanwhile goes before that."""
+    """Press a button, for ``duration`` or until it is released; who presses or releases it meanwhile goes before that."""
 
     button: str
     duration: Nanos | None = None
