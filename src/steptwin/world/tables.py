@@ -106,7 +106,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         Key("name", name_value, "how scripts and conditions name it"),
         Key("drive", pin_name, "what drives it: MACHINE.M1 to M4 of a MIC488, MACHINE.M1 of an M1486"),
         _optional(word("linear", "rotary"), "kind", "linear or rotary", "linear"),
-        _optional(text_value, "unit", "unit of its positions: mm, cm, m, degree, rev, or anything; default that of its scale"),
+        _optional(text_value, "unit", "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's"),
         _optional(
             _positive, "pulses_per_unit", "pulses (M1486: minimum microsteps) per unit; else by pitch, by revolution, by gear"
         ),
@@ -164,14 +164,14 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         Key("to", pin_name, "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
         _optional(word("constant", "ramp", "sine", "table"), "kind", "constant, ramp, sine or table", "constant"),
         _optional(number(), "value", "volts; of a sine its mean", 0.0),
-        _optional(number(), "amplitude", "volts", 0.0),
-        _optional(_not_negative, "frequency", "Hz", 1.0),
-        _optional(number(), "phase", "degrees", 0.0),
+        _optional(number(), "amplitude", "sine: volts", 0.0),
+        _optional(_not_negative, "frequency", "sine: Hz", 1.0),
+        _optional(number(), "phase", "sine: degrees", 0.0),
         _optional(points, "points", "table: [[seconds, volts], ...]", ()),
         _optional(number(), "begin", "ramp: volts at first", 0.0),
         _optional(number(), "end", "ramp: volts in the end", 0.0),
         _optional(time_value, "over", "ramp: how long it takes", 0, "ramp_time"),
-        _optional(positive_time, "repeat", "begins anew after this time"),
+        _optional(positive_time, "repeat", "ramp, table: begins anew after this time"),
         _optional(positive_time, "period", "how often the voltage is renewed", 10 * MILLISECOND),
     ),
     "event": (
@@ -179,7 +179,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(time_value, "at", "when"),
         _optional(positive_time, "every", "again and again"),
         _optional(text_value, "when", "a condition, such as 'x.position > 100'"),
-        _optional(flag, "once", "only the first time the condition comes true", False),
+        _optional(flag, "once", "when: only the first time the condition comes true", False),
     ),
     "script": (
         Key("name", name_value, "for the trace"),
