@@ -94,16 +94,28 @@ def test_a_move_that_somebody_else_replaced_is_diverted() -> None:
     assert not other.axis(1).wait(check=False).detail
 
 
-def test_a_position_error_is_named() -> None:
+@pytest.mark.parametrize(("err_time_ms", "knows", "distance"), [(2000, True, 5.0), (2000, False, 5.0), (9000, True, 100.0)])
+def test_a_position_error_is_named(err_time_ms: int, knows: bool, distance: float) -> None:
+    """The controller gives up long after the motion should have been over."""
     config = spindles()
     axis = dataclasses.replace(
-        config.axes[0], mot_resol=400, enc_resol=400, pos_ctrl_mode=1, err_ctrl_mode=2, limit_mode=0, in_kl=20, in_kr=20
+        config.axes[0],
+        mot_resol=400,
+        enc_resol=400,
+        pos_ctrl_mode=1,
+        err_ctrl_mode=2,
+        err_time_ms=err_time_ms,
+        limit_mode=0,
+        in_kl=20,
+        in_kr=20,
     )
     wire, mic = ready(config=dataclasses.replace(config, axes=(axis, *config.axes[1:])), switches=False)
+    if not knows:
+        mic = driver(wire, config=None)
     wire.twin.couple_encoder(1, wire.twin.axes[0].encoder.coupling.BLOCKED, wire.now)
-    mic.axis(1).move_to(5.0)
+    mic.axis(1).move_to(distance)
     with pytest.raises(MoveFailed, match="M1: position error"):
-        mic.axis(1).wait(20.0)
+        mic.axis(1).wait()
 
 
 def test_a_line_that_fails_is_the_end_of_waiting() -> None:

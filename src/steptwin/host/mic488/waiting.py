@@ -21,7 +21,8 @@ MARGIN = 1.2
 UNKNOWN_S = 60.0
 """Time-out of a motion whose end nobody can compute: a homing, or one that somebody else has begun."""
 CORRECTION_S = 5.0
-"""The controller itself gives a correction up sooner (ERR_TIME)."""
+"""Time for a correction of the position after a motion. The controller itself gives up sooner: 2 s without progress (ERR_TIME),
+unless its configuration says otherwise."""
 
 
 class Watch:
@@ -34,6 +35,8 @@ class Watch:
         check_wait(timeout_s)
         self._begin = unit.line.now()
         self._limit: Nanos | None = None if timeout_s is None else self._begin + round(timeout_s * SECOND)
+        self._is_computed = timeout_s is None
+        self._corrects = False
 
     @property
     def after(self) -> Nanos:
@@ -46,8 +49,10 @@ class Watch:
         motion = self._motion
         if status in MOVING:
             now = self._unit.line.now()
-            if self._limit is None:
+            corrects = status == Status.CORRECTION  # which follows the motion that the time was computed of
+            if self._limit is None or (self._is_computed and corrects is not self._corrects):
                 self._limit = now + round(await self._time_out_s(status) * SECOND)
+                self._corrects = corrects
             if now < self._limit:
                 return None
             return await self._end(Reason.OVERDUE, f"{status_text(status)} for {(now - self._begin) / SECOND:.1f} s")
@@ -76,7 +81,9 @@ class Watch:
         """How long the motion may take from now on."""
         unit, axis, motion = self._unit, self._axis, self._motion
         if status == Status.CORRECTION:
-            return CORRECTION_S
+            known = unit.config.axes[axis - 1] if unit.config is not None else None
+            patience_s = 0.0 if known is None else (known.enc_settle_ms + known.err_time_ms) / 1000.0 + MARGIN_S
+            return max(CORRECTION_S, patience_s)
         if status == Status.HOMING:
             return UNKNOWN_S
         position, velocity, acc, dec, vmax = await dynamics(unit, axis)
