@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from chip_rig import ChipWire, chip_driver
+from chip_rig import ChipWire, chip_driver, chip_line
 
-from steptwin.host.m1486 import WrongType
+from steptwin.host.m1486 import M1486, WrongType
 from steptwin.m1486.lines import DUAL_DAC
 
 
@@ -16,6 +16,16 @@ def test_the_type_is_found(kind: str, title: str) -> None:
     chip = chip_driver(ChipWire(kind, interface=DUAL_DAC))
     status = chip.status()
     assert (chip.variant.title, status.type, status.interface, status.series) == (title, title, "Dual DAC", 1)
+
+
+@pytest.mark.parametrize("kind", ["B", "E1", "E2"])
+def test_a_chip_that_echoes_already_is_known_again_by_the_next_program(kind: str) -> None:
+    """It does at once what every connection types before its questions; an E type takes half a second for each."""
+    wire = ChipWire(kind, (1,))
+    for _ in range(3):
+        chip = M1486(chip_line(wire), 1)
+        chip.open()
+        assert (chip.variant.name, chip.status().series) == (kind, 1)
 
 
 def test_another_type_than_expected_is_refused() -> None:
