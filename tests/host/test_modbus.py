@@ -297,8 +297,10 @@ def test_tcp_late_answers_and_those_of_others_are_passed_over(tcp: Callable[...,
     master.abandon(1)
     master.start(Query(1, POSITION), 2, urgent=False)
     assert master.receive(answered(1, "03 04 00 01 00 02"), 3) is None
-    assert master.receive(answered(2, "03 04 00 01 00 02", unit=7), 3) is None
-    assert master.receive(answered(2, "03 04 00 03 00 04"), 3) == bytes.fromhex("03 04 00 03 00 04")
+    assert master.receive(other := answered(2, "03 04 00 01 00 02", unit=7), 3) is None
+    assert master.abandon(4) == other
+    master.start(Query(1, POSITION), 5, urgent=False)
+    assert master.receive(answered(3, "03 04 00 03 00 04"), 6) == bytes.fromhex("03 04 00 03 00 04")
 
 
 def test_tcp_refusals(tcp: Callable[..., TcpMaster]) -> None:

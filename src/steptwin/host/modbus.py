@@ -256,7 +256,7 @@ class TcpMaster:
 
     def reset(self) -> None:
         self._asked: Query | None = None
-        self._no_answer = b""  # what came with the number of the request
+        self._no_answer = b""  # what came instead of an answer
         self._framer = mbap.TcpFramer()
 
     def allowance_ns(self, request: Query) -> Nanos:
@@ -287,15 +287,14 @@ class TcpMaster:
         for frame in self._feed(data):
             if self.on_frame is not None:
                 self.on_frame(now, Direction.OUT, frame.raw)
-            if frame.transaction != self._number or frame.unit != asked.device:
-                continue
-            answer = frame.pdu
-            if asked.answered_by(answer):
-                self._asked = None
-                return answer
-            if answer[0] == asked.function | pdu.REFUSED and len(answer) == 2:
-                self._asked = None
-                raise pdu.ModbusException(asked.function, answer[1])
+            if frame.transaction == self._number and frame.unit == asked.device:
+                answer = frame.pdu
+                if asked.answered_by(answer):
+                    self._asked = None
+                    return answer
+                if answer[0] == asked.function | pdu.REFUSED and len(answer) == 2:
+                    self._asked = None
+                    raise pdu.ModbusException(asked.function, answer[1])
             self._no_answer = frame.raw
         return None
 
