@@ -153,6 +153,32 @@ def test_the_last_hand_on_a_button_says_when_it_is_released() -> None:
     assert session_of(world).replay().trace.digest() == world.trace.digest()
 
 
+def test_an_edge_of_an_input_is_told_once() -> None:
+    world = World.from_toml("""
+        [[m1486]]
+        name = "d"
+        [[mic488]]
+        name = "t"
+        [[wire]]
+        from = "t.OUT1"
+        to = "d.B2"
+    """)
+    world.run(for_=1)
+    begin = world.now
+    world.m1486["d"].set_pin("B1", 0)
+    world.m1486["d"].set_pin("BR0", 0)
+    world.mic488["t"].write("OUT1", 1)
+    world.run(for_=1)
+    world.mic488["t"].write("OUT1", 0)
+    world.m1486["d"].set_pin("B1", 1)
+    world.m1486["d"].set_pin("LIMIT", 0)
+    world.run(for_=1)
+    edges = [(edge.subject, edge.value, edge.time - begin) for edge in world.trace.edges("d") if edge.time >= begin]
+    assert sorted(edges) == [
+        ("B1", 0.0, 0), ("B1", 1.0, SECOND), ("B2", 0.0, SECOND), ("B2", 1.0, 0), ("B5", 0.0, 0), ("LIMIT", 0.0, SECOND)
+    ]  # fmt: skip
+
+
 def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:
     world = small()
     with pytest.raises(Misuse, match="no axis 5: axes are 1, 2, 3, 4"):

@@ -6,8 +6,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
+from steptwin.m1486.chip import M1486
+from steptwin.m1486.pins import known_pin
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
+from steptwin.world.kernel import PinName
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.trace import Record
 
@@ -49,10 +52,9 @@ def _record(plant: Plant, machine: str, what: str, value: object) -> None:
 
 def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, value in step.levels:
-        plant.machine(name)
+        known = known_pin(pin) if isinstance(plant.machine(name), M1486) else pin
         kernel = plant.touch(name)
-        kernel.machines[name].set_pin(pin, value, plant.now)
-        plant.trace.add(Record(plant.now, name, "edge", pin, value))
+        kernel.give(PinName(name, known), value)
         kernel.settle()
 
 

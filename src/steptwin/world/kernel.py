@@ -114,6 +114,8 @@ class Kernel:
         self._wires: dict[PinName, list[Wire]] = {}
         self._levels: dict[PinName, float] = {}
         """What was driven to each input last."""
+        self._given: dict[PinName, tuple[Nanos, float]] = {}
+        """The last edge recorded of each input."""
         self._flights: list[Flight] = []
         self._plans: list[_Plans] = []
         """Of each machine, as recorded last."""
@@ -182,8 +184,13 @@ class Kernel:
         if self._levels.get(target) == level:
             return
         self._levels[target] = level
+        self.give(target, level)
+
+    def give(self, target: PinName, level: float) -> None:
+        """An input takes a level now, which is recorded here: what its machine tells of the same edge is not."""
         self.machines[target.machine].set_pin(target.pin, level, self.now)
         if self._record is not None:
+            self._given[target] = self.now, level
             self._record(Record(self.now, target.machine, "edge", target.pin, level))
 
     def _send(self, wire: Wire, value: float) -> None:
@@ -264,11 +271,12 @@ class Kernel:
         self._due = soonest
 
     def _edge(self, name: str, edge: Edge) -> None:
-        if self._record is not None:
+        pin = PinName(name, edge.pin)
+        if self._record is not None and self._given.get(pin) != (edge.time, edge.value):
             self._record(Record(edge.time, name, "edge", edge.pin, edge.value))
         for observer in self.observers:
             observer(name, edge)
-        for wire in self._wires.get(PinName(name, edge.pin), ()):
+        for wire in self._wires.get(pin, ()):
             self._send(wire, edge.value)
 
     def _arrive(self) -> None:
@@ -300,6 +308,7 @@ class Kernel:
         for part, its_state in zip(self.parts, state.parts, strict=True):
             part.set_state(its_state)
         self._levels = dict(state.levels)
+        self._given.clear()
         self._flights = list(state.flights)
         for plans in self._plans:
             plans.take_as_told()
