@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 
 import pytest
-from chip_rig import ChipWire, chip_line, chip_task_line, run_in
+from chip_rig import ChipWire, Fault, chip_line, chip_task_line, run_in
 
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.host import Overtaken
@@ -291,3 +291,22 @@ def test_a_chip_that_is_absent_or_off_makes_no_other_one_restarted() -> None:
     with pytest.raises(Restarted, match="chip 7 was"):
         y.position()
     assert x.flags() == y.flags()
+
+
+def test_an_answer_that_is_lost_is_asked_for_again() -> None:
+    wire = ChipWire("B", (0, 7))
+    chips = moving(wire, 2000.0, 2000.0)
+    wire.at(2.0, lambda: wire.put(Fault("to host", 0, "drop")))
+    assert [chip.wait().reason for chip in chips] == [ChipReason.TARGET] * 2
+    assert wire.faults[0].met
+    assert [chip.counter() for chip in chips] == [128_000] * 2
+
+
+def test_trouble_with_one_chip_is_told_to_who_waits_for_it() -> None:
+    wire = ChipWire("B", (0, 7))
+    chips = moving(wire, 2000.0, 2000.0)
+    wire.at(1.0, lambda: wire.chips[7].power_cycle(wire.now))
+    assert chips[0].wait().reason is ChipReason.TARGET
+    with pytest.raises(Restarted, match="chip 7 was switched off or reset meanwhile"):
+        chips[1].wait()
+    assert chips[0].counter() == 128_000

@@ -53,6 +53,8 @@ class Notes:
         self.is_position_valid = True
         self.was_awake = False
         """Whether it echoed before: if it does not any more, it was switched off."""
+        self.restarted: Restarted | None = None
+        """Somebody who watched another chip has found out that this one was switched off: to be told to who uses it next."""
         self.stops = 0
         """How often it was stopped: a motion asked for before must not begin after."""
         self.is_killed = False
@@ -177,6 +179,9 @@ class Unit:
 
     async def _ready(self) -> None:
         """It echoes, and its EEPROM is free."""
+        restarted, self.notes.restarted = self.notes.restarted, None
+        if restarted is not None:
+            raise restarted
         rest = self.notes.ready_at - self.line.now()
         if rest > 0:
             await self.line.sleep(rest / SECOND)

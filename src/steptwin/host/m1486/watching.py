@@ -9,6 +9,7 @@ time is somebody's who was stopped early: the chips are asked again one by one, 
 from __future__ import annotations
 
 from steptwin.errors import LineFailure, Refusal
+from steptwin.host.m1486.failures import Restarted
 from steptwin.host.m1486.motion import EARLY, EARLY_S, Told
 from steptwin.host.m1486.talk import WHO
 from steptwin.host.m1486.unit import SLICE_NS, Notes, Unit
@@ -142,10 +143,12 @@ class _Watch:
         mover = self._movers[address] = _Mover(unit, motion)
         try:
             await self._ask(mover)
-        except (LineFailure, Refusal):
-            # Who waits for that chip is told; others are not troubled with it.
+        except (LineFailure, Refusal) as failure:
+            # Who uses that chip is told; others are not troubled with it.
             if unit is own:
                 raise
+            if isinstance(failure, Restarted):
+                unit.notes.restarted = failure
             del self._movers[address]
             self._given_up.add(address)
             return
