@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from steptwin.errors import Misuse
+from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
@@ -118,17 +119,6 @@ STOPPING = """
 """
 
 
-CHIPS = """
-    [[line]]
-    name = "chips"
-    kind = "m1486"
-    rtu_tcp = "127.0.0.1:0"
-    [[m1486]]
-    name = "b"
-    line = "chips"
-"""
-
-
 def test_a_script_that_stops_a_live_world_stops_it_for_all() -> None:
     live = LiveWorld(World.from_toml(STOPPING))
     stops: list[Nanos] = []
@@ -179,12 +169,14 @@ def test_a_trace_that_cannot_be_written_leaves_the_session(tmp_path: Path, monke
 
 
 def test_what_did_not_begin_overwrites_nothing(tmp_path: Path) -> None:
-    options = arguments(tmp_path, STOPPING + CHIPS)
-    for path in (options.session, options.trace):
-        assert path is not None
-        path.write_text("yesterday")
-    with pytest.raises(Misuse, match="rtu_tcp is for Modbus lines"):
-        up(options)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        line = f'[[line]]\nname = "chips"\nkind = "m1486"\ntcp = "127.0.0.1:{taken.getsockname()[1]}"\n'
+        options = arguments(tmp_path, STOPPING + line + '[[m1486]]\nname = "b"\nline = "chips"\n')
+        for path in (options.session, options.trace):
+            assert path is not None
+            path.write_text("yesterday")
+        with pytest.raises(LineFailure, match="in use"):
+            up(options)
     assert [path.read_text() for path in tmp_path.glob("?.json*")] == ["yesterday"] * 2
 
 
