@@ -187,6 +187,40 @@ def test_a_block_is_done_when_its_last_command_is() -> None:
     assert [event.text for _, event in wire.happened if event.code == "moves"][1].startswith("moves -640")
 
 
+@pytest.mark.parametrize("kind", ["A", "B"])
+@pytest.mark.parametrize(
+    ("commands", "moved"),
+    [
+        (["f6400", "e"], 0),  # E outside a loop
+        ([":1", "v", "f6400", "r"], 0),  # V1
+        (["f640", "r", ":15", "q", "r"], 640),  # Q15
+    ],
+)
+def test_a_block_that_a_command_of_it_ends_is_not_done(kind: str, commands: list[str], moved: int) -> None:
+    """What the chip was asked meanwhile goes with the block, so it is asked again."""
+    wire = ChipWire(kind)
+    chip = chip_driver(wire)
+    begin = wire.now
+    with pytest.raises(ChipMoveFailed, match=r"cut short .*\(a command was wrong data when it came to be done") as failed:
+        chip.run_block(commands)
+    assert failed.value.end.reason is ChipReason.CUT
+    assert wire.true() == moved
+    assert wire.now - begin < 5 * SECOND
+    assert chip.run_block(["f640", "r"]).ok
+    assert chip.counter() == moved + 640
+
+
+def test_a_block_that_ends_late_is_seen_to_have_ended() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    begin = wire.now
+    with pytest.raises(ChipMoveFailed, match="cut short"):
+        chip.run_block(["w12000", "e"])
+    assert 12 * SECOND < wire.now - begin < 20 * SECOND
+    with pytest.raises(Misuse, match="no program of the chip was started here"):
+        chip.uploaded(1)
+
+
 PROGRAM = "[\n@1\nf640\nr ; to and fro\nw500\nd\nr\nw500\nj1\n]\n"
 
 

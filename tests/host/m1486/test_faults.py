@@ -14,6 +14,7 @@ from chip_rig import KINDS, ChipWire, Direction, Fault, Kind, chip_line
 
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.host.m1486.failures import ChipMoveFailed, DoubtfulMove, FileGivenUp
+from steptwin.host.m1486.motion import ChipReason
 from steptwin.host.m1486.sync import M1486
 from steptwin.machine import SECOND
 
@@ -131,7 +132,7 @@ def test_a_fault_at_every_character_of_every_exchange(name: str) -> None:
         else:
             assert not operation.sure, f"{fault}: {error}"
             if isinstance(error, ChipMoveFailed):
-                assert str(error).startswith("chip 7: cut short by trouble on the line")
+                assert error.end.reason is ChipReason.CUT
                 moved = min(moved, 0)
             assert moved in (0, operation.done), f"{fault}: {error}"
             uncertain = getattr(error, "uncertain", False)

@@ -235,6 +235,29 @@ def test_tasks_that_wait_for_their_chips_are_told_why_each_ended() -> None:
     assert asked[0] > 5
 
 
+@pytest.mark.parametrize("after", [n / 10 for n in range(0, 14, 2)])
+def test_the_end_of_a_block_is_heard_while_the_end_of_a_move_is_watched(after: float) -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_task_line(wire)
+    x, y = (AsyncM1486(line, address, variant="B") for address in (0, 7))
+
+    async def wait() -> ChipReason:
+        return (await x.wait()).reason
+
+    async def block() -> ChipReason:
+        await asyncio.sleep(after)
+        return (await y.run_block(["w100", "f640", "r"])).reason
+
+    async def main() -> list[ChipReason]:
+        await x.open()
+        await y.open()
+        await x.configure(**KNOWN)
+        await x.move_by(1000.0)
+        return await asyncio.gather(wait(), block())
+
+    assert run_in(wire, main()) == [ChipReason.TARGET, ChipReason.DONE]
+
+
 def test_a_chip_that_is_late_or_stopped_does_not_hold_up_the_others() -> None:
     wire = ChipWire("B", (0, 7, 9))
     chips = moving(wire, 2000.0, 2500.0, 3000.0)

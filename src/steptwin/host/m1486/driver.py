@@ -19,6 +19,8 @@ from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import Store
 from steptwin.machine import SECOND
 
+MARK = "u15"
+"""The last command of a block: uploads the driver interface, a byte that is no type letter."""
 _TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
 """Commands that may be typed alone: they move nothing, lead nowhere and are not answered."""
 
@@ -186,7 +188,8 @@ class AsyncM1486(AsyncChip):
 
     async def run_block(self, commands: Iterable[str], timeout_s: float | None = None) -> ChipMoveEnd:
         """Have commands done one after the other, as a file in ``[ ]`` that nothing of runs before it is there whole, and wait
-        until the last one is done. The chip says so by an upload behind them (manual chapter II, Memory).
+        until the last one is done. The chip says so by an upload that is typed as the last of them (manual chapter II, Memory):
+        without it the block was cut short (``ChipReason.CUT``), as by a command that is wrong data when it comes to be done.
 
         Not for E types, which would keep it in their EEPROM. ``timeout_s``: by default a minute. Raises `Misuse` for commands
         that have no place in a block, `FileGivenUp` when it could not be typed whole.
@@ -198,12 +201,14 @@ class AsyncM1486(AsyncChip):
         for command in typed:
             if command[0] in "[]\\kxu" or command == "c75":
                 raise Misuse(f"{command!r} has no place in a block")
-        if 8 + sum(memory_bits(command[0].upper()) for command in typed) > unit.variant.memory_bits - 8:
+        if 8 + sum(memory_bits(command[0].upper()) for command in (*typed, MARK)) > unit.variant.memory_bits - 8:
             raise Misuse(f"the block is larger than the command memory of {unit.variant.title}, {unit.variant.memory_bits} bits")
         guard = unit.stop_guard()
         async with unit.turn():
             await unit.rest()
-            await type_file(unit, ["[", *typed, "]"], guard, lambda count: None)
+            await type_file(unit, ["[", *typed, MARK, "]"], guard, lambda count: None)
+            if unit.notes.motion is not None:
+                unit.notes.motion.is_marked = True
         return await self.wait(timeout_s if timeout_s is not None else UNKNOWN_S)
 
     async def uploaded(self, count: int = 1, timeout_s: float = 10.0) -> bytes:
@@ -218,7 +223,7 @@ class AsyncM1486(AsyncChip):
             raise Misuse(f"{count} bytes: at least 1")
         kept = unit.notes.uploads
         if kept is None:
-            raise Misuse(f"{self.line.place}: no program of {unit.name} was started here: download, start_program or run_block")
+            raise Misuse(f"{self.line.place}: no program of {unit.name} was started here: download or start_program")
         if any(notes.motion is not None and notes.motion.kind is ChipMotion.BLOCK for notes in unit.others()):
             raise Misuse(
                 f"{self.line.place}: another chip runs a program too, and bytes do not say whose they are: wait for its end"

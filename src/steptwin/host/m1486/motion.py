@@ -28,7 +28,7 @@ class ChipReason(enum.Enum):
     STOPPED = "stopped"
     EARLY = "ended before its time (LIMIT, or Kill by somebody)"
     DIVERTED = "not where it was sent"
-    CUT = "cut short by trouble on the line"
+    CUT = "cut short"
     LIMIT = "stopped without being told (LIMIT, or Kill by somebody)"
     OVERDUE = "not done yet"
     COMMUNICATION = "communication lost"
@@ -54,6 +54,10 @@ class Told:
     duration_s: float | None = None
     spoilt: int = 0
     """Lines the chip was made to drop before."""
+    is_marked: bool = False
+    """Whether its last command is an upload, by which its end is known."""
+    is_unfinished: bool = False
+    """Whether that did not come, although the chip is at rest."""
     over_at: Nanos | None = None
     """When its end was seen."""
 

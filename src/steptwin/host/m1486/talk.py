@@ -224,8 +224,8 @@ class CharacterTalk:
         if request.sort is Sort.LISTEN:
             return self._take_owed(request, byte)
         if request.sort is Sort.LETTER:
-            came = sum(self._absorb(one) for one in (byte, *rest) if one in LETTERS)
-            return self._done(bytes((byte,))) if came else None
+            came = [self._uploaded(one) and one in LETTERS for one in (byte, *rest)]
+            return self._done(bytes((byte,))) if any(came) else None
         if request.sort is Sort.UPLOAD:
             for one in (byte, *rest):
                 self._uploaded(one)

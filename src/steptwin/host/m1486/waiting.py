@@ -6,9 +6,13 @@ from collections.abc import Callable
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.host.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
+from steptwin.host.m1486.talk import WHO
 from steptwin.host.m1486.unit import SLICE_NS, Unit
 from steptwin.host.m1486.watching import early_ns, watch
 from steptwin.machine import SECOND, Nanos
+
+ASK_AGAIN_NS: Nanos = SECOND
+"""A block that does not end is asked about after this time, and then each time after twice as long."""
 
 
 async def wait_for(
@@ -32,7 +36,13 @@ async def wait_for(
             await watch(unit, motion, limit)
         async with unit.turn():
             if motion is None or motion.over_at is None:
+                marked = motion if motion is not None and motion.is_marked and unit.talk.uploads is notes.uploads else None
+                if marked is not None:
+                    await _end_of_block(unit, limit)
                 letter = await unit.asks_who(max(limit - unit.line.now(), SLICE_NS))
+                if marked is not None and letter is not None:
+                    marked.is_unfinished = not notes.uploads
+                    notes.uploads = None
                 if letter is None:
                     is_stopped = motion is not None and motion.stops != notes.stops
                     return ended(ChipReason.STOPPED if is_stopped else ChipReason.OVERDUE, None, unit.why_busy())
@@ -49,6 +59,26 @@ async def wait_for(
     if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
         notes.is_position_valid = False  # M-16
     return ended(reason, shown(counter) if notes.is_position_valid else None, detail)
+
+
+async def _end_of_block(unit: Unit, limit: Nanos) -> None:
+    """Until a block has sent its mark, or the chip answers without, or ``limit``.
+
+    What the chip was asked goes with a block that it drops because of wrong data (M-11). So it is asked again, but not as often
+    as would fill its input buffer.
+    """
+    line, talk, notes = unit.line, unit.talk, unit.notes
+    most = unit.variant.input_bits // (8 * (len(WHO) + 1)) - 1
+    pause = ASK_AGAIN_NS
+    due = line.now() + pause
+    while not notes.uploads and unit.address not in talk.came and line.now() < limit:
+        await unit.hear_upload(SLICE_NS)
+        if line.now() >= due and talk.owes(unit.address) < most - 1:
+            await unit.ask()
+            pause *= 2
+            due = line.now() + pause
+    if line.now() >= limit and talk.owes(unit.address) < most:
+        await unit.ask()  # those before may be gone
 
 
 def _time_out_s(unit: Unit, motion: Told | None) -> float:
@@ -69,8 +99,11 @@ def _reason(unit: Unit, motion: Told | None, counter: int, over_at: Nanos) -> tu
     if motion.stops != unit.notes.stops:
         return ChipReason.STOPPED, ""
     if motion.kind is ChipMotion.BLOCK:
-        is_whole = unit.talk.spoilt.get(unit.address, 0) == motion.spoilt
-        return (ChipReason.DONE if is_whole else ChipReason.CUT), ""
+        if unit.talk.spoilt.get(unit.address, 0) != motion.spoilt:
+            return ChipReason.CUT, "by trouble on the line"
+        if motion.is_unfinished:
+            return ChipReason.CUT, "a command was wrong data when it came to be done, or the end was not heard"
+        return ChipReason.DONE, ""
     if motion.kind in _ENDS:
         return _ENDS[motion.kind], ""
     if motion.target_u is not None and counter != motion.target_u:
