@@ -248,14 +248,14 @@ def test_the_end_of_a_block_is_heard_while_the_end_of_a_move_is_watched(after: f
         await asyncio.sleep(after)
         return (await y.run_block(["w100", "f640", "r"])).reason
 
-    async def main() -> list[ChipReason]:
+    async def main() -> tuple[ChipReason, ChipReason]:
         await x.open()
         await y.open()
         await x.configure(**KNOWN)
         await x.move_by(1000.0)
         return await asyncio.gather(wait(), block())
 
-    assert run_in(wire, main()) == [ChipReason.TARGET, ChipReason.DONE]
+    assert run_in(wire, main()) == (ChipReason.TARGET, ChipReason.DONE)
 
 
 def test_a_chip_that_is_late_or_stopped_does_not_hold_up_the_others() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from math import isfinite
 
 from steptwin.errors import LineFailure, Misuse
+from steptwin.host.line import check_wait
 from steptwin.host.m1486.chip import LARGEST, AsyncChip
 from steptwin.host.m1486.download import Progress, begin, reset, send_program, type_file
 from steptwin.host.m1486.failures import Busy, ChipMoveFailed
@@ -194,6 +195,7 @@ class AsyncM1486(AsyncChip):
         Not for E types, which would keep it in their EEPROM. ``timeout_s``: by default a minute. Raises `Misuse` for commands
         that have no place in a block, `FileGivenUp` when it could not be typed whole.
         """
+        check_wait(timeout_s)
         unit = self._unit
         if unit.variant.store is Store.EEPROM:
             raise Misuse(f"{unit.variant.title} keeps what stands in [ ] in its EEPROM: use download")
@@ -218,6 +220,7 @@ class AsyncM1486(AsyncChip):
         The program has to have been started by this driver, and by it alone on this line, for bytes do not say whose they are:
         else `Misuse`. Raises `LineFailure` when so many have not come in time; those that have are kept for the next call.
         """
+        check_wait(timeout_s)
         unit = self._unit
         if count < 1:
             raise Misuse(f"{count} bytes: at least 1")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from steptwin.errors import LineFailure, Misuse
+from steptwin.host.line import check_wait
 from steptwin.host.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
 from steptwin.host.m1486.talk import WHO
 from steptwin.host.m1486.unit import SLICE_NS, Unit
@@ -22,6 +23,7 @@ async def wait_for(
 
     A line that fails is raised with ``check``, else it is the end.
     """
+    check_wait(timeout_s)
     notes = unit.notes
     motion = notes.motion
     begin = unit.line.now()
