@@ -253,7 +253,8 @@ def test_the_end_of_a_block_is_heard_while_the_end_of_a_move_is_watched(after: f
         await y.open()
         await x.configure(**KNOWN)
         await x.move_by(1000.0)
-        return await asyncio.gather(wait(), block())
+        moved, done = await asyncio.gather(wait(), block())
+        return moved, done
 
     assert run_in(wire, main()) == (ChipReason.TARGET, ChipReason.DONE)
 
