@@ -16,8 +16,9 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.links import Feed
+from steptwin.runtime.pace import Pace
 from steptwin.runtime.session import load, session_of
-from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, begin, handlers_of, up
+from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, handlers_of, up
 from steptwin.runtime.world import World
 from steptwin.wire.crc import with_crc
 
@@ -207,7 +208,11 @@ def test_requests_of_the_control_endpoint() -> None:
 
 @pytest.mark.parametrize(
     ("speed", "message"),
-    [("0", "permitted are 0.001 to 1000"), ("fast", "permitted are 0.001"), ("max", "line 'bus' has clients outside")],
+    [
+        ("-1", "permitted are 0 \\(stands\\), 0.001 to 1000"),
+        ("fast", "permitted are 0"),
+        ("max", "line 'bus' has clients outside"),
+    ],
 )
 def test_speeds_that_cannot_be_are_misuse(speed: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
@@ -220,7 +225,7 @@ def test_a_world_wakes_up_by_itself() -> None:
         noted = asyncio.Event()
         live.world.trace.watchers.append(lambda record: noted.set() if record.subject == "note" else None)
         cell = Cell(live, Clock(1000.0))
-        begin(cell)
+        Pace(live, cell, lambda _: None, has_clients=False).begin(1000.0)
         await asyncio.wait_for(noted.wait(), 60)
         cell.close()
 

@@ -23,6 +23,7 @@ from steptwin.cli import (
     info,
     monitor,
     move,
+    pace,
     record,
     registers,
     replay,
@@ -57,6 +58,10 @@ app.command()(twin.encoder)
 app.command("power-cycle")(twin.power_cycle)
 app.command()(twin.state)
 app.command()(fault.fault)
+app.command()(pace.pause)
+app.command()(pace.step)
+app.command()(pace.resume)
+app.command()(pace.save)
 app.command()(info.info)
 app.command()(get.get)
 app.command("set")(get.set_)

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from steptwin.runtime.timedinputs import TimedInput
 
 
+_NAMES = {"moment": "from"}
+"""Options that are no names in Python."""
+
+
 @dataclass(frozen=True)
 class Options:
     """What was asked for on the command line; None where nothing was said."""
@@ -38,6 +42,8 @@ class Options:
     statement_time: str | None = None
     fault: list[str] | None = None
     session: Path | None = None
+    seed: int | None = None
+    moment: Nanos | None = None
 
     @property
     def until_idle(self) -> bool:
@@ -46,12 +52,14 @@ class Options:
     def refuse(self, files: str, *names: str) -> None:
         """Raises `Misuse` when one of these options was given, which mean nothing for such files."""
         for name in names:
-            if getattr(self, name):
-                raise Misuse(f"--{name.replace('_', '-')} is not for {files}")
+            if getattr(self, name) not in (None, []):
+                raise Misuse(f"--{_NAMES.get(name, name).replace('_', '-')} is not for {files}")
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="What to run; its suffix says what it is: .prg, .m1486 or .toml.")],
+    file: Annotated[
+        Path, typer.Argument(help="What to run; its suffix says what it is: .prg, .m1486, .toml, or .json, a session.")
+    ],
     duration: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until.")
     ] = None,
@@ -88,9 +96,14 @@ def run(
         list[str] | None,
         typer.Option(help="World: something that goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
     ] = None,
+    seed: Annotated[int | None, typer.Option(help="World: where all chance comes from. Default: what its file says.")] = None,
     session: Annotated[Path | None, typer.Option(help="World: write a session for 'steptwin replay'.")] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option("--from", metavar="TIME", help="Session: go on from this moment, such as 2.5s. Default: its end."),
+    ] = None,
 ) -> None:
-    """Run a program in virtual time: its moves, waits, outputs and uploads with their times."""
+    """Run a program or a world in virtual time: its moves, waits, outputs and uploads with their times. A session goes on."""
     from steptwin.runtime.timedinputs import parse_duration, parse_inputs
 
     runner = _RUNNERS.get(file.suffix.lower())
@@ -125,9 +138,15 @@ def run(
         statement_time=statement_time,
         fault=fault,
         session=session,
+        seed=seed,
+        moment=None if begin is None else parse_duration(begin, "--from"),
     )
     if not runner(file, options):
         raise typer.Exit(1)
+
+
+_WORLDS = ("fault", "session", "seed", "moment")
+"""Options for worlds alone."""
 
 
 def _run_m1486(file: Path, options: Options) -> bool:
@@ -135,7 +154,7 @@ def _run_m1486(file: Path, options: Options) -> bool:
     from steptwin.runtime.run_m1486 import M1486Run
     from steptwin.runtime.run_m1486 import run as run_program
 
-    options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time", "fault", "session")
+    options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time", *_WORLDS)
     wanted = M1486Run(
         program=file,
         variant=options.variant or DEFAULT.name,
@@ -157,7 +176,7 @@ def _run_wbc(file: Path, options: Options) -> bool:
     from steptwin.runtime.wbc_bench import parse_travel
     from steptwin.wbc.dialect import DEFAULT
 
-    options.refuse("WBC programs", "variant", "interface", "wire", "fault", "session")
+    options.refuse("WBC programs", "variant", "interface", "wire", *_WORLDS)
     wanted = WbcRun(
         program=file,
         positions=options.positions,
@@ -182,6 +201,8 @@ def _run_world(file: Path, options: Options) -> bool:
     options.refuse("worlds, whose file says all that", *mechanics)
     wanted = WorldRun(
         world=file,
+        moment=options.moment,
+        seed=options.seed,
         limit=options.limit,
         until=options.until,
         inputs=tuple(options.inputs),
@@ -194,4 +215,9 @@ def _run_world(file: Path, options: Options) -> bool:
 
 
 #: What runs each kind of file; True when nothing went wrong.
-_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {".m1486": _run_m1486, ".prg": _run_wbc, ".toml": _run_world}
+_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {
+    ".m1486": _run_m1486,
+    ".prg": _run_wbc,
+    ".toml": _run_world,
+    ".json": _run_world,
+}

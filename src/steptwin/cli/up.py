@@ -15,9 +15,15 @@ from steptwin.errors import Misuse
 
 
 def up(
-    world: Annotated[Path | None, typer.Argument(metavar="[MACHINE.toml]", help="The description of the world.")] = None,
+    world: Annotated[
+        Path | None,
+        typer.Argument(metavar="[MACHINE.toml]", help="The description of the world, or a session (.json) to go on from."),
+    ] = None,
     speed: Annotated[
-        str, typer.Option(help="Virtual seconds in a second: 0.1, 1, 10; 'max' for worlds without clients outside.")
+        str,
+        typer.Option(
+            help="Virtual seconds in a second: 0.1, 1, 10; 'max' for worlds without clients outside; 0: paused at first."
+        ),
     ] = "1",
     name: Annotated[
         str | None, typer.Option(help="Name under which 'steptwin pin' and its like find it. Default: that of the file.")
@@ -28,22 +34,33 @@ def up(
         list[str] | None,
         typer.Option(help="What goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
     ] = None,
+    seed: Annotated[int | None, typer.Option(help="Where all chance comes from. Default: what the description says.")] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option("--from", metavar="TIME", help="Session: go on from this moment, such as 2.5s. Default: its end."),
+    ] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
     keys: Annotated[bool, typer.Option("--keys", help="Show what a description may say.")] = False,
     form: Annotated[Format, typer.Option("--format", help="How to print the keys.")] = Format.TEXT,
 ) -> None:
-    """Run a world until Ctrl-C, or until a script of its own stops it, with its lines open to other programs."""
+    """Run a world until Ctrl-C, or until a script of its own stops it, with its lines open to other programs.
+
+    'steptwin pause', 'step', 'resume' and 'save' take its time in hand.
+    """
     if keys:
         show(sections(), form)
         return
     if world is None:
         raise Misuse("which world? give the TOML file that describes it")
+    from steptwin.runtime.timedinputs import parse_duration
     from steptwin.runtime.up_world import UpOptions
     from steptwin.runtime.up_world import up as run_up
 
     options = UpOptions(
         world=world,
+        moment=None if begin is None else parse_duration(begin, "--from"),
+        seed=seed,
         speed=speed,
         name=name,
         session=session,

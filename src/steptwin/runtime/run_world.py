@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,11 @@ from typing import Any, NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.runtime import session as sessions
+from steptwin.runtime.beginning import begin_world, set_faults
 from steptwin.runtime.export import axis_views, bar, write_trace
 from steptwin.runtime.timedinputs import TimedInput
 from steptwin.runtime.world import LONGEST_RUN_NS, World
 from steptwin.world import script as do
-from steptwin.world.faults import read as read_fault
 from steptwin.world.references import check_step
 from steptwin.world.trace import Record
 
@@ -37,6 +38,10 @@ class WorldRun:
     """
 
     world: Path
+    """A description, or a session to go on from."""
+    moment: Nanos | None = None
+    """That of the session; None: its end."""
+    seed: int | None = None
     limit: Nanos | None = None
     until: str | None = None
     inputs: Sequence[TimedInput] = ()
@@ -51,31 +56,37 @@ def run(options: WorldRun, say: Say, warn: Say) -> bool:
 
     Raises `Misuse` for what cannot be run.
     """
-    world = World.load(options.world, keep_trace=options.trace is not None or not options.as_json)
-    for warning in world.plan.warnings:
-        warn(warning)
+    keep_trace = options.trace is not None or not options.as_json
+    world = begin_world(options.world, warn, moment=options.moment, seed=options.seed, keep_trace=keep_trace)
+    began = world.now
+    known = Counter(record.machine for record in filter(is_told, world.trace))
     _arrange(world, options)
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual
-    begin = time.perf_counter()
-    with bar(f"running {world.spec.name}", 0, limit) as progress:
+    wall = time.perf_counter()
+    with bar(f"running {world.spec.name}", began, began + limit) as progress:
         reason = world.run(until=options.until, for_=limit / SECOND, watch=progress)
-    wall_s = time.perf_counter() - begin
+    wall_s = time.perf_counter() - wall
     written = _write(world, options)
     session = sessions.session_of(world)
     if options.session is not None:
         sessions.save(session, options.session)
         written.append(options.session)
     in_vain = options.until if reason is None else None
-    outcome = Outcome(reason, in_vain, wall_s, session.digest, written)
+    outcome = Outcome(began, known, reason, in_vain, wall_s, session.digest, written)
     report = _json if options.as_json else _lines
     report(world, outcome, say)
     return not world.failures
 
 
 class Outcome(NamedTuple):
-    """How a run ended; ``reason`` is why before its time, ``in_vain`` what did not come true in its time."""
+    """How a run ended; ``reason`` is why before its time, ``in_vain`` what did not come true in its time.
 
+    ``known``: how many of the records that are told each machine had when it ``began``.
+    """
+
+    began: Nanos
+    known: Counter[str]
     reason: str | None
     in_vain: str | None
     wall_s: float
@@ -85,8 +96,7 @@ class Outcome(NamedTuple):
 
 def _arrange(world: World, options: WorldRun) -> None:
     """Inputs and faults of the command line."""
-    for fault in options.faults:
-        world.outside(do.SetFault(read_fault(fault)))
+    set_faults(world, options.faults)
     for given in options.inputs:
         machine, dot, pin = given.pin.rpartition(".")
         names = {name.upper(): name for name in world.machines}
@@ -98,9 +108,9 @@ def _arrange(world: World, options: WorldRun) -> None:
         step = do.Set(((name, pin.upper(), given.value),))
         try:
             check_step(world, step)
+            world.at(given.time / SECOND, step, name=f"--input {given.pin}")
         except Misuse as error:
             raise Misuse(f"--input {name}.{pin}: {error}") from None
-        world.at(given.time / SECOND, step, name=f"--input {given.pin}")
     if options.until is not None:
         world.condition(options.until)
 
@@ -138,7 +148,10 @@ def describe(record: Record) -> str:
 
 def _lines(world: World, outcome: Outcome, say: Say) -> None:
     for record in filter(is_told, world.trace):
-        say(describe(record))
+        if outcome.known[record.machine]:
+            outcome.known[record.machine] -= 1
+        else:
+            say(describe(record))
     say("")
     for name, axis in world.axis.items():
         lost = f"   {axis.lost} pulses lost" if axis.lost else ""
@@ -152,13 +165,14 @@ def _lines(world: World, outcome: Outcome, say: Say) -> None:
     for name, chip in world.m1486.items():
         say(f"{name:<10} {chip.position:12d} minimum microsteps")
     ended = "" if outcome.reason is None else f", ended by: {outcome.reason}"
-    say(f"{world.time:g} s of {world.spec.name} in {outcome.wall_s:.2f} s{ended}")
+    begun = f", from {outcome.began / SECOND:g} s on" if outcome.began else ""
+    say(f"{world.time:g} s of {world.spec.name}{begun} in {outcome.wall_s:.2f} s{ended}")
     for failure in world.failures:
         say(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
     for late in world.overdue:
         say(f"warning: at {late.time / SECOND:g} s {late.value}")
     if outcome.in_vain is not None:
-        say(f"warning: {outcome.in_vain} did not come true in {world.time:g} s")
+        say(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
     for path in outcome.written:
         say(f"wrote {path}")
     say(f"digest {outcome.digest}")
@@ -168,6 +182,7 @@ def _json(world: World, outcome: Outcome, say: Say) -> None:
     data: dict[str, Any] = {
         "version": JSON_VERSION,
         "world": world.spec.name,
+        "from_s": outcome.began / SECOND,
         "time_s": world.time,
         "wall_s": round(outcome.wall_s, 3),
         "ended_by": outcome.reason,

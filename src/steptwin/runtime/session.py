@@ -44,9 +44,9 @@ class Session:
     digest: str
     version: str = __version__
 
-    def world(self) -> World:
+    def world(self, *, keep_trace: bool = True) -> World:
         """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
-        world = World(read_world(self.name, self.text, self.seed), self.files)
+        world = World(read_world(self.name, self.text, self.seed), self.files, keep_trace=keep_trace)
         ran = {name: view.device.firmware.name for name, view in world.mic488.items()}
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
@@ -55,7 +55,7 @@ class Session:
                 )
         return world
 
-    def replay(self, until: Nanos | None = None) -> World:
+    def replay(self, until: Nanos | None = None, *, keep_trace: bool = True) -> World:
         """The world after all of it, or after what had come by the moment ``until``, from which it may go another way.
 
         Raises `Misuse` where inputs do not fit the world, and for a moment after the session's end.
@@ -63,7 +63,7 @@ class Session:
         end = self.until if until is None else until
         if end > self.until:
             raise Misuse(f"the session ends at {self.until / SECOND:g} s, before {end / SECOND:g} s")
-        world = self.world()
+        world = self.world(keep_trace=keep_trace)
         for time, what, settled in self.inputs:
             if time > self.until:
                 raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")

@@ -8,13 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import count
+from math import inf
 from pathlib import Path
 from typing import Any
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.runtime import session as sessions
+from steptwin.runtime.beginning import begin_world, set_faults
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.control import Handler
@@ -22,6 +24,7 @@ from steptwin.runtime.export import axis_views, check_target, write_trace
 from steptwin.runtime.m1486_state import state_of as state_of_chip
 from steptwin.runtime.mic488 import state_of
 from steptwin.runtime.output import Output
+from steptwin.runtime.pace import Pace, read_speed
 from steptwin.runtime.run_world import describe, is_told
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_name
@@ -31,12 +34,9 @@ from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Leave
 from steptwin.world.faults import read as read_fault
-from steptwin.world.lines import Place
+from steptwin.world.lines import SCRIPTS, Place
 from steptwin.world.spec import LineSpec
 from steptwin.world.trace import Record
-
-SLICE_NS: Nanos = 10 * SECOND
-"""Without a clock a world runs this much at a time, so that it can be ended."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +44,10 @@ class UpOptions:
     """The command's options as given; see ``steptwin up --help``."""
 
     world: Path
+    """A description, or a session to go on from."""
+    moment: Nanos | None = None
+    """That of the session; None: its end."""
+    seed: int | None = None
     speed: str = "1"
     name: str | None = None
     session: Path | None = None
@@ -144,14 +148,18 @@ def up(options: UpOptions) -> bool:
     """
     name = options.name or options.world.stem
     check_name(name)
-    world = World.load(options.world, keep_trace=options.trace is not None)
-    for warning in world.plan.warnings:
-        sys.stderr.write(f"{warning}\n")
-    for fault in options.faults:
-        world.outside(do.SetFault(read_fault(fault)))
-    speed = _speed(options.speed)
+    speed = read_speed(options.speed, least=0)
+    world = begin_world(
+        options.world,
+        lambda text: sys.stderr.write(f"{text}\n"),
+        moment=options.moment,
+        seed=options.seed,
+        keep_trace=options.trace is not None,
+    )
+    _send_away(world)
+    set_faults(world, options.faults)
     outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
-    if speed is None and outside:
+    if speed == inf and outside:
         raise Misuse(f"--speed max: line {outside[0].name!r} has clients outside, which need a clock; use 'steptwin run'")
     for line in world.spec.lines:
         for address in (line.tcp, line.rtu_tcp):
@@ -163,75 +171,51 @@ def up(options: UpOptions) -> bool:
         check_writable(options.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    asyncio.run(_serve(options, world, speed, name))
+    asyncio.run(_serve(options, world, speed, name, has_clients=bool(outside)))
     return not world.failures
 
 
-def _speed(text: str) -> float | None:
-    """How many virtual seconds a second has; None: as many as there can be."""
-    if text == "max":
-        return None
-    try:
-        speed = float(text)
-    except ValueError:
-        speed = 0.0
-    if not 0.001 <= speed <= 1000.0:
-        raise Misuse(f"--speed {text}: permitted are 0.001 to 1000, and 'max'")
-    return speed
+def _send_away(world: World) -> None:
+    """Who was there in the session is not there now."""
+    for line in world.lines.values():
+        for place in [place for place in line.places if place != SCRIPTS]:
+            world.outside(Leave(line.name, place))
 
 
-async def _serve(options: UpOptions, world: World, speed: float | None, name: str) -> None:
+async def _serve(options: UpOptions, world: World, speed: float, name: str, *, has_clients: bool) -> None:
     with ExitStack() as stack:
         output = Output(sys.stdout)
         stack.callback(output.close)
         live = LiveWorld(world)
-        server = Server(Cell(live, Clock(speed or 1.0)), output.line)
+        server = Server(Cell(live, Clock(begin=world.now)), output.line)
+        pace = Pace(live, server.cell, output.line, has_clients=has_clients)
         live.on_stop = server.end
         begun = False
         try:
-            await _open(server, live, options, name)
+            await _open(server, live, pace, options, name)
             begun = True
-            _greet(output, server, world, speed)
+            _greet(output, server, world)
             world.trace.watchers.append(lambda record: _tell(output, record))
-            if speed is None:
-                await _run_freely(server, world)
-            else:
-                begin(server.cell)
-                await server.until_ended()
-                server.cell.enter()
+            pace.begin(speed)
+            await server.until_ended()
+            server.cell.enter()
         finally:
+            pace.close()
             await server.close()
             if begun:
                 _keep(options, world, output)
 
 
-def begin(cell: Cell) -> None:
-    """Wake up for the first thing that happens by itself."""
-    cell.enter()
-    cell.leave()
-
-
-def _greet(output: Output, server: Server, world: World, speed: float | None) -> None:
+def _greet(output: Output, server: Server, world: World) -> None:
     output.line(f"{world.spec.name}: {', '.join(world.machines)}")
     for end_point in server.end_points:
         output.line(f"  {end_point.protocol:<24} {end_point.place}")
-    if speed != 1.0:
-        output.line("  as fast as it goes" if speed is None else f"  {speed:g} virtual seconds a second")
     output.line("Ctrl-C ends")
 
 
 def _tell(output: Output, record: Record) -> None:
     if is_told(record):
         output.line(describe(record))
-
-
-async def _run_freely(server: Server, world: World) -> None:
-    """Without a clock, in slices."""
-    ending = asyncio.ensure_future(server.until_ended())
-    while not ending.done() and world.stopped is None:
-        world.run(for_=SLICE_NS / SECOND)
-        await asyncio.sleep(0)
-    ending.cancel()
 
 
 def _keep(options: UpOptions, world: World, output: Output) -> None:
@@ -264,8 +248,8 @@ def _write_trace(where: Path, world: World, session: sessions.Session) -> list[P
 # ---------------------------------------------------------------------- links
 
 
-async def _open(server: Server, live: LiveWorld, options: UpOptions, name: str) -> None:
-    await server.open_control(name, handlers_of(server.cell, live))
+async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, name: str) -> None:
+    await server.open_control(name, {**handlers_of(server.cell, live), **pace.handlers()})
     for line in live.world.spec.lines:
         await _open_line(server, live, line, options)
     if options.ready_file is not None:

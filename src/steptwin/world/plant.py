@@ -235,11 +235,14 @@ class Plant:
 
     def expect(self, text: str) -> None:
         """Tell it where a condition does not hold."""
-        condition = self.condition(text)
-        self._bring(condition)
-        if not condition.holds(self.now):
+        if not self.holds(self.condition(text)):
             self.failures.append(Record(self.now, WORLD, "event", "expectation", text))
             self.trace.add(self.failures[-1])
+
+    def holds(self, condition: Condition) -> bool:
+        """Whether a condition is true now."""
+        self._bring(condition)
+        return condition.holds(self.now)
 
     def _bring(self, condition: Condition) -> None:
         for kernel in self._kernels_of(condition):
@@ -390,8 +393,7 @@ class Plant:
             return bool(answer), answer[1:-2]
         if waiting.condition is None:
             return False, None
-        self._bring(waiting.condition)
-        holds = waiting.condition.holds(self.now)
+        holds = self.holds(waiting.condition)
         return holds, holds
 
     def settle_all(self) -> None:
