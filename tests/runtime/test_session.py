@@ -143,7 +143,7 @@ CHAIN = """
     do = [{ note = "both" }, { set = { "t.IN2" = 0 } }]
     [[script]]
     name = "s"
-    steps = [{ wait = "1 s" }, { set = { "t.IN3" = 1 } }, { wait = "2 s" }, { note = "x" }]
+    steps = [{ wait = "1 s" }, { set = { "t.IN3" = 1 } }, { stop = "a" }, { stop = "b" }, { note = "x" }]
 """
 
 
@@ -168,6 +168,7 @@ def test_what_comes_at_the_nanosecond_of_other_steps_replays(changes: list[Any],
         world.run(for_=seconds)
         world.mic488["t"].set_pin("IN1", 1)
         world.mic488["t"].set_pin("IN2", 1)
+    world.run(until="t.IN2", for_=4)
     world.run(for_=4)
     session = session_of(world)
     assert list(session.replay().trace) == list(world.trace)

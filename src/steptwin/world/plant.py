@@ -30,7 +30,7 @@ from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import SCRIPTS, Line
 from steptwin.world.references import check_scripts, check_step
 from steptwin.world.rigging import Rigging
-from steptwin.world.running import NEXT_RUN, Script, ScriptState, Waiting
+from steptwin.world.running import Script, ScriptState, Waiting
 from steptwin.world.signals import find_signal
 from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.trace import Mark, Record, Trace
@@ -186,7 +186,7 @@ class Plant:
             value = None
             if isinstance(step, do.Stop):
                 self.stopped = step.reason if self.stopped is None else self.stopped
-                script.waiting = NEXT_RUN
+                self._wait(script, Waiting(self.now + 1))
                 return
             waiting = self._waits(step, script)
             if waiting is not None:
@@ -424,13 +424,8 @@ class Plant:
         self._agenda_of(script).remove(script)
 
     def go_on(self) -> None:
-        """What has stopped goes on: scripts that stopped it take their next step."""
-        if self.stopped is None:
-            return
+        """A world that was stopped may go on."""
         self.stopped = None
-        for script in self._scripts:
-            if script.waiting is NEXT_RUN:
-                self._wait(script, Waiting(self.now))
 
     # ------------------------------------------------------------------ snapshots
 
@@ -476,9 +471,6 @@ class Plant:
             script.replay(state.sent)
             script.ended = state.ended
             if state.ended:
-                continue
-            if state.until is state.condition is state.answer is None:
-                self._wait(script, Waiting(self.now))  # it stopped the run
                 continue
             condition = None if state.condition is None else self.condition(state.condition)
             self._wait(script, Waiting(state.until, condition, None if state.answer is None else self.lines[state.answer]))

@@ -26,10 +26,6 @@ class Waiting:
         return self.condition is None and self.answer is None and self.until is not None
 
 
-NEXT_RUN = Waiting(None)
-"""What a script waits for that has stopped the run."""
-
-
 class ScriptState(NamedTuple):
     """A script, what it was sent so far, as (value, how often), what it waits for, and whether it has ended."""
 

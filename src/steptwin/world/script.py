@@ -158,7 +158,7 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """The run ends when all scripts have done what they do at this moment; steps after it are for the next run."""
+    """The run ends when all scripts have done what they do at this moment. The next step is due a nanosecond later."""
 
     reason: str
 
