@@ -227,6 +227,17 @@ def test_a_block_that_ends_late_is_seen_to_have_ended() -> None:
 PROGRAM = "[\n@1\nf640\nr ; to and fro\nw500\nd\nr\nw500\nj1\n]\n"
 
 
+def test_a_file_of_another_kind_is_refused_in_a_few_words() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.sent.clear()
+    with pytest.raises(Misuse, match=r"^notes.txt is not sent:") as refused:
+        chip.download("~\n" * 1000, name="notes.txt")
+    assert str(refused.value).count("error M") == 10
+    assert str(refused.value).endswith("\nand 990 more errors")
+    assert wire.sent == []
+
+
 def test_a_program_is_downloaded_runs_and_is_ended() -> None:
     wire = ChipWire("B")
     chip = chip_driver(wire)

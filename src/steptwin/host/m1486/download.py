@@ -19,6 +19,8 @@ from steptwin.machine import MILLISECOND, SECOND
 Progress = Callable[[int, int], object]
 """Told how many commands were typed, of how many."""
 
+MOST_TOLD = 10
+"""So many errors of a program are told: a file of another kind has one in each line."""
 ERASE_MARGIN_S = 0.1
 FULL_PAUSE_NS = 50 * MILLISECOND
 """The input buffer is given this long to empty when characters come back inverted."""
@@ -26,13 +28,14 @@ _MOVES = frozenset("r)(jk'[")
 
 
 def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> Program:
-    """Raises `Misuse` with every error in it."""
+    """Raises `Misuse` with the errors in it."""
     from steptwin.m1486.check import check
 
     checked = check(text, variant, interface)
     if not checked.is_sound:
         errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
-        raise Misuse(f"{name} is not sent:\n{render(Source(name, text), errors)}")
+        more = f"\nand {len(errors) - MOST_TOLD} more errors" if len(errors) > MOST_TOLD else ""
+        raise Misuse(f"{name} is not sent:\n{render(Source(name, text), errors[:MOST_TOLD])}{more}")
     return checked.program
 
 

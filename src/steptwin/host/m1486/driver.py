@@ -257,7 +257,7 @@ class AsyncM1486(AsyncChip):
     async def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
         """Type a program into the chip: a file in ``[ ]``, which runs from ``]`` on and which an E type keeps, or plain commands.
 
-        An E type is erased before a file. Returns what ``U`` outside ``[ ]`` uploaded. Raises `Misuse` with every error the
+        An E type is erased before a file. Returns what ``U`` outside ``[ ]`` uploaded. Raises `Misuse` with the first errors the
         checker finds, `NoRoom`, `FileGivenUp`.
         """
         return await send_program({self.address: self._unit, None: self._unit}, text, progress=progress, name=name)
