@@ -275,8 +275,6 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
         protocol = f"Modbus TCP, {line.name}" if line.kind == "modbus" else what
         await server.open_tcp("tcp", address, protocol, maker("tcp", kind, several=True))
     if line.rtu_tcp is not None:
-        if line.kind != "modbus":
-            raise Misuse(f"line {line.name!r}: rtu_tcp is for Modbus lines; use tcp")
         address = parse_address(line.rtu_tcp, listen_any=options.listen_any)
         await server.open_tcp("rtu-tcp", address, f"RTU over TCP, {line.name}", maker("rtu", "rtu", several=True))
 
