@@ -96,7 +96,7 @@ def test_check_as_json(run: Run, file: File) -> None:
         (("fmt", "a.m1486"), "cannot format a.m1486: permitted are WBC programs (.prg)"),
         (("build", "none.prg"), "cannot read none.prg: No such file or directory"),
         (("build", "named.prg"), "named.prg names positions: give the table with --positions"),
-        (("build", "a.prg", "-o", "none/a.wbc"), "cannot write none/a.wbc: No such file or directory"),
+        (("build", "a.prg", "-o", "a.prg/a.wbc"), "cannot write a.prg/a.wbc: Not a directory"),
         (("decompile", "a.prg"), "not a compiled image: 8 bytes instead of 20094"),
         (("decompile", "none.wbc"), "cannot read none.wbc: No such file or directory"),
     ],

@@ -86,9 +86,10 @@ def test_a_session(address: str) -> None:
         assert mic.user.reals.read_many(100, 3) == [1.5, -2.5, 1e6]
         mic.user.dints.write(200, -70000)
         assert mic.user.words.read_many(200, 2) == [0xEE90, 0xFFFE]
+        mic.axis(3).set_ramp(acc=5.0)
         kept = mic.take_snapshot()
         mic.axis(3).set_ramp(acc=7.0)
-        assert [str(change) for change in mic.restore_snapshot(kept, dry_run=True)] == ["M3_ACC: 7 → 0"]
+        assert [str(change) for change in mic.restore_snapshot(kept, dry_run=True)] == ["M3_ACC: 7 → 5"]
         with pytest.raises(Refused, match="exception 02"):
             mic.request(Read(3, 11999, 2))
 

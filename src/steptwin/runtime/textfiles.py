@@ -50,6 +50,7 @@ def check_writable(path: Path) -> None:
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file, and the folders it is to be in. Raises `Misuse` when it cannot be written."""
+    check_writable(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
