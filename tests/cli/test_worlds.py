@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,7 @@ from typer.testing import CliRunner
 
 from steptwin.cli import app
 from steptwin.errors import Misuse
+from steptwin.machine import SECOND
 
 FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
 runner = CliRunner()
@@ -65,6 +69,20 @@ def test_run_writes_a_session_on_its_own(tmp_path: Path) -> None:
     assert "2 s of bar feeder, 1 inputs: the same" in invoke("replay", str(session))
     with pytest.raises(Misuse, match="--session is not for WBC programs"):
         invoke("run", "x.prg", "--session", str(session))
+
+
+def test_ctrl_c_ends_a_run_and_keeps_what_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    @contextmanager
+    def bar(*_: object) -> Generator[Callable[[int], None]]:
+        yield lambda now: signal.raise_signal(signal.SIGINT) if now == SECOND else None
+
+    monkeypatch.setattr("steptwin.runtime.run_world.bar", bar)
+    session = tmp_path / "s.json"
+    told = invoke("run", str(FEEDER), "--for", "20s", "--session", str(session), code=130)
+    assert "1 s of bar feeder in" in told
+    assert "ended by: Ctrl-C" in told
+    monkeypatch.undo()
+    assert "1 s of bar feeder, 0 inputs: the same" in invoke("replay", str(session))
 
 
 def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:

@@ -15,6 +15,8 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.runtime import session as sessions
 from steptwin.runtime.beginning import begin_world, set_faults
 from steptwin.runtime.export import axis_views, bar, write_trace
+from steptwin.runtime.export.progress import Progress
+from steptwin.runtime.interrupts import FirstInterrupt
 from steptwin.runtime.timedinputs import TimedInput
 from steptwin.runtime.world import LONGEST_RUN_NS, World
 from steptwin.world import script as do
@@ -23,6 +25,7 @@ from steptwin.world.trace import Record
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
 SESSION = "session.json"
+INTERRUPTED = "Ctrl-C"
 JSON_VERSION = 1
 _NAMED = ("note", "expectation", "overdue")
 """Events whose texts do not say what they are."""
@@ -54,7 +57,7 @@ class WorldRun:
 def run(options: WorldRun, say: Say, warn: Say) -> bool:
     """Run a world and say what happened; whether all expectations held. ``warn`` is told what is doubtful in its files.
 
-    Raises `Misuse` for what cannot be run.
+    Raises `Misuse` for what cannot be run, and `KeyboardInterrupt` after one that Ctrl-C has ended, when everything is written.
     """
     keep_trace = options.trace is not None or not options.as_json
     world = begin_world(options.world, warn, moment=options.moment, seed=options.seed, keep_trace=keep_trace)
@@ -65,7 +68,7 @@ def run(options: WorldRun, say: Say, warn: Say) -> bool:
     limit = options.limit if options.limit is not None else usual
     wall = time.perf_counter()
     with bar(f"running {world.spec.name}", began, began + limit) as progress:
-        reason = world.run(until=options.until, for_=limit / SECOND, watch=progress)
+        reason = _run(world, options.until, limit, progress)
     wall_s = time.perf_counter() - wall
     written = _write(world, options)
     session = sessions.session_of(world)
@@ -76,7 +79,28 @@ def run(options: WorldRun, say: Say, warn: Say) -> bool:
     outcome = Outcome(began, known, reason, in_vain, wall_s, session.digest, written)
     report = _json if options.as_json else _lines
     report(world, outcome, say)
+    if reason is INTERRUPTED:
+        raise KeyboardInterrupt
     return not world.failures
+
+
+def _run(world: World, until: str | None, limit: Nanos, progress: Progress) -> str | None:
+    """Run on; gives why it ended before its time. What has been done by the first Ctrl-C is kept."""
+
+    def watch(now: Nanos) -> None:
+        progress(now)
+        if interrupt.came:
+            raise _Interrupted
+
+    with FirstInterrupt() as interrupt:
+        try:
+            return world.run(until=until, for_=limit / SECOND, watch=watch)
+        except _Interrupted:
+            return INTERRUPTED
+
+
+class _Interrupted(Exception):
+    """Somebody wants a run to end."""
 
 
 class Outcome(NamedTuple):

@@ -33,7 +33,9 @@ from steptwin.world.views import AxisView, LineView, M1486View, Mic488View, View
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """A condition that never comes true is given up after an hour, where nothing else is said."""
 SLICES = 200
-"""In so many parts a run is done, where somebody watches its progress."""
+"""In so many parts a run is done at least, where somebody watches its progress."""
+LONGEST_SLICE_NS: Nanos = 10 * SECOND
+"""Somebody who watches may want it to end."""
 
 Duration: TypeAlias = float | str
 """Seconds, or a text such as ``"10 min"``."""
@@ -118,8 +120,9 @@ class World(Plant):
         if watch is silent:
             return super().run(end, condition)
         begin = self.now
-        for part in range(1, SLICES + 1):
-            reason = super().run(begin + (end - begin) * part // SLICES, condition)
+        slices = max(SLICES, (end - begin) // LONGEST_SLICE_NS)
+        for part in range(1, slices + 1):
+            reason = super().run(begin + (end - begin) * part // slices, condition)
             watch(self.now)
             if reason is not None:
                 return reason

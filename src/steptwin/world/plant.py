@@ -409,8 +409,10 @@ class Plant:
             steps = (do.Until(until), do.Stop(until))
             watch = self.start("until", lambda: do.run_through(steps))
         self.advance(end)
-        if watch is not None and not watch.ended:
+        if watch is not None:
             self._end(watch)
+            if self._scripts[-1] is watch:
+                self._scripts.pop()
         self.settle_all()
         return self.stopped
 
