@@ -164,7 +164,7 @@ class TcpLink:
     async def open(self) -> Address:
         """Listen; returns the address with the port in use. Raises `LineFailure` naming the address."""
         try:
-            self._listener = listener = await _listening(self._asked)
+            self._listener = listener = _listening(self._asked)
         except OSError as error:
             raise LineFailure(f"cannot listen on {self._asked}: {where(error)}") from error
         self._listen()
@@ -206,10 +206,9 @@ class TcpLink:
             connection.close()
 
 
-async def _listening(address: Address) -> socket.socket:
-    loop = asyncio.get_running_loop()
-    family, _, _, _, where_ = (await loop.getaddrinfo(*address, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE))[0]
-    listener = socket.create_server(where_[:2], family=family, backlog=BACKLOG)
+def _listening(address: Address) -> socket.socket:
+    family = socket.getaddrinfo(*address, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0][0]
+    listener = socket.create_server(address, family=family, backlog=BACKLOG)
     listener.setblocking(False)
     # What is accepted inherits these.
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
