@@ -29,7 +29,7 @@ class _Selector(selectors.DefaultSelector):
             return ready
         if timeout is None:
             return super().select(5.0)  # nothing is planned: something outside has to happen
-        self.loop.now_ns += round(timeout * 1e9)
+        self.loop.now_ns += max(round(timeout * 1e9), 1)
         return []
 
 

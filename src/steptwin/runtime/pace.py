@@ -137,16 +137,18 @@ class Pace:
         world = live.world
         seen = len(world.trace)
         until = perf_counter() + PART_S
+        moves = False
         try:
             while True:
                 if condition is not None and world.holds(condition):
                     return True
                 if live.now >= end or world.stopped is not None:
                     return False
-                if perf_counter() > until or len(world.trace) - seen > MOST_TOLD:
+                if moves and (perf_counter() > until or len(world.trace) - seen > MOST_TOLD):
                     return None
                 dues = [end, live.deadline(), None if condition is None else condition.due(live.now)]
                 live.advance(max(live.now, min(due for due in dues if due is not None)))
+                moves = True
         finally:
             self._cell.clock.stop(live.now)
             self._cell.close()  # a timer set for what has been done would find that it was held up
@@ -179,8 +181,12 @@ class Pace:
         """A step, or its next part: ``to_ns`` of the answer, where there is one, is for the request for that."""
         text = request.get("until")
         condition = None if text is None else self._live.world.condition(str(text))
+        given = {key: request[key] for key in ("to_ns", "for_ns") if request.get(key) is not None}
+        for key, value in given.items():
+            if not isinstance(value, int) or value < 0:
+                raise Misuse(f"{key} = {value!r}: must be a number of nanoseconds")
         self.pause()
-        end = self._end_of(request, has_condition=condition is not None)
+        end = self._end_of(given, has_condition=condition is not None)
         happened: list[str] = []
         watchers = self._live.world.trace.watchers
 
@@ -197,14 +203,12 @@ class Pace:
         rest = {} if came is not None else {"to_ns": end}
         return {**self._where(), "happened": happened, "came": came is True, "stopped": stopped, "idle": end is None, **rest}
 
-    def _end_of(self, request: Mapping[str, Any], *, has_condition: bool) -> Nanos | None:
+    def _end_of(self, given: Mapping[str, Nanos], *, has_condition: bool) -> Nanos | None:
         """The moment to which a step goes. Without a time that is the next thing that happens by itself; None: nothing will."""
-        for key, begin in (("to_ns", 0), ("for_ns", self._live.now)):
-            value = request.get(key)
-            if value is not None:
-                if not isinstance(value, int) or value < 0:
-                    raise Misuse(f"{key} = {value!r}: must be a number of nanoseconds")
-                return begin + value
+        if "to_ns" in given:
+            return given["to_ns"]
+        if "for_ns" in given:
+            return self._live.now + given["for_ns"]
         return self._live.now + LONGEST_RUN_NS if has_condition else self._live.deadline()
 
     def _save(self, request: Mapping[str, Any]) -> object:

@@ -114,7 +114,9 @@ def _bytes(plant: Plant, given: Bytes) -> None:
 
 
 def _leave(plant: Plant, given: Leave) -> None:
-    plant.line_called(given.line).leave(given.place)
+    line = plant.line_called(given.line)
+    plant.touch(given.line)
+    line.leave(given.place)
 
 
 def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
