@@ -85,6 +85,59 @@ def test_ctrl_c_ends_a_run_and_keeps_what_it_did(tmp_path: Path, monkeypatch: py
     assert "1 s of bar feeder, 0 inputs: the same" in invoke("replay", str(session))
 
 
+def test_a_session_goes_on_another_way(tmp_path: Path) -> None:
+    first, other = tmp_path / "first.json", tmp_path / "other.json"
+    invoke("run", str(FEEDER), "--for", "10s", "--input", "table.IN8=1@4s", "--session", str(first))
+    told = invoke(
+        "run", str(first), "--from", "3s", "--until", "drum.moving", "--input", "table.IN9=1@3.5s", "--session", str(other)
+    ).splitlines()
+    assert told[0].endswith("table      M1 is at its home position")
+    assert any(" s of bar feeder, from 3 s on in " in line and line.endswith("ended by: drum.moving") for line in told)
+    data = json.loads(other.read_text())
+    assert [(given["time_ns"], given["levels"]) for given in data["inputs"]] == [(3_500_000_000, [["table", "IN9", 1.0]])]
+    assert "1 inputs: the same" in invoke("replay", str(other))
+    told = json.loads(invoke("run", str(first), "--for", "1s", "--json"))
+    assert (told["from_s"], told["time_s"]) == (10.0, 11.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["s.json", "--seed", "3"], r"--seed: s\.json is a session, which goes on with its own"),
+        (["s.json", "--from", "3s"], r"the session ends at 2 s, before 3 s"),
+        (["s.json", "--input", "table.IN8=1@1s"], r"--input table\.IN8: at 1 s: this world is at 2 s already"),
+        ([str(FEEDER), "--from", "1s"], r"--from: .*feeder\.toml is no session; a description begins at 0 s"),
+        ([str(FEEDER), "--seed", "-1"], r"seed -1: permitted are whole numbers from 0 to"),
+        (["x.prg", "--seed", "0"], r"--seed is not for WBC programs"),
+        (["x.m1486", "--from", "0s"], r"--from is not for M1486 programs"),
+    ],
+)
+def test_what_a_session_cannot_go_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    invoke("run", str(FEEDER), "--for", "2s", "--session", "s.json")
+    with pytest.raises(Misuse, match=message):
+        invoke("run", *arguments)
+
+
+def test_a_session_that_goes_on_otherwise_says_so(tmp_path: Path) -> None:
+    session = tmp_path / "s.json"
+    invoke("run", str(FEEDER), "--for", "2s", "--session", str(session))
+    session.write_text(json.dumps(json.loads(session.read_text()) | {"digest": "0" * 32}))
+    assert "another thing happened than then" in invoke("run", str(session), "--for", "1s")
+
+
+def test_another_seed_is_another_chance_and_stays_with_the_session(tmp_path: Path) -> None:
+    session = tmp_path / "s.json"
+    said = [
+        invoke("run", str(FEEDER), "--for", "9s", "--seed", seed, "--session", str(session)).splitlines()[-1]
+        for seed in ("7", "8", "8")
+    ]
+    assert said[0] != said[1] == said[2]
+    assert "the same" in invoke("replay", str(session))
+
+
 def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:
     world = tmp_path / "w.toml"
     world.write_text('[[mic488]]\nname = "a"\n[[event]]\nat = 1\ndo = [{ expect = "a.M1.position > 3" }]\n')

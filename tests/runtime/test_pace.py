@@ -275,6 +275,9 @@ def test_what_a_hand_does_to_a_standing_world_leads_to_something_at_that_moment(
         session = load(tmp_path / "new" / "s.json")
         assert session.replay().trace.digest() == answer["digest"] == session.digest
         rig.do("pin", set={"a.IN3": 1})
+        rig.do("step", for_ns=5 * SECOND)
+        assert rig.do("pause")["time_ns"] == 6 * SECOND
+        assert rig.lags == []
         assert the_same_again(rig.close())
 
     run(scene())
