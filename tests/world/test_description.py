@@ -70,6 +70,10 @@ def wrong(text: str) -> str:
             AXIS + '[[axis.switch]]\nto = "table.IN1"\nbelow = 0\n[[button]]\nname = "b"\nto = "table.IN1"\n',
             "table.IN1 is driven already, from line 7",
         ),
+        (
+            AXIS + '[[axis.switch]]\nto = "table.IN1"\nbelow = 0\n[[axis.switch]]\nto = "table.IN1"\nabove = 9\n',
+            "w.toml:9:1: error D009: table.IN1 is driven already, from line 7",
+        ),
         (AXIS + "[axis.motor]\ntorque = [[1, 1]]\n", "w.toml:7:1: error D003: a torque curve begins at 0 rev/min"),
         (
             AXIS + 'unit = "degree"\npitch = 1\n[axis.motor]\nmass = 1\ntorque = [[0, 1]]\n',
