@@ -348,3 +348,18 @@ def test_a_session_goes_on_live_without_those_who_were_there(run: Run, tmp_path:
     assert session.replay().trace.digest() == session.digest
     assert up(UpOptions(world=tmp_path / "s.json", moment=SECOND, speed="max", session=tmp_path / "end.json"))
     assert load(tmp_path / "end.json").inputs == ()
+
+
+def test_what_a_script_stopped_goes_on_from_its_session(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    world, first, second = tmp_path / "w.toml", tmp_path / "1.json", tmp_path / "2.json"
+    steps = '[{ wait = "1 s" }, { stop = "here" }, { note = "on" }, { wait = "1 s" }, { stop = "there" }]'
+    world.write_text(f'[[mic488]]\nname = "a"\n[[script]]\nname = "s"\nsteps = {steps}\n')
+    assert up(UpOptions(world=world, seed=5, speed="1000", session=first))
+    assert "1.000 s, 0 inputs, ended by: here" in capfd.readouterr().out
+    assert up(UpOptions(world=first, speed="1000", session=second))
+    told = capfd.readouterr().out
+    assert "note: on" in told
+    assert "2.000 s, 0 inputs, ended by: there" in told
+    session = load(second)
+    assert session.seed == 5
+    assert session.replay().trace.digest() == session.digest

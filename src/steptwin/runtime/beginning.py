@@ -40,6 +40,7 @@ def begin_world(
     world = session.replay(moment, keep_trace=keep_trace)
     if moment is None and world.trace.digest() != session.digest:
         warn(f"{path}: another thing happened than then (steptwin {session.version}): it goes on from what happens now")
+    world.go_on()
     return world
 
 

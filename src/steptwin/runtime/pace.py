@@ -31,7 +31,7 @@ SLICE_NS: Nanos = 10 * SECOND
 PART_S = 0.1
 """A step that takes longer is taken in parts, one for each request."""
 MOST_TOLD = 1000
-"""A part ends, too, when so much has happened that people want to know."""
+"""A part ends, too, when so much has happened that people want to know of."""
 
 
 def read_speed(text: str, least: float = SLOWEST) -> float:
@@ -131,25 +131,34 @@ class Pace:
 
     # ------------------------------------------------------------------ steps
 
-    def step(self, end: Nanos, condition: Condition | None) -> bool | None:
-        """Go on to the moment ``end``, or until a condition is true; gives whether that ended it, None for not there yet."""
+    def step(self, end: Nanos, condition: Condition | None, happened: list[str]) -> bool | None:
+        """Go on to the moment ``end``, or until a condition is true; gives whether that ended it, None for not there yet.
+
+        What people want to know of is added to ``happened``.
+        """
         live = self._live
         world = live.world
-        seen = len(world.trace)
         until = perf_counter() + PART_S
         moves = False
+
+        def listen(record: Record) -> None:
+            if is_told(record):
+                happened.append(describe(record))
+
+        world.trace.watchers.append(listen)
         try:
             while True:
                 if condition is not None and world.holds(condition):
                     return True
                 if live.now >= end or world.stopped is not None:
                     return False
-                if moves and (perf_counter() > until or len(world.trace) - seen > MOST_TOLD):
+                if moves and (perf_counter() > until or len(happened) >= MOST_TOLD):
                     return None
                 dues = [end, live.deadline(), None if condition is None else condition.due(live.now)]
                 live.advance(max(live.now, min(due for due in dues if due is not None)))
                 moves = True
         finally:
+            world.trace.watchers.remove(listen)
             self._cell.clock.stop(live.now)
             self._cell.close()  # a timer set for what has been done would find that it was held up
 
@@ -188,17 +197,7 @@ class Pace:
         self.pause()
         end = self._end_of(given, has_condition=condition is not None)
         happened: list[str] = []
-        watchers = self._live.world.trace.watchers
-
-        def listen(record: Record) -> None:
-            if is_told(record):
-                happened.append(describe(record))
-
-        watchers.append(listen)
-        try:
-            came = False if end is None else self.step(end, condition)
-        finally:
-            watchers.remove(listen)
+        came = False if end is None else self.step(end, condition, happened)
         stopped = self._live.world.stopped
         rest = {} if came is not None else {"to_ns": end}
         return {**self._where(), "happened": happened, "came": came is True, "stopped": stopped, "idle": end is None, **rest}
