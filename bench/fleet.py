@@ -12,7 +12,7 @@ from steptwin.mic488.device import Mic488
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.descriptors import descriptors
-from steptwin.runtime.tcp import Clients, Connection
+from steptwin.runtime.tcp import Address, Clients, Connection
 from steptwin.wire.slave import TcpSlavePort
 from steptwin.world.kernel import Kernel
 
@@ -29,14 +29,14 @@ async def main(port: int) -> None:
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def accept() -> None:
-        client = listener.accept()[0]
+        client, peer = listener.accept()
         client.setblocking(False)
         kernel = Kernel(clock.now())
         device = Mic488(config)
         kernel.add("1", device)
         for request in (ENABLE_ALL, *RUN):
             device.execute(request, kernel.now)
-        Connection(client, Cell(kernel, clock), TcpSlavePort({1: device}), clients)
+        Connection(client, Address(*peer), Cell(kernel, clock), TcpSlavePort({1: device}), clients)
 
     descriptors().await_input(listener.fileno(), accept)
     gc.freeze()

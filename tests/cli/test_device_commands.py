@@ -6,6 +6,7 @@ import json
 import os
 import pty
 import signal
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,15 +14,29 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from steptwin.cli import main
-from steptwin.cli.device import table, tied
+from steptwin.cli.device import shown, table, tied
 from steptwin.errors import Misuse
 from steptwin.host import Mic488
 from steptwin.host.address import DeviceAddress, parse_device
 from steptwin.runtime.ports import Place
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
+
+
+@given(st.floats(width=32, allow_nan=False))
+@example(0.1)
+def test_a_real_is_shown_with_the_digits_it_has(value: float) -> None:
+    real = struct.unpack("<f", struct.pack("<f", value))[0]
+    assert struct.pack("<f", float(shown(real))) == struct.pack("<f", real) or abs(real) < 1e-37
+
+
+def test_a_real_is_shown_as_people_write_it() -> None:
+    reals = [struct.unpack("<f", struct.pack("<f", value))[0] for value in (10.13, 0.1, -9.999999, 100.0, 123456.79)]
+    assert [shown(real) for real in reals] == ["10.13", "0.1", "-9.999999", "100", "123456.79"]
 
 
 class Shell:

@@ -7,6 +7,7 @@ import contextlib
 import errno
 import re
 import socket
+import struct
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -334,6 +335,29 @@ def test_a_flood_is_served_in_slices_between_the_requests_of_others(run: Run, ma
     assert order.index("other") < 2000
 
 
+def test_a_client_that_resets_after_a_wrong_header_is_told_by_its_address(run: Run, make_cell: Make) -> None:
+    async def play(scene: Scene) -> tuple[list[str], str]:
+        with socket.create_connection(scene.address) as client:
+            await scene.fallen_to(1)
+            address = Address(*client.getsockname())
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            client.send(b"GET / HTTP/1.1")
+        await scene.fallen_to(0)
+        return scene.notices, str(address)
+
+    notices, address = in_scene(run, make_cell, play)
+    assert notices == [f"client {address}: MBAP protocol 21536 is not 0; its connection is closed"]
+
+
+def test_what_is_no_name_of_a_host(run: Run, make_cell: Make) -> None:
+    async def scene() -> None:
+        cell, _ = make_cell()
+        with pytest.raises(LineFailure, match=r"cannot listen on a\.\.b:0: no name of a host"):
+            await TcpLink(cell, Address("a..b", 0), lambda: TcpSlavePort({}), Clients()).open()
+
+    run(scene())
+
+
 def test_closing_the_link_ends_its_connections_and_no_others(run: Run, make_cell: Make) -> None:
     async def scene() -> tuple[bytes, bytes]:
         async with Scene(make_cell) as one:
@@ -356,7 +380,10 @@ def test_a_port_that_is_taken(run: Run, make_cell: Make) -> None:
     async def scene() -> None:
         async with Scene(make_cell) as one:
             second = TcpLink(one.cell, one.address, lambda: TcpSlavePort({1: one.device}), one.clients)
-            with pytest.raises(LineFailure, match=rf"cannot listen on 127\.0\.0\.1:{one.address.port}: address already in use$"):
+            with pytest.raises(
+                LineFailure,
+                match=rf"cannot listen on 127\.0\.0\.1:{one.address.port}: address already in use; port 0 takes a free one$",
+            ):
                 await second.open()
 
     run(scene())

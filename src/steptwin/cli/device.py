@@ -116,7 +116,20 @@ def number_of(value: str, whole: str) -> float:
 def shown(value: object) -> str:
     if isinstance(value, bool):
         return "ON" if value else "OFF"
-    return f"{value:.9g}" if isinstance(value, float) else str(value)
+    return _real(value) if isinstance(value, float) else str(value)
+
+
+_HALF_STEP = 2.0**-25
+"""Of a REAL's size: what is nearer to it than this is nearer to no other."""
+
+
+def _real(value: float) -> str:
+    """As few digits as tell a REAL from its neighbours: 10.13, not 10.1300001."""
+    for digits in range(6, 9):
+        text = f"{value:.{digits}g}"
+        if abs(float(text) - value) <= abs(value) * _HALF_STEP:
+            return text
+    return f"{value:.9g}"
 
 
 def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:

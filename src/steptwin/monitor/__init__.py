@@ -19,7 +19,7 @@ def monitor(device: str | None, hz: float) -> None:
     try:
         import textual  # noqa: F401
     except ImportError as error:
-        raise NoTextual("the monitor needs textual: pip install 'steptwin[monitor]'") from error
+        raise NoTextual("the monitor needs textual: pip install 'steptwin[monitor]', in a clone: make extras") from error
     from steptwin.monitor.app import Monitor
     from steptwin.monitor.session import session_at
 

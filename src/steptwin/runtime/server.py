@@ -75,7 +75,7 @@ class Server:
         link = PtyLink(self.cell, path, make_port)
         await link.open()
         self._links.append(link)
-        self.end_points.append(EndPoint("pty", str(path), protocol, {"path": str(link.path)}))
+        self.end_points.append(EndPoint("pty", str(link.path), protocol, {"path": str(link.path)}))
 
     async def open_serial(self, device: str, baud: int, protocol: str, make_port: Callable[[], Port]) -> None:
         from steptwin.runtime.serialport import SerialLink

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import ipaddress
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from weakref import WeakSet
 
 from steptwin.errors import LineFailure, Misuse
@@ -73,10 +74,23 @@ class Clients:
 class Connection:
     """One client of a port. While it does not read its answers no request of it is read; its flood is served in slices."""
 
-    __slots__ = ("__weakref__", "_clients", "_descriptors", "_ending", "_feed", "_receive", "_send", "_socket", "_unsent", "port")
+    __slots__ = (
+        "__weakref__",
+        "_clients",
+        "_descriptors",
+        "_ending",
+        "_feed",
+        "_peer",
+        "_receive",
+        "_send",
+        "_socket",
+        "_unsent",
+        "port",
+    )
 
-    def __init__(self, client: socket.socket, cell: Cell, port: Port, clients: Clients) -> None:
+    def __init__(self, client: socket.socket, peer: Address, cell: Cell, port: Port, clients: Clients) -> None:
         self.port = port
+        self._peer = peer
         self._socket = client
         self._receive = client.recv
         self._send = client.send
@@ -105,8 +119,7 @@ class Connection:
             return
         self._feed.take(data)
         if self.port.broken is not None and self._socket.fileno() >= 0:
-            client = Address(*self._socket.getpeername()[:2])
-            self._clients.notice(f"client {client}: {self.port.broken}; its connection is closed")
+            self._clients.notice(f"client {self._peer}: {self.port.broken}; its connection is closed")
             self._ending = True
             if not self._unsent:
                 self.close()
@@ -166,7 +179,10 @@ class TcpLink:
         try:
             self._listener = listener = _listening(self._asked)
         except OSError as error:
-            raise LineFailure(f"cannot listen on {self._asked}: {where(error)}") from error
+            hint = "; port 0 takes a free one" if error.errno == errno.EADDRINUSE else ""
+            raise LineFailure(f"cannot listen on {self._asked}: {where(error)}{hint}") from error
+        except UnicodeError as error:
+            raise LineFailure(f"cannot listen on {self._asked}: no name of a host") from error
         self._listen()
         return Address(self._asked.host, listener.getsockname()[1])
 
@@ -179,7 +195,7 @@ class TcpLink:
             return
         try:
             for _ in range(AT_ONCE):
-                self._welcome(self._listener.accept()[0])
+                self._welcome(*self._listener.accept())
         except (BlockingIOError, ConnectionAbortedError):
             return
         except OSError as error:
@@ -187,13 +203,13 @@ class TcpLink:
             descriptors().forget(self._listener.fileno())
             self._retry = asyncio.get_running_loop().call_later(RETRY_S, self._listen)
 
-    def _welcome(self, client: socket.socket) -> None:
+    def _welcome(self, client: socket.socket, peer: tuple[Any, ...]) -> None:
         if len(self._clients.present) >= self._clients.most:
             self._clients.notice(f"more than {self._clients.most} clients at once are turned away")
             client.close()
             return
         client.setblocking(False)
-        self._connections.add(Connection(client, self._cell, self._make_port(), self._clients))
+        self._connections.add(Connection(client, Address(*peer[:2]), self._cell, self._make_port(), self._clients))
 
     async def close(self) -> None:
         if self._retry is not None:

@@ -47,7 +47,9 @@ def test_a_directory_gets_the_usual_ones_or_those_that_are_named(tmp_path: Path)
 def test_missing_libraries_are_named_with_their_extra(tmp_path: Path, without: None) -> None:
     extras = {"png": "plots", "svg": "plots", "vcd": "numbers", "csv": "numbers", "parquet": "parquet"}
     for name, extra in extras.items():
-        with pytest.raises(Misuse, match=rf"^{name} needs .*not installed: pip install 'steptwin\[{extra}\]'$"):
+        with pytest.raises(
+            Misuse, match=rf"^{name} needs .*not installed: pip install 'steptwin\[{extra}\]', in a clone: make extras$"
+        ):
             write_trace(TRACE, tmp_path / f"x.{name}")
     assert [path.name for path in write_trace(TRACE, tmp_path)] == ["trace.jsonl", "trace.html"]
 
