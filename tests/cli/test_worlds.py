@@ -185,8 +185,12 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_runs(tm
         invoke("run", str(program), "--trace", str(program / "t"))
     with pytest.raises(Misuse, match=r"out\.foo: formats are jsonl, html"):
         invoke("up", str(program), "--trace", str(tmp_path / "out.foo"))
+    (tmp_path / "s.json").mkdir()
     with pytest.raises(Misuse, match=r"cannot write .*: Is a directory"):
-        invoke("up", str(program), "--session", str(tmp_path))
+        invoke("up", str(program), "--session", str(tmp_path / "s.json"))
+    for command in (("up", str(program), "--session"), ("run", str(program), "--session"), ("save",)):
+        with pytest.raises(Misuse, match=r"now\.toml: a session is called NAME\.json$"):
+            invoke(*command, str(tmp_path / "now.toml"))
 
 
 def test_options_for_programs_are_refused() -> None:

@@ -123,6 +123,17 @@ def test_a_conversation() -> None:
     assert wire.written[:3] == [b"x7\r", b"u1\r", b"r\r"]
 
 
+def test_what_is_no_byte_is_refused_and_the_rest_goes_on() -> None:
+    wire = Wire(u1=b"\x05")
+    terminal = ChipTerminal(wire, 4800, None, str)
+    with pytest.raises(Misuse, match=r"^'v€': '€' is no character of one byte$"):
+        terminal.type("v€")
+    terminal.type("u1")
+    assert terminal.settle(60.0) == 0
+    terminal.close()
+    assert wire.written == [b"u1\r"]
+
+
 def test_kill_waits_for_no_eeprom() -> None:
     """Half a second for each command of an E type (chapter II); K and X take no part in that."""
     wire = Wire()

@@ -67,9 +67,9 @@ def save(
     json: Json = False,
 ) -> None:
     """Write a session of a running world up to now: for 'steptwin replay', and for 'run' and 'up' to go on from."""
-    from steptwin.runtime.textfiles import check_writable
+    from steptwin.runtime.beginning import check_session_target
 
-    check_writable(file)
+    check_session_target(file)
     there = _ask(twin, {"do": "save", "file": str(file.absolute())})
     if not json:
         typer.echo(f"wrote {file}: {there['inputs']} inputs, digest {there['digest']}")

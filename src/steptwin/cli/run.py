@@ -119,9 +119,9 @@ def run(
 
         check_target(trace)
     if session is not None:
-        from steptwin.runtime.textfiles import check_writable
+        from steptwin.runtime.beginning import check_session_target
 
-        check_writable(session)
+        check_session_target(session)
     options = Options(
         limit=limit,
         until=until,

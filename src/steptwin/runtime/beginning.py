@@ -8,6 +8,7 @@ from pathlib import Path
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.runtime import session as sessions
+from steptwin.runtime.textfiles import check_writable
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.faults import read as read_fault
@@ -18,6 +19,13 @@ SESSION_SUFFIX = ".json"
 def is_session(path: Path) -> bool:
     """Whether a file is taken for a session; others are taken for descriptions."""
     return path.suffix.lower() == SESSION_SUFFIX
+
+
+def check_session_target(path: Path) -> None:
+    """Whether a session can be written there, and is one by its name afterwards. Raises `Misuse`."""
+    if not is_session(path):
+        raise Misuse(f"{path}: a session is called NAME{SESSION_SUFFIX}")
+    check_writable(path)
 
 
 def begin_world(

@@ -173,7 +173,11 @@ class ChipTerminal:
         self._thread.start()
 
     def type(self, text: str) -> None:
-        """Send a line and its CR. Raises the `LineFailure` that has ended the line."""
+        """Send a line and its CR. Raises `Misuse` for what is no byte, and the `LineFailure` that has ended the line."""
+        try:
+            text.encode("latin-1")
+        except UnicodeEncodeError as error:
+            raise Misuse(f"{text!r}: {text[error.start]!r} is no character of one byte") from None
         chosen = _SELECT.fullmatch(text.strip())
         if chosen is not None:
             self.selected = chosen[1].upper().replace("G", "")
@@ -231,7 +235,7 @@ class ChipTerminal:
             text = self._next()
         if text is None:
             return
-        data = (text + "\r").encode("latin-1", "replace")
+        data = (text + "\r").encode("latin-1")
         self._words.typed(text)
         self._channel.write(data)
         self._sent += 1

@@ -16,7 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.runtime import session as sessions
-from steptwin.runtime.beginning import begin_world, set_faults
+from steptwin.runtime.beginning import begin_world, check_session_target, set_faults
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.control import Handler
@@ -29,7 +29,6 @@ from steptwin.runtime.run_world import describe, is_told
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_name
 from steptwin.runtime.tcp import parse_address
-from steptwin.runtime.textfiles import check_writable
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Leave
@@ -168,7 +167,7 @@ def up(options: UpOptions) -> bool:
     if options.trace is not None:
         check_target(options.trace)
     if options.session is not None:
-        check_writable(options.session)
+        check_session_target(options.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
     asyncio.run(_serve(options, world, speed, name, has_clients=bool(outside)))
