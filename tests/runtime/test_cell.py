@@ -104,6 +104,21 @@ def test_a_short_delay_is_caught_up_with(run: Run, make_cell: Make) -> None:
     assert (now, status) == (2 * SECOND + LONGEST_DELAY_NS, Status.REACHED)
 
 
+def test_what_is_short_on_the_wall_is_long_where_time_runs_fast(run: Run, make_cell: Make) -> None:
+    async def scene() -> tuple[list[Nanos], Nanos]:
+        cell, device = make_cell()
+        cell.clock.run(20.0)
+        lags: list[Nanos] = []
+        cell.on_lag = lags.append
+        start_move(cell, device)
+        asyncio.get_running_loop().hold_up(0.4)  # type: ignore[attr-defined]
+        now = cell.enter()
+        cell.close()
+        return lags, now
+
+    assert run(scene()) == ([], 8 * SECOND)
+
+
 def test_time_in_which_nothing_was_due_has_passed(run: Run, make_cell: Make) -> None:
     async def scene() -> tuple[list[Nanos], Nanos]:
         cell, _ = make_cell()

@@ -14,7 +14,7 @@ LONGEST_WAIT_S = 3600.0
 """Event loops take no arbitrarily distant timer; a longer wait is waited in parts."""
 
 LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
-"""Something due that is done later than this has not jittered: the process was stopped or cannot keep up."""
+"""Something due that is done later than this on the wall has not jittered: the process was stopped or cannot keep up."""
 
 
 class Advancing(Protocol):
@@ -59,7 +59,7 @@ class Cell:
         self.moments += 1
         now = self.clock.now()
         due = self._armed_for
-        if due is not None and now - due > LONGEST_DELAY_NS:
+        if due is not None and now - due > LONGEST_DELAY_NS * self.clock.speed:
             now = self._held_up(due, now)
         self.kernel.advance(now)
         return now
