@@ -21,6 +21,9 @@ from steptwin.runtime.serialport import SerialLink
 from steptwin.wire.slave import RtuSlavePort
 from steptwin.world.kernel import Kernel
 
+Run = Callable[..., Any]
+Make = Callable[[], tuple[Cell, Mic488]]
+
 REQUEST = bytes.fromhex("010213880008FD62")
 ANSWER = bytes.fromhex("01020100A188")
 
@@ -122,6 +125,31 @@ def test_closing_while_it_is_looked_for(tmp_path: Path) -> None:
 
     before_it_is_cancelled = 1
     assert on_line(adapter.device, play) <= before_it_is_cancelled
+
+
+def test_while_the_device_takes_nothing_nothing_is_read_and_what_is_said_unasked_is_lost(run: Run, make_cell: Make) -> None:
+    class Transport:
+        def __init__(self) -> None:
+            self.reading = True
+
+        def pause_reading(self) -> None:
+            self.reading = False
+
+        def resume_reading(self) -> None:
+            self.reading = True
+
+    async def scene() -> list[tuple[bool, bool]]:
+        cell, mic = make_cell()
+        transport: Any = Transport()
+        line = serialport._Line(cell, RtuSlavePort({1: mic}), print)
+        line.connection_made(transport)
+        seen = []
+        for change in (line.pause_writing, line.resume_writing):
+            change()
+            seen.append((transport.reading, line._feed.is_read))
+        return seen
+
+    assert run(scene()) == [(False, False), (True, True)]
 
 
 @pytest.mark.parametrize(

@@ -263,6 +263,31 @@ def test_what_was_answered_before_a_wrong_header_is_sent_though_it_has_to_wait(r
     assert len(notices) == 1
 
 
+def test_a_connection_that_is_to_end_ends_when_its_last_answers_have_found_room(run: Run, make_cell: Make) -> None:
+    """Requests and rubbish come together, and their answers find no room."""
+
+    async def play(scene: Scene) -> tuple[int, int, int]:
+        deaf = deafen(scene)
+        deaf.send(READ_MANY * 150 + b"\xff" * 12)
+        while not scene.notices:
+            await asyncio.sleep(0)
+        waiting = sum(connection.waiting for connection in scene.clients.present)
+        received = 0
+        while True:
+            await asyncio.sleep(0)
+            with contextlib.suppress(BlockingIOError):
+                data = deaf.recv(1 << 20)
+                if not data:
+                    break
+                received += len(data)
+        deaf.close()
+        return waiting, received, await scene.fallen_to(0)
+
+    waiting, received, left = in_scene(run, make_cell, play)
+    assert waiting > 0
+    assert (received, left) == (150 * (9 + 250), 0)
+
+
 def test_after_a_wrong_header_the_rest_of_a_flood_is_not_executed(run: Run, make_cell: Make) -> None:
     async def play(scene: Scene) -> tuple[int, int]:
         _, writer = await scene.client()

@@ -46,7 +46,7 @@ class Cell:
         self._batch = 0
         """That the machines have been brought to the present for."""
         self.moments = 0
-        """Counts on whenever time may have passed or signals have settled."""
+        """Counts on whenever the machines are brought to the present: time may have passed, signals have settled."""
         self._timer: asyncio.TimerHandle | None = None
         self._armed_for: Nanos | None = None
 
@@ -68,7 +68,6 @@ class Cell:
         """Let signals settle after an input and wake up for what it leads to."""
         if self.kernel.stale:
             self._batch = 0  # something may be due at once
-            self.moments += 1
             self._arm(self.kernel.deadline())
 
     def _held_up(self, due: Nanos, now: Nanos) -> Nanos:

@@ -107,8 +107,8 @@ def session_of(world: World) -> Session:
     )
 
 
-def save(session: Session, path: Path) -> None:
-    """Raises `Misuse` when the file cannot be written."""
+def save(session: Session, path: Path | str) -> None:
+    """Write a session, as JSON. Raises `Misuse` when the file cannot be written."""
     data = {
         "steptwin_session": FORMAT,
         "version": session.version,
@@ -124,13 +124,13 @@ def save(session: Session, path: Path) -> None:
             for time, what, settled in session.inputs
         ],
     }
-    write_bytes(path, (json.dumps(data, ensure_ascii=False, indent=1) + "\n").encode())
+    write_bytes(Path(path), (json.dumps(data, indent=1) + "\n").encode())
 
 
-def load(path: Path) -> Session:
-    """Raises `Misuse` for a file that cannot be read or is no session."""
+def load(path: Path | str) -> Session:
+    """What `save` wrote. Raises `Misuse` for a file that cannot be read or is no session."""
     try:
-        data = json.loads(read_bytes(path))
+        data = json.loads(read_bytes(Path(path)))
         if data["steptwin_session"] != FORMAT:
             raise Misuse(f"{path} is a session of format {data['steptwin_session']}: this version reads {FORMAT}")
         return _session(data)

@@ -117,6 +117,7 @@ def _configured(row: ConfigKey) -> Callable[[Any], Any]:
     words = {text.upper(): number for number, text in row.choices.items() if text}
 
     def read(value: Any) -> Any:
+        said = value
         if isinstance(value, str):
             if row.attribute in ("in_kl", "in_kr") and value.upper().startswith("IN") and value[2:].isdecimal():
                 value = int(value[2:]) - 1
@@ -125,7 +126,7 @@ def _configured(row: ConfigKey) -> Callable[[Any], Any]:
             else:
                 raise Misuse(f"{value!r}: permitted are {', '.join(words)}" if words else f"{value!r} is no number")
         if isinstance(value, bool) or not isinstance(value, int | float) or not row.permits(value):
-            raise Misuse(f"{value!r} is not permitted")
+            raise Misuse(f"{said!r} is not permitted")
         return int(value) if row.whole and value == int(value) else value
 
     return read

@@ -106,7 +106,7 @@ def test_what_is_no_fault_is_refused_with_what_is_permitted(line: str) -> None:
         ({"kind": 3}, "[[fault]] 2: kind = 3: permitted are"),
         ({"kind": "crc", "nth": True}, "[[fault]] 2 (crc): nth = True: permitted are whole numbers 1 and more"),
         ({"kind": "crc", "nth": "3"}, "[[fault]] 2 (crc): nth = '3': permitted are whole numbers 1 and more"),
-        ({"kind": "crc", "name": "a b"}, "[[fault]] 2: name = 'a b': permitted is text without blanks"),
+        ({"kind": "crc", "name": "a b"}, "[[fault]] 2: name = 'a b': permitted is text that can be printed, without blanks"),
         ({"kind": "crc", "link": ""}, "[[fault]] 2 (crc): link = '': permitted are text"),
     ],
 )

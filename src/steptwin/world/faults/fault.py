@@ -65,8 +65,8 @@ def parse(mapping: Mapping[str, object], place: str = "fault") -> Fault:
     if kind is None:
         raise Misuse(f"{place}: kind = {word!r}: permitted are {', '.join(KINDS)}")
     name = mapping.get("name", "")
-    if not isinstance(name, str) or " " in name:
-        raise Misuse(f"{place}: name = {name!r}: permitted is text without blanks")
+    if not isinstance(name, str) or " " in name or not name.isprintable():
+        raise Misuse(f"{place}: name = {name!r}: permitted is text that can be printed, without blanks")
     place = f"{place} ({kind.name})"
     given: dict[str, Value] = {}
     for key, value in mapping.items():
