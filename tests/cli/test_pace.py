@@ -43,7 +43,7 @@ def invoke(*arguments: str) -> str:
 
 
 def test_a_running_world_in_somebodys_hands(up: Up) -> None:
-    assert invoke("step") == "bar feeder stands at 0.002083334 s\n"
+    assert invoke("step") == "    0.002083 s  table      M1_EN: 1\nbar feeder stands at 0.002083334 s\n"
     assert invoke("step", "2s") == "bar feeder stands at 2.002083334 s\n"
     invoke("pin", "table.IN8=1")
     told = invoke("step", "--until", "start.pressed", "1min").splitlines()

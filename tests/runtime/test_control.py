@@ -68,8 +68,8 @@ async def answer_to(endpoint: ControlEndpoint, *parts: bytes) -> Any:
     ("request_", "answer"),
     [
         (b'{"do": "echo", "x": [1, null]}\n', {"ok": {"do": "echo", "x": [1, None]}}),
-        (b'{"do": "refuse"}\nmore', {"error": "not permitted: 7"}),
-        (b'{"do": "fly"}\n', {"error": "this twin cannot do 'fly': it can echo, refuse"}),
+        (b'{"do": "refuse"}\nmore', {"error": "not permitted: 7", "misuse": True}),
+        (b'{"do": "fly"}\n', {"error": "this twin cannot do 'fly': it can echo, refuse", "misuse": True}),
         (b"\n", FORM_ERROR),
         (b"[]\n", FORM_ERROR),
         (b'{"do": []}\n', FORM_ERROR),
@@ -189,14 +189,14 @@ def test_a_twin_is_asked_by_name() -> None:
 
 
 def test_what_the_twin_refuses() -> None:
-    with pytest.raises(Refusal, match="not permitted: 7"):
+    with pytest.raises(Misuse, match="not permitted: 7"):
         asked(None, {"do": "refuse"}, "one")
 
 
 @pytest.mark.parametrize(
     ("name", "names", "family", "text"),
     [
-        (None, (), LineFailure, "no twin is running: start one with 'steptwin serve'"),
+        (None, (), LineFailure, "no twin is running: start one with 'steptwin serve' or 'steptwin up'"),
         (None, ("one", "two"), Misuse, "several twins are running: choose one with --twin: one, two"),
         ("three", ("one", "two"), LineFailure, "no twin named 'three' is running; running: one, two"),
         ("three", (), LineFailure, "no twin named 'three' is running; running: none"),

@@ -1,6 +1,7 @@
 """The control endpoint of a served twin: what a hand at the machine could do, over a local socket.
 
-One request and one answer, each a line of JSON: ``{"do": NAME, ...}`` → ``{"ok": RESULT}`` or ``{"error": TEXT}``. Only the
+One request and one answer, each a line of JSON: ``{"do": NAME, ...}`` → ``{"ok": RESULT}`` or ``{"error": TEXT}``,
+with ``"misuse": true`` where the request was wrong. Only the
 user who started the twin can open the socket.
 """
 
@@ -86,9 +87,11 @@ class ControlEndpoint:
             return {"error": FORM}
         handler = self._handlers.get(wanted)
         if handler is None:
-            return {"error": f"this twin cannot do {wanted!r}: it can {', '.join(self._handlers)}"}
+            return {"error": f"this twin cannot do {wanted!r}: it can {', '.join(self._handlers)}", "misuse": True}
         try:
             return {"ok": handler(request)}
+        except Misuse as error:
+            return {"error": str(error), "misuse": True}
         except SteptwinError as error:
             return {"error": str(error)}
 
@@ -159,7 +162,7 @@ def ask(name: str | None, request: Mapping[str, object]) -> Any:
     names = running()
     if name is None:
         if not names:
-            raise LineFailure("no twin is running: start one with 'steptwin serve'")
+            raise LineFailure("no twin is running: start one with 'steptwin serve' or 'steptwin up'")
         if len(names) > 1:
             raise Misuse(f"several twins are running: choose one with --twin: {', '.join(names)}")
         name = names[0]
@@ -175,5 +178,5 @@ def ask(name: str | None, request: Mapping[str, object]) -> Any:
         except (OSError, ValueError) as error:
             raise LineFailure(f"the twin {name!r} does not answer: {error}") from error
     if "error" in answer:
-        raise Refusal(answer["error"])
+        raise (Misuse if answer.get("misuse") else Refusal)(answer["error"])
     return answer["ok"]

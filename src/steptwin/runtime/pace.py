@@ -32,6 +32,11 @@ PART_S = 0.1
 """A step that takes longer is taken in parts, one for each request."""
 MOST_TOLD = 1000
 """A part ends, too, when so much has happened that people want to know of."""
+_SEEN_CLOSELY: dict[str, Callable[[Any], str]] = {
+    "edge": lambda level: f"{level:g}",
+    "plan": lambda plan: "moves" if getattr(plan, "profile", plan).segments else "stands",
+}
+"""Records that are shown where the next thing is waited for, and their values in words."""
 
 
 def read_speed(text: str, least: float = SLOWEST) -> float:
@@ -131,10 +136,10 @@ class Pace:
 
     # ------------------------------------------------------------------ steps
 
-    def step(self, end: Nanos, condition: Condition | None, happened: list[str]) -> bool | None:
+    def step(self, end: Nanos, condition: Condition | None, happened: list[str], *, closely: bool = False) -> bool | None:
         """Go on to the moment ``end``, or until a condition is true; gives whether that ended it, None for not there yet.
 
-        What people want to know of is added to ``happened``.
+        What people want to know of is added to ``happened``; ``closely``: levels and motions too.
         """
         live = self._live
         world = live.world
@@ -144,6 +149,8 @@ class Pace:
         def listen(record: Record) -> None:
             if is_told(record):
                 happened.append(describe(record))
+            elif closely and record.kind in _SEEN_CLOSELY:
+                happened.append(describe(record._replace(value=_SEEN_CLOSELY[record.kind](record.value))))
 
         world.trace.watchers.append(listen)
         try:
@@ -197,7 +204,8 @@ class Pace:
         self.pause()
         end = self._end_of(given, has_condition=condition is not None)
         happened: list[str] = []
-        came = False if end is None else self.step(end, condition, happened)
+        is_next = condition is None and not given
+        came = False if end is None else self.step(end, condition, happened, closely=is_next)
         stopped = self._live.world.stopped
         rest = {} if came is not None else {"to_ns": end}
         return {**self._where(), "happened": happened, "came": came is True, "stopped": stopped, "idle": end is None, **rest}
