@@ -30,7 +30,11 @@ def refuse(request: Mapping[str, Any]) -> object:
     raise Misuse("not permitted: 7")
 
 
-HANDLERS: dict[str, Callable[[Mapping[str, Any]], object]] = {"echo": dict, "refuse": refuse}
+def deny(request: Mapping[str, Any]) -> object:
+    raise Refusal("not now")
+
+
+HANDLERS: dict[str, Callable[[Mapping[str, Any]], object]] = {"echo": dict, "refuse": refuse, "deny": deny}
 
 
 async def turns() -> None:
@@ -69,7 +73,7 @@ async def answer_to(endpoint: ControlEndpoint, *parts: bytes) -> Any:
     [
         (b'{"do": "echo", "x": [1, null]}\n', {"ok": {"do": "echo", "x": [1, None]}}),
         (b'{"do": "refuse"}\nmore', {"error": "not permitted: 7", "misuse": True}),
-        (b'{"do": "fly"}\n', {"error": "this twin cannot do 'fly': it can echo, refuse", "misuse": True}),
+        (b'{"do": "fly"}\n', {"error": "this twin cannot do 'fly': it can echo, refuse, deny", "misuse": True}),
         (b"\n", FORM_ERROR),
         (b"[]\n", FORM_ERROR),
         (b'{"do": []}\n', FORM_ERROR),
@@ -191,6 +195,8 @@ def test_a_twin_is_asked_by_name() -> None:
 def test_what_the_twin_refuses() -> None:
     with pytest.raises(Misuse, match="not permitted: 7"):
         asked(None, {"do": "refuse"}, "one")
+    with pytest.raises(Refusal, match="not now"):
+        asked(None, {"do": "deny"}, "one")
 
 
 @pytest.mark.parametrize(
