@@ -39,12 +39,12 @@ def test_every_kind_and_parameter_is_explained() -> None:
     assert "crc         The answer has a wrong CRC." in kinds("text")
 
 
-def test_what_is_no_fault_is_refused_here_and_what_the_twin_cannot_have_by_the_twin(serve: Serve) -> None:
+def test_what_is_no_fault_is_refused_and_what_the_twin_cannot_have(serve: Serve) -> None:
     twin = serve("--demo")
     wrong = twin.command("fault", "crc", "nth=0")
     assert (wrong.returncode, wrong.stderr) == (2, "steptwin: fault (crc): nth = 0: permitted are whole numbers 1 and more\n")
     refused = twin.command("fault", "crc", "unit=3")
-    assert (refused.returncode, refused.stderr) == (1, "steptwin: fault crc: unit = 3: served are 1\n")
+    assert (refused.returncode, refused.stderr) == (2, "steptwin: fault crc: unit = 3: served are 1\n")
 
 
 def test_a_stuck_switch_stays_stuck_under_a_hand(serve: Serve) -> None:

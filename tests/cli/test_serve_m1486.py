@@ -102,9 +102,9 @@ def test_a_hand_at_the_chips(serve_m1486: Serve) -> None:
     assert lines[0].startswith("M1486B at address 0, 4800 bit/s, ")
     assert lines[1:3] == ["program  has nothing to do", "memory   0 of 2032 bits, input buffer 0 of 32 characters"]
     refused = twin.command("pin", "B1=0")
-    assert (refused.returncode, refused.stderr) == (1, "steptwin: several chips are served: choose one with --unit: 0, A\n")
+    assert (refused.returncode, refused.stderr) == (2, "steptwin: several chips are served: choose one with --unit: 0, A\n")
     cannot = twin.command("encoder", "M1+1")
-    assert cannot.returncode == 1
+    assert cannot.returncode == 2
     assert "this twin cannot do 'encoder': it can pin, power-cycle, state" in cannot.stderr
     host.close()
 
