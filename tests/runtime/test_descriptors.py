@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from steptwin.runtime import descriptors as module
-from steptwin.runtime.descriptors import BATCH, LINGER_NS, TURN_NS, Descriptors, descriptors
+from steptwin.runtime.descriptors import BATCH, LINGER_NS, MOMENT_NS, TURN_NS, Descriptors, descriptors
 
 Run = Callable[..., Any]
 
@@ -53,15 +53,19 @@ def test_a_loop_has_one_set(run: Run) -> None:
     assert one is not other
 
 
-def test_what_is_ready_together_is_one_batch(run: Run) -> None:
+@pytest.mark.parametrize(("look_ns", "second"), [(1, 1), (MOMENT_NS, 2)])
+def test_what_comes_within_a_moment_happens_at_one(run: Run, monkeypatch: pytest.MonkeyPatch, look_ns: int, second: int) -> None:
+    """Two batches; looking at the clock takes next to nothing, or a moment."""
+    monkeypatch.setattr(module, "time", FakeTime(look_ns))
+
     async def scene() -> tuple[list[int], int]:
-        watched, batches = descriptors(), []
+        watched, moments = descriptors(), []
         with pipes(BATCH + 2) as ends:
 
             def serve(read: int) -> Callable[[], None]:
                 def act() -> None:
                     os.read(read, 1)
-                    batches.append(watched.batch)
+                    moments.append(watched.moment)
 
                 return act
 
@@ -70,10 +74,10 @@ def test_what_is_ready_together_is_one_batch(run: Run) -> None:
             await asyncio.sleep(0.01)
             for read, _ in ends:
                 watched.forget(read)
-        return batches, watched.batch
+        return moments, watched.moment
 
-    batches, between = run(scene())
-    assert batches == [1] * BATCH + [2] * 2
+    moments, between = run(scene())
+    assert moments == [1] * BATCH + [second] * 2
     assert between == 0
 
 
@@ -143,7 +147,7 @@ def test_trouble_with_one_is_told_and_others_are_served() -> None:
             await asyncio.sleep(0.01)
             watched.forget(bad)
             watched.forget(good)
-        return told, served, watched.batch
+        return told, served, watched.moment
 
     assert asyncio.run(scene()) == (["bad"], [1], 0)
 

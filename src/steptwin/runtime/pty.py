@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import select
 import termios
@@ -11,7 +12,6 @@ from pathlib import Path
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.runtime.cell import Cell
-from steptwin.runtime.descriptors import descriptors
 from steptwin.runtime.links import SLICE_BYTES, Feed, Port, where
 from steptwin.runtime.ownership import InUse, Ownership
 
@@ -29,6 +29,7 @@ class PtyLink:
         self._cell = cell
         self.path = path.absolute()
         self._make_port = make_port
+        self._loop = asyncio.get_running_loop()
         self._owned: Ownership | None = None
         self._master = -1
         self._device = ""
@@ -98,7 +99,7 @@ class PtyLink:
         self._feed = Feed(self._cell, self._make_port(), self)
         self._quiet = True
         if self._stirring is not None:
-            descriptors().await_input(self._stirring.fileno(), self._stirred)
+            self._loop.add_reader(self._stirring.fileno(), self._stirred)
             # Our own coming and going was reported too.
             self._look(self._stirring)
 
@@ -111,8 +112,8 @@ class PtyLink:
         if not any(events & select.EPOLLIN for _, events in stirring.poll(0)):
             return False
         self._quiet = False
-        descriptors().forget(stirring.fileno())
-        descriptors().await_input(self._master, self._readable)
+        self._loop.remove_reader(stirring.fileno())
+        self._loop.add_reader(self._master, self._readable)
         return True
 
     def _readable(self) -> None:
@@ -121,7 +122,7 @@ class PtyLink:
         except BlockingIOError:
             return
         except OSError:
-            descriptors().forget(self._master)
+            self._loop.remove_reader(self._master)
             self._left()
             return
         if self._feed is not None:
@@ -129,14 +130,14 @@ class PtyLink:
 
     async def close(self) -> None:
         if self._stirring is not None:
-            descriptors().forget(self._stirring.fileno())
+            self._loop.remove_reader(self._stirring.fileno())
             self._stirring.close()
             self._stirring = None
         if self._feed is not None:
             self._feed.close()
             self._feed = None
         if self._master >= 0:
-            descriptors().forget(self._master)
+            self._loop.remove_reader(self._master)
             os.close(self._master)
             self._master = -1
         if self._owned is not None:
