@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from steptwin.runtime import descriptors as module
-from steptwin.runtime.descriptors import BATCH, LINGER_NS, MOMENT_NS, TURN_NS, Descriptors, descriptors
+from steptwin.runtime.descriptors import BATCH, LINGER_NS, TURN_NS, Descriptors, descriptors
 
 Run = Callable[..., Any]
 
@@ -53,19 +53,15 @@ def test_a_loop_has_one_set(run: Run) -> None:
     assert one is not other
 
 
-@pytest.mark.parametrize(("look_ns", "second"), [(1, 1), (MOMENT_NS, 2)])
-def test_what_comes_within_a_moment_happens_at_one(run: Run, monkeypatch: pytest.MonkeyPatch, look_ns: int, second: int) -> None:
-    """Two batches; looking at the clock takes next to nothing, or a moment."""
-    monkeypatch.setattr(module, "time", FakeTime(look_ns))
-
+def test_what_is_ready_together_is_one_batch(run: Run) -> None:
     async def scene() -> tuple[list[int], int]:
-        watched, moments = descriptors(), []
+        watched, batches = descriptors(), []
         with pipes(BATCH + 2) as ends:
 
             def serve(read: int) -> Callable[[], None]:
                 def act() -> None:
                     os.read(read, 1)
-                    moments.append(watched.moment)
+                    batches.append(watched.batch)
 
                 return act
 
@@ -74,10 +70,10 @@ def test_what_comes_within_a_moment_happens_at_one(run: Run, monkeypatch: pytest
             await asyncio.sleep(0.01)
             for read, _ in ends:
                 watched.forget(read)
-        return moments, watched.moment
+        return batches, watched.batch
 
-    moments, between = run(scene())
-    assert moments == [1] * BATCH + [second] * 2
+    batches, between = run(scene())
+    assert batches == [1] * BATCH + [2] * 2
     assert between == 0
 
 
@@ -147,7 +143,7 @@ def test_trouble_with_one_is_told_and_others_are_served() -> None:
             await asyncio.sleep(0.01)
             watched.forget(bad)
             watched.forget(good)
-        return told, served, watched.moment
+        return told, served, watched.batch
 
     assert asyncio.run(scene()) == (["bad"], [1], 0)
 

@@ -43,20 +43,20 @@ def in_scene(run: Run, make_cell: Make, play: Callable[[Cell, Mic488, Counted, A
     return run(scene())
 
 
-def test_at_one_moment_a_read_is_executed_once(run: Run, make_cell: Make) -> None:
+def test_within_a_batch_a_read_is_executed_once(run: Run, make_cell: Make) -> None:
     def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> tuple[set[bytes], int, int]:
-        descriptors().moment = 1
+        descriptors().batch = 1
         answers = {shared.execute(READ_USER, cell.enter()) for _ in range(3)}
         once = counted.executed
-        descriptors().moment = 2
+        descriptors().batch = 2
         shared.execute(READ_USER, cell.enter())
-        descriptors().moment = 0
+        descriptors().batch = 0
         return answers, once, counted.executed
 
     assert in_scene(run, make_cell, play) == ({bytes.fromhex("03020000")}, 1, 2)
 
 
-def test_outside_of_turns_every_read_is_executed(run: Run, make_cell: Make) -> None:
+def test_without_a_batch_every_read_is_executed(run: Run, make_cell: Make) -> None:
     def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> int:
         for _ in range(3):
             shared.execute(READ_USER, cell.enter())
@@ -67,9 +67,9 @@ def test_outside_of_turns_every_read_is_executed(run: Run, make_cell: Make) -> N
 
 def test_what_is_written_is_read(run: Run, make_cell: Make) -> None:
     def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> list[bytes]:
-        descriptors().moment = 1
+        descriptors().batch = 1
         answers = [shared.execute(pdu, cell.enter()) for pdu in (READ_USER, READ_OUT, WRITE_USER, READ_USER, OUT_ON, READ_OUT)]
-        descriptors().moment = 0
+        descriptors().batch = 0
         return answers
 
     user, out, _, written, _, on = in_scene(run, make_cell, play)
@@ -78,32 +78,32 @@ def test_what_is_written_is_read(run: Run, make_cell: Make) -> None:
 
 
 def test_what_signals_settle_to_is_read(run: Run, make_cell: Make) -> None:
-    """Something other than a request changes the controller at a moment, and the kernel is told."""
+    """Something other than a request changes the controller within a batch, and the kernel is told."""
 
     def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> list[bytes]:
-        descriptors().moment = 1
+        descriptors().batch = 1
         answers = [shared.execute(READ_OUT, cell.enter())]
         device.set_output(0, True)
         device.touch()
         cell.leave()
         answers.append(shared.execute(READ_OUT, cell.enter()))
-        descriptors().moment = 0
+        descriptors().batch = 0
         return answers
 
     assert in_scene(run, make_cell, play) == [bytes.fromhex("010100"), bytes.fromhex("010101")]
 
 
-def test_a_moment_is_one_of_virtual_time(run: Run, make_cell: Make) -> None:
+def test_a_batch_happens_at_one_moment(run: Run, make_cell: Make) -> None:
     async def scene() -> tuple[Nanos, Nanos, Nanos]:
         cell, _ = make_cell()
         loop: Any = asyncio.get_running_loop()
-        descriptors().moment = 1
+        descriptors().batch = 1
         first = cell.enter()
         loop.hold_up(0.001)
         second = cell.enter()
-        descriptors().moment = 2
+        descriptors().batch = 2
         third = cell.enter()
-        descriptors().moment = 0
+        descriptors().batch = 0
         cell.close()
         return first, second, third
 

@@ -35,7 +35,7 @@ class Cell:
     by how much.
     """
 
-    __slots__ = ("_armed_for", "_descriptors", "_loop", "_moment", "_timer", "clock", "kernel", "moments", "on_lag")
+    __slots__ = ("_armed_for", "_batch", "_descriptors", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
 
     def __init__(self, kernel: Advancing, clock: Clock) -> None:
         self.kernel = kernel
@@ -43,8 +43,8 @@ class Cell:
         self.on_lag: Callable[[Nanos], None] | None = None
         self._loop = asyncio.get_running_loop()
         self._descriptors = descriptors()
-        self._moment = 0
-        """Of the descriptors, that the machines have been brought to."""
+        self._batch = 0
+        """That the machines have been brought to the present for."""
         self.moments = 0
         """Counts on whenever the machines are brought to the present: time may have passed, signals have settled."""
         self._timer: asyncio.TimerHandle | None = None
@@ -52,10 +52,10 @@ class Cell:
 
     def enter(self) -> Nanos:
         """Bring the machines to the present; inputs may be applied at the moment returned, then call `leave`."""
-        moment = self._descriptors.moment
-        if moment and moment == self._moment:
+        batch = self._descriptors.batch
+        if batch and batch == self._batch:
             return self.kernel.now
-        self._moment = moment
+        self._batch = batch
         self.moments += 1
         now = self.clock.now()
         due = self._armed_for
@@ -67,7 +67,7 @@ class Cell:
     def leave(self) -> None:
         """Let signals settle after an input and wake up for what it leads to."""
         if self.kernel.stale:
-            self._moment = 0  # something may be due at once
+            self._batch = 0  # something may be due at once
             self._arm(self.kernel.deadline())
 
     def _held_up(self, due: Nanos, now: Nanos) -> Nanos:

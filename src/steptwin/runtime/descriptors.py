@@ -20,8 +20,6 @@ TURN_NS = 1_000_000
 """After this long a loop's timers and other descriptors have their turn too."""
 BATCH = 128
 """Descriptors served before the others are asked for."""
-MOMENT_NS = 100_000
-"""What comes within this time happens at one moment of virtual time. A character on a serial line takes longer."""
 LINGER_NS = 50_000
 """Who has an answer often asks again at once. To wait for him awake spares him the time it takes to wake up."""
 MOST_SKIPPED = 1023
@@ -31,9 +29,10 @@ class Descriptors:
     """The set of an event loop. One descriptor is awaited for one thing at a time: input, or room for output."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self.moment = 0
-        """While descriptors are served, the number of the moment at which what they bring happens; else 0."""
-        self._moments = 0
+        self.batch = 0
+        """While descriptors are served that were found ready together, the number of their batch: what they bring happens at
+        one moment. Between batches 0."""
+        self._batches = 0
         self._epoll = select.epoll()
         self._serve: dict[int, Serve] = {}
         # Lingering that was in vain is not repeated for so many turns, and then longer still: slow masters cost nothing,
@@ -64,24 +63,18 @@ class Descriptors:
 
     def _turn(self) -> None:
         poll, serving, now = self._epoll.poll, self._serve, time.monotonic_ns
-        at = now()
-        end = at + TURN_NS
-        moment_end = at
+        end = now() + TURN_NS
         ready = poll(0, BATCH)
         while ready:
-            if at >= moment_end:
-                self._moments += 1
-                moment_end = at + MOMENT_NS
-            self.moment = self._moments
+            self._batches = self.batch = self._batches + 1
             try:
                 for descriptor, _ in ready:
                     serve = serving.get(descriptor)
                     if serve is not None:  # one served before it has not ended it
                         serve()
             finally:
-                self.moment = 0
-            at = now()
-            if at > end:
+                self.batch = 0
+            if now() > end:
                 return
             ready = poll(0, BATCH) or self._linger()
 
