@@ -18,7 +18,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.cli import main
-from steptwin.cli.device import shown, table, tied
+from steptwin.cli.device import shown, table, tell_under_way, tied
 from steptwin.errors import Misuse
 from steptwin.host import Mic488
 from steptwin.host.address import DeviceAddress, parse_device
@@ -37,6 +37,15 @@ def test_a_real_is_shown_with_the_digits_it_has(value: float) -> None:
 def test_a_real_is_shown_as_people_write_it() -> None:
     reals = [struct.unpack("<f", struct.pack("<f", value))[0] for value in (10.13, 0.1, -9.999999, 100.0, 123456.79)]
     assert [shown(real) for real in reals] == ["10.13", "0.1", "-9.999999", "100", "123456.79"]
+
+
+def test_somebody_at_a_terminal_is_told_that_it_moves(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tell_under_way(["M1"])
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    tell_under_way(["M1", "M3"])
+    assert capsys.readouterr() == ("", "M1, M3 under way; Ctrl-C stops\n")
 
 
 class Shell:

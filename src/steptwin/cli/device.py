@@ -113,6 +113,12 @@ def number_of(value: str, whole: str) -> float:
 # ---------------------------------------------------------------------- what people read
 
 
+def tell_under_way(names: Sequence[str]) -> None:
+    """A sign of life for somebody at a terminal, for a motion takes its time."""
+    if sys.stderr.isatty():
+        typer.echo(f"{', '.join(names)} under way; Ctrl-C stops", err=True)
+
+
 def shown(value: object) -> str:
     if isinstance(value, bool):
         return "ON" if value else "OFF"

@@ -18,7 +18,19 @@ import typer
 from steptwin.cli.chip import chip_address
 from steptwin.cli.chip import move as move_chip
 from steptwin.cli.chip import stop as chip_stop
-from steptwin.cli.device import Axes, Device, Json, LogFrames, axes_of, complain, number_of, opened, print_json, tied
+from steptwin.cli.device import (
+    Axes,
+    Device,
+    Json,
+    LogFrames,
+    axes_of,
+    complain,
+    number_of,
+    opened,
+    print_json,
+    tell_under_way,
+    tied,
+)
 from steptwin.errors import Misuse, Refusal
 
 if TYPE_CHECKING:
@@ -165,6 +177,7 @@ def _do(
             begin(mic, begun)
             if not wait:
                 return
+            tell_under_way([f"M{axis}" for axis in values])
             ends = mic.wait(*values, timeout_s=timeout, check=False)
         except (Misuse, Refusal):
             if begun:
