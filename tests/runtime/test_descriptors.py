@@ -95,12 +95,18 @@ def test_what_is_forgotten_within_a_batch_is_not_served(run: Run) -> None:
     assert run(scene()) == [1]
 
 
-def test_what_is_not_awaited_may_be_forgotten(run: Run) -> None:
-    async def scene() -> None:
-        with pipes(1) as ((read, _),):
-            descriptors().forget(read)
+def test_to_forget_what_is_not_awaited_changes_nothing(run: Run) -> None:
+    async def scene() -> list[bytes]:
+        watched, served = descriptors(), []
+        with pipes(2) as ((read, _), (other, _)):
+            watched.await_input(read, lambda: served.append(os.read(read, 1)))
+            watched.forget(other)
+            await asyncio.sleep(0.01)
+            watched.forget(read)
+            watched.forget(read)
+        return served
 
-    run(scene())
+    assert run(scene()) == [b"x"]
 
 
 def test_room_and_input_of_one_descriptor(run: Run) -> None:
