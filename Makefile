@@ -20,7 +20,7 @@ INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 PEER_PACKAGES := mbpoll libmodbus-dev gcc libc6-dev pkg-config make ser2net
 
 .DEFAULT_GOAL := help
-.PHONY: help run test extras lint format types imports bench docs peers lock clean
+.PHONY: help run test soak extras lint format types imports bench docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -30,6 +30,9 @@ run: $(RUN_STAMP)  ## Start a virtual MIC488 with home switches (ARGS="--firmwar
 
 test: $(DEV_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto $(ARGS)
+
+soak: $(DEV_STAMP)  ## Run the soak tests at full length (STEPTWIN_SOAK=0.1 for a tenth)
+	STEPTWIN_SOAK=$${STEPTWIN_SOAK:-1} $(BIN)/pytest -n auto -m soak tests/soak $(ARGS)
 
 extras: $(DEV_STAMP)  ## Install what pictures, other exports and the monitor need (as the tests do)
 

@@ -4,6 +4,8 @@ A test takes the fixture `require_peer` or `require_library` and thereby gets th
 installed the test is skipped and says what to install; with ``STEPTWIN_REQUIRE_PEERS=1`` it fails instead.
 ``make peers`` installs them all.
 
+Files in ``tests/soak`` get the marker ``soak`` and a time limit that grows with their length.
+
 The fixture `serve` starts the real command.
 """
 
@@ -22,6 +24,7 @@ from typing import Any, NoReturn
 
 import pytest
 from hypothesis import settings
+from soak import time_limit
 
 pytest_plugins = ["pytester"]
 
@@ -31,18 +34,31 @@ settings.register_profile("steptwin", deadline=None)
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steptwin"))
 
+# Commands that tests start inherit ignored signals: SIGINT from a shell without job control (`make test &`), SIGHUP from nohup.
+for _number in (signal.SIGINT, signal.SIGHUP):
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, signal.default_int_handler if _number == signal.SIGINT else signal.SIG_DFL)
+
 # Commands that tests start compile nothing twice, whatever the surroundings say.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
 PEER_FIXTURES = {"require_peer", "require_library"}
+SOAK_TESTS = Path(__file__).with_name("soak")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    try:
+        soak_limit = time_limit()
+    except ValueError as error:
+        raise pytest.UsageError(str(error)) from error
     for item in items:
         if PEER_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.peers)
+        if item.path.is_relative_to(SOAK_TESTS):
+            item.add_marker(pytest.mark.soak)
+            item.add_marker(pytest.mark.timeout(soak_limit))
 
 
 def _missing(peer: str) -> NoReturn:
