@@ -8,7 +8,7 @@ from __future__ import annotations
 import enum
 import re
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
@@ -72,6 +72,16 @@ class Source:
         """Text of a line (from 1) without its end."""
         first, after = self._starts[number - 1], self._starts[number : number + 1]
         return self.text[first : after[0] if after else None].rstrip("\r\n")
+
+
+def split_lines(text: str) -> Iterator[tuple[str, str]]:
+    """The lines of a text as `Source` counts them, each with its line end; an empty last line is left out."""
+    start = 0
+    for end in _LINE_END.finditer(text):
+        yield text[start : end.start()], end.group()
+        start = end.end()
+    if start < len(text):
+        yield text[start:], ""
 
 
 def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:

@@ -127,6 +127,63 @@ def test_fmt_keeps_the_encoding(run: Run, file: File, comment: bytes) -> None:
     assert program.read_bytes() == b"m1 = on  // " + comment + b"\n"
 
 
+@pytest.mark.parametrize(
+    ("mark", "encoding"),
+    [(b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8")],
+    ids=["UTF-16", "UTF-16 big-endian", "UTF-8"],
+)
+def test_fmt_and_check_read_unicode_as_windows_saves_it(run: Run, file: File, mark: bytes, encoding: str) -> None:
+    program = file("a.prg", mark + "m1=on // zażółć\r\nend\r\n".encode(encoding))
+    assert run("check", program)[0] == 0
+    assert run("fmt", program) == (0, f"{program}: formatted\n", "")
+    assert program.read_bytes() == mark + "m1 = on  // zażółć\r\nEND\r\n".encode(encoding)
+
+
+def test_fmt_leaves_the_end_mark_of_dos_where_it_is(run: Run, file: File) -> None:
+    program = file("a.prg", b"m1=on\r\nend\x1a")
+    assert run("check", program)[0] == 0
+    assert run("fmt", program)[0] == 0
+    assert program.read_bytes() == b"m1 = on\r\nEND\r\n\x1a"
+
+
+NO_TEXT = {
+    "all bytes": bytes(range(256)) * 8,
+    "UTF-16 without mark": "M1 = ON\r\n".encode("utf-16-le"),
+    "half UTF-16": b"\xff\xfeM\x00\x00\xd8x\x00",
+    "control characters": b"\x01\x02\x03M1 = ON\n",
+}
+
+
+@pytest.mark.parametrize("content", NO_TEXT.values(), ids=NO_TEXT)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("fmt", "x.prg"),
+        ("check", "x.prg"),
+        ("build", "x.prg"),
+        ("run", "x.prg"),
+        ("check", "x.m1486"),
+        ("run", "x.m1486"),
+        ("check", "good.prg", "--positions", "x.csv"),
+        ("run", "good.prg", "--positions", "x.csv"),
+    ],
+    ids=" ".join,
+)
+def test_what_is_no_text_is_refused_in_one_sentence(
+    run: Run, file: File, tmp_path: Path, arguments: tuple[str, ...], content: bytes
+) -> None:
+    file("good.prg", "END\n")
+    name = arguments[-1]
+    file(name, content)
+    with contextlib.chdir(tmp_path):
+        code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert err.startswith(f"steptwin: {name} ")
+    assert "not a text file" in err or "UTF-16" in err
+    assert (tmp_path / name).read_bytes() == content
+
+
 def test_build_and_decompile_come_back_to_the_same_bytes(run: Run, file: File, tmp_path: Path) -> None:
     program, table = file("a.prg", PROGRAM), file("a.csv", TABLE)
     image = tmp_path / "a.wbc"

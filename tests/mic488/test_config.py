@@ -308,10 +308,21 @@ def test_every_unknown_name_is_told_with_its_line() -> None:
     ]
 
 
-def test_utf_16_is_named() -> None:
-    data = "[Axis0]\r\nGear=1\r\n".encode("utf-16")
+@pytest.mark.parametrize(("mark", "encoding"), [(b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be")])
+def test_utf_16_is_read_and_written_back(mark: bytes, encoding: str) -> None:
+    data = mark + "[Axis0]\r\nGear=1\r\n".encode(encoding)
     file = IniFile.parse(data)
-    assert "C004" in [f.code for f in file.findings]
+    assert (file.findings, file.get("Axis0", "Gear")) == ((), "1")
+    assert file.to_bytes() == data
+    assert file.with_value("Axis0", "Gear", "25").to_bytes() == data.replace("1".encode(encoding), "25".encode(encoding))
+
+
+@pytest.mark.parametrize(
+    "data", [bytes(range(256)), b"[Axis0]\r\nGear=\0\r\n", b"\xff\xfe[\0\0\xd8"], ids=["all bytes", "NUL", "half a pair"]
+)
+def test_a_binary_file_is_named_once(data: bytes) -> None:
+    file = IniFile.parse(data)
+    assert [(f.code, f.message) for f in file.findings] == [("C004", "the file is not text")]
     assert file.to_bytes() == data
 
 

@@ -68,9 +68,81 @@ def test_neat_text_stays() -> None:
     assert format_text(NEAT) == NEAT
 
 
-@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
-def test_line_ends_stay(line_end: str) -> None:
-    assert format_text(f"M1=ON{line_end}END") == f"M1 = ON{line_end}END{line_end}"
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [
+        ("M1=ON\nEND\n", "M1 = ON\nEND\n"),
+        ("M1=ON\r\nEND\r\n", "M1 = ON\r\nEND\r\n"),
+        ("M1=ON\rEND\r", "M1 = ON\rEND\r"),
+        ("M1=ON\r\nEND\nEND\rEND\n", "M1 = ON\r\nEND\nEND\rEND\n"),
+        ("M1=ON\rEND", "M1 = ON\rEND\r"),
+        ("M1=ON\nEND\r\nEND", "M1 = ON\nEND\r\nEND\r\n"),
+        ("M1=ON", "M1 = ON\n"),
+        ("M1=ON\r\n\r\n\n", "M1 = ON\r\n"),
+    ],
+)
+def test_every_line_keeps_its_end(text: str, printed: str) -> None:
+    assert format_text(text) == printed
+
+
+ALIGNED = """#speed     60      // u/s
+#pump      OUT3    // hydraulics
+#longName  2,5
+#a 1
+#b 2
+
+M1 = ON            // drive
+SET x = 1          // count
+                   // of parts
+IF IN1 = 1         // start
+    OUT1 = ON      // lamp
+    DELAY 1
+    OUT2 = ON      // valve
+ENDIF
+OUT1 = OFF  // not aligned
+"""
+
+
+def test_aligned_comments_and_constants_stay_aligned() -> None:
+    assert format_text(ALIGNED) == ALIGNED
+
+
+def test_aligned_comments_move_together_when_a_line_grows() -> None:
+    text = "m1=on   // drive\nx=1+2   // sum\nlongName=x // more\n"
+    assert format_text(text) == "m1 = on    // drive\nx = 1 + 2  // sum\nlongName = x  // more\n"
+
+
+@pytest.mark.parametrize("tab", [4, 8])
+def test_what_tabs_align_stays_aligned(tab: int) -> None:
+    text = "#a\t\t1\n#longer\t2\n" if tab == 4 else "#a\t1\n#longer\t2\n"
+    assert format_text(text) == "#a      1\n#longer 2\n"
+
+
+BELOW_LABELS = """M1 = ON
+
+MAIN:
+    WAIT IN1 = ON
+    // inside
+    IF IN2 = 1
+        JUMP FLAT
+    ENDIF
+    JUMP MAIN
+
+// of the next label
+FLAT:
+OUT1 = ON
+RETURN
+"""
+
+
+def test_indentation_below_labels_stays() -> None:
+    assert format_text(BELOW_LABELS) == BELOW_LABELS
+    assert format_text(BELOW_LABELS.replace("    ", "\t")) == BELOW_LABELS
+    assert format_text(BELOW_LABELS.replace("    ", "  ")) == BELOW_LABELS
+
+
+def test_a_section_that_is_not_all_indented_is_not_indented() -> None:
+    assert format_text("MAIN:\n  M1 = ON\nM2 = ON\n") == "MAIN:\nM1 = ON\nM2 = ON\n"
 
 
 def test_blocks_that_are_never_opened_are_not_indented() -> None:
@@ -81,6 +153,9 @@ def test_raw_records_are_written_in_capitals() -> None:
     assert format_text(f"//!RECORD  {'0a' * 16}\n") == f"//!record {'0A' * 16}\n"
 
 
+ARRANGED = ("M1=1", "END", "IF x=1", "ENDIF", "A:", "#b 1", "#long", " 5", "// c", " ", "  ", "    ", "\t", "\n", "\n", "\r\n")
+
+
 def said(text: str) -> list[Line]:
     lines = list(parse(text)[0].lines)
     while lines and lines[-1].statement is None and lines[-1].comment is None:
@@ -89,7 +164,13 @@ def said(text: str) -> list[Line]:
 
 
 @settings(max_examples=300)
-@given(st.one_of(st.text(max_size=200), st.text(alphabet="IFELSENDWH x=1+-,.()@:#/!\n\r\t", max_size=200)))
+@given(
+    st.one_of(
+        st.text(max_size=200),
+        st.text(alphabet="IFELSENDWH x=1+-,.()@:#/!\n\r\t", max_size=200),
+        st.lists(st.sampled_from(ARRANGED), max_size=40).map("".join),
+    )
+)
 def test_any_text_keeps_its_meaning(text: str) -> None:
     printed = format_text(text)
     assert said(printed) == said(text)

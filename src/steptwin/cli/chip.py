@@ -219,11 +219,9 @@ def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
     """Download a program into the chips it names by ``X``, or the one meant; it runs from its ``]`` on."""
     from steptwin.host.m1486 import M1486, M1486Line
     from steptwin.host.m1486.sync import download_to
+    from steptwin.runtime.textfiles import read_text
 
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise Misuse(f"cannot read {file}: {getattr(error, 'strerror', None) or error}") from None
+    text = read_text(file).source.text
     addresses = _addressed(text, address.chip, file)
     with M1486Line(address.place, baud=address.baud, log=complain if log_frames else None) as line:
         chips = {a: M1486(line, a, variant=address.variant, timeout_s=address.timeout) for a in addresses}

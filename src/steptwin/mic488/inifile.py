@@ -18,7 +18,7 @@ _LINE = re.compile(r"([^\r\n]*)(\r\n|\r|\n|\Z)")
 _TRAILING_COMMENT = re.compile(r"\s[;#]")
 _COMMENT_SIGNS = (";", "#", "//")
 _BYTE_ORDER_MARK = "\ufeff"
-_UTF_16_MARKS = tuple(mark.decode("cp1250") for mark in (b"\xff\xfe", b"\xfe\xff"))
+_UTF_16 = ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +55,12 @@ class IniFile:
     def parse(cls, data: bytes, name: str = "configuration") -> IniFile:
         """Read a file. Any bytes are accepted: what is no INI is kept and reported in ``findings``.
 
-        Text is UTF-8 or, where it is not, Windows code page 1250.
+        Text is UTF-8, UTF-16 with a byte order mark or, where it is neither, Windows code page 1250.
         """
         try:
+            encoding = next((encoding for mark, encoding in _UTF_16 if data.startswith(mark)), None)
+            if encoding is not None:
+                return _read(Source(name, data.decode(encoding)), encoding)
             return _read(Source(name, data.decode("utf-8")), "utf-8")
         except UnicodeDecodeError:
             # Bytes outside the code page survive as surrogates, so that every file is written back as it was.
@@ -147,9 +150,10 @@ def _read(source: Source, encoding: str) -> IniFile:
     def find(code: str, severity: Severity, span: Span, message: str, hint: str | None = None) -> None:
         findings.append(Diagnostic(code, severity, span, message, hint))
 
-    if source.text.startswith(_UTF_16_MARKS):
-        find("C004", Severity.ERROR, Span(0, 1), "the file is UTF-16 text", "save it as ANSI or UTF-8")
-    for start, line in _lines(source.text):
+    binary = source.text.find("\0")
+    if binary >= 0:
+        find("C004", Severity.ERROR, Span(binary, binary + 1), "the file is not text", "save it as ANSI or UTF-8")
+    for start, line in () if binary >= 0 else _lines(source.text):
         stripped = line.strip()
         span = Span(start + len(line) - len(line.lstrip()), start + len(line.rstrip()))
         if not stripped or stripped.startswith(_COMMENT_SIGNS):

@@ -9,10 +9,7 @@ from pathlib import Path
 
 from steptwin.diagnostics import Source
 from steptwin.errors import Misuse
-
-# Polish Windows before Unicode; Latin-1 takes whatever bytes that page leaves undefined, so that every file can be written back.
-_ENCODINGS = ("utf-8", "cp1250", "latin-1")
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+from steptwin.textcodec import Decoded, decode
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +17,11 @@ class TextFile:
     """A text and how its bytes say it."""
 
     source: Source
-    encoding: str
-    has_mark: bool
+    decoded: Decoded
 
     def to_bytes(self, text: str) -> bytes:
-        """A text in the manner of this file; its own text gives its own bytes."""
-        return (_BYTE_ORDER_MARK if self.has_mark else b"") + text.encode(self.encoding)
+        """A text in the manner of this file: encoding, byte order mark, DOS end mark. Its own text gives its own bytes."""
+        return self.decoded.to_bytes(text)
 
 
 def read_bytes(path: Path) -> bytes:
@@ -59,13 +55,9 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def read_text(path: Path) -> TextFile:
-    """A text file in UTF-8, with or without byte order mark, or else in the code page of Polish Windows."""
-    data = read_bytes(path)
-    has_mark = data.startswith(_BYTE_ORDER_MARK)
-    content = data.removeprefix(_BYTE_ORDER_MARK)
-    for encoding in _ENCODINGS[:-1]:
-        try:
-            return TextFile(Source(str(path), content.decode(encoding)), encoding, has_mark)
-        except UnicodeDecodeError:
-            continue
-    return TextFile(Source(str(path), content.decode(_ENCODINGS[-1])), _ENCODINGS[-1], has_mark)
+    """A text file in UTF-8, UTF-16 with its byte order mark, or the code page of Polish Windows.
+
+    Raises `Misuse` when it cannot be read or is no text.
+    """
+    decoded = decode(read_bytes(path), str(path))
+    return TextFile(Source(str(path), decoded.text), decoded)

@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from steptwin.diagnostics import Diagnostic, Span
+from steptwin.diagnostics import Diagnostic, Span, split_lines
 from steptwin.errors import Misuse
 from steptwin.wbc import findings as f
 from steptwin.wbc.dialect import MAX_POSITIONS
@@ -119,10 +119,10 @@ def parse_positions(text: str) -> tuple[PositionTable, list[Diagnostic]]:
     names: dict[str, int] = {}
     blanks: list[Span] = []
     start = 0
-    for whole in text.splitlines(keepends=True):
-        content = whole.rstrip()
+    for line, end in split_lines(text):
+        content = line.rstrip()
         span = Span(start, start + len(content))
-        start += len(whole)
+        start += len(line) + len(end)
         if not content:
             blanks.append(span)
             continue

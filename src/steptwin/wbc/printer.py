@@ -1,12 +1,17 @@
 """Tree to text, in one style: keywords in upper case, one blank between words, blocks indented, two blanks before a comment.
 
-Names, numbers, comments and lines with errors stay as written. Printing what was printed changes nothing, and the printed
-text has the same tree.
+Names, numbers, comments and lines with errors stay as written, and so does what was arranged on purpose (`steptwin.wbc.layout`):
+comments and values of constants in one column, lines indented below a label. Printing what was printed changes nothing, and the
+printed text has the same tree.
 """
 
 from __future__ import annotations
 
-from steptwin.wbc.statements import CLOSING, OPENING, SET, STATEMENTS
+from collections.abc import Sequence
+
+from steptwin.diagnostics import split_lines
+from steptwin.wbc.layout import Cell, aligned, columns_of, indentations
+from steptwin.wbc.statements import SET, STATEMENTS
 from steptwin.wbc.syntax import POSITION_MARK, RECORD_MARK, parse
 from steptwin.wbc.tree import (
     Assign,
@@ -21,47 +26,75 @@ from steptwin.wbc.tree import (
     Operand,
     Position,
     PositionRecord,
-    Program,
     Record,
     Statement,
 )
 
-INDENT = "    "
+_BEFORE_COMMENT = 2
+"""Blanks between a statement and its comment."""
 
 
 def format_text(text: str) -> str:
-    """A program in the one style, with the line ends it had (``\\r\\n`` when it has any). Never raises."""
+    """A program in the one style. Every line keeps its line end; empty lines at the end are left out. Never raises."""
     program, _ = parse(text)
-    return print_program(program, "\r\n" if "\r\n" in text else "\n")
-
-
-def print_program(program: Program, line_end: str = "\n") -> str:
-    """The text of a program. Empty lines at its end are left out."""
-    printed: list[str] = []
-    depth = 0
-    for line in program.lines:
-        keyword = _keyword(line.statement)
-        if keyword in CLOSING:
-            depth = max(depth - 1, 0)
-        printed.append(_line(line, max(depth - 1, 0) if keyword == "ELSE" else depth))
-        if keyword in OPENING:
-            depth += 1
+    written = [content for content, _ in split_lines(text)]
+    ends = [end for _, end in split_lines(text)]
+    printed = _with_comments(program.lines, written, _bodies(program.lines, written))
     while printed and not printed[-1]:
         printed.pop()
-    return "".join(text + line_end for text in printed)
+    # A last line without an end is given that of the line before.
+    last = next((end for end in reversed(ends) if end), "\n")
+    return "".join(line + (end or last) for line, end in zip(printed, ends, strict=False))
 
 
-def _keyword(statement: Statement | None) -> str | None:
-    return statement.keyword if isinstance(statement, Command | Broken) else None
+def _bodies(lines: Sequence[Line], written: Sequence[str]) -> list[str]:
+    """The lines without their comments; of a line that is only a comment, its indentation."""
+    columns = aligned([_value_cell(line, text) for line, text in zip(lines, written, strict=True)], _borders(lines))
+    bodies: list[str] = []
+    for line, indent, column in zip(lines, indentations(lines, written), columns, strict=True):
+        statement = line.statement
+        body = "" if statement is None else print_statement(statement)
+        if isinstance(statement, Constant) and column is not None:
+            body = f"{f'#{statement.name.text}':<{column}}{statement.value.text}"
+        bodies.append(" " * indent + body if body or line.comment else "")
+    return bodies
 
 
-def _line(line: Line, depth: int) -> str:
+def _value_cell(line: Line, text: str) -> Cell | None:
+    """The value of a constant."""
     statement = line.statement
-    indent = "" if isinstance(statement, Label | Constant | Record | PositionRecord) else INDENT * depth
-    if statement is None:
-        return indent + line.comment.text if line.comment else ""
-    text = indent + print_statement(statement)
-    return f"{text}  {line.comment.text}" if line.comment else text
+    if not isinstance(statement, Constant):
+        return None
+    place, end = statement.value.start - line.start, statement.name.end - line.start
+    return Cell(columns_of(text, place), len(statement.name.text) + 2, arranged=place - end > 1 or "\t" in text[end:place])
+
+
+def _with_comments(lines: Sequence[Line], written: Sequence[str], bodies: Sequence[str]) -> list[str]:
+    """The lines with their comments."""
+    cells = [_comment_cell(*each) for each in zip(lines, written, bodies, strict=True)]
+    printed: list[str] = []
+    for line, body, column in zip(lines, bodies, aligned(cells, _borders(lines)), strict=True):
+        if line.comment is None:
+            printed.append(body)
+        elif column is not None:
+            printed.append(f"{body.rstrip():<{column}}{line.comment.text}")
+        else:
+            printed.append(body + (" " * _BEFORE_COMMENT if line.statement else "") + line.comment.text)
+    return printed
+
+
+def _comment_cell(line: Line, text: str, body: str) -> Cell | None:
+    if line.comment is None:
+        return None
+    columns = columns_of(text, line.comment.start - line.start)
+    if line.statement is None:
+        return Cell(columns, 0, follows=True)
+    return Cell(columns, len(body) + _BEFORE_COMMENT)
+
+
+def _borders(lines: Sequence[Line]) -> list[bool]:
+    """Empty lines and labels end what is aligned."""
+    return [isinstance(line.statement, Label) or (line.statement is None and line.comment is None) for line in lines]
 
 
 def print_statement(statement: Statement) -> str:

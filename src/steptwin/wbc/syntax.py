@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from steptwin.diagnostics import Diagnostic
+from steptwin.diagnostics import Diagnostic, split_lines
 from steptwin.wbc import findings as f
 from steptwin.wbc.lexer import tokens
 from steptwin.wbc.nearmiss import NearMiss
@@ -23,10 +23,9 @@ def parse(text: str) -> tuple[Program, list[Diagnostic]]:
     diagnostics: list[Diagnostic] = []
     near = NearMiss()
     start = 0
-    for whole in text.splitlines(keepends=True):
-        content = whole.rstrip()
-        lines.append(_line(content, start, diagnostics, near))
-        start += len(whole)
+    for line, end in split_lines(text):
+        lines.append(_line(line.rstrip(), start, diagnostics, near))
+        start += len(line) + len(end)
     return Program(tuple(lines)), diagnostics
 
 

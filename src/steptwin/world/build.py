@@ -20,6 +20,7 @@ from steptwin.mic488.device import Mic488
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
 from steptwin.mic488.program import LoadedProgram, load
+from steptwin.textcodec import decode
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
@@ -139,11 +140,7 @@ class _Builder:
         return found
 
     def _text(self, name: str) -> str:
-        data = self._data(name).removeprefix(b"\xef\xbb\xbf")
-        try:
-            return data.decode()
-        except UnicodeDecodeError:
-            return data.decode("latin-1")
+        return decode(self._data(name), name).text
 
     def _warn(self, source: Source, findings: Iterable[Diagnostic]) -> None:
         shown = [finding for finding in findings if finding.severity is Severity.WARNING]
