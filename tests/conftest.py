@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 from soak import time_limit
 
 pytest_plugins = ["pytester"]
@@ -32,6 +32,8 @@ pytest_plugins = ["pytester"]
 settings.register_profile("steptwin", deadline=None)
 # A change is judged by the same examples every time; `make test` on a developer's machine draws new ones.
 settings.register_profile("same", deadline=None, derandomize=True)
+# For mutation tests any counterexample will do.
+settings.register_profile("unshrunk", deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steptwin"))
 
 # Commands that tests start inherit ignored signals: SIGINT from a shell without job control (`make test &`), SIGHUP from nohup.
