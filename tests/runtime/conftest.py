@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import selectors
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, TypeVar
 
 import pytest
@@ -16,6 +16,14 @@ from steptwin.runtime.clock import Clock
 from steptwin.world.kernel import Kernel
 
 T = TypeVar("T")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def own_runtime_directory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Twins of tests that run at the same time have the same names."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
+        yield
 
 
 class _Selector(selectors.DefaultSelector):

@@ -17,7 +17,7 @@ from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.runtime import control
 from steptwin.runtime.control import ControlEndpoint, ask, private_directory, running, runtime_directory
 
-FORM_ERROR = {"error": 'a request is a line of JSON: {"do": NAME, ...}'}
+FORM_ERROR = {"error": 'a request is a line of JSON: {"do": NAME, ...}', "misuse": True}
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +34,16 @@ def deny(request: Mapping[str, Any]) -> object:
     raise Refusal("not now")
 
 
-HANDLERS: dict[str, Callable[[Mapping[str, Any]], object]] = {"echo": dict, "refuse": refuse, "deny": deny}
+def break_down(request: Mapping[str, Any]) -> object:
+    return request["x"]
+
+
+HANDLERS: dict[str, Callable[[Mapping[str, Any]], object]] = {
+    "echo": dict,
+    "refuse": refuse,
+    "deny": deny,
+    "break": break_down,
+}
 
 
 async def turns() -> None:
@@ -73,18 +82,64 @@ async def answer_to(endpoint: ControlEndpoint, *parts: bytes) -> Any:
     [
         (b'{"do": "echo", "x": [1, null]}\n', {"ok": {"do": "echo", "x": [1, None]}}),
         (b'{"do": "refuse"}\nmore', {"error": "not permitted: 7", "misuse": True}),
-        (b'{"do": "fly"}\n', {"error": "this twin cannot do 'fly': it can echo, refuse, deny", "misuse": True}),
+        (b'{"do": "fly"}\n', {"error": "this twin cannot do 'fly': it can echo, refuse, deny, break", "misuse": True}),
         (b"\n", FORM_ERROR),
         (b"[]\n", FORM_ERROR),
         (b'{"do": []}\n', FORM_ERROR),
         (b'{"say": "echo"}\n', FORM_ERROR),
         (b"\xff\xfe\n", FORM_ERROR),
         (b"[" * 60000 + b"\n", FORM_ERROR),
-        (b"x" * 70000, {"error": "a request has at most 65536 bytes"}),
+        (b"x" * 70000, {"error": "a request has at most 65536 bytes", "misuse": True}),
     ],
 )
 def test_whatever_is_asked_is_answered(request_: bytes, answer: object) -> None:
     assert served(lambda endpoint: answer_to(endpoint, request_)) == answer
+
+
+@pytest.mark.parametrize(
+    ("request_", "message"),
+    [
+        (b'{"do": "echo", "x": %s}' % (b"9" * 400), "a number is not finite, or not below 2^63"),
+        (b'{"do": "echo", "x": %s}' % (b"9" * 5000), FORM_ERROR["error"]),
+        (b'{"do": "echo", "x": [1e999]}', "a number is not finite, or not below 2^63"),
+        (b'{"do": "echo", "x": -Infinity}', "a number is not finite, or not below 2^63"),
+        (b'{"do": "echo", "x": NaN}', "a number is not finite, or not below 2^63"),
+        (b'{"do": "echo", "a\\u0000b": 1}', "'a\\x00b': a text takes neither NUL nor surrogates"),
+        (b'{"do": "echo", "x": "\\udcff"}', "'\\udcff': a text takes neither NUL nor surrogates"),
+        (b'{"do": "echo", "x": "%s"}' % (b"x" * 5000), "a text of 5000 characters: permitted are at most 4096"),
+    ],
+)
+def test_values_that_no_handler_has_to_expect(request_: bytes, message: str) -> None:
+    assert served(lambda endpoint: answer_to(endpoint, request_ + b"\n")) == {"error": message, "misuse": True}
+
+
+def test_an_exception_of_a_handler_is_an_answer_and_told_to_the_loop() -> None:
+    told: list[dict[str, Any]] = []
+
+    async def play(endpoint: ControlEndpoint) -> Any:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
+        return await answer_to(endpoint, b'{"do": "break"}\n')
+
+    assert served(play) == {"error": "internal error, please report it: KeyError: 'x'"}
+    assert [repr(context["exception"]) for context in told] == ["KeyError('x')"]
+
+
+def test_a_request_that_ends_early_is_answered() -> None:
+    async def play(endpoint: ControlEndpoint) -> Any:
+        reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
+        writer.write(b'{"do": "echo"}')
+        writer.write_eof()
+        answer = await reader.read()
+        writer.close()
+        return json.loads(answer)
+
+    assert served(play)["error"].startswith("the request has no end of line")
+
+
+def test_half_a_request_is_dropped_after_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "TIMEOUT_S", 0.02)
+    answer = served(lambda endpoint: answer_to(endpoint, b'{"do": '))
+    assert answer["error"].startswith("no complete request within 0.02 s")
 
 
 def test_a_request_in_pieces() -> None:
@@ -133,7 +188,7 @@ def test_a_name_has_one_twin() -> None:
 
 
 def test_the_socket_of_a_killed_twin_is_replaced(own_directory: Path) -> None:
-    own_directory.mkdir()
+    own_directory.mkdir(0o700)
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(own_directory / "twin.control"))
     assert running() == []
@@ -156,6 +211,21 @@ def test_a_directory_others_could_enter_is_closed_to_them(own_directory: Path) -
     own_directory.chmod(0o777)
     private_directory(own_directory)
     assert stat.S_IMODE(own_directory.stat().st_mode) == 0o700
+
+
+def test_a_twin_in_a_directory_that_others_can_write_is_not_believed(own_directory: Path) -> None:
+    own_directory.mkdir()
+    own_directory.chmod(0o777)
+    with pytest.raises(Misuse, match="can be written by other users, so a twin in it may be theirs"):
+        ask(None, {"do": "echo"})
+
+
+def test_a_twin_in_a_directory_of_another_user_is_not_believed(own_directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own_directory.mkdir(0o700)
+    owner = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: owner + 1)
+    with pytest.raises(Misuse, match="belongs to another user"):
+        running()
 
 
 def test_without_xdg_the_directory_is_the_users_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -216,7 +286,7 @@ def test_which_twin_is_not_clear(name: str | None, names: tuple[str, ...], famil
 
 def test_a_twin_that_hangs(own_directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(control, "TIMEOUT_S", 0.02)
-    own_directory.mkdir()
+    own_directory.mkdir(0o700)
     with socket.socket(socket.AF_UNIX) as hanging:
         hanging.bind(str(own_directory / "twin.control"))
         hanging.listen()

@@ -18,8 +18,9 @@ from steptwin.runtime.clock import Clock
 from steptwin.runtime.links import Feed
 from steptwin.runtime.pace import Pace
 from steptwin.runtime.session import load, session_of
-from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, handlers_of, up
+from steptwin.runtime.up_world import LiveWorld, PlacePort, UpOptions, up
 from steptwin.runtime.world import World
+from steptwin.runtime.world_control import WorldControl
 from steptwin.wire.crc import with_crc
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
@@ -61,7 +62,7 @@ def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], spee
         wall = Wall()
         world, live, cell = started(wall, speed)
         bus, chips = PlacePort(live, "bus", "tcp-1", "rtu"), PlacePort(live, "chips", "raw-1", "raw")
-        hand = handlers_of(cell, live)
+        hand = WorldControl(cell, live).handlers()
         for pause, what in looks:
             # Less than what counts as held up: nothing here runs the loop between.
             for _ in range(pause // 100 + 1):
@@ -185,7 +186,7 @@ def test_requests_of_the_control_endpoint() -> None:
     async def run() -> None:
         wall = Wall()
         world, live, cell = started(wall)
-        hand = handlers_of(cell, live)
+        hand = WorldControl(cell, live).handlers()
         assert hand["pin"]({"unit": "table", "set": {"IN7": 1}})["table.IN7"] == 1.0  # type: ignore[index]
         assert hand["state"]({"unit": "DRUM"})["controller"] == "M1486"  # type: ignore[index]
         assert hand["encoder"]({"unit": "table", "set": {"2": 12}})[1]["counts"] == 12  # type: ignore[index]

@@ -79,11 +79,12 @@ def _data(step: int, line: str, what: str, one: Any, two: Any) -> dict[str, Any]
 
 
 def _read(path: Path) -> str:
+    from steptwin.files import MOST_RECORDED_BYTES, read_bytes
+
     try:
-        return path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is no UTF-8 text"
-        raise Misuse(f"cannot read {path}: {(why or str(error)).lower()}") from error
+        return read_bytes(path, MOST_RECORDED_BYTES).decode()
+    except UnicodeDecodeError as error:
+        raise Misuse(f"cannot read {path}: it is no UTF-8 text") from error
 
 
 def _write(path: Path, lines: list[str]) -> None:

@@ -29,7 +29,13 @@ def check_session_target(path: Path) -> None:
 
 
 def begin_world(
-    path: Path, warn: Callable[[str], object], *, moment: Nanos | None = None, seed: int | None = None, keep_trace: bool = True
+    path: Path,
+    warn: Callable[[str], object],
+    *,
+    moment: Nanos | None = None,
+    seed: int | None = None,
+    keep_trace: bool = True,
+    keep_inputs: bool = True,
 ) -> World:
     """The world that a file describes; that of a session at its end, or at a ``moment`` with all that had come by then.
 
@@ -38,14 +44,14 @@ def begin_world(
     if not is_session(path):
         if moment is not None:
             raise Misuse(f"--from: {path} is no session; a description begins at 0 s")
-        world = World.load(path, seed=seed, keep_trace=keep_trace)
+        world = World.load(path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs)
         for warning in world.plan.warnings:
             warn(warning)
         return world
     if seed is not None:
         raise Misuse(f"--seed: {path} is a session, which goes on with its own")
     session = sessions.load(path)
-    world = session.replay(moment, keep_trace=keep_trace)
+    world = session.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
     if moment is None and world.trace.digest() != session.digest:
         warn(f"{path}: another thing happened than then (steptwin {session.version}): it goes on from what happens now")
     world.go_on()

@@ -1,8 +1,8 @@
-"""The control endpoint of a served twin: what a hand at the machine could do, over a local socket.
+"""The control endpoint of a running twin: what an operator does to pins, power and time, over a local socket.
 
-One request and one answer, each a line of JSON: ``{"do": NAME, ...}`` → ``{"ok": RESULT}`` or ``{"error": TEXT}``,
-with ``"misuse": true`` where the request was wrong. Only the
-user who started the twin can open the socket.
+One request and one answer, each a line of JSON: ``{"do": NAME, ...}`` → ``{"ok": RESULT}`` or ``{"error": TEXT}``, with
+``"misuse": true`` where the request was wrong. Every request has exactly one answer, whatever it is; one that is not complete in
+time is answered with an error. Only the user who started the twin can open the socket, and clients believe no other.
 """
 
 from __future__ import annotations
@@ -24,7 +24,11 @@ from steptwin.runtime.ownership import InUse, Ownership
 Handler = Callable[[Mapping[str, Any]], object]
 
 LONGEST_REQUEST = 65536
+LONGEST_TEXT = 4096
+"""Of a text in a request, in characters; the longest that are meant are paths."""
+LARGEST_NUMBER = 1 << 63
 TIMEOUT_S = 10.0
+"""For a request to be complete, and for its answer to be fetched."""
 SUFFIX = ".control"
 END_POINTS = "end-points"
 """What every twin is asked for the places where it listens."""
@@ -38,16 +42,84 @@ def runtime_directory() -> Path:
 
 
 def private_directory(path: Path) -> Path:
-    """Make ``path`` for this user alone. Raises `Misuse` where it is something else or belongs to somebody else."""
+    """Make ``path`` for this user alone. Raises `Misuse` where it is something else or belongs to another user."""
     path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if _permissions(path) & 0o077:
+        path.chmod(0o700)
+    return path
+
+
+def _permissions(path: Path) -> int:
+    """The permission bits of a directory. Raises `Misuse` for what is no directory, or of another user."""
     found = path.lstat()
     if not stat.S_ISDIR(found.st_mode):
         raise Misuse(f"{path} is no directory")
     if found.st_uid != os.getuid():
         raise Misuse(f"{path} belongs to another user")
-    if stat.S_IMODE(found.st_mode) & 0o077:
-        path.chmod(0o700)
-    return path
+    return stat.S_IMODE(found.st_mode)
+
+
+# ---------------------------------------------------------------------- requests
+
+
+def read_request(line: bytes) -> dict[str, Any]:
+    """A request that handlers can rely on: plain texts of bounded length, finite numbers below 2⁶³. Raises `Misuse`."""
+    try:
+        request = json.loads(line)
+    except (ValueError, RecursionError):
+        raise Misuse(FORM) from None
+    if not isinstance(request, dict) or not isinstance(request.get("do"), str):
+        raise Misuse(FORM)
+    _check_values(request)
+    return request
+
+
+def _check_values(value: object) -> None:
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _check_values(name)
+            _check_values(item)
+    elif isinstance(value, list):
+        for item in value:
+            _check_values(item)
+    elif isinstance(value, str):
+        if len(value) > LONGEST_TEXT:
+            raise Misuse(f"a text of {len(value)} characters: permitted are at most {LONGEST_TEXT}")
+        if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
+            raise Misuse(f"{value[:40]!r}: a text takes neither NUL nor surrogates")
+    elif isinstance(value, int | float) and not abs(value) < LARGEST_NUMBER:
+        raise Misuse("a number is not finite, or not below 2^63")
+
+
+def changes(request: Mapping[str, Any]) -> dict[str, Any]:
+    """``set`` of a request: names and values. Raises `Misuse`."""
+    found = request.get("set") or {}
+    if not isinstance(found, dict):
+        raise Misuse(f'"set" = {found!r}: expected {{NAME: VALUE, ...}}')
+    return found
+
+
+def texts(request: Mapping[str, Any], key: str) -> list[str]:
+    """A list of texts in a request. Raises `Misuse`."""
+    found = request.get(key) or []
+    if not isinstance(found, list) or not all(isinstance(text, str) for text in found):
+        raise Misuse(f'"{key}" = {found!r}: expected a list of texts')
+    return found
+
+
+def number(name: str, value: object) -> float:
+    """The value that a pin or button is to take. Raises `Misuse` for what is no number."""
+    if not isinstance(value, int | float):
+        raise Misuse(f"{name} = {value!r}: a pin takes a number")
+    return float(value)
+
+
+def axis_number(text: str) -> int:
+    """The number of an axis in a request, 0 for what is none."""
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0
+
+
+# ---------------------------------------------------------------------- serving
 
 
 class ControlEndpoint:
@@ -78,22 +150,21 @@ class ControlEndpoint:
         return self.path
 
     def _answer(self, line: bytes) -> dict[str, object]:
+        """The answer to a request. Any exception is one, too: a client that waits is never left without."""
         try:
-            request = json.loads(line)
-        except (ValueError, RecursionError):
-            return {"error": FORM}
-        wanted = request.get("do") if isinstance(request, dict) else None
-        if not isinstance(wanted, str):
-            return {"error": FORM}
-        handler = self._handlers.get(wanted)
-        if handler is None:
-            return {"error": f"this twin cannot do {wanted!r}: it can {', '.join(self._handlers)}", "misuse": True}
-        try:
+            request = read_request(line)
+            wanted = request["do"]
+            handler = self._handlers.get(wanted)
+            if handler is None:
+                raise Misuse(f"this twin cannot do {wanted!r}: it can {', '.join(self._handlers)}")
             return {"ok": handler(request)}
         except Misuse as error:
             return {"error": str(error), "misuse": True}
         except SteptwinError as error:
             return {"error": str(error)}
+        except Exception as error:  # noqa: BLE001  told to both sides
+            asyncio.get_running_loop().call_exception_handler({"message": "a control request failed", "exception": error})
+            return {"error": f"internal error, please report it: {type(error).__name__}: {error}"}
 
     async def close(self) -> None:
         if self._server is not None:
@@ -115,30 +186,55 @@ class _Conversation(asyncio.Protocol):
         self._answer = answer
         self._asking = asking
         self._request = b""
+        self._is_answered = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
         self._asking.add(self)
+        self._wait()
+
+    def _wait(self) -> None:
+        self._timer = asyncio.get_running_loop().call_later(TIMEOUT_S, self._late)
+
+    def _late(self) -> None:
+        if self._is_answered:
+            self.abort()
+        else:
+            self._reply({"error": f"no complete request within {TIMEOUT_S:g} s: {FORM}", "misuse": True})
 
     def connection_lost(self, exc: Exception | None) -> None:
+        self._timer.cancel()
         self._asking.discard(self)
 
     def data_received(self, data: bytes) -> None:
+        if self._is_answered:
+            return
         self._request += data
         line, newline, _ = self._request.partition(b"\n")
         if newline:
-            answer = self._answer(line)
+            self._reply(self._answer(line))
         elif len(self._request) > LONGEST_REQUEST:
-            answer = {"error": f"a request has at most {LONGEST_REQUEST} bytes"}
-        else:
-            return
+            self._reply({"error": f"a request has at most {LONGEST_REQUEST} bytes", "misuse": True})
+
+    def eof_received(self) -> None:
+        if self._request and not self._is_answered:
+            self._reply({"error": f"the request has no end of line: {FORM}", "misuse": True})
+
+    def _reply(self, answer: dict[str, object]) -> None:
+        self._is_answered = True
         self._request = b""
+        self._timer.cancel()
+        self._wait()
         self._transport.pause_reading()
         self._transport.write(json.dumps(answer).encode() + b"\n")
         self._transport.close()
 
     def abort(self) -> None:
+        self._timer.cancel()
         self._transport.abort()
+
+
+# ---------------------------------------------------------------------- asking
 
 
 def _answers(path: Path) -> bool:
@@ -152,9 +248,14 @@ def _answers(path: Path) -> bool:
 
 
 def running() -> list[str]:
-    """Names of the twins of this user that answer."""
+    """Names of the twins of this user that answer. Raises `Misuse` where others could have put up their own."""
     directory = runtime_directory()
-    return sorted(path.stem for path in directory.glob(f"*{SUFFIX}") if _answers(path)) if directory.is_dir() else []
+    try:
+        if _permissions(directory) & 0o022:
+            raise Misuse(f"{directory} can be written by other users, so a twin in it may be theirs: chmod 700 it")
+    except FileNotFoundError:
+        return []
+    return sorted(path.stem for path in directory.glob(f"*{SUFFIX}") if _answers(path))
 
 
 def ask(name: str | None, request: Mapping[str, object]) -> Any:

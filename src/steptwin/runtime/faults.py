@@ -8,7 +8,7 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.runtime.cell import Cell
-from steptwin.runtime.control import Handler
+from steptwin.runtime.control import Handler, texts
 from steptwin.world.faults import Active, Body, Fault, Faults, Line, Wire, check_place, read, rig
 from steptwin.world.kernel import Kernel
 from steptwin.world.trace import Record
@@ -48,9 +48,9 @@ class FaultDesk:
         nothing; answers what is set then."""
 
         def handle(request: Mapping[str, Any]) -> object:
-            wanted, unwanted = _texts(request, "set"), request.get("clear")
+            wanted, unwanted = texts(request, "set"), request.get("clear")
             there = [active.name for active in self.faults.active]
-            names = there if unwanted is True else _texts(request, "clear")
+            names = there if unwanted is True else list(dict.fromkeys(texts(request, "clear")))
             for name in names:
                 if name not in there:
                     raise Misuse(f"no fault {name!r}: set are {', '.join(there) or 'none'}")
@@ -86,10 +86,3 @@ class FaultDesk:
 
 def _shown(active: Active) -> dict[str, object]:
     return {"name": active.name, "fault": str(active.fault), "seen": active.seen, "happened": active.struck}
-
-
-def _texts(request: Mapping[str, Any], key: str) -> list[str]:
-    texts = request.get(key) or []
-    if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
-        raise Misuse(f'"{key}" = {texts!r}: expected a list of texts')
-    return texts

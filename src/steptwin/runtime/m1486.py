@@ -19,6 +19,7 @@ from steptwin.m1486.pins import known_pin
 from steptwin.m1486.variants import DEFAULT, Store, Variant
 from steptwin.machine import Nanos
 from steptwin.runtime.cell import Cell
+from steptwin.runtime.control import changes
 from steptwin.runtime.faults import FaultDesk
 from steptwin.runtime.lines import Happening
 from steptwin.runtime.links import Port
@@ -159,7 +160,7 @@ class M1486Line:
         if isinstance(unit, str):
             with suppress(ValueError):
                 address = int(unit, 16)
-        if not isinstance(address, int) or address not in self.chips:
+        if not isinstance(address, int) or isinstance(address, bool) or address not in self.chips:
             raise Misuse(f"no chip {unit}: served are {served}")
         return self.chips[address]
 
@@ -253,10 +254,7 @@ def pin_change(pin: str, value: object) -> PinChange:
 
 
 def _pin_changes(request: Mapping[str, Any]) -> list[PinChange]:
-    wanted = request.get("set") or {}
-    if not isinstance(wanted, dict):
-        raise Misuse(f'"set" = {wanted!r}: expected {{NAME: VALUE, ...}}')
-    return [pin_change(pin, value) for pin, value in wanted.items()]
+    return [pin_change(pin, value) for pin, value in changes(request).items()]
 
 
 # ---------------------------------------------------------------------- places on the line

@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from steptwin.errors import Misuse, SteptwinError
+from steptwin.files import read_bytes
 from steptwin.runtime.ownership import InUse, Ownership
 
 _MAGIC = b"STW1"
@@ -128,11 +129,11 @@ class StateDirectory:
     def _read(self, name: str, slot: int) -> _Generation | str | None:
         """A good generation; what a bad one is; None for a slot never used."""
         try:
-            content = self._slot(name, slot).read_bytes()
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            raise StateFailure(f"{self._slot(name, slot)} cannot be read: {error.strerror}") from error
+            content = read_bytes(self._slot(name, slot))
+        except Misuse as error:
+            if isinstance(error.__cause__, FileNotFoundError):
+                return None
+            raise StateFailure(str(error)) from error
         if len(content) < _HEADER.size:
             return "too short"
         magic, number, length, check = _HEADER.unpack_from(content)

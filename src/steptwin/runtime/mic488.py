@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos, PinMachine
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Event, Mic488, check_pin
+from steptwin.mic488.device import Event, Mic488, check_pin, check_turn
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
 from steptwin.mic488.vision import Com1Port
 from steptwin.runtime.cell import Cell
+from steptwin.runtime.control import axis_number, changes, number
 from steptwin.runtime.demo import place_switches
 from steptwin.runtime.faults import FaultDesk
 from steptwin.runtime.frames import FrameLog, WatchedRtuPort
@@ -164,7 +165,7 @@ class Mic488Line:
         served = ", ".join(map(str, self.devices))
         if unit is None:
             raise Misuse(f"several units are served: choose one with --unit: {served}")
-        if not isinstance(unit, int) or unit not in self.devices:
+        if not isinstance(unit, int) or isinstance(unit, bool) or unit not in self.devices:
             raise Misuse(f"no unit {unit}: served are {served}")
         return self.devices[unit]
 
@@ -186,34 +187,29 @@ def open_state(stack: ExitStack, path: Path | None) -> StateDirectory | None:
     return stack.enter_context(StateDirectory(path)) if path is not None else None
 
 
-def _changes(request: Mapping[str, Any]) -> Mapping[str, Any]:
-    changes = request.get("set") or {}
-    if not isinstance(changes, dict):
-        raise Misuse(f'"set" = {changes!r}: expected {{NAME: VALUE, ...}}')
-    return changes
-
-
 def _pin(device: Mic488, terminals: PinMachine, request: Mapping[str, Any], now: Nanos) -> object:
     """All changes or none, then every pin."""
-    changes = _changes(request)
-    for pin, value in changes.items():
-        if not isinstance(value, int | float):
-            raise Misuse(f"{pin} = {value!r}: a pin takes a number")
-        check_pin(pin, float(value))
-    for pin, value in changes.items():
-        terminals.set_pin(pin, float(value), now)
+    levels = {pin: number(pin, value) for pin, value in changes(request).items()}
+    for pin, level in levels.items():
+        check_pin(pin, level)
+    for pin, level in levels.items():
+        terminals.set_pin(pin, level, now)
     return dict(device.pins())
 
 
 def _encoder(device: Mic488, request: Mapping[str, Any], now: Nanos) -> object:
     """Turn or couple shafts, then all of them. A whole number turns by counts, a word says what turns the shaft."""
-    changes: list[tuple[int, int | Coupling]] = []
-    for number, change in _changes(request).items():
-        axis = int(number) if number.isdecimal() else 0
+    wanted: list[tuple[int, int | Coupling]] = []
+    for name, change in changes(request).items():
+        axis = axis_number(name)
         if not 1 <= axis <= AXES:
-            raise Misuse(f"no axis M{number}: axes are M1 to M{AXES}")
-        changes.append((axis, change if isinstance(change, int) else _coupling(axis, change)))
-    for axis, change in changes:
+            raise Misuse(f"no axis M{name}: axes are M1 to M{AXES}")
+        if not isinstance(change, int) or isinstance(change, bool):
+            wanted.append((axis, _coupling(axis, change)))
+            continue
+        check_turn(axis, change)
+        wanted.append((axis, change))
+    for axis, change in wanted:
         if isinstance(change, int):
             device.turn_encoder(axis, change, now)
         else:

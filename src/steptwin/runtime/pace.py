@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING, Any
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.runtime import session as sessions
+from steptwin.runtime.beginning import check_session_target
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.control import Handler
 from steptwin.runtime.run_world import describe, is_told
+from steptwin.runtime.textfiles import check_folder
 from steptwin.runtime.world import LONGEST_RUN_NS
+from steptwin.world.durations import LONGEST_NS
 from steptwin.world.expression import Condition
 from steptwin.world.trace import Record
 
@@ -196,11 +199,13 @@ class Pace:
     def _asked_to_step(self, request: Mapping[str, Any]) -> object:
         """A step, or its next part: ``to_ns`` of the answer, where there is one, is for the request for that."""
         text = request.get("until")
-        condition = None if text is None else self._live.world.condition(str(text))
+        if text is not None and not isinstance(text, str):
+            raise Misuse(f"until = {text!r}: expected a condition")
+        condition = None if text is None else self._live.world.condition(text)
         given = {key: request[key] for key in ("to_ns", "for_ns") if request.get(key) is not None}
         for key, value in given.items():
-            if not isinstance(value, int) or value < 0:
-                raise Misuse(f"{key} = {value!r}: must be a number of nanoseconds")
+            if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= LONGEST_NS:
+                raise Misuse(f"{key} = {value!r}: permitted are whole nanoseconds from 0 to {LONGEST_NS}")
         self.pause()
         end = self._end_of(given, has_condition=condition is not None)
         happened: list[str] = []
@@ -220,9 +225,12 @@ class Pace:
 
     def _save(self, request: Mapping[str, Any]) -> object:
         file = request.get("file")
-        if not isinstance(file, str):
-            raise Misuse(f"file = {file!r}: must be the path of a file")
+        if not isinstance(file, str) or not Path(file).is_absolute():
+            raise Misuse(f"file = {file!r}: must be the absolute path of a file")
+        path = Path(file)
+        check_session_target(path)
+        check_folder(path)
         self._cell.enter()
-        session = sessions.session_of(self._live.world)
-        sessions.save(session, Path(file))
+        session = self._live.session()
+        sessions.save(session, path)
         return {**self._where(), "file": file, "inputs": len(session.inputs), "digest": session.digest}

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from steptwin.diagnostics import Diagnostic, Severity, Source
+from steptwin.files import read_bytes
 from steptwin.mic488.config import ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
-from steptwin.runtime.textfiles import read_bytes, read_text
+from steptwin.runtime.textfiles import read_text
 from steptwin.wbc.check import Checked, check
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.positions import PositionTable, parse_positions

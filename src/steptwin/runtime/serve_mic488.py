@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from steptwin.diagnostics import Severity, render
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import Misuse
+from steptwin.files import read_bytes
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import ConfigError, ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
@@ -18,7 +19,6 @@ from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.demo import demo_config
 from steptwin.runtime.lines import Face, Lines
-from steptwin.runtime.links import where
 from steptwin.runtime.mic488 import LineOptions, Mic488Line, open_state
 from steptwin.runtime.output import Output
 from steptwin.runtime.programbanks import Banks, Findings, ProgramErrors, parse_banks, read_banks
@@ -94,15 +94,11 @@ def serve(options: Mic488Options) -> None:
 
 
 def load_config(path: Path, firmware: str) -> ControllerConfig:
-    """The configuration in a ``.cfg`` file. Raises `Misuse` with every error in it, `LineFailure` if it cannot be read.
+    """The configuration in a ``.cfg`` file. Raises `Misuse` for a file that cannot be read, and with every error in it.
 
     Warnings go to standard error.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise LineFailure(f"cannot read the configuration {path}: {where(error)}") from error
-    file = IniFile.parse(data, str(path))
+    file = IniFile.parse(read_bytes(path), str(path))
     config, findings = examine_config(file, firmware)
     if any(finding.severity is Severity.ERROR for finding in findings):
         raise ConfigError(file.source, findings)

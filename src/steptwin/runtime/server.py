@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.errors import LineFailure, Misuse, SteptwinError
+from steptwin.files import read_bytes
 from steptwin.machine import SECOND, Nanos
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.control import END_POINTS, ControlEndpoint, Handler
@@ -170,15 +171,17 @@ def clear_ready_file(path: Path) -> None:
     Raises `Misuse` where the path is taken by another kind of file.
     """
     try:
-        found = json.loads(path.read_text())
+        data = read_bytes(path)
+    except Misuse as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            return
+        raise Misuse(f"{path} cannot be a ready file: {error}") from error
+    try:
+        found = json.loads(data)
         pid = found["pid"] if "end_points" in found else None
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise Misuse(f"{path} cannot be a ready file: {where(error)}") from error
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         pid = None
-    if not isinstance(pid, int):
+    if not isinstance(pid, int) or not 0 < pid < 1 << 31:
         raise Misuse(f"{path} exists and is no ready file: choose another --ready-file")
     if pid == os.getpid() or not Path(f"/proc/{pid}").exists():
         path.unlink()

@@ -15,8 +15,9 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from steptwin import __version__
 from steptwin.errors import Misuse
+from steptwin.files import read_bytes
 from steptwin.machine import SECOND, Nanos
-from steptwin.runtime.textfiles import read_bytes, write_bytes
+from steptwin.runtime.textfiles import write_bytes
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import ACTIONS, Outside
@@ -44,9 +45,9 @@ class Session:
     digest: str
     version: str = __version__
 
-    def world(self, *, keep_trace: bool = True) -> World:
+    def world(self, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
-        world = World(read_world(self.name, self.text, self.seed), self.files, keep_trace=keep_trace)
+        world = World(read_world(self.name, self.text, self.seed), self.files, keep_trace=keep_trace, keep_inputs=keep_inputs)
         ran = {name: view.device.firmware.name for name, view in world.mic488.items()}
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
@@ -55,7 +56,7 @@ class Session:
                 )
         return world
 
-    def replay(self, until: Nanos | None = None, *, keep_trace: bool = True) -> World:
+    def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world after all of it, or after what had come by the moment ``until``, from which it may go another way.
 
         Raises `Misuse` where inputs do not fit the world, and for a moment after the session's end.
@@ -63,7 +64,7 @@ class Session:
         end = self.until if until is None else until
         if end > self.until:
             raise Misuse(f"the session ends at {self.until / SECOND:g} s, before {end / SECOND:g} s")
-        world = self.world(keep_trace=keep_trace)
+        world = self.world(keep_trace=keep_trace, keep_inputs=keep_inputs)
         for time, what, settled in self.inputs:
             if time > self.until:
                 raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")
@@ -92,7 +93,12 @@ def _settle(world: World) -> None:
 
 
 def session_of(world: World) -> Session:
-    """The session of a world up to now. What Python code did to the world is in it, the code is not."""
+    """The session of a world up to now. What Python code did to the world is in it, the code is not.
+
+    Raises `Misuse` for a world that does not keep its inputs.
+    """
+    if not world.keeps_inputs:
+        raise Misuse("this world records no session: it does not keep its inputs")
     _settle(world)
     spec = world.spec
     return Session(

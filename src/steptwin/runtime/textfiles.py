@@ -1,14 +1,15 @@
-"""Files the user names: their bytes, and texts as people's editors leave them."""
+"""Files the user names: texts as editors leave them, and writing."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from errno import EACCES, EISDIR, ENOTDIR
+from errno import EACCES, EINVAL, EISDIR, ENOTDIR
 from pathlib import Path
 
 from steptwin.diagnostics import Source
 from steptwin.errors import Misuse
+from steptwin.files import read_bytes, shown
 from steptwin.textcodec import Decoded, decode
 
 
@@ -24,24 +25,29 @@ class TextFile:
         return self.decoded.to_bytes(text)
 
 
-def read_bytes(path: Path) -> bytes:
-    """The content of a file the user named. Raises `Misuse` when it cannot be read."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise Misuse(f"cannot read {path}: {error.strerror or error}") from error
-
-
 def check_writable(path: Path) -> None:
     """Whether a file can be written here, before much is done for it; folders on the way can be made. Raises `Misuse`."""
-    place, number = path, EISDIR if path.is_dir() else 0
-    while not number and not place.exists():
-        place = place.parent
-        number = 0 if place.is_dir() or not place.exists() else ENOTDIR
-    if not number and not os.access(place, os.W_OK):
-        number = EACCES
+    try:
+        place, number = path, EISDIR if path.is_dir() else 0
+        while not number and not place.exists():
+            place = place.parent
+            number = 0 if place.is_dir() or not place.exists() else ENOTDIR
+        if not number and not os.access(place, os.W_OK):
+            number = EACCES
+    except OSError as error:  # a name that is too long
+        number = error.errno or EINVAL
+    except ValueError as error:
+        raise Misuse(f"cannot write {shown(path)}: {error}") from None
     if number:
-        raise Misuse(f"cannot write {path}: {os.strerror(number)}")
+        raise Misuse(f"cannot write {shown(path)}: {os.strerror(number)}")
+    if path.exists() and not path.is_file():
+        raise Misuse(f"cannot write {path}: it is no regular file")
+
+
+def check_folder(path: Path) -> None:
+    """Whether the folder a file is to be in is there. Raises `Misuse`."""
+    if not path.parent.is_dir():
+        raise Misuse(f"cannot write {shown(path)}: there is no folder {shown(path.parent)}")
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import count
 from math import inf
 from pathlib import Path
-from typing import Any
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.mic488.device import Mic488
 from steptwin.runtime import session as sessions
 from steptwin.runtime.beginning import begin_world, check_session_target, set_faults
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
-from steptwin.runtime.control import Handler
 from steptwin.runtime.export import axis_views, check_target, write_trace
-from steptwin.runtime.m1486_state import state_of as state_of_chip
-from steptwin.runtime.mic488 import state_of
 from steptwin.runtime.output import Output
 from steptwin.runtime.pace import Pace, read_speed
 from steptwin.runtime.run_world import describe, is_told
@@ -30,9 +25,8 @@ from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_name
 from steptwin.runtime.tcp import parse_address
 from steptwin.runtime.world import World
-from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Leave
-from steptwin.world.faults import read as read_fault
+from steptwin.runtime.world_control import WorldControl
+from steptwin.world.actions import Bytes, Leave, Outside
 from steptwin.world.lines import SCRIPTS, Place
 from steptwin.world.spec import LineSpec
 from steptwin.world.trace import Record
@@ -56,11 +50,19 @@ class UpOptions:
     listen_any: bool = False
 
 
+MOST_INPUTS = 200_000
+MOST_INPUT_BYTES = 16 << 20
+"""Where a recorded session ends, so that its memory and its file stay bounded."""
+
+
 class LiveWorld:
     """A world as a `Cell` keeps it up with real time."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, tell: Callable[[str], None] = lambda _: None) -> None:
         self.world = world
+        self._tell = tell
+        self._recorded_bytes = sum(_size(given.what) for given in world.inputs)
+        self._full: sessions.Session | None = None
         self.stale = True
         """Something was done to it since somebody asked for the deadline."""
         self.on_stop: Callable[[], None] | None = None
@@ -69,6 +71,31 @@ class LiveWorld:
     @property
     def now(self) -> Nanos:
         return self.world.now
+
+    def outside(self, what: Outside) -> None:
+        """Do something from outside at the present moment, recorded where a session was asked for. Raises `Misuse`."""
+        world = self.world
+        if world.keeps_inputs:
+            if len(world.inputs) >= MOST_INPUTS or self._recorded_bytes >= MOST_INPUT_BYTES:
+                self._end_session()
+            else:
+                self._recorded_bytes += _size(what)
+        world.outside(what)
+
+    def _end_session(self) -> None:
+        world = self.world
+        self._full = sessions.session_of(world)
+        world.keeps_inputs = False
+        world.inputs.clear()
+        self._tell(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
+
+    def session(self) -> sessions.Session:
+        """The session up to now, or up to where it was full. Raises `Misuse` where none is recorded."""
+        if self._full is not None:
+            return self._full
+        if not self.world.keeps_inputs:
+            raise Misuse("this world records no session: start it with --session FILE")
+        return sessions.session_of(self.world)
 
     def advance(self, now: Nanos) -> None:
         world = self.world
@@ -96,8 +123,12 @@ class LiveWorld:
         return min(dues if own is None else [*dues, own], default=None)
 
 
+def _size(what: Outside) -> int:
+    return len(what.data) if isinstance(what, Bytes) else 0
+
+
 class PlacePort:
-    """A place on a line for a program outside; everything it sends goes into the session."""
+    """A place on a line for a program outside."""
 
     broken: str | None = None
 
@@ -118,10 +149,9 @@ class PlacePort:
             self.on_output()
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        world = self._live.world
         place = self._place()
         place.on_output = None  # what comes at once is given back at once
-        world.outside(Bytes(self._line, self._name, self._kind, data))
+        self._live.outside(Bytes(self._line, self._name, self._kind, data))
         self._live.stale = True
         answer = b"".join(piece for _, piece in place.take(now))
         place.on_output = self._came
@@ -137,7 +167,7 @@ class PlacePort:
         return None
 
     def close(self) -> None:
-        self._live.world.outside(Leave(self._line, self._name))
+        self._live.outside(Leave(self._line, self._name))
 
 
 def up(options: UpOptions) -> bool:
@@ -154,6 +184,7 @@ def up(options: UpOptions) -> bool:
         moment=options.moment,
         seed=options.seed,
         keep_trace=options.trace is not None,
+        keep_inputs=options.session is not None,
     )
     _send_away(world)
     set_faults(world, options.faults)
@@ -185,7 +216,7 @@ async def _serve(options: UpOptions, world: World, speed: float, name: str, *, h
     with ExitStack() as stack:
         output = Output(sys.stdout)
         stack.callback(output.close)
-        live = LiveWorld(world)
+        live = LiveWorld(world, output.line)
         server = Server(Cell(live, Clock(begin=world.now)), output.line)
         pace = Pace(live, server.cell, output.line, has_clients=has_clients)
         live.on_stop = server.end
@@ -202,7 +233,7 @@ async def _serve(options: UpOptions, world: World, speed: float, name: str, *, h
             pace.close()
             await server.close()
             if begun:
-                _keep(options, world, output)
+                _keep(options, live, output)
 
 
 def _greet(output: Output, server: Server, world: World) -> None:
@@ -217,29 +248,33 @@ def _tell(output: Output, record: Record) -> None:
         output.line(describe(record))
 
 
-def _keep(options: UpOptions, world: World, output: Output) -> None:
+def _keep(options: UpOptions, live: LiveWorld, output: Output) -> None:
     """Write what was asked for when it is over. The session first: a trace can be made from it. Raises `Misuse`."""
-    session = sessions.session_of(world)
+    world = live.world
+    world.advance(world.now)
+    world.settle_all()
     failures: list[str] = []
     for where, write in ((options.session, _write_session), (options.trace, _write_trace)):
         if where is not None:
             try:
-                for path in write(where, world, session):
+                for path in write(where, live):
                     output.line(f"wrote {path}")
             except Misuse as error:
                 failures.append(str(error))
     ended = "" if world.stopped is None else f", ended by: {world.stopped}"
-    output.line(f"{world.time:.3f} s, {len(session.inputs)} inputs{ended}, digest {session.digest}")
+    inputs = f", {len(live.session().inputs)} inputs" if options.session is not None else ""
+    output.line(f"{world.time:.3f} s{inputs}{ended}, digest {world.trace.digest()}")
     if failures:
         raise Misuse("\n".join(failures))
 
 
-def _write_session(where: Path, world: World, session: sessions.Session) -> list[Path]:
-    sessions.save(session, where)
+def _write_session(where: Path, live: LiveWorld) -> list[Path]:
+    sessions.save(live.session(), where)
     return [where]
 
 
-def _write_trace(where: Path, world: World, session: sessions.Session) -> list[Path]:
+def _write_trace(where: Path, live: LiveWorld) -> list[Path]:
+    world = live.world
     views = axis_views(world.machines, world.axes)
     return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now)
 
@@ -248,7 +283,7 @@ def _write_trace(where: Path, world: World, session: sessions.Session) -> list[P
 
 
 async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, name: str) -> None:
-    await server.open_control(name, {**handlers_of(server.cell, live), **pace.handlers()})
+    await server.open_control(name, {**WorldControl(server.cell, live).handlers(), **pace.handlers()})
     for line in live.world.spec.lines:
         await _open_line(server, live, line, options)
     if options.ready_file is not None:
@@ -276,107 +311,3 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
     if line.rtu_tcp is not None:
         address = parse_address(line.rtu_tcp, listen_any=options.listen_any)
         await server.open_tcp("rtu-tcp", address, f"RTU over TCP, {line.name}", maker("rtu", "rtu", several=True))
-
-
-# ---------------------------------------------------------------------- a hand at the machine
-
-
-def _worked(world: World, name: str, value: float) -> do.Press | do.Release | None:
-    """A button by its name; None if there is no such button."""
-    button = next((b for b in world.plan.buttons if b.upper() == name.upper()), None)
-    if button is None:
-        return None
-    if value not in (0, 1):
-        raise Misuse(f"{button} = {value:g}: a button takes 1 (pressed) and 0 (released)")
-    return do.Press(button) if value else do.Release(button)
-
-
-def _chosen(world: World, wanted: str, pin: str | None) -> str:
-    """The machine meant, which is the only one where none is named."""
-    if not wanted and len(world.machines) == 1:
-        return next(iter(world.machines))
-    for name in world.machines:
-        if name.upper() == wanted.upper():
-            return name
-    machines = ", ".join(world.machines)
-    if pin is not None and not wanted:
-        buttons = ", ".join(world.plan.buttons) or "none"
-        raise Misuse(f"{pin}: give a pin as MACHINE.PIN; machines are {machines}; buttons are {buttons}")
-    raise Misuse(f"choose a machine with --unit: {machines}")
-
-
-def handlers_of(cell: Cell, live: LiveWorld) -> dict[str, Handler]:
-    """Requests of the control endpoint. ``unit`` is the name of a machine; pins are ``MACHINE.PIN``, buttons their names."""
-    world = live.world
-
-    def acting(action: Callable[[Mapping[str, Any]], object]) -> Handler:
-        def handle(request: Mapping[str, Any]) -> object:
-            cell.enter()
-            try:
-                return action(request)
-            finally:
-                live.stale = True
-                cell.leave()
-
-        return handle
-
-    def chosen(request: Mapping[str, Any], pin: str | None = None) -> str:
-        return _chosen(world, str(request.get("unit") or ""), pin)
-
-    def pin(request: Mapping[str, Any]) -> object:
-        for name, value in (request.get("set") or {}).items():
-            if not isinstance(value, int | float):
-                raise Misuse(f"{name} = {value!r}: a pin takes a number")
-            if "." in name:
-                owner, _, pin = name.rpartition(".")
-                step: do.Set | do.Press | do.Release = do.Set(((chosen({"unit": owner}), pin.upper(), float(value)),))
-            else:
-                step = _worked(world, name, value) or do.Set(((chosen(request, name), name.upper(), float(value)),))
-            world.outside(step)
-        shown = list(world.machines) if request.get("unit") is None else [chosen(request)]
-        for name in shown:
-            world.touch(name)
-        return {f"{name}.{pin}": value for name in shown for pin, value in world.machines[name].pins().items()}
-
-    def state(request: Mapping[str, Any]) -> object:
-        name = chosen(request)
-        world.touch(name)
-        machine = world.machines[name]
-        return state_of(machine, world.now) if isinstance(machine, Mic488) else state_of_chip(machine, world.now)
-
-    def power_cycle(request: Mapping[str, Any]) -> object:
-        world.outside(do.PowerCycle(chosen(request)))
-        return None
-
-    def encoder(request: Mapping[str, Any]) -> object:
-        name = chosen(request)
-        device = world.controller(name, "encoder")
-        for number, change in (request.get("set") or {}).items():
-            if not isinstance(change, int):
-                raise Misuse("what turns a shaft is said in the world's file: an encoder is turned by +N or -N counts")
-            world.outside(do.Turn(name, int(number), change))
-        world.touch(name)
-        return [
-            {"axis": a.number, "counts": a.encoder_counts(world.now), "turned_by": a.encoder.coupling.value} for a in device.axes
-        ]
-
-    return {
-        "pin": acting(pin),
-        "state": acting(state),
-        "power-cycle": acting(power_cycle),
-        "encoder": acting(encoder),
-        "fault": acting(lambda request: _fault(world, request)),
-    }
-
-
-def _fault(world: World, request: Mapping[str, Any]) -> object:
-    faults = world.plan.faults
-    wanted = [read_fault(line) for line in request.get("set") or []]
-    for fault in wanted:
-        world.rigging.check(fault)
-    unwanted = request.get("clear") or []
-    for name in [active.name for active in faults.active] if unwanted is True else unwanted:
-        world.outside(do.ClearFault(name))
-    for fault in wanted:
-        world.outside(do.SetFault(fault))
-    return [{"name": a.name, "fault": str(a.fault), "happened": a.struck} for a in faults.active]

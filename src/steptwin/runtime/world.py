@@ -14,13 +14,14 @@ from types import TracebackType
 from typing import Self, TypeAlias
 
 from steptwin.errors import Misuse
+from steptwin.files import read_bytes
 from steptwin.host.mic488.values import encoded, named
 from steptwin.m1486.chip import M1486
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.registermap import DataType
 from steptwin.runtime.export.progress import Progress, silent
-from steptwin.runtime.textfiles import read_bytes, read_text
+from steptwin.runtime.textfiles import read_text
 from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegisters, encode_request
 from steptwin.world import script as do
 from steptwin.world.description import read_world
@@ -50,8 +51,15 @@ class World(Plant):
     back cannot.
     """
 
-    def __init__(self, spec: WorldSpec, files: Mapping[str, bytes] | None = None, *, keep_trace: bool = True) -> None:
-        super().__init__(spec, files or {}, encode_write, keep_trace=keep_trace)
+    def __init__(
+        self,
+        spec: WorldSpec,
+        files: Mapping[str, bytes] | None = None,
+        *,
+        keep_trace: bool = True,
+        keep_inputs: bool = True,
+    ) -> None:
+        super().__init__(spec, files or {}, encode_write, keep_trace=keep_trace, keep_inputs=keep_inputs)
         machines = self.machines
         self.mic488: Views[Mic488View] = Views(
             self, "MIC488", {name: Mic488View(self, name, m) for name, m in machines.items() if isinstance(m, Mic488)}
@@ -68,22 +76,30 @@ class World(Plant):
     # ------------------------------------------------------------------ making one
 
     @classmethod
-    def load(cls, path: str | Path, *, seed: int | None = None, keep_trace: bool = True) -> Self:
+    def load(cls, path: str | Path, *, seed: int | None = None, keep_trace: bool = True, keep_inputs: bool = True) -> Self:
         """The world described by a TOML file; other files are looked for beside it. Raises `WorldError` (a `Misuse`).
 
-        With ``seed`` chance is another than the description says.
+        ``seed`` replaces that of the description. Without ``keep_trace`` and ``keep_inputs`` the memory of a long run does not
+        grow with what happens; it then has no trace and no session.
         """
         place = Path(path)
         spec = _described(str(path), read_text(place).source.text, seed)
         files = {name: read_bytes(place.parent / name) for name in spec.files()}
-        return cls(spec, files, keep_trace=keep_trace)
+        return cls(spec, files, keep_trace=keep_trace, keep_inputs=keep_inputs)
 
     @classmethod
     def from_toml(
-        cls, text: str, files: Mapping[str, bytes] | None = None, *, name: str = "world.toml", keep_trace: bool = True
+        cls,
+        text: str,
+        files: Mapping[str, bytes] | None = None,
+        *,
+        name: str = "world.toml",
+        seed: int | None = None,
+        keep_trace: bool = True,
+        keep_inputs: bool = True,
     ) -> Self:
-        """The world described by a text. ``files`` are the contents of the files it names. Raises `WorldError`."""
-        return cls(_described(name, text), files, keep_trace=keep_trace)
+        """The world described by a text. ``files`` are the contents of the files it names; the rest is as in `load`."""
+        return cls(_described(name, text, seed), files, keep_trace=keep_trace, keep_inputs=keep_inputs)
 
     def __enter__(self) -> Self:
         return self

@@ -25,6 +25,8 @@ from steptwin.world.trace import Record, Recorder
 
 SCRIPTS = "script"
 """The place of the world's own scripts on every line."""
+MOST_UNFETCHED = 64
+"""Pieces kept for scripts, which fetch nothing but the answer to a request of theirs."""
 
 
 class Place(Stateful):
@@ -123,6 +125,8 @@ class Line(Stateful):
 
     def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)
+        while place == SCRIPTS and len(found.received) > MOST_UNFETCHED:
+            found.received.popleft()
         if found.on_output is not None:
             found.on_output()
 

@@ -77,7 +77,9 @@ class PlantSnapshot:
 class Plant:
     """A world without files and clocks. ``encode`` makes the requests of `Write` steps."""
 
-    def __init__(self, spec: WorldSpec, files: Files, encode: Encode, *, keep_trace: bool = True) -> None:
+    def __init__(
+        self, spec: WorldSpec, files: Files, encode: Encode, *, keep_trace: bool = True, keep_inputs: bool = True
+    ) -> None:
         names = [*(m.name for m in (*spec.mic488, *spec.m1486)), *(line.name for line in spec.lines), WORLD]
         self.spec = spec
         self.files = files
@@ -90,8 +92,10 @@ class Plant:
         """Expectations that did not hold."""
         self.overdue: list[Record] = []
         """What scripts of the description waited for in vain."""
+        self.keeps_inputs = keep_inputs
+        """Whether everything from outside is kept, as a session needs it; a world that runs for weeks has no room for that."""
         self.inputs: list[Given] = []
-        """Everything from outside so far."""
+        """Everything from outside so far, where it is kept."""
         self._is_settled = False
         """Whether the scripts of the description have done what they had to do since the last of that."""
         self.encode = encode
@@ -254,10 +258,11 @@ class Plant:
     # ------------------------------------------------------------------ what comes from outside
 
     def outside(self, what: Outside) -> None:
-        """Something comes from outside now: it is done, and remembered for a replay. Refused (`Misuse`), it leaves no mark."""
+        """Do something from outside at the present moment, and keep it for a replay. A `Misuse` changes nothing."""
         check_step(self, what)
         self.perform(what)
-        self.inputs.append(Given(self.now, what, self._is_settled))
+        if self.keeps_inputs:
+            self.inputs.append(Given(self.now, what, self._is_settled))
         self._is_settled = False
 
     def perform(self, what: Outside) -> None:

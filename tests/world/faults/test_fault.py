@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.world.faults import KINDS, Fault, Kind, Layer, Occasion, Parameter, parse, read, schema
-from steptwin.world.faults.table import Form, _checked, check
+from steptwin.world.faults.table import LARGEST_WHOLE, Form, _checked, check
 
 WANTED = {
     Layer.BYTES: {"flip", "drop", "insert", "gap", "split", "noise"},
@@ -29,7 +29,9 @@ def values(parameter: Parameter) -> st.SearchStrategy[object]:
     least, most = parameter.least, parameter.most
     match parameter.form:
         case Form.WHOLE:
-            return st.integers(None if least is None else int(least), None if most is None else int(most))
+            return st.integers(
+                1 - LARGEST_WHOLE if least is None else int(least), LARGEST_WHOLE - 1 if most is None else int(most)
+            )
         case Form.NUMBER:
             return st.floats(least, most, allow_nan=False, allow_infinity=False)
         case Form.SPAN:

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Self
 
 from steptwin.errors import LineFailure, Misuse
+from steptwin.files import read_bytes
 from steptwin.host.line import Line
 from steptwin.host.mic488 import identify, snapshot
 from steptwin.host.mic488.axis import AsyncAxis
@@ -56,11 +57,7 @@ class Mic488Status:
 
 def load_config(path: str | Path, firmware: str = DEFAULT_FIRMWARE) -> ControllerConfig:
     """The configuration in a ``.cfg`` file of the vendor's tool. Raises `Misuse` with all its errors."""
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise Misuse(f"cannot read the configuration {path}: {(error.strerror or str(error)).lower()}") from error
-    return read_config(IniFile.parse(data, str(path)), firmware)
+    return read_config(IniFile.parse(read_bytes(Path(path)), str(path)), firmware)
 
 
 class AsyncMic488:

@@ -112,6 +112,8 @@ def _number(name: str, meaning: str, least: float, most: float | None, **others:
     return Parameter(name, Form.NUMBER, meaning, least, most, **others)  # type: ignore[arg-type]
 
 
+LARGEST_WHOLE = 1 << 63
+"""No whole number of a fault is as large."""
 _LONGEST_S = 1e9
 _LONGEST_MS = 1e9
 
@@ -193,6 +195,8 @@ def _checked(kinds: Sequence[Kind]) -> dict[str, Kind]:
 def check(parameter: Parameter, value: object, where: str) -> Value:
     """``value`` if the parameter takes it. `Misuse` names it, ``where`` and what is permitted."""
     form = parameter.form
+    if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:
+        raise Misuse(f"{where}: a number of more than 63 bits: permitted are {parameter.permitted}")
     if form is Form.SPAN:
         return _span(parameter, value, where)
     if form is Form.NUMBER and isinstance(value, int) and not isinstance(value, bool):

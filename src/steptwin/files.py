@@ -1,0 +1,64 @@
+"""Reading the files a user names. Only regular files of a bounded size: a pipe would block, a device need never end."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import IO
+
+from steptwin.errors import Misuse
+
+MOST_BYTES = 1 << 20
+"""Of programs, configurations, tables and descriptions, which people write."""
+MOST_RECORDED_BYTES = 64 << 20
+"""Of sessions and recordings, which programs write."""
+
+_KINDS = (
+    (stat.S_ISDIR, "a directory"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+    """The content of a regular file of at most ``most`` bytes. Raises `Misuse`."""
+    with open_regular(path, most) as file:
+        try:
+            data = file.read(most + 1)
+        except OSError as error:
+            raise Misuse(f"cannot read {path}: {error.strerror or error}") from error
+    if len(data) > most:  # it grew, or its file system tells no sizes
+        raise _too_large(path, len(data), most)
+    return data
+
+
+def open_regular(path: Path, most: int | None = None) -> IO[bytes]:
+    """A regular file opened for reading. Raises `Misuse` for what cannot be read, is no regular file or has more bytes."""
+    try:
+        # Opening a pipe would wait for somebody to write into it.
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as error:
+        raise Misuse(f"cannot read {shown(path)}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise Misuse(f"cannot read {shown(path)}: {error}") from None
+    found = os.fstat(handle)
+    if stat.S_ISREG(found.st_mode) and (most is None or found.st_size <= most):
+        return os.fdopen(handle, "rb")
+    os.close(handle)
+    if stat.S_ISREG(found.st_mode):
+        raise _too_large(path, found.st_size, most or 0)
+    kind = next((kind for is_one, kind in _KINDS if is_one(found.st_mode)), "something else")
+    raise Misuse(f"cannot read {path}: it is {kind}, not a file")
+
+
+def _too_large(path: Path, size: int, most: int) -> Misuse:
+    return Misuse(f"cannot read {path}: it has {size} bytes; permitted are at most {most}")
+
+
+def shown(path: Path) -> str:
+    """A path for a message: printable, and no longer than a line."""
+    text = str(path).encode("utf-8", "backslashreplace").decode().replace("\0", "\\0")
+    return text if len(text) <= 200 else f"{text[:100]}…{text[-60:]}"
