@@ -109,7 +109,8 @@ def test_the_slave_address_is_that_of_com1_and_com2_s_is_ignored() -> None:
 
 
 def test_mic_27_without_a_file_the_controller_is_as_delivered() -> None:
-    config = read_config(parse(""))
+    config = read_config(parse("[Axis0]"))
+    assert config == ControllerConfig()
     assert config == ControllerConfig()
     assert len(config.axes) == 4
     assert len(config.inputs) == 20
@@ -215,12 +216,12 @@ def test_one_error(text: str, code: str, message: str, hint: str) -> None:
     ("text", "code", "message"),
     [
         ("[Axis0]\nGaer=100", "C005", "[Axis0] Gaer is not known; did you mean Gear?"),
-        ("[Axsi0]\nGear=100", "C005", "the section [Axsi0] is not known; did you mean [Axis0]?"),
+        ("[Axsi0]\nGear=100\n[Axis1]", "C005", "the section [Axsi0] is not known; did you mean [Axis0]?"),
         ("[Axis0]\nMotCurrent=x", "C005", "[Axis0] MotCurrent is not known and has no effect"),
         # Gear is there, so Gears is somebody else's key.
         ("[Axis0]\nGear=2\nGears=3", "C005", "[Axis0] Gears is not known and has no effect"),
-        ("[Vision]", "C005", "the section [Vision] is not known and has no effect"),
-        ("[IN20]\nLevel=1", "C005", "the section [IN20] is not known; did you mean [IN2]?"),
+        ("[Axis0]\n[Vision]", "C005", "the section [Vision] is not known and has no effect"),
+        ("[IN0]\n[IN20]\nLevel=1", "C005", "the section [IN20] is not known; did you mean [IN2]?"),
         ("[Axis0]\nsomething", "C001", "'something' has no effect"),
         ("Gear=1\n[Axis0]", "C001", "'Gear=1' stands before the first [section] and has no effect"),
         ("[Axis0]\nGear=1\ngear=2", "C003", "[Axis0] gear is repeated; the first one counts"),
@@ -294,6 +295,22 @@ def test_a_misspelt_key_comes_with_the_repair() -> None:
     span = found.fix.span
     repaired = file.source.text[: span.start] + found.fix.text + file.source.text[span.end :]
     assert repaired == "[Axis0]\nGear=100"
+
+
+@pytest.mark.parametrize(
+    "text", ["", " \n; only a comment\n", "PREL M1 10\nWAIT M1\n", "[tool]\nname=x\n[other]\n", "a=1\nb=2\n"]
+)
+def test_a_file_without_any_known_section_is_one_error(text: str) -> None:
+    assert findings(text) == [("C011", "this is no configuration of a MIC488")]
+    with pytest.raises(ConfigError, match=r"(?s)m\.cfg:.*error C011.*expected: sections such as \[Axis0\]…\[Axis3\]"):
+        read_config(parse(text))
+
+
+def test_a_misspelt_section_comes_with_the_repair_where_it_is_the_only_one() -> None:
+    assert findings("[Axsi0]\nGear=100") == [
+        ("C011", "this is no configuration of a MIC488"),
+        ("C005", "the section [Axsi0] is not known; did you mean [Axis0]?"),
+    ]
 
 
 def test_every_unknown_name_is_told_with_its_line() -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from steptwin.errors import Misuse
 from steptwin.mic488.config import ConfigError
-from steptwin.runtime.serve_mic488 import load_config
+from steptwin.runtime.serve_mic488 import Mic488Options, load_config, serve
 
 MISSPELT = "[Axis0]\nHomeMod=1\nGear=3\n"
 
@@ -24,3 +26,21 @@ def test_what_is_wrong_is_told_with_what_is_doubtful(tmp_path: Path) -> None:
     path.write_text(MISSPELT + "Acc=0\n")
     with pytest.raises(ConfigError, match=r"(?s)C005: \[Axis0\] HomeMod .*C008: \[Axis0\] Acc = 0 is not permitted"):
         load_config(path, "1.70")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"baud": 38401}, r"--baud 38401: permitted are 9600, 19200, 38400, 57600, 115200 bit/s"),
+        ({"demo": True, "config": Path("m.cfg")}, r"--demo and --config m\.cfg: the demo has a configuration of its own"),
+        (
+            {"listen_any": True, "tcp": "127.0.0.1:0"},
+            r"--listen-any .* \(addresses: 127\.0\.0\.1:0\); 0\.0\.0\.0:PORT",
+        ),
+        ({"listen_any": True, "pty": Path("p")}, r"--listen-any .* there is none \(addresses: none\)"),
+        ({"tcp": "0.0.0.0:0"}, r"0\.0\.0\.0 is not a loopback address: .* --listen-any permits it"),
+    ],
+)
+def test_options_that_cannot_be_meant(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        serve(Mic488Options(**options))

@@ -84,6 +84,7 @@ def wrong(text: str) -> str:
         (TABLE + "[[event]]\nat = 1\ndo = [{ wiat = 1 }]\n", "step 1 has 'wiat'; did you mean 'wait'?"),
         (TABLE + "[[event]]\nat = 1\ndo = [{ until = 'a >' }]\n", "condition 'a >' ends too early"),
         (TABLE + '[[line]]\nname = "bus"\n', "w.toml:3:1: error D009: nothing is on this line"),
+        (TABLE + 'line = "bus"\n[[line]]\nname = "bus"\nbaud = 38401\n', "baud = 38401: a MIC488 has 9600, 19200, 38400,"),
         (TABLE + 'line = "bus"\n[[line]]\nname = "bus"\nkind = "m1486"\n', "'table' cannot be on a line of kind m1486"),
         (
             "x = " + "[" * 3000 + "]" * 3000,

@@ -9,15 +9,23 @@ import typer
 
 app = typer.Typer(help="Serve a twin until Ctrl-C.", no_args_is_help=True)
 
-DEFAULT_TCP = "127.0.0.1:5020"
-DEFAULT_RTU_TCP = "127.0.0.1:5021"
-DEFAULT_M1486_TCP = "127.0.0.1:5022"
+MODBUS_TCP_PORT = 5020
+RTU_TCP_PORT = 5021
+M1486_TCP_PORT = 5022
 
+ListenAny = Annotated[
+    bool,
+    typer.Option("--listen-any", help="Permit addresses that others can reach; without any address, listen on all interfaces."),
+]
 
 Fault = Annotated[
     list[str] | None, typer.Option(help="Something that goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds.")
 ]
 Seed = Annotated[int, typer.Option(help="Chance of faults: the same number, the same chance.")]
+
+
+def _default_host(listen_any: bool) -> str:
+    return "0.0.0.0" if listen_any else "127.0.0.1"
 
 
 @app.command()
@@ -58,7 +66,7 @@ def mic488(
         bool, typer.Option("--log-frames", help="Print every frame with time, direction, bytes and meaning.")
     ] = False,
     name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "mic488",
-    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    listen_any: ListenAny = False,
     fault: Fault = None,
     seed: Seed = 0,
     demo: Annotated[bool, typer.Option("--demo", help="Four spindles in mm with a switch at each end.")] = False,
@@ -74,7 +82,8 @@ def mic488(
     if not (pty or serial or tcp or rtu_tcp or rfc2217):
         from steptwin.runtime.control import runtime_directory
 
-        pty, tcp, rtu_tcp = runtime_directory() / name, DEFAULT_TCP, DEFAULT_RTU_TCP
+        host = _default_host(listen_any)
+        pty, tcp, rtu_tcp = runtime_directory() / name, f"{host}:{MODBUS_TCP_PORT}", f"{host}:{RTU_TCP_PORT}"
     serve(
         Mic488Options(
             firmware=firmware,
@@ -128,7 +137,7 @@ def m1486(
         bool, typer.Option("--log-frames", help="Print everything on the line with time, direction, bytes and meaning.")
     ] = False,
     name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "m1486",
-    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    listen_any: ListenAny = False,
     fault: Fault = None,
     seed: Seed = 0,
 ) -> None:
@@ -141,7 +150,7 @@ def m1486(
     if not (pty or serial or tcp or rfc2217):
         from steptwin.runtime.control import runtime_directory
 
-        pty, tcp = runtime_directory() / name, DEFAULT_M1486_TCP
+        pty, tcp = runtime_directory() / name, f"{_default_host(listen_any)}:{M1486_TCP_PORT}"
     serve(
         M1486Options(
             variant=variant,

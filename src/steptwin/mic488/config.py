@@ -5,7 +5,7 @@ defaults (MIC-27); names that are not known mean nothing and are told. Numbers t
 
 Diagnostics: C001–C004 form of the file; C005 name that is not known; C006 no number; C007 no whole number; C008 not
 permitted; C009 limit switch on an encoder input of an axis that uses its encoder; C010 limit switch on a channel of an encoder
-that another axis uses. C001, C003, C005 and C010 are warnings.
+that another axis uses; C011 no section of a configuration in the whole file. C001, C003, C005 and C010 are warnings.
 """
 
 from __future__ import annotations
@@ -244,6 +244,8 @@ def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tupl
         program=ProgramConfig(**reader.values("WBC_PROGRAM", _program_keys(firmware(firmware_name)))),
     )
     reader.ignore("AIN1", ADDRESS_KEY)
+    if not reader.has_known_section() and not any(finding.severity is Severity.ERROR for finding in file.findings):
+        return config, [_no_configuration(file), *(finding for finding in reader.unknown() if finding.fix is not None)]
     findings = [*file.findings, *reader.findings, *_switch_conflicts(file, config), *reader.unknown()]
     return config, in_order(findings)
 
@@ -297,6 +299,10 @@ class _Reader:
         message = f"[{entry.section}] {entry.key} = {entry.value} {why}"
         self.findings.append(Diagnostic(code, Severity.ERROR, entry.value_span, message, key.hint))
 
+    def has_known_section(self) -> bool:
+        known = {section.lower() for section in self._known}
+        return any(header.section.lower() in known for header in self._file.headers)
+
     def unknown(self) -> Iterator[Diagnostic]:
         """Sections and keys nobody asked for; with a repair where one looks like one that is missing."""
         file, known = self._file, self._known
@@ -315,6 +321,15 @@ class _Reader:
             if entry.section.lower() not in meant and entry.key.lower() not in {name.lower() for name in names}:
                 near = _near(entry.key, sorted(name for name in names if file.find(entry.section, name) is None))
                 yield _unknown(entry.key_span, f"[{section or entry.section}] {entry.key}", near)
+
+
+def _no_configuration(file: IniFile) -> Diagnostic:
+    """For another kind of file: one error instead of a warning for each of its lines."""
+    text = file.source.text
+    first = len(text) - len(text.lstrip())
+    line = text[first:].split("\n", 1)[0].rstrip()
+    hint = f"expected: sections such as [Axis0]…[Axis{AXES - 1}], [IN0]…[IN{INPUTS - 1}], [AIN0], [AIN1], [WBC_PROGRAM]"
+    return Diagnostic("C011", Severity.ERROR, Span(first, first + len(line)), "this is no configuration of a MIC488", hint)
 
 
 def _near(name: str, there: list[str]) -> str | None:

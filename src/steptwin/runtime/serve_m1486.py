@@ -25,7 +25,7 @@ from steptwin.runtime.output import Output
 from steptwin.runtime.rfc2217 import over_network
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, shows_live_view
-from steptwin.runtime.tcp import parse_address
+from steptwin.runtime.tcp import check_addresses, parse_address
 from steptwin.runtime.textfiles import read_text
 
 CHARACTERS = "M1486 line"
@@ -61,9 +61,7 @@ def serve(options: M1486Options) -> None:
     check_name(options.name)
     kind = variant(options.variant)
     baud_pins(kind, options.baud)
-    for address in (options.tcp, options.rfc2217):
-        if address is not None:
-            parse_address(address, listen_any=options.listen_any)
+    check_addresses((options.tcp, options.rfc2217), listen_any=options.listen_any)
     chain = ChainOptions(
         variant=kind,
         addresses=parse_addresses(options.chain),

@@ -12,7 +12,7 @@ from steptwin.diagnostics import Severity, render
 from steptwin.errors import Misuse
 from steptwin.files import read_bytes
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.mic488.config import ConfigError, ControllerConfig, examine_config
+from steptwin.mic488.config import BAUDS, ConfigError, ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registers import firmware as known_firmware
 from steptwin.runtime.cell import Cell
@@ -25,7 +25,7 @@ from steptwin.runtime.programbanks import Banks, Findings, ProgramErrors, parse_
 from steptwin.runtime.rfc2217 import over_network
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, shows_live_view
-from steptwin.runtime.tcp import parse_address
+from steptwin.runtime.tcp import check_addresses, parse_address
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
@@ -71,15 +71,15 @@ class Mic488Options:
 def serve(options: Mic488Options) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
     check_line_timing(options.line_timing)
-    if options.baud is not None and not 300 <= options.baud <= 1_000_000:
-        raise Misuse(f"--baud {options.baud}: permitted are 300 to 1000000 bit/s")
+    if options.baud is not None and options.baud not in BAUDS:
+        raise Misuse(f"--baud {options.baud}: permitted are {', '.join(map(str, BAUDS))} bit/s")
+    if options.demo and options.config is not None:
+        raise Misuse(f"--demo and --config {options.config}: the demo has a configuration of its own; give one of the two")
     if options.gap_ms is not None and not 0.0 < options.gap_ms <= 10_000.0:
         raise Misuse(f"--gap {options.gap_ms:g}: permitted are more than 0 and at most 10000 ms")
     check_name(options.name)
     known_firmware(options.firmware)
-    for address in (options.tcp, options.rtu_tcp, options.rfc2217, options.vision):
-        if address is not None:
-            parse_address(address, listen_any=options.listen_any)
+    check_addresses((options.tcp, options.rtu_tcp, options.rfc2217, options.vision), listen_any=options.listen_any)
     if options.config is not None:
         config = load_config(options.config, options.firmware)
     else:

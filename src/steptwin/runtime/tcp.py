@@ -6,7 +6,7 @@ import asyncio
 import errno
 import ipaddress
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 from weakref import WeakSet
@@ -46,6 +46,17 @@ def parse_address(text: str, *, listen_any: bool) -> Address:
             "moves the axes; --listen-any permits it"
         )
     return Address(host, int(number))
+
+
+def check_addresses(given: Iterable[str | None], *, listen_any: bool) -> None:
+    """Raises `Misuse` for what `parse_address` refuses, and for ``--listen-any`` where no address needs it."""
+    addresses = [parse_address(text, listen_any=listen_any) for text in given if text is not None]
+    if listen_any and all(_is_loopback(address.host) for address in addresses):
+        where = ", ".join(map(str, addresses)) or "none"
+        raise Misuse(
+            f"--listen-any permits addresses that others can reach, but there is none (addresses: {where}); "
+            "0.0.0.0:PORT is reached from all networks"
+        )
 
 
 def _is_loopback(host: str) -> bool:

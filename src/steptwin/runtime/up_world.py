@@ -23,7 +23,7 @@ from steptwin.runtime.pace import Pace, read_speed
 from steptwin.runtime.run_world import describe, is_told
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_name
-from steptwin.runtime.tcp import parse_address
+from steptwin.runtime.tcp import check_addresses, parse_address
 from steptwin.runtime.world import World
 from steptwin.runtime.world_control import WorldControl
 from steptwin.world.actions import Bytes, Leave, Outside
@@ -191,10 +191,7 @@ def up(options: UpOptions) -> bool:
     outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
     if speed == inf and outside:
         raise Misuse(f"--speed max: line {outside[0].name!r} has clients outside, which need a clock; use 'steptwin run'")
-    for line in world.spec.lines:
-        for address in (line.tcp, line.rtu_tcp):
-            if address is not None:
-                parse_address(address, listen_any=options.listen_any)
+    check_addresses((address for line in world.spec.lines for address in (line.tcp, line.rtu_tcp)), listen_any=options.listen_any)
     if options.trace is not None:
         check_target(options.trace)
     if options.session is not None:

@@ -15,7 +15,7 @@ from steptwin.m1486.lines import interface
 from steptwin.m1486.syntax import parse as parse_m1486
 from steptwin.m1486.variants import Store, Variant, variant
 from steptwin.machine import Nanos
-from steptwin.mic488.config import ConfigError, ControllerConfig, examine_config
+from steptwin.mic488.config import BAUDS, ConfigError, ControllerConfig, examine_config
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
@@ -272,6 +272,8 @@ class _Builder:
             names[unit] = spec.name
         if not names:
             raise Misuse("nothing is on this line")
+        if kind == "modbus" and baud is not None and baud not in BAUDS:
+            raise Misuse(f"baud = {baud}: a MIC488 has {', '.join(map(str, BAUDS))} bit/s")
         line: Line
         if kind == "m1486":
             line = ChipLine(kernel, name, plan.record, plan.faults, chips)
