@@ -9,6 +9,7 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.line import SerialChain
+from steptwin.m1486.uart import MOST_WAITING
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
 
@@ -96,6 +97,29 @@ def test_every_port_hears_the_chips() -> None:
     one.receive(b"u20\r", SECOND)
     assert other.pending == []
     assert one.to_send(SECOND) == [(SECOND, b"\x42")]
+
+
+def test_what_was_sent_before_a_program_came_is_not_for_it() -> None:
+    line = chain(1)
+    line.receive(b"u20\r", 0)
+    assert not line.chips[1].uart.sent
+    one = line.port()
+    line.receive(b"u16\r", SECOND)
+    other = line.port()
+    line.receive(b"u15\r", 2 * SECOND)
+    assert one.to_send(3 * SECOND) == [(SECOND, b"\x01"), (2 * SECOND, b"\x02")]
+    assert other.to_send(3 * SECOND) == [(2 * SECOND, b"\x02")]
+
+
+def test_a_port_that_nobody_fetches_from_holds_the_last_characters() -> None:
+    line = chain(1)
+    talking, silent = line.port(), line.port()
+    talking.exchange(b"t41\r", 0)
+    for now in range(1, 3 + MOST_WAITING // 1000):
+        talking.exchange(b"\n" * 1000, now)
+    talking.exchange(b"u15\r", SECOND)
+    assert len(silent.pending) == MOST_WAITING
+    assert silent.pending[-1][1] == b"\x02"
 
 
 def test_a_port_says_when_the_next_character_will_have_left() -> None:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from held import held
 from m1486_rig import Bench, seconds
 
+from steptwin.m1486.chip import M1486
 from steptwin.m1486.program import BURST, BURST_NS
+from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
 
 
@@ -99,6 +102,18 @@ def test_a_label_given_anew_counts_for_commands_that_were_done_before() -> None:
         assert next_round(bench) == b"\x42"
         bench.send("@1", "u15")
         assert next_round(bench) == b"\x02"
+
+
+def test_commands_that_are_overwritten_in_the_ring_leave_nothing_behind() -> None:
+    """A command that names a label is compiled again wherever the ring has brought it."""
+    chip = M1486(variant("B"), statement_ns=0)
+
+    def level(commands: int) -> int:
+        for _ in range(commands):
+            chip.receive(b"i80h1\r", chip.now + MILLISECOND)
+        return held(chip).bytes
+
+    assert level(2000) == level(4000)
 
 
 def test_the_internal_variable_stands_for_a_number_left_out() -> None:

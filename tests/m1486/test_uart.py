@@ -54,3 +54,20 @@ def test_another_baud_rate_loses_what_is_on_its_way() -> None:
     uart.send(0x42, 0)
     uart.set_baud(300)
     assert (uart.baud, uart.arrival(), uart.departure()) == (300, None, None)
+
+
+def test_a_host_that_does_not_read_loses_the_oldest_characters() -> None:
+    uart = Uart(4800, is_timed=False)
+    for number in range(MOST_WAITING + 3):
+        uart.send(number % 256, number)
+    sent = uart.take_sent()
+    assert (len(sent), sent[0]) == (MOST_WAITING, (3, 3))
+
+
+def test_no_more_characters_wait_for_the_line_to_the_host_than_it_can_hold() -> None:
+    uart = Uart(4800, is_timed=True)
+    for _ in range(MOST_WAITING + 3):
+        uart.send(0x42, 0)
+    assert uart.overrun == 3
+    assert uart.leave(MOST_WAITING * SECOND)
+    assert len(uart.take_sent()) == MOST_WAITING

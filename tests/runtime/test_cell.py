@@ -6,10 +6,15 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from steptwin.m1486.check import check
+from steptwin.m1486.chip import M1486
+from steptwin.m1486.eeprom import image_of
+from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.status import Status
-from steptwin.runtime.cell import LONGEST_DELAY_NS, Cell
+from steptwin.runtime.cell import LONGEST_DELAY_NS, LONGEST_WAIT_S, Cell
+from steptwin.world.kernel import Kernel
 
 Make = Callable[[], tuple[Cell, Mic488]]
 Run = Callable[..., Any]
@@ -37,6 +42,45 @@ def test_a_move_ends_by_itself_though_nobody_looks(run: Run, make_cell: Make) ->
     status, last_advanced = run(scene())
     assert status is Status.REACHED
     assert MOVE_NS <= last_advanced < MOVE_NS + MILLISECOND
+
+
+def test_what_a_machine_does_by_itself_is_done_though_nothing_is_ever_sent(run: Run) -> None:
+    """A stored file runs from power-up; so do faults with a time, programs of a MIC488, anything that begins without input."""
+
+    async def scene() -> list[tuple[str, Nanos]]:
+        loop: Any = asyncio.get_running_loop()
+        image = image_of(check("[\nw300\nu20\nw300\nu16\n]").program, variant("B"))
+        chip, kernel = M1486(variant("B"), image=image), Kernel()
+        done: list[tuple[str, Nanos]] = []
+        chip.on_event = lambda event: done.append((event.text, loop.now_ns // MILLISECOND))
+        kernel.add("F", chip)
+        cell = Cell(kernel, loop.clock())
+        cell.start()
+        await asyncio.sleep(2.0)
+        cell.close()
+        return done
+
+    assert run(scene()) == [("waits 300 ms", 0), ("U20 sends 42H", 300), ("waits 300 ms", 301), ("U16 sends 01H", 601)]
+
+
+def test_a_stopped_clock_sets_no_timer(run: Run, make_cell: Make) -> None:
+    """Time that stands for longer than the longest timer is no delay."""
+
+    async def scene() -> tuple[list[Nanos], Nanos]:
+        cell, device = make_cell()
+        lags: list[Nanos] = []
+        cell.on_lag = lags.append
+        cell.clock.stop(0)
+        start_move(cell, device)
+        await asyncio.sleep(2 * LONGEST_WAIT_S)
+        cell.clock.run(1.0)
+        cell.start()
+        await asyncio.sleep(1.0)
+        now = cell.enter()
+        cell.close()
+        return lags, now
+
+    assert run(scene()) == ([], SECOND)
 
 
 def test_at_rest_nothing_wakes_up(run: Run, make_cell: Make) -> None:

@@ -230,8 +230,7 @@ def test_the_line_in_words(run: Run) -> None:
     served.frames.sinks.append(lines.append)
 
     async def play(cell: Cell, programs: list[tuple[Feed, Told]]) -> None:
-        listening = served.listening_port()
-        listener = Feed(cell, listening, listening)
+        listener = served.log_characters(cell)
         (one, _), (two, _) = programs
         one.take(b"x7\rF12800\r")
         two.take(b"u20\r; so\r\rq3\ri80h")
@@ -272,8 +271,7 @@ def test_answers_of_a_full_buffer_in_words(run: Run) -> None:
     served.frames.sinks.append(lines.append)
 
     async def play(cell: Cell, programs: list[tuple[Feed, Told]]) -> None:
-        listening = served.listening_port()
-        listener = Feed(cell, listening, listening)
+        listener = served.log_characters(cell)
         programs[0][0].take(b"r\r" + b"f1\r" * 12)
         await asyncio.sleep(0.1)
         listener.close()

@@ -34,8 +34,7 @@ def screen(run: Run, addresses: list[int], typed: bytes, width: int, height: int
         cell = Cell(line.kernel, loop.clock())
         view = M1486View(line, cell, Output(None))
         view.watch(banner(line, [EndPoint("pty", "/run/m1486", "M1486 line")], []))
-        listening = line.listening_port()
-        feeds = [Feed(cell, listening, listening), Feed(cell, line.port("pty"), Nowhere())]
+        feeds = [line.log_characters(cell), Feed(cell, line.port("pty"), Nowhere())]
         feeds[1].take(typed)
         await asyncio.sleep(NOW / SECOND)
         shown = [text.plain[:width].rstrip() for text in view.lines(cell.enter(), width, height)]

@@ -19,6 +19,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
+from steptwin.m1486.uart import MOST_WAITING
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
 
@@ -28,7 +29,8 @@ class SerialChain(Stateful):
     their own.
 
     M-33: outputs on one wire pull it low together. Characters that chips begin at the same moment come to the host as one,
-    their bitwise AND; a character that begins while another chip's is on the wire is lost and counted in ``collisions``.
+    their bitwise AND; a character that begins while another chip's is on the wire is lost and counted in ``collisions``. While
+    no program is connected, nothing is kept of what they send.
     Raises `Misuse` for two chips with the same address, or with different baud rates or line timing.
     """
 
@@ -57,6 +59,7 @@ class SerialChain(Stateful):
 
     def port(self) -> LinePort:
         """A place on the line for one more program. What the chips send from now on reaches every port."""
+        self.collect(max(chip.now for chip in self.chips.values()))
         port = LinePort(self)
         self._ports.append(port)
         return port
@@ -74,7 +77,7 @@ class SerialChain(Stateful):
         """Give the ports what has left the chips by ``now``."""
         merged = self._merged(now)
         for port in self._ports:
-            port.pending += merged
+            port.keep(merged)
 
     def departure(self) -> Nanos | None:
         """When the next character will have left a chip."""
@@ -103,6 +106,9 @@ class SerialChain(Stateful):
         return next(iter(self.chips.values())).uart.character_ns
 
     def _wake_ports(self) -> None:
+        if not self._ports:
+            for chip in self.chips.values():
+                chip.uart.take_sent()
         for port in self._ports:
             port.wake()
 
@@ -119,6 +125,7 @@ class LinePort:
     def __init__(self, chain: SerialChain) -> None:
         self._chain = chain
         self.pending: list[tuple[Nanos, bytes]] = []
+        """What was sent and not fetched; of more than `MOST_WAITING` characters the last ones."""
         self.on_output: Callable[[], None] | None = None
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
@@ -134,6 +141,12 @@ class LinePort:
         self._chain.collect(now)
         pending, self.pending = self.pending, []
         return pending
+
+    def keep(self, sent: list[tuple[Nanos, bytes]]) -> None:
+        """Hold characters until they are fetched."""
+        self.pending += sent
+        if len(self.pending) > MOST_WAITING:
+            del self.pending[:-MOST_WAITING]
 
     def deadline(self) -> Nanos | None:
         """When there may be more to send: characters that are on their way. ``on_output`` tells of others."""

@@ -91,7 +91,7 @@ class Program(Stateful):
         self._code: list[Callable[[], int]] = [_look] * places
         self._compiled: dict[int, _Compiled] = {}
         #: Places of commands whose closures know where labels are.
-        self._linked: list[int] = []
+        self._linked: set[int] = set()
         self._on_command: CommandHook | None = None
         self.statement_ns = statement_ns
         self._burst = 0
@@ -246,7 +246,7 @@ class Program(Stateful):
             if code.computes and self._on_command is None:
                 self._code[place] = code.effect
             if code.is_linked:
-                self._linked.append(place)
+                self._linked.add(place)
         self._compiled[place] = compiled
         return compiled
 

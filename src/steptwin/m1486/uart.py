@@ -11,12 +11,13 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.wire.line import CharacterClock, SerialLine
 
-#: More characters than this never wait for the line: a real sender would not have got rid of them yet.
+#: More characters than this never wait in one place: towards the chip, towards the host, or for a host that does not read.
 MOST_WAITING = 1 << 16
 
 
 class Uart(Stateful):
-    """8N1 at the baud rate that was read from the pins. ``sent`` are the characters that have left and were not fetched."""
+    """8N1 at the baud rate that was read from the pins. ``sent`` are the characters that have left and were not fetched; of more
+    than `MOST_WAITING` the last ones."""
 
     __slots__ = ("_arriving", "_incoming", "_is_timed", "_leaving", "_outgoing", "overrun", "sent")
     FIXED = frozenset({"_is_timed"})
@@ -25,9 +26,9 @@ class Uart(Stateful):
         self._is_timed = is_timed
         self._arriving: deque[tuple[Nanos, int]] = deque()
         self._leaving: deque[tuple[Nanos, int]] = deque()
-        self.sent: list[tuple[Nanos, int]] = []
+        self.sent: deque[tuple[Nanos, int]] = deque(maxlen=MOST_WAITING)
         self.overrun = 0
-        """Characters that found no room on the line."""
+        """Characters that found no room on the line, in either direction."""
         self._incoming = self._outgoing = CharacterClock(SerialLine(baud))
         self.set_baud(baud)
 
@@ -60,10 +61,12 @@ class Uart(Stateful):
 
     def send(self, byte: int, now: Nanos) -> bool:
         """Put a character on the line towards the host; True if it has left with that."""
-        if self._is_timed:
+        if not self._is_timed:
+            self.sent.append((now, byte))
+        elif len(self._leaving) < MOST_WAITING:
             self._leaving.append((self._outgoing.send(1, now), byte))
         else:
-            self.sent.append((now, byte))
+            self.overrun += 1
         return not self._is_timed
 
     def arrived(self, now: Nanos) -> int | None:
@@ -74,13 +77,15 @@ class Uart(Stateful):
 
     def leave(self, now: Nanos) -> bool:
         """Characters whose time is over by ``now`` have been sent; True if there are any."""
-        before = len(self.sent)
+        if not self._leaving or self._leaving[0][0] > now:
+            return False
         while self._leaving and self._leaving[0][0] <= now:
             self.sent.append(self._leaving.popleft())
-        return len(self.sent) > before
+        return True
 
     def take_sent(self) -> list[tuple[Nanos, int]]:
-        sent, self.sent = self.sent, []
+        sent = list(self.sent)
+        self.sent.clear()
         return sent
 
     def arrival(self) -> Nanos | None:

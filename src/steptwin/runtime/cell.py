@@ -1,4 +1,4 @@
-"""A kernel in real time: whoever has an input for its machines asks `Cell.enter` for the moment and says `Cell.leave`."""
+"""A kernel in real time: `Cell.start` begins it, and an input for its machines comes between `Cell.enter` and `Cell.leave`."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class Advancing(Protocol):
 
 
 class Cell:
-    """Machines that are advanced together, when somebody looks or something happens.
+    """Machines that are advanced together: at their deadlines, and when a client or an input arrives.
 
-    When the process is held up, virtual time is held up with it, so that nothing has to be caught up with; ``on_lag`` is told
-    by how much.
+    When the process is held up, virtual time is held up with it, so that nothing has to be caught up with; ``on_lag`` is
+    called with the delay.
     """
 
     __slots__ = ("_armed_for", "_batch", "_descriptors", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
@@ -49,6 +49,11 @@ class Cell:
         """Counts on whenever the machines are brought to the present: time may have passed, signals have settled."""
         self._timer: asyncio.TimerHandle | None = None
         self._armed_for: Nanos | None = None
+
+    def start(self) -> None:
+        """Follow the clock from now on, also without any input: what machines do by themselves happens when it is due."""
+        self.enter()
+        self._arm(self.kernel.deadline())
 
     def enter(self) -> Nanos:
         """Bring the machines to the present; inputs may be applied at the moment returned, then call `leave`."""
@@ -79,7 +84,7 @@ class Cell:
         return resumed
 
     def _arm(self, due: Nanos | None) -> None:
-        if due is None or (self._armed_for is not None and self._armed_for <= due):
+        if due is None or self.clock.is_stopped or (self._armed_for is not None and self._armed_for <= due):
             return
         if self._timer is not None:
             self._timer.cancel()

@@ -22,7 +22,7 @@ from steptwin.runtime.cell import Cell
 from steptwin.runtime.control import changes
 from steptwin.runtime.faults import FaultDesk
 from steptwin.runtime.lines import Happening
-from steptwin.runtime.links import Port
+from steptwin.runtime.links import Feed, Port
 from steptwin.runtime.m1486_characters import CharacterLog, LineSplitter
 from steptwin.runtime.m1486_state import state_of
 from steptwin.runtime.memory import StateDirectory
@@ -87,9 +87,10 @@ class M1486Line:
         """A place on the line for one more client of raw TCP."""
         return self.port(f"tcp-{next(self._connections)}")
 
-    def listening_port(self) -> ListeningPort:
-        """A place on the line for the log of characters."""
-        return ListeningPort(self.chain.port(), self.frames)
+    def log_characters(self, cell: Cell) -> Feed:
+        """From now on what the chips send goes into the log of characters, until the feed is closed."""
+        port = ListeningPort(self.chain.port(), self.frames)
+        return Feed(cell, port, port)
 
     # ------------------------------------------------------------------ events
 

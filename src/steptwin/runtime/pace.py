@@ -120,9 +120,7 @@ class Pace:
             return
         self._cell.close()  # its timer was set for another clock
         self._cell.clock.run(self.speed)
-        self._cell.enter()
-        self._live.stale = True
-        self._cell.leave()
+        self._cell.start()
 
     def _run_freely(self) -> None:
         """Without a clock, in slices."""

@@ -18,7 +18,6 @@ from steptwin.m1486.variants import DEFAULT, Store, variant
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.clock import Clock
 from steptwin.runtime.lines import Face, Lines
-from steptwin.runtime.links import Feed
 from steptwin.runtime.m1486 import ChainOptions, M1486Line, parse_addresses, parse_wire
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.output import Output
@@ -101,8 +100,7 @@ async def _serve(options: M1486Options, chain: ChainOptions, image: bytes | None
         face = _live_view(line, cell, output) if live else Lines(line, output, frames=options.log_frames)
         server = Server(cell, face.notice)
         line.faults.tell(face.notice)
-        listening = line.listening_port()
-        listener = Feed(cell, listening, listening) if chain.is_written_down else None
+        listener = line.log_characters(cell) if chain.is_written_down else None
         try:
             await _open(server, line, options)
             await face.show(server, remarks_of(options))

@@ -126,6 +126,7 @@ class Server:
 
     async def until_ended(self) -> None:
         """Serve until SIGINT, SIGTERM or SIGHUP. Raises `LineFailure` when the server could not go on."""
+        self.cell.start()
         await self._ended.wait()
         if self._failure is not None:
             raise LineFailure(self._failure)

@@ -68,9 +68,7 @@ class RealTime:
         self._ended = asyncio.Event()
         self._clock = Clock(self.speed)
         self.cell = Cell(self.machines, self._clock)
-        self.cell.enter()
-        self.machines.stale = True
-        self.cell.leave()
+        self.cell.start()
         self._ready.set()
         try:
             await self._ended.wait()

@@ -1,0 +1,192 @@
+"""A served twin holds as much after many requests as after few: ports, kernel, events and the log of frames."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from collections.abc import Callable, Iterator
+from itertools import islice, repeat
+from typing import Any
+
+import pytest
+from held import Held, held
+from soak import scaled
+from virtual_loop import run_virtually
+
+from steptwin.m1486.check import check
+from steptwin.m1486.eeprom import image_of
+from steptwin.m1486.variants import variant
+from steptwin.mic488.config import ControllerConfig
+from steptwin.runtime.cell import Cell
+from steptwin.runtime.links import Feed, Port
+from steptwin.runtime.m1486 import ChainOptions, M1486Line
+from steptwin.runtime.mic488 import LineOptions, Mic488Line
+from steptwin.wire.crc import crc16
+
+REQUESTS = 1_000_000
+PIECES = 150_000
+"""Of typed text: about a million characters."""
+FIRST = 6_000
+"""Fill whatever is bounded: kept events, compiled commands and requests, the command memory."""
+
+
+class Client:
+    """Counts what it is sent and keeps nothing."""
+
+    def __init__(self) -> None:
+        self.received = 0
+
+    def write(self, data: bytes) -> None:
+        self.received += len(data)
+
+
+Line = M1486Line | Mic488Line
+Begin = Callable[[Line, Cell], Callable[[bytes], None]]
+
+
+async def _grown(line: Line, begin: Begin, sent: Iterator[bytes], requests: int, pause_s: float) -> tuple[Held, Held]:
+    """What is held after the first requests and after many more, each time when all work is done."""
+    loop: Any = asyncio.get_running_loop()
+    cell = Cell(line.kernel, loop.clock())
+    line.frames.sinks.append(lambda frame: None)
+    line.watch_events(lambda unit, event: None)
+    send = begin(line, cell)
+    cell.start()
+
+    async def level(requests: int) -> Held:
+        for data in islice(sent, requests):
+            send(data)
+            await asyncio.sleep(pause_s)
+        await asyncio.sleep(10.0)
+        return held(line, cell, send)
+
+    levels = await level(FIRST), await level(requests)
+    cell.close()
+    return levels
+
+
+def assert_level(line: Line, begin: Begin, sent: Iterator[bytes], full: int, pause_s: float) -> None:
+    requests = scaled(full)
+    before, after = run_virtually(_grown(line, begin, sent, requests, pause_s))
+    objects, size = after.objects - before.objects, after.bytes - before.bytes
+    permitted = 500 + requests // 100
+    assert objects < permitted, f"{objects} objects more after {requests} further requests: {before}, {after}"
+    assert size < 100 * permitted, f"{size} bytes more after {requests} further requests: {before}, {after}"
+
+
+# ---------------------------------------------------------------------- M1486
+
+COMMANDS = b"f640 u20 u5 @3 :7 +9 ?14 c1 t1 k c75 xg R Q3 t41 t57 t44 f1;so \\ [ ] j3 i80h3 l3 e"
+TYPED = [*(command + b"\r" for command in COMMANDS.split()), b"\xff\x00", b"f" * 90, b"\n"]
+
+
+def characters(chance: random.Random) -> Iterator[bytes]:
+    """What people and programs type, in pieces of any size; a loop that never ends is killed and begun anew."""
+    while True:
+        data = b"".join(chance.choices(TYPED, k=20))
+        while data:
+            size = chance.choice((1, 1, 2, 7, 40))
+            yield data[:size]
+            data = data[size:]
+
+
+def to_chips(*, watched: bool) -> Begin:
+    """A client that types and reads, one that has stopped reading, and where that is asked for a log."""
+
+    def begin(line: Line, cell: Cell) -> Callable[[bytes], None]:
+        assert isinstance(line, M1486Line)
+        feeds = [Feed(cell, line.port(name), Client()) for name in ("pty", "tcp-1")]
+        feeds[1].is_read = False
+        if watched:
+            feeds.append(line.log_characters(cell))
+        return feeds[0].take
+
+    return begin
+
+
+@pytest.mark.parametrize("is_timed", [False, True], ids=["untimed", "timed"])
+@pytest.mark.parametrize("watched", [False, True], ids=["unwatched", "watched"])
+def test_characters_to_m1486_chips(is_timed: bool, watched: bool) -> None:
+    line = M1486Line(ChainOptions(variant=variant("B"), addresses=(0, 7), is_timed=is_timed, is_written_down=watched))
+    assert_level(line, to_chips(watched=watched), characters(random.Random(2)), PIECES, 0.02 if is_timed else 0.004)
+
+
+def test_a_chip_that_sends_to_nobody() -> None:
+    """A character in 10 ms, and nobody is on the line; the log of characters is not wanted."""
+    kind = variant("B")
+    image = image_of(check("[\n@1\nw10\nu20\nc1\nt1\nj1\n]").program, kind)
+    line = M1486Line(ChainOptions(variant=kind), image=image)
+
+    def nobody(line: Line, cell: Cell) -> Callable[[bytes], None]:
+        return lambda data: None
+
+    assert_level(line, nobody, repeat(b""), REQUESTS, 0.012)
+
+
+# ---------------------------------------------------------------------- MIC488
+
+
+def pdus(chance: random.Random) -> Iterator[bytes]:
+    """Reads and writes at any address, permitted or not, functions that are none."""
+    while True:
+        function = chance.choice((1, 2, 3, 3, 4, 5, 6, 16, 16, 17, 22, 99))
+        address = chance.choice((0, 10, 100, 110, 1000, 1010, 5000, chance.randrange(0x10000))).to_bytes(2, "big")
+        if function == 16:
+            count = chance.choice((1, 2, 4))
+            yield bytes((16,)) + address + bytes((0, count, 2 * count)) + chance.randbytes(2 * count)
+        else:
+            yield bytes((function,)) + address + chance.choice((b"\x00\x01", b"\x00\x02", b"\xff\x00", chance.randbytes(2)))
+
+
+def rtu_requests(chance: random.Random) -> Iterator[bytes]:
+    """Frames for units that are there, not there and all, some of them damaged or cut."""
+    for pdu in pdus(chance):
+        frame = bytes((chance.choice((1, 1, 1, 2, 9, 0)),)) + pdu
+        frame += crc16(frame).to_bytes(2, "little")
+        yield chance.choice((frame, frame, frame, frame, frame[:-1], frame + b"\x55", chance.randbytes(9)))
+
+
+def tcp_requests(chance: random.Random) -> Iterator[bytes]:
+    for number, pdu in enumerate(pdus(chance)):
+        head = (number & 0xFFFF).to_bytes(2, "big") + b"\x00\x00" + (len(pdu) + 1).to_bytes(2, "big")
+        yield head + bytes((chance.choice((1, 2, 9)),)) + pdu
+
+
+def one_client(port: Callable[[Mic488Line], Port]) -> Begin:
+    def begin(line: Line, cell: Cell) -> Callable[[bytes], None]:
+        assert isinstance(line, Mic488Line)
+        line.share_reads(cell)
+        return Feed(cell, port(line), Client()).take
+
+    return begin
+
+
+@pytest.mark.parametrize("frames", [False, True], ids=["unwatched", "watched"])
+@pytest.mark.parametrize("kind", ["tcp", "rtu", "timed-rtu"])
+def test_requests_to_mic488_controllers(kind: str, frames: bool) -> None:
+    chance = random.Random(3)
+    options = LineOptions(timing=kind == "timed-rtu", frames=frames)
+    line = Mic488Line(ControllerConfig(), (1, 2), "1.70", options=options, demo=True)
+    port, requests = (Mic488Line.tcp_port, tcp_requests) if kind == "tcp" else (lambda line: line.rtu_port("pty"), rtu_requests)
+    assert_level(line, one_client(port), requests(chance), REQUESTS, 0.010)
+
+
+@pytest.mark.parametrize("kind", ["mic488", "m1486"])
+def test_clients_that_come_and_go(kind: str) -> None:
+    def begin(line: Line, cell: Cell) -> Callable[[bytes], None]:
+        def visit(data: bytes) -> None:
+            port = line.client_port() if isinstance(line, M1486Line) else line.tcp_port()
+            feed = Feed(cell, port, Client())
+            feed.take(data)
+            feed.close()
+
+        return visit
+
+    chance = random.Random(4)
+    if kind == "m1486":
+        line: Line = M1486Line(ChainOptions(variant=variant("B"), is_written_down=True))
+        sent, full = characters(chance), PIECES
+    else:
+        line = Mic488Line(ControllerConfig(), (1,), "1.70", options=LineOptions(frames=True))
+        sent, full = tcp_requests(chance), REQUESTS
+    assert_level(line, begin, sent, full, 0.002)

@@ -1,0 +1,62 @@
+"""An event loop in virtual time: sockets are real, timers come when nothing else is left to do, and nobody waits."""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+from collections.abc import Coroutine
+from typing import Any, TypeVar
+
+from steptwin.runtime.clock import Clock
+
+T = TypeVar("T")
+
+
+class _Selector(selectors.DefaultSelector):
+    """Where the loop would sleep, its time jumps."""
+
+    loop: VirtualLoop
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        ready = super().select(0)
+        if ready or timeout == 0:
+            return ready
+        if timeout is None:
+            return super().select(5.0)  # nothing is planned: something outside has to happen
+        self.loop.now_ns += max(round(timeout * 1e9), 1)
+        return []
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    now_ns: int
+
+    def __init__(self) -> None:
+        selector = _Selector()
+        selector.loop = self
+        self.now_ns = 0
+        super().__init__(selector)
+
+    def time(self) -> float:
+        return self.now_ns / 1e9
+
+    def hold_up(self, seconds: float) -> None:
+        """Time passes in which the process does nothing."""
+        self.now_ns += round(seconds * 1e9)
+
+    def clock(self) -> Clock:
+        return Clock(wall_ns=lambda: self.now_ns)
+
+
+def run_virtually(coroutine: Coroutine[Any, Any, T]) -> T:
+    """Run in virtual time; what the loop has to complain about fails the test."""
+    complaints: list[dict[str, Any]] = []
+
+    def loop() -> VirtualLoop:
+        made = VirtualLoop()
+        made.set_exception_handler(lambda _, context: complaints.append(context))
+        return made
+
+    with asyncio.Runner(loop_factory=loop) as runner:
+        result = runner.run(coroutine)
+    assert complaints == []
+    return result
