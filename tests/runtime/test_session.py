@@ -86,7 +86,7 @@ def test_requests_of_python_are_in_the_session() -> None:
     world.script(operator)
     world.run(for_=2)
     session = session_of(world)
-    assert [type(given.what).__name__ for given in session.inputs] == ["Bytes"]
+    assert [type(given.what).__name__ for given in session.inputs] == ["Request"]
     assert session.replay().trace.digest() == session.digest
 
 

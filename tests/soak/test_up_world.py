@@ -19,7 +19,7 @@ from steptwin.runtime.up_world import LiveWorld, PlacePort
 from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes
-from steptwin.world.lines import MOST_UNFETCHED, SCRIPTS
+from steptwin.world.lines import SCRIPTS, ModbusLine
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_RTU = bytes.fromhex("01 03 27 24 00 02 8e b4")
@@ -85,7 +85,10 @@ def test_answers_that_scripts_do_not_fetch_are_dropped() -> None:
     step = do.Write((("table", "USER_REGISTER[10]", 1.0),))
     for _ in range(scaled(REQUESTS // 10)):
         live.outside(step)
-    assert len(live.world.lines["bus"].places[SCRIPTS].received) <= MOST_UNFETCHED
+        live.advance(live.now + 20 * MILLISECOND)
+    line = live.world.lines["bus"]
+    assert isinstance(line, ModbusLine)
+    assert (len(line.places[SCRIPTS].received), line.master.answers, line.master.deadline()) == (0, {}, None)
 
 
 def test_a_recorded_session_ends_where_it_is_full(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

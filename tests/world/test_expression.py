@@ -17,6 +17,9 @@ class Level:
         self.level = value
         self.continuous = False
 
+    def bring(self, now: Nanos) -> tuple[object, ...]:
+        return (self,)
+
     def value(self, now: Nanos) -> float:
         return self.level
 
@@ -36,6 +39,9 @@ class Moving:
         out = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 200.0, 300.0, 80.0)
         self.profile = plan_position(MotionState.of(out, SECOND // 2), -40, 200.0, 300.0, 80.0)
         self.velocity = velocity
+
+    def bring(self, now: Nanos) -> tuple[object, ...]:
+        return (self,)
 
     def value(self, now: Nanos) -> float:
         return self.profile.velocity(now) if self.velocity else float(self.profile.count(now))
@@ -168,3 +174,7 @@ def test_a_crossing_is_found_once_while_the_signal_goes_on_as_it_did() -> None:
     limit.level = 50.0
     assert condition.due(0) == 1_350_000_000
     assert moving.looked == 5
+
+
+def test_a_condition_depends_on_what_its_signals_depend_on_each_once() -> None:
+    assert Condition("b or x.position > 5 and b == 0", SIGNALS.__getitem__).bring(5) == (SIGNALS["b"], SIGNALS["x.position"])

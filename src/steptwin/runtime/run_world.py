@@ -193,8 +193,12 @@ def _lines(world: World, outcome: Outcome, say: Say) -> None:
     say(f"{world.time:g} s of {world.spec.name}{begun} in {outcome.wall_s:.2f} s{ended}")
     for failure in world.failures:
         say(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
+    if world.failures.more:
+        say(f"{world.failures.more} more expectations failed")
     for late in world.overdue:
         say(f"warning: at {late.time / SECOND:g} s {late.value}")
+    if world.overdue.more:
+        say(f"warning: {world.overdue.more} more of these")
     if outcome.in_vain is not None:
         say(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
     for path in outcome.written:

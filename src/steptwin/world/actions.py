@@ -11,7 +11,8 @@ from steptwin.m1486.pins import known_pin
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
 from steptwin.world.kernel import PinName
-from steptwin.world.lines import SCRIPTS
+from steptwin.world.lines import SCRIPTS, Line, ModbusLine
+from steptwin.world.master import ANSWER_NS, Master
 from steptwin.world.trace import Record
 
 if TYPE_CHECKING:
@@ -61,8 +62,7 @@ def _set(plant: Plant, step: do.Set) -> None:
 def _press(plant: Plant, step: do.Press) -> None:
     _move_button(plant, step.button, pressed=True)
     if step.duration is not None:
-        later = (do.Wait(step.duration), do.Release(step.button))
-        plant.start(_releasing(step.button), lambda: do.run_through(later))
+        plant.do_later(_releasing(step.button), (do.Wait(step.duration), do.Release(step.button)))
 
 
 def _release(plant: Plant, step: do.Release) -> None:
@@ -91,11 +91,25 @@ def _write(plant: Plant, step: do.Write) -> None:
         for pdu in plant.requests(device, values):
             if on is not None:
                 line, unit = on
-                line.receive(SCRIPTS, encode_frame(unit, pdu), plant.now)
+                master_of(line).ask(encode_frame(unit, pdu), ANSWER_NS, plant.now)
             else:
                 _record(plant, name, "request", pdu)
                 device.execute(pdu, plant.now)
         kernel.settle()
+
+
+def master_of(line: Line) -> Master:
+    """The master of a line for scripts. `Misuse` for a line without one."""
+    if not isinstance(line, ModbusLine):
+        raise Misuse(f"line {line.name!r} is of kind m1486: requests need one of kind modbus")
+    return line.master
+
+
+def _request(plant: Plant, step: do.Request) -> None:
+    line = plant.line_called(step.line)
+    kernel = plant.touch(step.line)
+    master_of(line).ask(encode_frame(step.unit, step.pdu), step.within, plant.now)
+    kernel.settle()
 
 
 def _send(plant: Plant, step: do.Send) -> None:
@@ -159,6 +173,7 @@ ACTIONS: dict[type, Callable[[Plant, Any], None]] = {
     do.Press: _press,
     do.Release: _release,
     do.Write: _write,
+    do.Request: _request,
     do.Send: _send,
     do.PowerCycle: _power_cycle,
     do.Turn: _turn,

@@ -1,49 +1,143 @@
-"""What scripts wait for: moments, in order, and conditions and answers, which are looked at in the order of the scripts."""
+"""When scripts that wait are looked at: at moments, and when kernels change on which it depends what they wait for.
+
+A script that watches is looked at when its own moment has come or one of its kernels has changed, never for what others do: what
+a world costs is the sum of what happens in it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from heapq import heapify, heappop, heappush
+from itertools import count
 
 from steptwin.machine import Nanos
-from steptwin.world.running import Script, Waiting
+from steptwin.world.kernel import Kernel
+from steptwin.world.running import Script
+
+_FEW = 64
+"""Outdated entries of a queue that are not worth removing."""
+
+
+class _Queue:
+    """Scripts by the moments at which they are due, those of one moment in their order.
+
+    A script has one entry in all queues that share ``count``, which gives each entry a number: the last one made for it.
+    """
+
+    __slots__ = ("_count", "_entries", "_room")
+
+    def __init__(self, count: Iterator[int]) -> None:
+        self._count = count
+        self._entries: list[tuple[Nanos, int, int, Script]] = []
+        self._room = _FEW
+
+    def put(self, script: Script, due: Nanos) -> None:
+        """A script is due at ``due``, and at no other moment."""
+        script.entry = next(self._count)
+        heappush(self._entries, (due, script.number, script.entry, script))
+        if len(self._entries) > self._room:
+            self._entries = [entry for entry in self._entries if entry[3].entry == entry[2]]
+            heapify(self._entries)
+            self._room = 2 * len(self._entries) + _FEW
+
+    def first(self) -> Nanos | None:
+        """The first moment at which one is due."""
+        entries = self._entries
+        while entries and entries[0][3].entry != entries[0][2]:
+            heappop(entries)
+        return entries[0][0] if entries else None
+
+    def take(self, now: Nanos) -> Script | None:
+        """One that is due by ``now``, which is then due no more."""
+        first = self.first()
+        if first is None or first > now:
+            return None
+        script = heappop(self._entries)[3]
+        script.entry = 0
+        return script
 
 
 class Agenda:
     """The scripts that wait, each in one of two ways."""
 
-    __slots__ = ("_timed", "watching")
+    __slots__ = ("_timed", "_watching")
 
     def __init__(self) -> None:
-        self._timed: list[tuple[Nanos, int, Script]] = []
-        self.watching: list[Script] = []
-        """Those that wait for more than a moment, in their order."""
+        numbers = count(1)
+        self._timed = _Queue(numbers)
+        self._watching = _Queue(numbers)
 
-    def add(self, script: Script, waiting: Waiting) -> None:
-        """A script waits."""
-        script.waiting = waiting
-        if waiting.is_timed and waiting.until is not None:
-            heappush(self._timed, (waiting.until, script.number, script))
-        else:
-            self.watching.append(script)
-            self.watching.sort(key=lambda one: one.number)
+    def wait(self, script: Script, until: Nanos) -> None:
+        """A script waits for a moment."""
+        self._timed.put(script, until)
+
+    def watch(self, script: Script, due: Nanos | None) -> None:
+        """A script that waits for something is looked at next at ``due``; None: when a kernel has changed."""
+        script.entry = 0
+        if due is not None:
+            self._watching.put(script, due)
 
     def remove(self, script: Script) -> None:
-        """A script waits no longer."""
-        script.waiting = None
-        self.watching = [one for one in self.watching if one is not script]
-        self._timed = [entry for entry in self._timed if entry[2] is not script]
-        heapify(self._timed)
+        """A script waits no longer: its entry is outdated."""
+        script.entry = 0
 
-    def called(self, name: str) -> list[Script]:
-        """Those of this name that wait for a moment."""
-        return [entry[2] for entry in self._timed if entry[2].name == name]
+    def first(self) -> Nanos | None:
+        """The first moment at which a script is to be looked at."""
+        timed, watching = self._timed.first(), self._watching.first()
+        return watching if timed is None else timed if watching is None else min(timed, watching)
 
-    def moment(self) -> Nanos | None:
-        """The first moment that is waited for."""
-        return self._timed[0][0] if self._timed else None
-
-    def take(self, now: Nanos) -> Iterator[Script]:
+    def take_timed(self, now: Nanos) -> Iterator[Script]:
         """Those whose moment has come, also while more of them are added."""
-        while self._timed and self._timed[0][0] <= now:
-            yield heappop(self._timed)[2]
+        while (script := self._timed.take(now)) is not None:
+            yield script
+
+    def take_watching(self, now: Nanos) -> list[Script]:
+        """Those that watch and are due."""
+        taken = []
+        while (script := self._watching.take(now)) is not None:
+            taken.append(script)
+        return taken
+
+
+class Watchers:
+    """Which scripts depend on which kernels, and which kernels have changed since somebody asked."""
+
+    __slots__ = ("_again", "_changed", "_scripts")
+
+    def __init__(self) -> None:
+        self._scripts: dict[Kernel, dict[int, Script]] = {}
+        self._changed: dict[Kernel, None] = {}
+        self._again: dict[int, Script] = {}
+
+    def set(self, script: Script, kernels: tuple[Kernel, ...]) -> None:
+        """A script depends on these kernels, and on no others any more."""
+        if kernels == script.kernels:
+            return
+        for kernel in script.kernels:
+            scripts = self._scripts[kernel]
+            del scripts[script.number]
+            if not scripts:
+                del self._scripts[kernel]
+                kernel.on_change = None
+        script.kernels = kernels
+        for kernel in kernels:
+            self._scripts.setdefault(kernel, {})[script.number] = script
+            kernel.on_change = self.change
+
+    def change(self, kernel: Kernel) -> None:
+        """What depends on a kernel may be another now."""
+        self._changed[kernel] = None
+
+    def again(self, script: Script) -> None:
+        """A script has been looked at in vain."""
+        self._again[script.number] = script
+
+    def take(self) -> list[Script]:
+        """The scripts for which something has changed, in their order."""
+        if not self._changed and not self._again:
+            return []
+        found, self._again = self._again, {}
+        for kernel in self._changed:
+            found.update(self._scripts.get(kernel, {}))
+        self._changed.clear()
+        return [found[n] for n in sorted(found)]

@@ -15,7 +15,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from operator import eq, ge, gt, le, lt, ne
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -37,6 +37,10 @@ class Signal(Protocol):
 
     @property
     def continuous(self) -> bool: ...
+    def bring(self, now: Nanos) -> tuple[Any, ...]:
+        """Have the value of ``now`` ready. Until something changes in one of what this gives, the value goes on as it goes."""
+        ...
+
     def value(self, now: Nanos) -> float: ...
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         """Moments after ``now``, in order, between which (and after the last of which) the value goes one way only."""
@@ -204,9 +208,12 @@ class Condition:
         self._crossings: list[_Crossing | None] = [None] * len(self._comparisons)
         """As found last."""
 
-    @property
-    def signals(self) -> list[str]:
-        return list(self._signals)
+    def bring(self, now: Nanos) -> tuple[Any, ...]:
+        """As `Signal.bring`, for all its signals; before anything else is asked."""
+        found: dict[Any, None] = {}
+        for signal in self._signals.values():
+            found.update(dict.fromkeys(signal.bring(now)))
+        return tuple(found)
 
     def holds(self, now: Nanos) -> bool:
         return self._holds(self._node, now)

@@ -110,6 +110,8 @@ class Kernel:
         """Called with machine name and edge, in order, for every output edge."""
         self.stale = False
         """Something changed since signals last settled."""
+        self.on_change: Callable[[Kernel], None] | None = None
+        """Called with the kernel whenever something has happened in it, or something has changed from outside."""
         self._record = record
         self._wires: dict[PinName, list[Wire]] = {}
         self._levels: dict[PinName, float] = {}
@@ -176,6 +178,8 @@ class Kernel:
     def mark(self) -> None:
         """Something changed: signals have to settle."""
         self.stale = True
+        if self.on_change is not None:
+            self.on_change(self)
 
     # ------------------------------------------------------------------ levels
 
@@ -230,6 +234,8 @@ class Kernel:
         ((name, machine),) = self.machines.items()
         (plans,) = self._plans
         due = self._due
+        if due is None or due > now:
+            return
         while due is not None and due <= now:
             self.now = due
             machine.advance(due)
@@ -240,6 +246,8 @@ class Kernel:
             due = machine.deadline()
         self._due = due
         self.stale = False
+        if self.on_change is not None:
+            self.on_change(self)
 
     def deadline(self) -> Nanos | None:
         """The next moment at which something happens by itself."""
@@ -269,6 +277,8 @@ class Kernel:
             if due is not None and (soonest is None or due < soonest):
                 soonest = due
         self._due = soonest
+        if self.on_change is not None:
+            self.on_change(self)
 
     def _edge(self, name: str, edge: Edge) -> None:
         pin = PinName(name, edge.pin)

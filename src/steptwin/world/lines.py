@@ -21,12 +21,17 @@ from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
 from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
 from steptwin.world.faults import Line as FaultLine
 from steptwin.world.kernel import Kernel
+from steptwin.world.master import Master
 from steptwin.world.trace import Record, Recorder
 
 SCRIPTS = "script"
 """The place of the world's own scripts on every line."""
-MOST_UNFETCHED = 64
-"""Pieces kept for scripts, which fetch nothing but the answer to a request of theirs."""
+SILENT_CHARACTERS = 4
+"""Between an answer and the next request of a master: Modbus RTU asks for 3.5."""
+
+
+MOST_RECEIVED = 1 << 16
+"""More pieces than these are not kept for a program that does not fetch them: the oldest go."""
 
 
 class Place(Stateful):
@@ -40,7 +45,7 @@ class Place(Stateful):
         self.port = port
         self.inner = inner
         """The port behind the faults of the line."""
-        self.received: deque[tuple[Nanos, bytes]] = deque()
+        self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
         self.on_output: Callable[[], None] | None = None
 
     def take(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
@@ -125,8 +130,6 @@ class Line(Stateful):
 
     def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)
-        while place == SCRIPTS and len(found.received) > MOST_UNFETCHED:
-            found.received.popleft()
         if found.on_output is not None:
             found.on_output()
 
@@ -177,7 +180,7 @@ class Line(Stateful):
 class ModbusLine(Line):
     """Controllers with different units on one line. With ``timing`` RTU takes the time a wire takes."""
 
-    __slots__ = ("devices", "timing")
+    __slots__ = ("devices", "master", "timing")
     FIXED: ClassVar[frozenset[str]] = frozenset({"devices", "timing"}) | Line.FIXED
 
     kinds = ("rtu", "tcp")
@@ -196,6 +199,25 @@ class ModbusLine(Line):
         super().__init__(kernel, name, record, faults)
         self.devices = devices
         self.timing = timing
+        self.master = Master(self._ask, 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
+        """Who asks for the scripts."""
+
+    def _ask(self, frame: bytes, now: Nanos) -> None:
+        self.receive(SCRIPTS, frame, now)
+
+    def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
+        if place == SCRIPTS:
+            self.master.answered(b"".join(data for _, data in pieces), pieces[-1][0])
+        else:
+            super()._came(place, found, pieces)
+
+    def look(self, now: Nanos) -> None:
+        super().look(now)
+        self.master.look(now)
+
+    def deadline(self) -> Nanos | None:
+        own, masters = super().deadline(), self.master.deadline()
+        return own if masters is None else masters if own is None else min(own, masters)
 
     @property
     def units(self) -> tuple[int, ...]:
@@ -241,10 +263,11 @@ class ChipLine(Line):
         super().receive(place, data, now)
 
     def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
-        if place == SCRIPTS:  # every place hears the same
+        if place == SCRIPTS:  # where all that comes is recorded, and nobody fetches it
             for moment, data in pieces:
                 self._tell(moment, "chips", Direction.OUT, data)
-        super()._came(place, found, pieces)
+        else:
+            super()._came(place, found, pieces)
 
     def _port_state(self, place: Place) -> Plain:
         return self.chain.copy_state(), tuple(place.inner.pending)

@@ -18,25 +18,23 @@ from steptwin.m1486.chip import M1486
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.wbc.nearmiss import NearMiss
-from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Outside, act
-from steptwin.world.agenda import Agenda
+from steptwin.world.actions import Outside, act
 from steptwin.world.build import Files, Fitted, Plan, build
 from steptwin.world.contacts import Button
 from steptwin.world.expression import Condition
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
-from steptwin.world.lines import SCRIPTS, Line
+from steptwin.world.lines import Line
 from steptwin.world.references import check_scripts, check_step
+from steptwin.world.reports import Reports, ReportsState
 from steptwin.world.rigging import Rigging
-from steptwin.world.running import Script, ScriptState, Waiting
-from steptwin.world.signals import find_signal
+from steptwin.world.running import Script
+from steptwin.world.scripts import MOST_STEPS_PER_INSTANT, Scripts, ScriptsState
+from steptwin.world.signals import Idle, SignalOf, find_signal
 from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.trace import Mark, Record, Trace
 
-MOST_STEPS_PER_INSTANT = 10_000
-"""More steps of scripts at one moment are a runaway."""
 WORLD = "world"
 """What happens to no machine happens to the world."""
 
@@ -44,8 +42,8 @@ Values: TypeAlias = tuple[tuple[str, float], ...]
 """Registers by name, and what they are to take."""
 Encode: TypeAlias = Callable[[Mic488, Values], tuple[bytes, ...]]
 """The PDUs of the requests that write registers by name, in order; as few as may be."""
-MOST_ENCODED = 10_000
-"""Requests are remembered, for scripts write the same again and again; not more than these."""
+MOST_REMEMBERED = 10_000
+"""Requests, signals and conditions are remembered, for scripts use the same again and again; not more of each than these."""
 
 
 class Given(NamedTuple):
@@ -66,12 +64,14 @@ class PlantSnapshot:
     faults: tuple[tuple[Fault, str, Nanos], ...]
     """Those that were set, with their names and moments."""
     faults_state: Any
-    scripts: tuple[ScriptState, ...]
+    scripts: ScriptsState
     inputs: tuple[Given, ...]
     is_settled: bool
-    failures: tuple[Record, ...]
-    overdue: tuple[Record, ...]
+    failures: ReportsState
+    overdue: ReportsState
     trace: Mark
+    later: frozenset[str]
+    """Names of what is done later, and may be called off."""
 
 
 class Plant:
@@ -88,9 +88,9 @@ class Plant:
         self.now: Nanos = 0
         self.stopped: str | None = None
         """Why the run ended, where a script says so."""
-        self.failures: list[Record] = []
+        self.failures = Reports()
         """Expectations that did not hold."""
-        self.overdue: list[Record] = []
+        self.overdue = Reports()
         """What scripts of the description waited for in vain."""
         self.keeps_inputs = keep_inputs
         """Whether everything from outside is kept, as a session needs it; a world that runs for weeks has no room for that."""
@@ -100,9 +100,11 @@ class Plant:
         """Whether the scripts of the description have done what they had to do since the last of that."""
         self.encode = encode
         self._encoded: dict[object, tuple[bytes, ...]] = {}
-        self._scripts: list[Script] = []
-        self._own, self._guests = Agenda(), Agenda()
-        """The scripts of the description, and those from outside: they come when the others have nothing to do at a moment."""
+        self._signals: dict[str, SignalOf | Idle] = {}
+        self._conditions: dict[str, Condition] = {}
+        self._scripts = Scripts(self)
+        self._later: dict[str, Script] = {}
+        """What is done later, and may be called off, by name."""
         self.rigging = Rigging(self.plan)
         for n, fault in enumerate(spec.faults):
             try:
@@ -133,8 +135,8 @@ class Plant:
 
     @property
     def scripts(self) -> list[Script]:
-        """All scripts in their order: those of the description, then those started later."""
-        return self._scripts
+        """Scripts that have not ended, in their order: those of the description, then those started later."""
+        return list(self._scripts)
 
     def touch(self, name: str) -> Kernel:
         """The kernel of a machine or line, brought to the present. `Misuse` with the names there are."""
@@ -152,13 +154,25 @@ class Plant:
 
     def condition(self, text: str) -> Condition:
         """Raises `Misuse` for what is no condition, and for unknown signals."""
-        return Condition(text, lambda name: find_signal(self.plan, name))
+        found = self._conditions.get(text)
+        if found is None:
+            if len(self._conditions) >= MOST_REMEMBERED:
+                self._conditions.clear()
+            found = self._conditions[text] = Condition(text, self._signal)
+        return found
+
+    def _signal(self, name: str) -> SignalOf | Idle:
+        found = self._signals.get(name)
+        if found is None:
+            if len(self._signals) >= MOST_REMEMBERED:
+                self._signals.clear()
+            found = self._signals[name] = find_signal(self.plan, name)
+        return found
 
     def read(self, signal: str) -> float:
         """The present value of a signal."""
-        found = find_signal(self.plan, signal)
-        for kernel in found.kernels:
-            kernel.advance(self.now)
+        found = self._signal(signal)
+        found.bring(self.now)
         return found.value(self.now)
 
     # ------------------------------------------------------------------ scripts
@@ -174,86 +188,28 @@ class Plant:
             steps = (do.At(spec.at or 0), *spec.steps)
             self.start(spec.name, lambda: do.run_through(steps, spec.repeat))
 
-    def start(self, name: str, make: Callable[[], do.Steps], *, is_outside: bool = False) -> Script:
-        """Let a script run from now on. ``make`` makes its generator, again whenever a snapshot is restored."""
-        script = Script(len(self._scripts), name, make, is_outside=is_outside)
-        self._scripts.append(script)
-        self._wait(script, Waiting(self.now))
-        return script
-
-    def _resume(self, script: Script, value: Any) -> None:
-        script.waiting = None
-        for _ in range(MOST_STEPS_PER_INSTANT):
-            step = script.send(value)
-            if step is None:
-                return
-            value = None
-            if isinstance(step, do.Stop):
-                self.stopped = step.reason if self.stopped is None else self.stopped
-                self._wait(script, Waiting(self.now + 1))
-                return
-            waiting = self._waits(step, script)
-            if waiting is not None:
-                self._wait(script, waiting)
-                return
-            value = self._gives(step, script)
-        raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self.now} ns")
-
-    def _wait(self, script: Script, waiting: Waiting) -> None:
-        self._agenda_of(script).add(script, waiting)
-
-    def _agenda_of(self, script: Script) -> Agenda:
-        return self._guests if script.is_outside else self._own
-
-    def _waits(self, step: do.Step, script: Script) -> Waiting | None:
-        if isinstance(step, do.Wait):
-            return Waiting(self.now + step.duration) if step.duration > 0 else None
-        if isinstance(step, do.At):
-            return Waiting(step.time) if step.time > self.now else None
-        if isinstance(step, do.Until):
-            return Waiting(None if step.within is None else self.now + step.within, self.condition(step.condition))
-        if isinstance(step, do.Request):
-            line = self.line_called(step.line)
-            place = line.connect(SCRIPTS)
-            place.received.clear()
-            self._do(script, Bytes(step.line, SCRIPTS, place.kind, encode_frame(step.unit, step.pdu)))
-            return Waiting(self.now + step.within, answer=line)
-        return None
-
-    def _gives(self, step: do.Step, script: Script) -> Any:
-        if isinstance(step, do.Wait | do.At):
-            return None  # its moment has come already
-        if isinstance(step, do.Read):
-            return self.read(step.signal)
-        if isinstance(step, do.Call):
-            step.function()
-        else:
-            self._do(script, step)
-        return None
-
-    def _do(self, script: Script, what: Outside) -> None:
-        if script.is_outside:
-            self.outside(what)
-        else:
-            self.perform(what)
+    def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool = False) -> Script:
+        """Let a script run from now on. ``make`` makes its steps, again whenever a snapshot is restored."""
+        return self._scripts.start(name, make, is_outside=is_outside)
 
     def expect(self, text: str) -> None:
         """Tell it where a condition does not hold."""
         if not self.holds(self.condition(text)):
-            self.failures.append(Record(self.now, WORLD, "event", "expectation", text))
-            self.trace.add(self.failures[-1])
+            self._report(self.failures, "expectation", text)
 
     def holds(self, condition: Condition) -> bool:
         """Whether a condition is true now."""
-        self._bring(condition)
+        condition.bring(self.now)
         return condition.holds(self.now)
 
-    def _bring(self, condition: Condition) -> None:
-        for kernel in self._kernels_of(condition):
-            kernel.advance(self.now)
+    def report_overdue(self, text: str) -> None:
+        """A script of the description has waited for something in vain."""
+        self._report(self.overdue, "overdue", text)
 
-    def _kernels_of(self, condition: Condition) -> list[Kernel]:
-        return [kernel for name in condition.signals for kernel in find_signal(self.plan, name).kernels]
+    def _report(self, reports: Reports, code: str, text: str) -> None:
+        record = Record(self.now, WORLD, "event", code, text)
+        reports.add(record)
+        self.trace.add(record)
 
     # ------------------------------------------------------------------ what comes from outside
 
@@ -294,7 +250,7 @@ class Plant:
         key = (device.firmware.name, device.data_type, values)
         found = self._encoded.get(key)
         if found is None:
-            if len(self._encoded) >= MOST_ENCODED:
+            if len(self._encoded) >= MOST_REMEMBERED:
                 self._encoded.clear()
             found = self._encoded[key] = self.encode(device, values)
         return found
@@ -322,26 +278,7 @@ class Plant:
 
     def next(self) -> Nanos | None:
         """When something happens to a script."""
-        return _first(self._due(self._own), self._due(self._guests))
-
-    def _due(self, agenda: Agenda) -> Nanos | None:
-        due = agenda.moment()
-        for script in agenda.watching:
-            waiting = script.waiting
-            if waiting is None:
-                continue
-            dues = [waiting.until]
-            if waiting.condition is not None:
-                self._bring(waiting.condition)
-                dues.append(waiting.condition.due(self.now))
-                dues += [kernel.deadline() for kernel in self._kernels_of(waiting.condition)]
-            if waiting.answer is not None:
-                kernel = self.touch(waiting.answer.name)
-                dues += [kernel.deadline(), self.now if waiting.answer.connect(SCRIPTS).received else None]
-            for one in dues:
-                if one is not None and (due is None or one < due):
-                    due = one
-        return due
+        return _first(*self._scripts.first())
 
     def advance(self, now: Nanos) -> None:
         """Bring the scripts, and the kernels they need, to ``now``, or to the end of the moment at which a script stops the run.
@@ -352,7 +289,7 @@ class Plant:
             raise TimeReversal(self.now, now)
         rounds, at = 0, -1
         while True:
-            own, guests = self._due(self._own), self._due(self._guests)
+            own, guests = self._scripts.first()
             due = _first(own, guests)
             if due is None or due > (now if self.stopped is None else self.now):
                 break
@@ -361,45 +298,13 @@ class Plant:
             if rounds > MOST_STEPS_PER_INSTANT:
                 raise Runaway(f"scripts go round for ever at {self.now} ns")
             if own is not None and own <= self.now:
-                self._run_scripts(self._own)
+                self._scripts.run_own()
             else:
                 self._is_settled = True
-                self._run_scripts(self._guests)
+                self._scripts.run_guests()
         self._is_settled = True
         if self.stopped is None:
             self.now = now
-
-    def _run_scripts(self, agenda: Agenda) -> None:
-        for script in agenda.take(self.now):
-            self._resume(script, None)
-        for script in [script for script in agenda.watching if script.waiting is not None]:
-            waiting = script.waiting
-            if waiting is None:
-                continue
-            found, value = self._come(waiting)
-            if found or (waiting.until is not None and waiting.until <= self.now):
-                agenda.watching.remove(script)
-                if not found:
-                    self._tell_overdue(script, waiting)
-                self._resume(script, value)
-
-    def _tell_overdue(self, script: Script, waiting: Waiting) -> None:
-        """Steps of a description go on whether or not what they wait for comes; code from outside is sent that, and decides."""
-        if waiting.condition is not None and not script.is_outside:
-            text = f"{script.name} waited in vain for {waiting.condition.text}"
-            self.overdue.append(Record(self.now, WORLD, "event", "overdue", text))
-            self.trace.add(self.overdue[-1])
-
-    def _come(self, waiting: Waiting) -> tuple[bool, Any]:
-        """Whether what a script waits for has come, and what it is sent."""
-        if waiting.answer is not None:
-            self.touch(waiting.answer.name)
-            answer = b"".join(data for _, data in waiting.answer.connect(SCRIPTS).take(self.now))
-            return bool(answer), answer[1:-2]
-        if waiting.condition is None:
-            return False, None
-        holds = self.holds(waiting.condition)
-        return holds, holds
 
     def settle_all(self) -> None:
         """Bring every kernel to the present."""
@@ -415,20 +320,20 @@ class Plant:
             watch = self.start("until", lambda: do.run_through(steps))
         self.advance(end)
         if watch is not None:
-            self._end(watch)
-            if self._scripts[-1] is watch:
-                self._scripts.pop()
+            self._scripts.end(watch)
         self.settle_all()
         return self.stopped
 
+    def do_later(self, name: str, steps: tuple[do.Step, ...]) -> None:
+        """Steps that are taken as those of the description, instead of others begun under the same name."""
+        self.call_off(name)
+        self._later[name] = self.start(name, lambda: do.run_through(steps))
+
     def call_off(self, name: str) -> None:
         """What was to be done later under a name is not done."""
-        for script in self._own.called(name):
-            self._end(script)
-
-    def _end(self, script: Script) -> None:
-        script.ended = True
-        self._agenda_of(script).remove(script)
+        script = self._later.pop(name, None)
+        if script is not None:
+            self._scripts.end(script)
 
     def go_on(self) -> None:
         """A world that was stopped may go on."""
@@ -445,12 +350,13 @@ class Plant:
             tuple(kernel.snapshot() for kernel in self.kernels),
             tuple((active.fault, active.name, active.since) for active in self.plan.faults.active),
             self.plan.faults.copy_state(),
-            tuple(script.state() for script in self._scripts),
+            self._scripts.state(),
             tuple(self.inputs),
             self._is_settled,
-            tuple(self.failures),
-            tuple(self.overdue),
+            self.failures.state(),
+            self.overdue.state(),
             self.trace.mark(),
+            frozenset(self._later),
         )
 
     def _description(self) -> tuple[str, int, Files]:
@@ -470,17 +376,10 @@ class Plant:
         for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
             kernel.restore(state)
         self.inputs, self._is_settled = list(snapshot.inputs), snapshot.is_settled
-        self.failures, self.overdue = list(snapshot.failures), list(snapshot.overdue)
-        self._scripts, self._own, self._guests = [], Agenda(), Agenda()
-        for number, state in enumerate(snapshot.scripts):
-            script = Script(number, state.name, state.make, is_outside=state.is_outside)
-            self._scripts.append(script)
-            script.replay(state.sent)
-            script.ended = state.ended
-            if state.ended:
-                continue
-            condition = None if state.condition is None else self.condition(state.condition)
-            self._wait(script, Waiting(state.until, condition, None if state.answer is None else self.lines[state.answer]))
+        self.failures, self.overdue = Reports(snapshot.failures), Reports(snapshot.overdue)
+        self._conditions.clear()
+        self._scripts.restore(snapshot.scripts)
+        self._later = {script.name: script for script in self._scripts if script.name in snapshot.later and not script.is_outside}
 
 
 def _first(one: Nanos | None, other: Nanos | None) -> Nanos | None:

@@ -9,6 +9,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.pins import settable_pin
 from steptwin.mic488.device import Mic488, check_pin, check_turn
 from steptwin.world import script as do
+from steptwin.world.actions import master_of
 from steptwin.world.faults import Fault
 from steptwin.world.reader import Path
 from steptwin.world.spec import ScriptSpec
@@ -86,6 +87,10 @@ def _write(plant: Plant, step: do.Write) -> None:
         plant.requests(plant.controller(name, "registers"), values)
 
 
+def _request(plant: Plant, step: do.Request) -> None:
+    master_of(plant.line_called(step.line))
+
+
 def _send(plant: Plant, step: do.Send) -> None:
     plant.line_called(step.line)
 
@@ -114,6 +119,7 @@ _CHECKS: dict[type, Callable[[Plant, Any], None]] = {
     do.Press: _button,
     do.Release: _button,
     do.Write: _write,
+    do.Request: _request,
     do.Send: _send,
     do.PowerCycle: _power_cycle,
     do.Turn: _turn,

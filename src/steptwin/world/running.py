@@ -1,93 +1,159 @@
-"""Scripts that run: generators of steps, with what they were sent and what they wait for."""
+"""Scripts that run: where each is in its steps, and what it waits for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from array import array
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
+from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.world import script as do
-from steptwin.world.expression import Condition
-from steptwin.world.lines import Line
 
 
-@dataclass(slots=True)
-class Waiting:
-    """What a script waits for. ``until`` is a moment; a condition or an answer may come before it."""
+class Asked(NamedTuple):
+    """Requests on a line, up to the one numbered ``last``, to which a script waits for the answers."""
+
+    line: str
+    first: int
+    last: int
+
+
+class Waiting(NamedTuple):
+    """What a script waits for: a moment, or something that comes before it."""
 
     until: Nanos | None
-    condition: Condition | None = None
-    answer: Line | None = None
+    condition: str | None = None
+    asked: tuple[Asked, ...] = ()
+    answer: bytes | None = None
+    """What a `Request` was answered at once."""
+    is_request: bool = False
+    """Whether the script is sent the answer."""
 
     @property
     def is_timed(self) -> bool:
         """Whether nothing but a moment ends it."""
-        return self.condition is None and self.answer is None and self.until is not None
+        return self.condition is None and not self.asked
+
+
+class Sent:
+    """What a generator was sent so far, in as many bytes as it takes: scripts may run for months."""
+
+    __slots__ = ("_bytes", "_kinds", "_lengths", "_numbers")
+
+    _PLAIN = (None, False, True)
+    _NUMBER, _BYTES = 3, 4
+
+    def __init__(self) -> None:
+        self._kinds = bytearray()
+        self._numbers = array("d")
+        self._lengths = array("L")
+        self._bytes = bytearray()
+
+    def __len__(self) -> int:
+        return len(self._kinds)
+
+    def add(self, value: object) -> None:
+        """None, a truth value, a number or bytes: what steps give."""
+        if value is None or value is False or value is True:
+            self._kinds.append(self._PLAIN.index(value))
+        elif isinstance(value, float):
+            self._kinds.append(self._NUMBER)
+            self._numbers.append(value)
+        elif isinstance(value, bytes):
+            self._kinds.append(self._BYTES)
+            self._lengths.append(len(value))
+            self._bytes += value
+        else:
+            raise Misuse(f"{value!r}: a step gives nothing, a truth value, a number or bytes")
+
+    def values(self) -> Any:
+        """All of it, in order."""
+        numbers, lengths, at = iter(self._numbers), iter(self._lengths), 0
+        for kind in self._kinds:
+            if kind == self._NUMBER:
+                yield next(numbers)
+            elif kind == self._BYTES:
+                length = next(lengths)
+                yield bytes(self._bytes[at : at + length])
+                at += length
+            else:
+                yield self._PLAIN[kind]
+
+    def copy(self) -> Sent:
+        other = Sent()
+        other._kinds, other._bytes = self._kinds.copy(), self._bytes.copy()
+        other._numbers, other._lengths = self._numbers[:], self._lengths[:]
+        return other
+
+
+Place: TypeAlias = "tuple[tuple[int, int], ...] | Sent"
+"""Where a script is: its place in a `Walk`, or what its generator was sent."""
 
 
 class ScriptState(NamedTuple):
-    """A script, what it was sent so far, as (value, how often), what it waits for, and whether it has ended."""
+    """A script that has not ended, where it is and what it waits for."""
 
+    number: int
     name: str
-    make: Callable[[], do.Steps]
+    make: Callable[[], do.Steps | do.Walk]
     is_outside: bool
-    sent: tuple[tuple[Any, int], ...]
-    until: Nanos | None
-    condition: str | None
-    answer: str | None
-    ended: bool
+    place: Place
+    waiting: Waiting | None
 
 
 class Script:
-    """A generator of steps in progress."""
+    """Steps in progress. Scripts are numbered in the order in which they began."""
 
-    __slots__ = ("ended", "is_outside", "make", "name", "number", "sent", "steps", "waiting")
+    __slots__ = ("_sent", "_steps", "ended", "entry", "is_outside", "kernels", "make", "name", "number", "waiting")
 
-    def __init__(self, number: int, name: str, make: Callable[[], do.Steps], *, is_outside: bool) -> None:
+    def __init__(self, number: int, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool) -> None:
         self.number = number
         self.name = name
         self.make = make
         self.is_outside = is_outside
         """Whether it is no part of the description: what it does comes from outside."""
-        self.sent: list[tuple[Any, int]] = []
-        self.steps = make()
+        self._sent = Sent()
+        self._steps = make()
         self.waiting: Waiting | None = None
+        self.entry = 0
+        """Its present entry in an agenda."""
+        self.kernels: tuple[Any, ...] = ()
+        """Those on which it depends what it waits for."""
         self.ended = False
 
     def send(self, value: Any) -> do.Step | None:
-        if self.sent and self.sent[-1][0] is value:
-            self.sent[-1] = value, self.sent[-1][1] + 1
-        else:
-            self.sent.append((value, 1))
+        """The next step; None after the last."""
+        if not isinstance(self._steps, do.Walk):
+            self._sent.add(value)
         return self._next(value)
 
     def _next(self, value: Any) -> do.Step | None:
         try:
-            return self.steps.send(value)
+            return self._steps.send(value)
         except StopIteration:
-            self.ended = True
+            self.end()
             return None
 
-    def state(self) -> ScriptState:
-        waiting = self.waiting
-        return ScriptState(
-            self.name,
-            self.make,
-            self.is_outside,
-            tuple(self.sent),
-            None if waiting is None else waiting.until,
-            None if waiting is None or waiting.condition is None else waiting.condition.text,
-            None if waiting is None or waiting.answer is None else waiting.answer.name,
-            self.ended,
-        )
+    def end(self) -> None:
+        """It takes no further step."""
+        self.ended = True
+        self._steps.close()
+        self._sent = Sent()
 
-    def replay(self, sent: Iterable[tuple[Any, int]]) -> None:
-        """Bring a fresh generator to where it had been sent all this."""
-        self.steps.close()
-        self.steps = self.make()
-        self.sent = list(sent)
-        self.ended = False
-        for value, count in self.sent:
-            for _ in range(count):
-                self._next(value)
+    def state(self) -> ScriptState:
+        steps = self._steps
+        place: Place = steps.place if isinstance(steps, do.Walk) else self._sent.copy()
+        return ScriptState(self.number, self.name, self.make, self.is_outside, place, self.waiting)
+
+    @classmethod
+    def at(cls, state: ScriptState) -> Script:
+        """A script in a state: a walk at its place, or a fresh generator that was sent the same again."""
+        script = cls(state.number, state.name, state.make, is_outside=state.is_outside)
+        if isinstance(state.place, Sent):
+            script._sent = state.place.copy()
+            for value in state.place.values():
+                script._next(value)
+        else:
+            script._steps.place = state.place  # type: ignore[union-attr]
+        return script

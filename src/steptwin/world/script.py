@@ -2,14 +2,15 @@
 nanoseconds: ``Wait(SECOND // 2)``, or ``Wait(duration("500 ms"))`` with `steptwin.world.durations`.
 
 A generator is sent what a step gives: for `Read` a number, for `Request` the answer (bytes), for `Until` whether the condition
-came true in time. It touches nothing by itself, so that it can be restored by sending it the same again.
+came true in time. It touches nothing by itself, so that it can be restored by sending it the same again. Steps that are known
+beforehand are a `Walk`, whose state is its place among them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -205,37 +206,100 @@ Step: TypeAlias = (
     | Repeat
 )
 Steps: TypeAlias = Generator[Step, Any, None]
+"""What an operator in Python is: steps as they come, which may depend on what steps before have given."""
 
 
-def run_through(steps: Iterable[Step], times: int = 1) -> Steps:
-    """The steps in order, ``times`` times."""
-    done = 0
-    while done < times:
-        for step in steps:
+@dataclass(frozen=True, slots=True)
+class _Turn:
+    """The first step of a `Walk` whose turns begin ``period`` after each other."""
+
+    begin: Nanos
+    period: Nanos
+
+
+class Walk:
+    """Steps in order, ``times`` times; None: without end. It is used like a generator, and `place` is all of its state."""
+
+    __slots__ = ("_levels", "_steps", "_times")
+
+    def __init__(self, steps: Iterable[Step | _Turn], times: int | None = 1) -> None:
+        self._steps = _without_empty(steps)
+        self._times = times
+        self._levels = [(self._steps, 0, 0)] if self._steps and times != 0 else []
+        """Of the whole and each `Repeat` that has begun, outermost first: steps, the next of them, how many turns are done."""
+
+    @property
+    def place(self) -> tuple[tuple[int, int], ...]:
+        """For the whole and each `Repeat` that has begun, outermost first: which step is next, and how many turns are done."""
+        return tuple((index, done) for _, index, done in self._levels)
+
+    @place.setter
+    def place(self, place: tuple[tuple[int, int], ...]) -> None:
+        self._levels = []
+        for index, done in place:
+            steps = self._steps if not self._levels else self._repeat().steps
+            self._levels.append((steps, index, done))
+
+    def _repeat(self) -> Repeat:
+        """The `Repeat` that the innermost level has begun."""
+        steps, index, _ = self._levels[-1]
+        return cast(Repeat, steps[index - 1])
+
+    def __iter__(self) -> Walk:
+        return self
+
+    def __next__(self) -> Step:
+        return self.send(None)
+
+    def send(self, value: object) -> Step:
+        """The next step; what the step before has given is ignored. Raises `StopIteration` after the last."""
+        while self._levels:
+            steps, index, done = self._levels.pop()
+            if index == len(steps):
+                times = self._repeat().times if self._levels else self._times
+                if times is None or done + 1 < times:
+                    self._levels.append((steps, 0, done + 1))
+                continue
+            self._levels.append((steps, index + 1, done))
+            step = steps[index]
             if isinstance(step, Repeat):
-                yield from run_through(step.steps, step.times)
+                self._levels.append((step.steps, 0, 0))
+            elif isinstance(step, _Turn):
+                return At(step.begin + step.period * (done + 1))
             else:
-                yield step
-        done += 1
+                return step
+        raise StopIteration
+
+    def close(self) -> None:
+        self._levels = []
 
 
-def run_every(steps: tuple[Step, ...], period: Nanos, begin: Nanos) -> Steps:
+def _without_empty(steps: Iterable[Step | _Turn]) -> tuple[Step | _Turn, ...]:
+    """Steps without repetitions of nothing, through which one could go for ever."""
+    kept: list[Step | _Turn] = []
+    for step in steps:
+        if not isinstance(step, Repeat):
+            kept.append(step)
+        elif step.times > 0 and (inner := _without_empty(step.steps)):
+            kept.append(Repeat(step.times, cast("tuple[Step, ...]", inner)))
+    return tuple(kept)
+
+
+def run_through(steps: Iterable[Step], times: int = 1) -> Walk:
+    """The steps in order, ``times`` times."""
+    return Walk(steps, times)
+
+
+def run_every(steps: tuple[Step, ...], period: Nanos, begin: Nanos) -> Walk:
     """The steps at ``begin`` + ``period``, and again after each period."""
-    moment = begin
-    while True:
-        moment += period
-        yield At(moment)
-        yield from run_through(steps)
+    return Walk((_Turn(begin, period), *steps), None)
 
 
-def run_when(steps: tuple[Step, ...], condition: str, *, once: bool) -> Steps:
+def run_when(steps: tuple[Step, ...], condition: str, *, once: bool) -> Walk:
     """The steps whenever the condition comes true."""
-    while True:
-        yield Until(condition)
-        yield from run_through(steps)
-        if once:
-            return
-        yield Until(f"not ({condition})")
+    if once:
+        return Walk((Until(condition), *steps))
+    return Walk((Until(condition), *steps, Until(f"not ({condition})")), None)
 
 
 # ---------------------------------------------------------------------- steps in TOML

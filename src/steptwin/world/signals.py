@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
@@ -16,6 +17,7 @@ from steptwin.wbc.nearmiss import NearMiss
 from steptwin.world.build import Fitted, Plan
 from steptwin.world.course import profile_of
 from steptwin.world.kernel import Kernel
+from steptwin.world.lines import Line
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,13 @@ class SignalOf:
     def continuous(self) -> bool:
         return self.turning is not None
 
+    def bring(self, now: Nanos) -> tuple[Kernel, ...]:
+        """Bring the kernels on which the value at ``now`` depends to that moment; gives them. Until one of them changes, the
+        value stays as it is or goes on as it goes."""
+        for kernel in self.kernels:
+            kernel.advance(now)
+        return self.kernels
+
     def value(self, now: Nanos) -> float:
         return self.read(now)
 
@@ -41,12 +50,48 @@ class SignalOf:
         return None if self.versions is None else self.versions()
 
 
-def find_signal(plan: Plan, name: str) -> SignalOf:
+class Idle:
+    """Whether all machines are idle, and nothing is on its way on a line. While one of them is busy the others do not matter."""
+
+    continuous = False
+
+    def __init__(self, plan: Plan) -> None:
+        self._kernels = tuple(plan.kernels)
+        self._things: list[tuple[Kernel, Callable[[Nanos], bool]]] = [
+            *((plan.kernel_of[name], partial(is_idle, machine)) for name, machine in plan.machines.items()),
+            *((plan.kernel_of[name], partial(_is_quiet, line)) for name, line in plan.lines.items()),
+        ]
+        self._busy: int | None = None
+        """The thing that was found busy last."""
+
+    def bring(self, now: Nanos) -> tuple[Kernel, ...]:
+        """As `SignalOf.bring`: the kernel of what is busy, all of them when nothing is."""
+        for n in (*(() if self._busy is None else (self._busy,)), *range(len(self._things))):
+            kernel, is_at_rest = self._things[n]
+            kernel.advance(now)
+            if not is_at_rest(now):
+                self._busy = n
+                return (kernel,)
+        self._busy = None
+        return self._kernels
+
+    def value(self, now: Nanos) -> float:
+        """After `bring`."""
+        return float(self._busy is None)
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        yield from ()
+
+    def version(self) -> object:
+        return None
+
+
+def find_signal(plan: Plan, name: str) -> SignalOf | Idle:
     """The signal called ``name``. `Misuse` with what there is."""
     if name == "time":
         return SignalOf((), lambda now: now / SECOND, lambda now: (), lambda: name)
     if name == "idle":
-        return SignalOf(tuple(plan.kernels), lambda now: float(_all_idle(plan, now)))
+        return Idle(plan)
     owner, _, rest = name.partition(".")
     if owner in plan.axes:
         return _of_axis(plan.axes[owner], rest, name)
@@ -69,10 +114,9 @@ def find_signal(plan: Plan, name: str) -> SignalOf:
     return _of_m1486(machine, kernel, rest, name)
 
 
-def _all_idle(plan: Plan, now: Nanos) -> bool:
-    """Whether all machines are idle, and nothing is on its way on a line."""
-    machines = all(is_idle(machine, now) for machine in plan.machines.values())
-    return machines and all(line.deadline() is None for line in plan.lines.values())
+def _is_quiet(line: Line, now: Nanos) -> bool:
+    """Whether nothing is on its way on a line."""
+    return line.deadline() is None
 
 
 def is_idle(machine: Mic488 | M1486, now: Nanos) -> bool:

@@ -1,0 +1,258 @@
+"""The scripts of a world: what each does next, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from heapq import heappop, heappush
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from steptwin.errors import Runaway
+from steptwin.machine import Nanos
+from steptwin.world import script as do
+from steptwin.world.actions import Outside, master_of
+from steptwin.world.agenda import Agenda, Watchers
+from steptwin.world.master import Master
+from steptwin.world.running import Asked, Script, ScriptState, Waiting
+
+if TYPE_CHECKING:
+    from steptwin.world.plant import Plant
+
+MOST_STEPS_PER_INSTANT = 10_000
+"""More steps of scripts at one moment are a runaway."""
+
+
+class ScriptsState(NamedTuple):
+    """All scripts that have not ended, and how many there were."""
+
+    begun: int
+    scripts: tuple[ScriptState, ...]
+
+
+class Scripts:
+    """Runs scripts step by step. Those of the description come first at a moment; those from outside when they are done."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._begun = 0
+        self._scripts: dict[int, Script] = {}
+        self._own, self._guests = Agenda(), Agenda()
+        self._watchers = Watchers()
+
+    def __iter__(self) -> Iterator[Script]:
+        """Those that have not ended, in their order."""
+        return iter(self._scripts.values())
+
+    # ------------------------------------------------------------------ beginning and ending
+
+    def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool) -> Script:
+        script = self._scripts[self._begun] = Script(self._begun, name, make, is_outside=is_outside)
+        self._begun += 1
+        self._wait(script, Waiting(self._plant.now))
+        return script
+
+    def end(self, script: Script) -> None:
+        """It takes no further step."""
+        if script.number in self._scripts:
+            script.end()
+            self._remove(script)
+
+    def _remove(self, script: Script) -> None:
+        script.waiting = None
+        self._agenda_of(script).remove(script)
+        self._watchers.set(script, ())
+        self._scripts.pop(script.number, None)
+
+    def _agenda_of(self, script: Script) -> Agenda:
+        return self._guests if script.is_outside else self._own
+
+    # ------------------------------------------------------------------ when they are looked at
+
+    def first(self) -> tuple[Nanos | None, Nanos | None]:
+        """When the first script of the description is due, and when the first one from outside."""
+        self._renew()
+        return self._own.first(), self._guests.first()
+
+    def _renew(self) -> None:
+        """Find anew when those are due for which something has changed."""
+        while changed := self._watchers.take():
+            for script in changed:
+                self._plan(script)
+
+    def _wait(self, script: Script, waiting: Waiting) -> None:
+        script.waiting = waiting
+        if waiting.is_timed and waiting.until is not None:
+            self._watchers.set(script, ())
+            self._agenda_of(script).wait(script, waiting.until)
+        else:
+            self._plan(script)
+
+    def _plan(self, script: Script) -> None:
+        """Find when a script that watches is due, unless one of its kernels changes before."""
+        waiting, plant = script.waiting, self._plant
+        if waiting is None:
+            return
+        dues = [waiting.until]
+        if waiting.condition is None:
+            kernels = tuple(plant.touch(asked.line) for asked in waiting.asked)
+            dues.append(plant.now if self._are_answered(waiting) else None)
+        else:
+            condition = plant.condition(waiting.condition)
+            kernels = condition.bring(plant.now)
+            dues.append(condition.due(plant.now))
+        dues += [kernel.deadline() for kernel in kernels]
+        self._watchers.set(script, kernels)
+        self._agenda_of(script).watch(script, min((due for due in dues if due is not None), default=None))
+
+    def _are_answered(self, waiting: Waiting) -> bool:
+        return all(self._master(asked.line).finished >= asked.last for asked in waiting.asked)
+
+    def _master(self, line: str) -> Master:
+        return master_of(self._plant.line_called(line))
+
+    # ------------------------------------------------------------------ what they do
+
+    def run_own(self) -> None:
+        """Let the scripts of the description do what is due now."""
+        self._run(self._own)
+
+    def run_guests(self) -> None:
+        """Let those from outside do what is due now."""
+        self._run(self._guests)
+
+    def _run(self, agenda: Agenda) -> None:
+        """First those whose moment has come, then those that watch, in their order. Each is looked at once; what comes to be due
+        behind the one that acts is left for the next time."""
+        now = self._plant.now
+        for script in agenda.take_timed(now):
+            self._resume(script, None)
+        ready: dict[int, Script] = {}
+        order: list[int] = []
+        behind: list[Script] = []
+        last = -1
+        while True:
+            self._renew()
+            for script in agenda.take_watching(now):
+                if script.number <= last:
+                    behind.append(script)
+                elif script.number not in ready:
+                    ready[script.number] = script
+                    heappush(order, script.number)
+            if not order:
+                break
+            last = heappop(order)
+            self._look(ready.pop(last))
+        for script in behind:
+            if script.waiting is not None:
+                agenda.watch(script, now)
+
+    def _look(self, script: Script) -> None:
+        """Let a script that watches go on if what it waits for has come, or its time is over."""
+        waiting, now = script.waiting, self._plant.now
+        if waiting is None:
+            return
+        if waiting.condition is not None:
+            condition = self._plant.condition(waiting.condition)
+            condition.bring(now)
+            value: Any = condition.holds(now)
+            has_come = value
+        else:
+            has_come = self._are_answered(waiting)
+            value = self._answer(waiting) if has_come else None
+        if has_come or (waiting.until is not None and waiting.until <= now):
+            self._report_overdue(script, waiting, has_come=has_come)
+            self._resume(script, value)
+        else:
+            self._watchers.again(script)
+
+    def _answer(self, waiting: Waiting) -> bytes | None:
+        """The PDU of the answer, for who asked for it."""
+        if not waiting.is_request:
+            return None
+        (asked,) = waiting.asked
+        return self._master(asked.line).answers.pop(asked.last)[1:-2]
+
+    def _report_overdue(self, script: Script, waiting: Waiting, *, has_come: bool) -> None:
+        """Steps of a description go on whether or not what they wait for comes; code from outside is sent that, and decides."""
+        if script.is_outside or waiting.is_request:
+            return
+        if waiting.condition is not None:
+            if not has_come:
+                self._plant.report_overdue(f"{script.name} waited in vain for {waiting.condition}")
+            return
+        for asked in waiting.asked:
+            if asked.first <= self._master(asked.line).unanswered <= asked.last:
+                self._plant.report_overdue(f"{script.name} waited in vain for an answer on {asked.line}")
+
+    def _resume(self, script: Script, value: Any) -> None:
+        script.waiting = None
+        for _ in range(MOST_STEPS_PER_INSTANT):
+            step = script.send(value)
+            if step is None:
+                self._remove(script)
+                return
+            waiting, value = self._take(step, script)
+            if waiting is not None:
+                self._wait(script, waiting)
+                return
+        raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self._plant.now} ns")
+
+    def _take(self, step: do.Step, script: Script) -> tuple[Waiting | None, Any]:
+        """Take a step: what it waits for, or else what it gives."""
+        plant = self._plant
+        match step:
+            case do.Wait():
+                return (Waiting(plant.now + step.duration) if step.duration > 0 else None), None
+            case do.At():
+                return (Waiting(step.time) if step.time > plant.now else None), None
+            case do.Until():
+                plant.condition(step.condition)  # wrong ones are told here
+                return Waiting(None if step.within is None else plant.now + step.within, step.condition), None
+            case do.Stop():
+                plant.stopped = step.reason if plant.stopped is None else plant.stopped
+                return Waiting(plant.now + 1), None
+            case do.Request():
+                master = self._master(step.line)
+                number = master.asked + 1
+                master.wanted |= {number}
+                self._do(script, step)
+                return Waiting(None, asked=(Asked(step.line, number, number),), is_request=True), None
+            case do.Write():
+                return self._write(step, script), None
+            case do.Read():
+                return None, plant.read(step.signal)
+            case do.Call():
+                step.function()
+            case _:
+                self._do(script, step)
+        return None, None
+
+    def _write(self, step: do.Write, script: Script) -> Waiting | None:
+        """As a master does it: what follows comes after the answers."""
+        plant = self._plant
+        lines = dict.fromkeys(plant.plan.line_of[name][0].name for name, *_ in step.values if name in plant.plan.line_of)
+        before = {name: self._master(name).asked for name in lines}
+        self._do(script, step)
+        asked = tuple(Asked(name, before[name] + 1, self._master(name).asked) for name in lines)
+        waiting = Waiting(None, asked=tuple(one for one in asked if self._master(one.line).finished < one.last))
+        return waiting if waiting.asked else None
+
+    def _do(self, script: Script, what: Outside) -> None:
+        if script.is_outside:
+            self._plant.outside(what)
+        else:
+            self._plant.perform(what)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def state(self) -> ScriptsState:
+        return ScriptsState(self._begun, tuple(script.state() for script in self._scripts.values()))
+
+    def restore(self, state: ScriptsState) -> None:
+        """Take a state; kernels have theirs already."""
+        for script in list(self._scripts.values()):
+            self.end(script)
+        self._begun = state.begun
+        for one in state.scripts:
+            script = self._scripts[one.number] = Script.at(one)
+            if one.waiting is not None:
+                self._wait(script, one.waiting)
