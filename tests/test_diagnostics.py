@@ -135,3 +135,10 @@ def test_to_json_is_plain_data_with_places_from_one() -> None:
             "fix": None,
         },
     ]
+
+
+def test_a_suggestion_that_the_text_makes_already_is_shown_once() -> None:
+    span = Span(0, 1)
+    for message, hint in (("unknown; did you mean speed?", None), ("unknown", "did you mean speed?")):
+        shown = render(Source("p", "x"), [Diagnostic("W104", Severity.ERROR, span, message, hint, Fix(span, "speed"))])
+        assert shown.count("speed") == 1, shown

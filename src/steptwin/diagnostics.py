@@ -106,7 +106,7 @@ def render(source: Source, diagnostics: Sequence[Diagnostic]) -> str:
         parts.append(f"  {pad} | {' ' * before}{'^' * width}")
         if d.hint:
             parts.append(f"  {pad} = {d.hint}")
-        if d.fix:
+        if d.fix and f"did you mean {d.fix.text}?" not in f"{d.message} {d.hint}":
             parts.append(f"  {pad} = suggestion: {d.fix.text.strip() or ('start a new line' if d.fix.text else 'remove it')}")
     return "\n".join(parts)
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 from steptwin import __version__
+from steptwin.cli import main
 
 
 def steptwin(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -20,3 +23,25 @@ def test_usage_and_errors_are_those_of_the_command() -> None:
     assert "Usage: python -m steptwin [OPTIONS] COMMAND" in steptwin("--help").stdout
     wrong = steptwin("serve", "mic488", "--firmware", "9")
     assert (wrong.returncode, "firmware '9'" in wrong.stderr, "Traceback" in wrong.stderr) == (2, True, False), wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["registers", "mic488", "--format", "x"],
+            "Invalid value for '--format': 'x' is not one of 'table', 'csv',",
+        ),
+        (["commands", "m1487"], "'m1487' is not one of"),
+        (["registers", "m1486"], "an M1486 has no registers; 'steptwin commands m1486' shows its commands"),
+        (["registers", "m1487"], "no controller 'm1487' with registers; there is mic488"),
+    ],
+)
+def test_choices_that_are_none(
+    arguments: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["steptwin", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    told = capsys.readouterr().err
+    assert (ended.value.code, message in told, "Value error" in told) == (2, True, False), told

@@ -6,9 +6,10 @@ Exit codes: 0 done, 1 not done (a check found something, a peer refused, a line 
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from steptwin import __version__
 from steptwin.cli import (
@@ -39,8 +40,25 @@ from steptwin.cli import (
 )
 from steptwin.errors import Misuse, SteptwinError
 
+
+class _Commands(TyperGroup):
+    """typer checks choices with a validator whose name it puts before the message."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            message = error.message.removeprefix("Value error, ")
+            raise typer.BadParameter(message, error.ctx, error.param, error.param_hint) from None
+
+
 app = typer.Typer(
-    name="steptwin", no_args_is_help=True, add_completion=True, pretty_exceptions_enable=False, rich_markup_mode=None
+    name="steptwin",
+    cls=_Commands,
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
 )
 app.add_typer(serve.app, name="serve")
 app.command()(registers.registers)

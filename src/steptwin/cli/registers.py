@@ -15,14 +15,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from steptwin.errors import Misuse
+
 if TYPE_CHECKING:
     from steptwin.mic488.registermap import Register, RegisterMap, Row
 
 _COLUMNS = ("address", "name", "type", "read", "write", "unit", "permitted", "meaning")
-
-
-class Device(enum.StrEnum):
-    MIC488 = "mic488"
 
 
 class Format(enum.StrEnum):
@@ -33,13 +31,17 @@ class Format(enum.StrEnum):
 
 
 def registers(
-    device: Annotated[Device, typer.Argument(help="Controller.")],
+    device: Annotated[str, typer.Argument(metavar="mic488", help="Controller.")],
     firmware: Annotated[str, typer.Option(help="Firmware generation: 1.23, 1.40 or 1.70.")] = "1.70",
     form: Annotated[Format, typer.Option("--format", help="How to print it.")] = Format.TABLE,
 ) -> None:
     """Show the coils, inputs and holding registers of a controller."""
     from steptwin.mic488.registers import register_map
 
+    if device == "m1486":
+        raise Misuse("an M1486 has no registers; 'steptwin commands m1486' shows its commands")
+    if device != "mic488":
+        raise Misuse(f"no controller {device!r} with registers; there is mic488")
     chosen = register_map(firmware)
     if form is Format.CSV:
         typer.echo(as_csv(chosen), nl=False)
