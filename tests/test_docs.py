@@ -18,10 +18,11 @@ def rows(prefix: str) -> list[str]:
 
 
 @pytest.mark.parametrize("prefix", PREFIXES)
-def test_interpretations_are_numbered_without_gap_or_double(prefix: str) -> None:
-    listed = rows(prefix)
+def test_interpretations_are_in_order_and_listed_once(prefix: str) -> None:
+    listed = [int(name.removeprefix(f"{prefix}-")) for name in rows(prefix)]
     assert listed
-    assert listed == [f"{prefix}-{n}" for n in range(1, len(listed) + 1)]
+    # Decisions of the reference begin again at 40, so numbers may be left out.
+    assert listed == sorted(set(listed))
 
 
 @pytest.mark.parametrize("prefix", PREFIXES)

@@ -94,6 +94,7 @@ def test_check_as_json(run: Run, file: File) -> None:
         (("check", "a.prg", "--config", "none.cfg"), "cannot read none.cfg: No such file or directory"),
         (("check", "none.prg"), "cannot read none.prg: No such file or directory"),
         (("fmt", "a.m1486"), "cannot format a.m1486: permitted are WBC programs (.prg)"),
+        (("build", "a.wbc"), "a.wbc is a compiled image already: steptwin decompile makes a program of it"),
         (("build", "none.prg"), "cannot read none.prg: No such file or directory"),
         (("build", "named.prg"), "named.prg names positions: give the table with --positions"),
         (("build", "a.prg", "-o", "a.prg/a.wbc"), "cannot write a.prg/a.wbc: Not a directory"),

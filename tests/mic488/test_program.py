@@ -87,7 +87,7 @@ def test_a_program_longer_than_the_firmware_holds_is_refused() -> None:
 @pytest.mark.parametrize("rows", ["", None])
 def test_wbc_25_a_program_that_uses_positions_needs_a_position_bank(rows: str | None) -> None:
     table, _ = parse_positions("A;1;2;3;4\n")
-    for line in ("MOVEPTP @A", "$R0 = LinX", "PTPM2 = 3"):
+    for line in ("MOVEPTP @A", "$R0 = LinX", "PTPM2 = 3\n$I0 = 1\nMOVEPTP $I0", "LinX = 3\nMOVELIN $I0"):
         rig = Rig(programs={0: load(check(f"{line}\nEND\n", table))})
         if rows is not None:
             rig.device.load_positions(0, parse_positions(rows)[0])
@@ -99,6 +99,15 @@ def test_wbc_25_a_program_that_uses_positions_needs_a_position_bank(rows: str | 
     rig.word("PROGRAM_CTRL", 1)
     rig.wait(0.1)
     assert rig.word("PROGRAM_CTRL") == 1
+
+
+def test_wbc_25_a_row_0_that_the_program_writes_needs_no_position_bank() -> None:
+    rig = ProgramRig(
+        "M1 = ON\nM2 = ON\nLinX = 5\nLinVel = 50\nMOVELIN 0\nWAITPOS\nPTPM2 = 3\nMOVEPTP 0\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\n"
+    )
+    rig.start()
+    rig.pin_until("OUT1", 1.0)
+    assert [rig.position(axis) for axis in (1, 2)] == [5, 3]
 
 
 def test_positions_of_an_image_replace_rows_of_the_table() -> None:

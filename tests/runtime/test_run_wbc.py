@@ -16,6 +16,12 @@ from steptwin.runtime.programbanks import ProgramErrors
 from steptwin.runtime.run_wbc import WbcRun, run
 from steptwin.runtime.timedinputs import parse_inputs
 from steptwin.runtime.wbc_bench import Travel, parse_travel
+from steptwin.wbc.check import check
+from steptwin.wbc.dialect import DEFAULT
+from steptwin.wbc.image import build
+from steptwin.wbc.positions import parse_positions
+from steptwin.wbc.resolve import resolve
+from steptwin.wbc.syntax import parse
 
 TOLD = re.compile(r" *(\d+\.\d{6}) s  (\S.*?)(?:  +(\d+)  \S.*)?$")
 EXAMPLES = Path(__file__).parents[2] / "examples" / "mic488"
@@ -143,7 +149,7 @@ SWITCHES = "[Axis0]\nUnit=3\nGear=10\nAcc=1000\nDec=1000\nVel=50\nHomeMode=0\nLi
 def test_switches_stand_where_travel_says_or_are_assumed(play: Play, level: int) -> None:
     config = SWITCHES.format(level=level)
     assumed = play(HOMING, config=config, until_idle=True)
-    assert assumed.lines[0] == "M1: KL on IN3 assumed at -5 mm (--travel says otherwise)"
+    assert assumed.lines[0] == "M1: KL on IN3 assumed at -5 mm (--travel M1=LOW.. says otherwise)"
     told = play(HOMING, config=config, until_idle=True, travels=[Travel(1, -12.0, None)])
     assert "assumed" not in "".join(told.lines)
     homed = [next(float(time) for time, text, _ in ran.told() if "position reached" in text) for ran in (assumed, told)]
@@ -151,6 +157,169 @@ def test_switches_stand_where_travel_says_or_are_assumed(play: Play, level: int)
     assert homed[1] == pytest.approx(12 / 20, abs=0.05)
     by_hand = play(HOMING, config=config, until_idle=True, inputs=parse_inputs(f"IN3={1 - level}@2s"))
     assert "assumed" not in by_hand.lines[0]
+
+
+def test_positions_are_of_the_moment_the_run_ended(play: Play) -> None:
+    ran = play("M1 = ON\nVABS M1 10\nWAIT IN3 = 1\n", config="[Axis0]\nGear=10\nAcc=5\n", until_idle=True)
+    # It runs up to 10 imp/s in 2 s from 0.002 s on; then nothing changes any more.
+    assert ran.lines[3:6] == [
+        "it waits for ever in line 3: WAIT IN3 = 1, while M1 moves on",
+        "  M1 at 10 imp, 10 imp/s, velocity mode",
+        "  on: M1_EN",
+    ]
+    assert ran.lines[-1].startswith("2.002000 s of virtual time")
+
+
+BOTH = "[Axis2]\nUnit=3\nGear=10\nVel=50\nHomeMode=0\nInKL=1\nInKR=2\n[Axis0]\nGear=10\nInKL=3\n"
+KR = "M3: KR on IN3 assumed at 5 mm (--travel M3=..HIGH says otherwise)"
+KL = "M3: KL on IN2 assumed at -5 mm (--travel M3=LOW.. says otherwise)"
+
+
+@pytest.mark.parametrize(
+    ("homing", "assumed"),
+    [
+        ("HOME M3 20", [KR]),
+        ("HOME M3 -20", [KL]),
+        ("SET v = 20\nHOME M3 v", [KR]),
+        ("HOME M3 $R0", [KL]),
+        ("HOME M3 -20\nWAITPOS\nHOME M3 20", [KL, KR.replace("at 5 mm", "at 500 mm")]),
+        ("PABS M3 1", []),
+    ],
+)
+def test_switches_are_assumed_where_the_program_homes_to(play: Play, homing: str, assumed: list[str]) -> None:
+    ran = play(f"$R0 = -20\nM3 = ON\n{homing}\nWAITPOS\n", config=BOTH)
+    assert [line for line in ran.lines if "assumed" in line] == assumed
+    assert "the program has ended" in ran.lines
+
+
+@pytest.mark.parametrize(
+    ("config", "travels", "missing"),
+    [
+        (BOTH, [Travel(3, -5.0, None)], "  M3 homes to KR on IN3, which nothing switches: --travel M3=..HIGH"),
+        (BOTH.replace("InKR=2\n", ""), [], "  M3 homes to KR, for which the configuration has no input (InKR of [Axis2])"),
+        (BOTH.replace("HomeMode=0", "HomeMode=3"), [], "  M3 homes to a mechanical stop: a run without a world has none"),
+        (
+            BOTH.replace("HomeMode=0", "HomeMode=4"),
+            [],
+            "  M3 homes to channel C of its encoder on IN15, which nothing switches: --input IN15=1@TIME",
+        ),
+    ],
+    ids=["no switch", "no input", "stop", "index"],
+)
+@pytest.mark.parametrize("until_idle", [False, True])
+def test_a_homing_that_cannot_end_is_explained(
+    play: Play, config: str, travels: list[Travel], missing: str, until_idle: bool
+) -> None:
+    ran = play("M3 = ON\nHOME M3 20\nWAITPOS\n", config=config, travels=travels, until_idle=until_idle)
+    assert missing in ran.lines
+    asked = play("M3 = ON\nHOME M3 20\nWAITPOS\n", config=config, travels=travels, as_json=True)
+    assert json.loads("\n".join(asked.lines))["missing_switches"] == [missing.strip()]
+
+
+@pytest.mark.parametrize(
+    ("line", "shown"),
+    [
+        ("$D0 = 123456789", "$D0 = 123456792"),
+        ("$D0 = -2000000000", "$D0 = -2000000000"),
+        ("$R0 = 0.1", "$R0 = 0.1"),
+        ("$R0 = 16777217.5", "$R0 = 16777218"),
+        ("$R0 = 1234.567", "$R0 = 1234.567"),
+        ("$R0 = 1 / 3", "$R0 = 0.33333334"),
+        ("$I0 = 32767", "$I0 = 32767"),
+    ],
+)
+def test_values_are_shown_whole_or_so_that_they_read_back(play: Play, line: str, shown: str) -> None:
+    ran = play(f"{line}\n")
+    assert next(text for _, text, _ in ran.told()) == shown
+    events = json.loads("\n".join(play(f"{line}\n", as_json=True).lines))["events"]
+    assert events[0]["text"] == shown
+
+
+def test_positions_in_pulses_are_whole(play: Play) -> None:
+    ran = play("M1 = ON\nVmaxM1 = 60000\nPosM1 = 123456784\nPREL M1 8\nWAITPOS\nWAIT IN1 = 1\n", until_idle=True)
+    assert "  M1 at 123456792 imp, position reached" in ran.lines
+
+
+@pytest.mark.parametrize("statement_ns", [1_000_000, 0])
+def test_what_caused_an_interrupt_comes_before_it(play: Play, statement_ns: int) -> None:
+    text = "CFGINT_M1 = INT_HIGH\nM1 = ON\nWAIT IN1 = 1\nINT_M1:\n$I0 = $I0 + 1\nRETURN\n"
+    ran = play(text, until_idle=True, statement_time=statement_ns)
+    assert [(text, line) for _, text, line in ran.told()][:3] == [
+        ("M1 on", "2"),
+        ("interrupt of M1", "4"),
+        ("$I0 = 1", "5"),
+    ]
+
+
+TABLE_AND_GEAR = {"table.csv": "A;5;x;x;x\n", "table.cfg": "[Axis0]\nGear=10\n"}
+
+
+def test_files_of_the_same_name_are_taken(tmp_path: Path) -> None:
+    for name, text in {"table.prg": "M1 = ON\nMOVEPTP @A\nWAITPOS\nWAIT IN1 = 1\n", **TABLE_AND_GEAR}.items():
+        (tmp_path / name).write_text(text)
+    ran = Ran(tmp_path / "table.prg", until_idle=True)
+    assert ran.lines[0] == "with table.csv and table.cfg, found beside the program"
+    assert "  M1 at 5 imp, position reached" in ran.lines
+    other = tmp_path / "other.csv"
+    other.write_text("A;7;x;x;x\n")
+    ran = Ran(tmp_path / "table.prg", until_idle=True, positions=other)
+    assert ran.lines[0] == "with table.cfg, found beside the program"
+    assert "  M1 at 7 imp, position reached" in ran.lines
+    data = json.loads("\n".join(Ran(tmp_path / "table.prg", until_idle=True, as_json=True).lines))
+    assert (data["positions"], data["config"]) == (str(tmp_path / "table.csv"), str(tmp_path / "table.cfg"))
+
+
+def test_a_row_0_that_the_program_writes_needs_no_table(play: Play) -> None:
+    text = "SET M1 = ON\nSET M2 = ON\nSET LinX = 50\nSET LinY = 20\nSET LinVel = 100\nMOVELIN 0\nWAITPOS\nWAIT IN1 = 1\n"
+    ran = play(text, until_idle=True)
+    assert ran.warnings == []
+    assert "  M1 at 50 imp, position reached" in ran.lines
+    assert "  M2 at 20 imp, position reached" in ran.lines
+
+
+@pytest.mark.parametrize("line", ["MOVEPTP 3", "MOVEPTP $I0", "MOVELIN 0"])
+def test_rows_without_a_table_are_refused_with_the_option(play: Play, line: str) -> None:
+    with pytest.raises(Misuse, match=r"program\.prg moves to rows of the position table: give it with --positions FILE$"):
+        play(f"M1 = ON\nM2 = ON\n{line}\n")
+
+
+def image(path: Path, text: str, rows: str = "") -> Path:
+    table, _ = parse_positions(rows)
+    executable = check(text, table).executable
+    assert executable is not None
+    data, refused = build(executable, table)
+    assert refused == []
+    assert data is not None
+    path.write_bytes(data)
+    return path
+
+
+def test_an_image_is_run_with_its_own_table(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("A;2;x;x;x\nB;3;x;x;x\n")
+    ran = Ran(image(tmp_path / "a.wbc", "M1 = ON\nMOVEPTP 1\nWAITPOS\nWAIT IN1 = 1\n", "A;1;x;x;x\nB;7;x;x;x\n"), until_idle=True)
+    assert "  M1 at 7 imp, position reached" in ran.lines
+    assert "it waits for ever in line 5: WAIT IN1 = 1" in ran.lines
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("M1 = ON\n//!record F1000000000000000000000000000000\n", "1 of its records is not known"),
+        ("//!record F1000000000000000000000000000000\n" * 3, "3 of its records are not known"),
+    ],
+)
+def test_an_image_with_unknown_records_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    table, _ = parse_positions("")
+    data, _ = build(resolve(parse(text)[0], table, DEFAULT).executable, table)
+    (tmp_path / "a.wbc").write_bytes(data or b"")
+    with pytest.raises(Misuse, match=rf"cannot run .*a\.wbc: {message}; 'steptwin decompile' shows the others$"):
+        Ran(tmp_path / "a.wbc")
+
+
+def test_what_is_no_image_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.wbc").write_text("M1 = ON\n")
+    with pytest.raises(Misuse, match=r"cannot run .*a\.wbc: not a compiled image: 8 bytes instead of 20094$"):
+        Ran(tmp_path / "a.wbc")
 
 
 def test_travel_as_people_type_it() -> None:
@@ -173,7 +342,7 @@ def test_what_cannot_be_run(play: Play, tmp_path: Path) -> None:
         play("OUT1 = ON\n", inputs=parse_inputs("OUT1=1@1s"))
     with pytest.raises(Misuse, match=r"--travel M1: the configuration has no KR for this axis"):
         play("OUT1 = ON\n", travels=[Travel(1, None, 5.0)])
-    with pytest.raises(Misuse, match="names positions: give the table with --positions 0=FILE"):
+    with pytest.raises(Misuse, match=r"names positions: give the table with --positions FILE$"):
         play("M1 = ON\nMOVEPTP @top\n")
     with pytest.raises(Misuse, match="cannot read"):
         run(WbcRun(program=tmp_path / "none.prg"), print, print)

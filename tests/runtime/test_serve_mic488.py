@@ -8,8 +8,12 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.mic488.config import ConfigError
-from steptwin.runtime.serve_mic488 import Mic488Options, load_config, serve
+from steptwin.mic488.config import ConfigError, ControllerConfig, ProgramConfig
+from steptwin.mic488.program import load
+from steptwin.runtime.programbanks import Banks
+from steptwin.runtime.serve_mic488 import Mic488Options, load_config, remarks, serve
+from steptwin.wbc.check import check
+from steptwin.wbc.positions import parse_positions
 
 MISSPELT = "[Axis0]\nHomeMod=1\nGear=3\n"
 
@@ -44,3 +48,29 @@ def test_what_is_wrong_is_told_with_what_is_doubtful(tmp_path: Path) -> None:
 def test_options_that_cannot_be_meant(options: dict[str, Any], message: str) -> None:
     with pytest.raises(Misuse, match=message):
         serve(Mic488Options(**options))
+
+
+TABLE, _ = parse_positions("A;1;x;x;x\n")
+MOVES = load(check("M1 = ON\nMOVEPTP 0\n", TABLE))
+
+
+@pytest.mark.parametrize(
+    ("program", "banks", "remark"),
+    [
+        (ProgramConfig(activate=1), Banks(), ", which is empty (--program 0=FILE)"),
+        (ProgramConfig(activate=1, prog_bank=2), Banks({0: MOVES}, {0: TABLE}), ", which is empty (--program 2=FILE)"),
+        (
+            ProgramConfig(activate=1, pos_bank=3),
+            Banks({0: MOVES}, {0: TABLE}),
+            " with position bank 3, which is empty (--positions 3=FILE)",
+        ),
+        (ProgramConfig(activate=1), Banks({0: MOVES}, {0: TABLE}), None),
+        (ProgramConfig(activate=0), Banks(), None),
+    ],
+)
+def test_a_configuration_that_starts_an_empty_bank_says_why_err_is_on(
+    program: ProgramConfig, banks: Banks, remark: str | None
+) -> None:
+    shown = [text for text in remarks(Mic488Options(), ControllerConfig(program=program), banks) if text.startswith("ERR")]
+    expected = [] if remark is None else [f"ERR is on: Activate=1 starts program bank {program.prog_bank} at power-on{remark}"]
+    assert shown == expected

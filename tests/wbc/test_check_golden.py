@@ -49,6 +49,8 @@ class Case:
                 accelerations=(10, numbers.get("acc2", 10), 1, 1),
                 decelerations=(10, numbers.get("dec2", 10), 1, 1),
                 input_interrupts=tuple(int(numbers.get(f"in{n}", 0)) for n in range(1, 21)),
+                homing_ends=tuple((numbers.get(f"kl{n}", 1) == 1, numbers.get(f"kr{n}", 1) == 1) for n in range(1, 5)),
+                most_speed_p=64_000,
             )
         checked = check(self.program, table, setup, dialect)
         return render(Source(self.name, self.program), checked.diagnostics) or NO_FINDING

@@ -68,6 +68,30 @@ def test_wbc_2_interrupts_do_not_nest_and_one_of_each_source_waits() -> None:
     assert rig.i(0) == 1
 
 
+@pytest.mark.parametrize("order", [("IN5", "IN2", "IN4"), ("IN2", "IN4", "IN5"), ("IN4", "IN5", "IN2")])
+def test_wbc_41_interrupts_that_wait_are_served_by_number(order: tuple[str, ...]) -> None:
+    handlers = "".join(f"INT_IN{n}:\nn = n * 10\nn = n + {n}\n$I0 = n\nRETURN\n" for n in (4, 5, 2))
+    enabled = "".join(f"CFGINT_IN{n} = RIS\n" for n in (2, 3, 4, 5))
+    rig = started(f"{enabled}WAIT 1 = 2\nINT_IN3:\nDELAY 1\nRETURN\n{handlers}")
+    rig.wait(0.1)
+    for pin in ("IN3", *order):
+        pulse(rig, pin)
+    rig.wait(2)
+    assert rig.i(0) == 245
+
+
+def test_wbc_9_a_pause_in_a_handler_keeps_the_rest_of_the_delay_it_interrupted() -> None:
+    rig = started("CFGINT_IN1 = RIS\nDELAY 3\nOUT1 = ON\nWAIT 1 = 2\nINT_IN1:\nDELAY 1\nRETURN\n")
+    rig.wait(0.5)
+    pulse(rig, "IN1")
+    rig.pause()
+    rig.wait(10)
+    rig.start()
+    rig.wait(5)
+    # The DELAY is executed at 2 ms, and the pause takes ten seconds.
+    assert rig.changes("OUT1") == [(13.002, 1.0)]
+
+
 def test_wbc_3_a_jump_in_a_handler_lets_interrupts_in_and_returns_come_back() -> None:
     rig = started(
         f"CFGINT_IN1 = RIS\nCFGINT_IN2 = RIS\nDELAY 3\nOUT3 = ON\nWAIT 1 = 2\n"

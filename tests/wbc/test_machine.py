@@ -196,7 +196,30 @@ def test_wbc_1_the_stack_keeps_sixteen_and_forgets_the_oldest() -> None:
     rig = run("L:\nn = n + 1\nIF n < 21\nJUMP L\nENDIF\n$I0 = m\nm = m + 1\nRETURN\n")
     assert rig.i(0) == 16
     assert rig.device.program.fault is not None
+    assert rig.device.program.fault.text == (
+        "the 16 places for RETURN were not enough, the oldest were forgotten: too many JUMPs without RETURN"
+    )
+
+
+def test_wbc_1_a_stack_that_was_full_once_and_empty_since_has_forgotten_nothing() -> None:
+    # Seventeen deep, back to the first of the sixteen, left for good by a last RETURN that finds its place, then one too many.
+    rig = run("JUMP SUB\nRETURN\nSUB:\nRETURN\n")
+    assert rig.device.program.fault is not None
     assert rig.device.program.fault.text == "RETURN without a JUMP"
+
+
+@pytest.mark.parametrize("depth", [15, 16])
+def test_wbc_1_sixteen_places_are_enough_for_sixteen_jumps(depth: int) -> None:
+    rig = run(f"L:\nn = n + 1\nIF n <= {depth}\nJUMP L\nENDIF\n$I0 = m\nm = m + 1\nRETURN\n")
+    assert rig.i(0) == depth
+    assert rig.device.program.fault is not None
+    assert rig.device.program.fault.text == "RETURN without a JUMP"
+
+
+def test_a_jump_to_itself_rests_for_ever() -> None:
+    rig = run("OUT1 = ON\nL:\nJUMP L\n", 0.1)
+    assert (rig.state, rig.out(1)) == (RUNNING, True)
+    assert rig.device.program.deadline() is None, "nothing can end this loop but an event, so nothing is due"
 
 
 def test_wbc_1_looping_by_jump_goes_on_for_ever() -> None:
@@ -346,7 +369,7 @@ def test_pulse_inverts_an_output_later_and_does_not_wait() -> None:
         ("y = -1\nTIMA1 = y", "TIMA1 = -1: permitted are numbers 0…999999"),
         ("y = 2\nCFGINT_MODBUS = y", "CFGINT_MODBUS = 2: permitted are numbers 0 or 4"),
         ("PULSE(OUT1, y)", "PULSE"),
-        ("y = 3000000000\nPABS M1 y", r"PABS M1 = 3e\+09 imp: permitted are -2.14748e\+09…2.14748e\+09 imp"),
+        ("y = 3000000000\nPABS M1 y", "PABS M1 = 3000000000 imp: permitted are -2147483648…2147483647 imp"),
         ("RETURN", "RETURN without a JUMP"),
     ],
 )

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
@@ -160,6 +160,36 @@ def test_wbc_18_polling_loops_rest_and_nobody_notices(text: str, happening: list
         act(resting, one)
         act(looking, one)
         assert resting.program.statement == looking.program.statement
+    resting.advance(END)
+    looking.advance(END)
+    assert seen(resting) == seen(looking)
+
+
+ACTING = (
+    *("PREL M1 1", "PREL M2 -3", "PABS M1 40", "VABS M1 -30", "VREL M2 1", "BRAKE M1", "STOP M2", "HOME M1 -20"),
+    *("OUT1 = IN2", "OUTPUTS = 5", "$I5 = $I5 + 1", "PosM1 = 0", "M1 = ON", "M2 = OFF", "LimRM1 = 12", "VmaxM1 = 20"),
+    *("CFGINT_IN3 = RIS", "TIMA1 = 0", "ENC1 = 7", "LinX = 3", "LinAcc = 9", "VisionNew = 0", "PULSE(OUT2, 0.05)"),
+    *("MOVEPTP @A", "MOVELIN @A", "n = n + 1", "DELAY 0.02"),
+)
+
+
+@settings(few, max_examples=40)
+@given(
+    body=st.lists(st.sampled_from(ACTING), min_size=1, max_size=3),
+    closed=st.sampled_from(("JUMP", "WHILE")),
+    happening=acts(),
+    statement_time=st.sampled_from(STATEMENT_TIMES),
+)
+@example(body=["PREL M1 1"], closed="JUMP", happening=[], statement_time=MILLISECOND)
+@example(body=["$I5 = $I5 + 1"], closed="WHILE", happening=[], statement_time=MILLISECOND)
+def test_wbc_18_a_loop_that_acts_never_rests(body: list[str], closed: str, happening: list[Act], statement_time: Nanos) -> None:
+    loop = ["L:", *body, "JUMP L"] if closed == "JUMP" else ["WHILE 1 = 1", *body, "ENDWHILE"]
+    loaded = ready("\n".join(["M1 = ON", "M2 = ON", "n = 0", *loop, "INT_IN3:", "$I7 = $I7 + 1", "RETURN", ""]), "A;1;2;3;4\n")
+    resting, looking = (started(loaded, statement_time, rests=rests) for rests in (True, False))
+    for one in happening:
+        act(resting, one)
+        act(looking, one)
+        assert resting.program.statement == looking.program.statement, one
     resting.advance(END)
     looking.advance(END)
     assert seen(resting) == seen(looking)

@@ -408,8 +408,8 @@ def test_wbc_17_encoder_correction_is_off_on_circles_and_on_on_lines() -> None:
         ("MOVELIN n", "A;0;0;1;x\nB;5;5;-1;x\n", "the path velocity p3 must be greater than 0"),
         ("n = 2\nMOVEPTP n", "A;0;0;1;x\nB;5;5;-1;x\n", "MOVEPTP 2: the position table has rows 0…1"),
         ("n = 0.5\nMOVEPTP n", "A;0;0;1;x\nB;5;5;-1;x\n", "MOVEPTP 0.5: the position table has rows 0…1"),
-        ("MOVEPTP n", "A;0;0;1;x\nB;99999999999;5;-1;x\n", "permitted are -2.14748e+07…2.14748e+07 imp"),
-        ("MOVELIN_REL n", "A;0;0;1;x\nB;99999999999;5;1;x\n", "permitted are -2.14748e+07…2.14748e+07 imp"),
+        ("MOVEPTP n", "A;0;0;1;x\nB;99999999999;5;-1;x\n", "permitted are -21474836.48…21474836.47 imp"),
+        ("MOVELIN_REL n", "A;0;0;1;x\nB;99999999999;5;1;x\n", "permitted are -21474836.48…21474836.47 imp"),
     ],
 )
 def test_rows_that_cannot_be_a_path_are_program_errors(lines: str, rows: str, text: str) -> None:

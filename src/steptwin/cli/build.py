@@ -15,19 +15,24 @@ from steptwin.errors import Misuse
 
 def build(
     file: Annotated[Path, typer.Argument(help="WBC program (.prg).")],
-    positions: Annotated[Path | None, typer.Option(help="Position table (.csv); default: an empty one.")] = None,
+    positions: Annotated[
+        Path | None, typer.Option(help="Position table; default: the .csv of the same name, else an empty one.")
+    ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Image to write; default: FILE.wbc.")] = None,
     firmware: Annotated[str, typer.Option(help="Firmware the program is checked for.")] = "1.70",
 ) -> None:
     """Compile a WBC program to the image of firmware 1.25. Exit code 1 if it has errors or something without a known form."""
     from steptwin.diagnostics import Severity, render
-    from steptwin.runtime.programfiles import read_program
+    from steptwin.runtime.programfiles import IMAGE, Companions, read_program
     from steptwin.runtime.textfiles import write_bytes
     from steptwin.wbc.dialect import dialect_for
     from steptwin.wbc.image import build as build_image
     from steptwin.wbc.positions import PositionTable
 
-    read = read_program(file, positions, dialect=dialect_for(firmware))
+    if file.suffix.lower() == IMAGE:
+        raise Misuse(f"{file} is a compiled image already: steptwin decompile makes a program of it")
+    files = Companions.of(file, positions, None)
+    read = read_program(file, files.positions, dialect=dialect_for(firmware))
     for source, diagnostics in read.findings:
         if diagnostics:
             typer.echo(render(source, diagnostics), err=True)
@@ -43,4 +48,6 @@ def build(
         raise typer.Exit(1)
     target = output or file.with_suffix(".wbc")
     write_bytes(target, data)
+    if files.found:
+        typer.echo(str(files))
     typer.echo(f"{target}: {len(executable.steps)} commands, {len(table.rows)} positions")

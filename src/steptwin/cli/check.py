@@ -60,8 +60,10 @@ def check(
     variant: Annotated[str | None, typer.Option(help="Type of M1486: A, B, C, E1, E2, or A2x and so on. Default A.")] = None,
     interface: Annotated[str | None, typer.Option(help="Driver interface of the M1486: sd, dual or two. Default sd.")] = None,
     memory: Annotated[bool, typer.Option("--memory", help="Show the command memory each M1486 command takes.")] = False,
-    positions: Annotated[Path | None, typer.Option(help="Position table (.csv) of a WBC program.")] = None,
-    config: Annotated[Path | None, typer.Option(help="Configuration (.cfg) of the MIC488 of a WBC program.")] = None,
+    positions: Annotated[
+        Path | None, typer.Option(help="Position table of a WBC program. Default: the .csv of the same name.")
+    ] = None,
+    config: Annotated[Path | None, typer.Option(help="Configuration of its MIC488. Default: the .cfg of the same name.")] = None,
     firmware: Annotated[str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -156,16 +158,23 @@ def _memory_data(source: Source, chip: ChipMemory) -> dict[str, Any]:
 
 
 def _check_wbc(source: Source, options: Options) -> Report:
-    from steptwin.runtime.programfiles import check_source
+    from steptwin.runtime.programfiles import Companions, check_source
     from steptwin.wbc.dialect import DEFAULT, dialect_for
 
     options.refuse("WBC", "variant", "interface", "memory")
     dialect = DEFAULT if options.firmware is None else dialect_for(options.firmware)
-    read = check_source(source, options.positions, options.config, dialect)
+    files = Companions.of(Path(source.name), options.positions, options.config)
+    read = check_source(source, files.positions, files.config, dialect)
     lines = read.checked.lines
     shown = f"MIC488 firmware {dialect.firmware}, {_count(lines, 'executable line')} of {dialect.max_steps}"
-    data = {"firmware": dialect.firmware, "executable_lines": lines, "limit_lines": dialect.max_steps}
-    return Report("wbc", read.checked.diagnostics, data, [shown], list(read.findings[1:]))
+    data = {
+        "firmware": dialect.firmware,
+        "positions": None if files.positions is None else str(files.positions),
+        "config": None if files.config is None else str(files.config),
+        "executable_lines": lines,
+        "limit_lines": dialect.max_steps,
+    }
+    return Report("wbc", read.checked.diagnostics, data, [shown, *([str(files)] if files.found else [])], list(read.findings[1:]))
 
 
 #: The checker of each language by the suffix of its files; every other suffix is M1486.
@@ -173,6 +182,8 @@ _CHECKERS: dict[str, Callable[[Source, Options], Report]] = {".prg": _check_wbc}
 
 
 def _checker(file: Path) -> Callable[[Source, Options], Report]:
-    if file.suffix.lower() == ".wbc":
+    from steptwin.runtime.programfiles import IMAGE
+
+    if file.suffix.lower() == IMAGE:
         raise Misuse(f"{file} is a compiled image: steptwin decompile makes a program of it")
     return _CHECKERS.get(file.suffix.lower(), _check_m1486)

@@ -58,7 +58,7 @@ class Options:
 
 def run(
     file: Annotated[
-        Path, typer.Argument(help="What to run; its suffix says what it is: .prg, .m1486, .toml, or .json, a session.")
+        Path, typer.Argument(help="What to run; its suffix says what it is: .prg, .wbc, .m1486, .toml, or .json, a session.")
     ],
     duration: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until.")
@@ -82,12 +82,15 @@ def run(
     wire: Annotated[
         list[str] | None, typer.Option(help="M1486: from a pin of one chip to an input of another, 0.B1=7.B3. Again for more.")
     ] = None,
-    positions: Annotated[Path | None, typer.Option(help="MIC488: position table (.csv).")] = None,
-    config: Annotated[Path | None, typer.Option(help="MIC488: configuration (.cfg).")] = None,
+    positions: Annotated[Path | None, typer.Option(help="MIC488: position table. Default: the .csv of the same name.")] = None,
+    config: Annotated[Path | None, typer.Option(help="MIC488: configuration. Default: the .cfg of the same name.")] = None,
     firmware: Annotated[str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70, which is the default.")] = None,
     travel: Annotated[
         list[str] | None,
-        typer.Option(metavar="Mn=LOW..HIGH,...", help="MIC488: where the switches of axes are, seen from power-on: M1=-10..250."),
+        typer.Option(
+            metavar="Mn=LOW..HIGH,...",
+            help="MIC488: switches KL and KR of axes, seen from power-on: M1=-10..250, M1=-50.. or M1=..250.",
+        ),
     ] = None,
     statement_time: Annotated[
         str | None, typer.Option(metavar="TIME", help="MIC488: what one statement takes; default 1ms, 0 for none.")
@@ -218,6 +221,7 @@ def _run_world(file: Path, options: Options) -> bool:
 _RUNNERS: dict[str, Callable[[Path, Options], bool]] = {
     ".m1486": _run_m1486,
     ".prg": _run_wbc,
+    ".wbc": _run_wbc,
     ".toml": _run_world,
     ".json": _run_world,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,6 +13,9 @@ from steptwin.diagnostics import Source, Span
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.mic488 import program_motion as motion
+from steptwin.mic488.axis import MAX_SPEED_P
+from steptwin.mic488.config import NO_INPUT
+from steptwin.mic488.homing import Homing
 from steptwin.mic488.program_registers import ACCESS, ProgramRegisters
 from steptwin.mic488.registers import OUTPUTS
 from steptwin.state import Stateful
@@ -23,15 +26,16 @@ from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.events import EVENTS
 from steptwin.wbc.machine import Machine
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.real import ProgramFault
-from steptwin.wbc.usage import sources
+from steptwin.wbc.real import ProgramFault, real_text
+from steptwin.wbc.registers import ROW_0
+from steptwin.wbc.usage import Setup, sources
 
 if TYPE_CHECKING:
+    from steptwin.mic488.config import ControllerConfig
     from steptwin.mic488.device import Mic488
 
 _MODBUS = next(number for number, event in enumerate(EVENTS) if event.name == "MODBUS")
 _DRIVES = {event.axis - 1: number for number, event in enumerate(EVENTS) if event.axis}
-_ROW_0 = frozenset({"PTPM", "CIRCX", "CIRCY", "CIRCR", "CIRCA", "LINX", "LINY", "LINVEL"})
 
 
 class ProgramState(enum.IntEnum):
@@ -55,6 +59,7 @@ class LoadedProgram:
     code: Code
     position_records: Mapping[int, bytes]
     uses_positions: bool
+    """It needs a position table: for more than a row 0 that it writes itself (WBC-25)."""
 
 
 class Fault(NamedTuple):
@@ -78,12 +83,35 @@ def load(checked: Checked, name: str = "program") -> LoadedProgram:
         reason = errors[0].message if errors else "its positions are not known without a table"
         raise Misuse(f"{name} cannot run: {reason}")
     steps = executable.steps
-    used = [source for step in steps for source in sources(step)]
-    used += [step.target for step in steps if isinstance(step, s.Set)]
-    writes_rows = any(isinstance(source, s.Register) and source.row.key in _ROW_0 for source in used)
-    moves_rows = any(isinstance(step, s.RowMotion) for step in steps)
     code = compile_program(executable, ACCESS)
-    return LoadedProgram(Source(name, checked.text), steps, code, executable.position_records, writes_rows or moves_rows)
+    return LoadedProgram(Source(name, checked.text), steps, code, executable.position_records, _uses_positions(steps))
+
+
+def setup_of(config: ControllerConfig) -> Setup:
+    """What the checker of programs needs of a configuration."""
+    return Setup(
+        gears=tuple(axis.gear for axis in config.axes),
+        accelerations=tuple(axis.acc for axis in config.axes),
+        decelerations=tuple(axis.dec for axis in config.axes),
+        input_interrupts=tuple(settings.interrupt for settings in config.inputs),
+        homing_ends=tuple(
+            (axis.home_mode == Homing.HOME3 or axis.in_kl != NO_INPUT, axis.home_mode == Homing.HOME3 or axis.in_kr != NO_INPUT)
+            for axis in config.axes
+        ),
+        most_speed_p=MAX_SPEED_P,
+    )
+
+
+def _uses_positions(steps: Sequence[s.Step]) -> bool:
+    """Whether rows are needed that the program does not write itself (WBC-25)."""
+    rows = [step.row for step in steps if isinstance(step, s.RowMotion)]
+    if any(isinstance(step, s.Set) and _is_row_0(step.target) for step in steps):
+        return any(row != s.Literal(0.0) for row in rows)
+    return bool(rows) or any(_is_row_0(source) for step in steps for source in sources(step))
+
+
+def _is_row_0(source: s.Source) -> bool:
+    return isinstance(source, s.Register) and source.row.key in ROW_0
 
 
 class ProgramControl(Stateful):
@@ -415,10 +443,13 @@ class ProgramControl(Stateful):
 
     def row(self, keyword: str, index: float) -> tuple[float | None, ...]:
         """Row ``index`` (from 0) of the table in use."""
-        rows = self.positions[self._table].rows
+        if index == 0 and self.registers.row_0 is not None:
+            return self.registers.row_0
+        table = self.positions.get(self._table)
+        rows = () if table is None else table.rows
         if not 0 <= index < len(rows) or index != int(index):
-            raise ProgramFault(f"{keyword} {index:g}: the position table has rows 0…{len(rows) - 1}")
-        return self._row(int(index)) if index or self.registers.row_0 is None else self.registers.row_0
+            raise ProgramFault(f"{keyword} {real_text(index)}: the position table has rows 0…{len(rows) - 1}")
+        return self._row(int(index))
 
     def _row(self, index: int) -> tuple[float | None, ...]:
         record = self.programs[self._program].position_records.get(index)

@@ -17,7 +17,7 @@ from steptwin.motion.paths import Arc, Circular, Straight, arc_between, circle
 from steptwin.motion.planner import MotionState, plan_position
 from steptwin.motion.trig import length
 from steptwin.wbc.paths import row_problem
-from steptwin.wbc.real import ProgramFault
+from steptwin.wbc.real import ProgramFault, real_text
 
 if TYPE_CHECKING:
     from steptwin.mic488.device import Mic488
@@ -75,7 +75,7 @@ def row_motion(control: ProgramControl, keyword: str, index: float, now: Nanos) 
     row = control.row(keyword, index)
     problem = row_problem(keyword, row)
     if problem is not None:
-        raise ProgramFault(f"{keyword} {index:g}: {problem}")
+        raise ProgramFault(f"{keyword} {real_text(index)}: {problem}")
     device = control.device
     if keyword == "MOVEPTP":
         for axis, value_u in zip(device.axes, row, strict=True):
@@ -88,7 +88,7 @@ def row_motion(control: ProgramControl, keyword: str, index: float, now: Nanos) 
     try:
         _PATHS[keyword](_Plane(control, now), row)
     except Misuse as refusal:
-        raise ProgramFault(f"{keyword} {index:g}: {refusal}") from None
+        raise ProgramFault(f"{keyword} {real_text(index)}: {refusal}") from None
 
 
 class _Pace(NamedTuple):
@@ -157,7 +157,7 @@ class _Plane:
         first = self.axes[0]
         speed_u = first.vmax_p / first.gear if pace.speed_u is None else pace.speed_u
         if speed_u * pace.steepest > MAX_SPEED_P:
-            text = f"{speed_u:g} {first.config.unit_name}/s along the path is above {MAX_SPEED_P:g} imp/s"
+            text = f"{real_text(speed_u)} {first.config.unit_name}/s along the path is above {MAX_SPEED_P:g} imp/s"
             self.device.event("speed-clamped", text)
             speed_u = MAX_SPEED_P / pace.steepest
         slowest_u = SLOWEST_RAMP_P / first.gear
@@ -215,8 +215,8 @@ def _do_circle(plane: _Plane, row: Row) -> None:
     arc = _circle(row, row[3] or 0.0)
     begin_p = plane.motor_p(arc.begin, "DOCIRC")
     if any(abs(begin - count) > 1 for begin, count in zip(begin_p, plane.counts, strict=True)):
-        place = "({:g}, {:g})".format(*plane.place_u())
-        begin = "({:g}, {:g})".format(*arc.begin)
+        place = "({}, {})".format(*map(real_text, plane.place_u()))
+        begin = "({}, {})".format(*map(real_text, arc.begin))
         raise ProgramFault(f"DOCIRC begins at {begin}, but the axes are at {place}: go there with MOVETOCIRC")
     plane.arc(arc, plane.motor_p(arc.end, "DOCIRC"))
 

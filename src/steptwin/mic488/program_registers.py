@@ -20,7 +20,7 @@ from steptwin.wbc.controller import FOREVER, Access, Reader, Tendency, Writer
 from steptwin.wbc.events import BY_REGISTER, EVENTS, INPUTS
 from steptwin.wbc.machine import HORIZON
 from steptwin.wbc.positions import PARAMETERS
-from steptwin.wbc.real import ProgramFault, real
+from steptwin.wbc.real import ProgramFault, real, real_text
 from steptwin.wbc.registers import TIMER
 
 if TYPE_CHECKING:
@@ -171,8 +171,8 @@ def position_p(axis: Axis, value_u: float, what: str) -> int:
     """Pulses of a position or distance (MIC-14). `ProgramFault` beyond what a position register holds."""
     pulses = value_u * axis.gear
     if not DINT_MIN - 0.5 < pulses < DINT_MAX + 0.5:
-        limits = f"{DINT_MIN / axis.gear:g}…{DINT_MAX / axis.gear:g} {axis.config.unit_name}"
-        raise ProgramFault(f"{what} = {value_u:g} {axis.config.unit_name}: permitted are {limits}")
+        limits = f"{DINT_MIN / axis.gear:.12g}…{DINT_MAX / axis.gear:.12g} {axis.config.unit_name}"
+        raise ProgramFault(f"{what} = {real_text(value_u)} {axis.config.unit_name}: permitted are {limits}")
     return round(pulses)
 
 

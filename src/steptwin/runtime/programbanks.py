@@ -9,11 +9,13 @@ from typing import TypeAlias
 
 from steptwin.diagnostics import Diagnostic, Severity, Source
 from steptwin.errors import Misuse, SteptwinError
+from steptwin.files import read_bytes
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.program import LoadedProgram, load
-from steptwin.runtime.programfiles import setup_of
+from steptwin.mic488.program import LoadedProgram, load, setup_of
+from steptwin.runtime.programfiles import IMAGE
 from steptwin.runtime.textfiles import read_text
 from steptwin.wbc.check import Checked, check
+from steptwin.wbc.decompile import ImageError, decompile
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.positions import PositionTable, parse_positions
 
@@ -28,6 +30,18 @@ class Banks:
     programs: Mapping[int, LoadedProgram] = field(default_factory=dict)
     positions: Mapping[int, PositionTable] = field(default_factory=dict)
     findings: Findings = ()
+
+
+def read_image(path: Path) -> tuple[Source, PositionTable]:
+    """Source and position table of a compiled image. Raises `Misuse` for what is none, or has statements that are not known."""
+    try:
+        found = decompile(read_bytes(path))
+    except ImageError as error:
+        raise Misuse(f"cannot run {path}: {error}") from None
+    if found.unknown:
+        records = "1 of its records is" if found.unknown == 1 else f"{found.unknown} of its records are"
+        raise Misuse(f"cannot run {path}: {records} not known; 'steptwin decompile' shows the others")
+    return Source(str(path), found.text), found.positions
 
 
 class ProgramErrors(SteptwinError):
@@ -58,15 +72,29 @@ def parse_banks(option: str, given: Sequence[str], banks: int) -> dict[int, Path
 
 
 def read_banks(
-    programs: Mapping[int, Path], positions: Mapping[int, Path], config: ControllerConfig, dialect: Dialect = DEFAULT
+    programs: Mapping[int, Path],
+    positions: Mapping[int, Path],
+    config: ControllerConfig,
+    dialect: Dialect = DEFAULT,
+    *,
+    option: str = "--positions {bank}=FILE",
 ) -> Banks:
-    """Read and check what goes into the banks.
+    """Read and check what goes into the banks: programs (`.prg`) and compiled images (`.wbc`), which bring their own table.
 
     Names of positions are found in the table of the program's own bank number, or else in the only table there is. Raises
-    `ProgramErrors`, and `Misuse` for files that cannot be read and for a program that names positions where there is no table.
+    `ProgramErrors`, and `Misuse` for files that cannot be read or run, and for a program that names positions where there is no
+    table; ``option`` is how a table for a bank is given.
     """
     tables: dict[int, PositionTable] = {}
     findings: list[tuple[Source, list[Diagnostic]]] = []
+    sources: dict[int, Source] = {}
+    for bank, path in programs.items():
+        if path.suffix.lower() == IMAGE:
+            sources[bank], table = read_image(path)
+            if table.rows and bank not in positions:
+                tables[bank] = table
+        else:
+            sources[bank] = read_text(path).source
     for bank, path in positions.items():
         source = read_text(path).source
         tables[bank], found = parse_positions(source.text)
@@ -74,7 +102,7 @@ def read_banks(
     only = next(iter(tables.values())) if len(tables) == 1 else None
     checked: dict[int, tuple[Checked, Path]] = {}
     for bank, path in programs.items():
-        source = read_text(path).source
+        source = sources[bank]
         program = check(source.text, tables.get(bank, only), setup_of(config), dialect)
         checked[bank] = program, path
         findings.append((source, program.diagnostics))
@@ -82,5 +110,5 @@ def read_banks(
         raise ProgramErrors(tuple(findings))
     for bank, (program, path) in checked.items():
         if program.executable is None:
-            raise Misuse(f"{path} names positions: give the table with --positions {bank}=FILE")
+            raise Misuse(f"{path} names positions: give the table with {option.format(bank=bank)}")
     return Banks({bank: load(program, str(path)) for bank, (program, path) in checked.items()}, tables, tuple(findings))

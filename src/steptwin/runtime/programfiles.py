@@ -9,11 +9,11 @@ from steptwin.diagnostics import Diagnostic, Severity, Source
 from steptwin.files import read_bytes
 from steptwin.mic488.config import ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
+from steptwin.mic488.program import setup_of
 from steptwin.runtime.textfiles import read_text
 from steptwin.wbc.check import Checked, check
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.positions import PositionTable, parse_positions
-from steptwin.wbc.usage import Setup
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,40 @@ class ProgramFiles:
 
     def count(self, severity: Severity) -> int:
         return sum(d.severity is severity for _, diagnostics in self.findings for d in diagnostics)
+
+
+IMAGE = ".wbc"
+"""The suffix of compiled images."""
+
+
+@dataclass(frozen=True, slots=True)
+class Companions:
+    """The files that belong to a program: those the user named, else those of the same name that lie beside it.
+
+    ``found`` are the names of the latter.
+    """
+
+    positions: Path | None
+    config: Path | None
+    found: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, program: Path, positions: Path | None, config: Path | None) -> Companions:
+        """A machine is three files of one name, as the vendor's tool keeps them: ``.prg``, ``.csv`` and ``.cfg``.
+
+        A compiled image has its positions in it.
+        """
+        table = _beside(program, ".csv") if positions is None and program.suffix.lower() != IMAGE else None
+        settings = _beside(program, ".cfg") if config is None else None
+        found = tuple(path.name for path in (table, settings) if path is not None)
+        return cls(positions or table, config or settings, found)
+
+    def __str__(self) -> str:
+        return f"with {' and '.join(self.found)}, found beside the program"
+
+
+def _beside(program: Path, suffix: str) -> Path | None:
+    return next((path for end in (suffix, suffix.upper()) if (path := program.with_suffix(end)).is_file()), None)
 
 
 def read_program(
@@ -52,13 +86,3 @@ def check_source(
         others.append((file.source, found))
     checked = check(source.text, table, None if settings is None else setup_of(settings), dialect)
     return ProgramFiles(checked, table, settings, ((source, checked.diagnostics), *others))
-
-
-def setup_of(config: ControllerConfig) -> Setup:
-    """What the checker of programs needs of a configuration."""
-    return Setup(
-        gears=tuple(axis.gear for axis in config.axes),
-        accelerations=tuple(axis.acc for axis in config.axes),
-        decelerations=tuple(axis.dec for axis in config.axes),
-        input_interrupts=tuple(settings.interrupt for settings in config.inputs),
-    )

@@ -10,16 +10,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from steptwin.diagnostics import Severity, render
+from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import check_pin
 from steptwin.runtime.mic488 import place_of, state_of
 from steptwin.runtime.programbanks import Findings, ProgramErrors, read_banks
+from steptwin.runtime.programfiles import Companions
 from steptwin.runtime.serve_mic488 import load_config
 from steptwin.runtime.timedinputs import TimedInput
 from steptwin.runtime.wbc_bench import NAME, Bench, Ending, Happening, Travel
 from steptwin.wbc.dialect import DEFAULT, dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.real import real_text
 from steptwin.world.trace import Trace
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
@@ -68,16 +71,19 @@ def run(options: WbcRun, say: Say, warn: Say) -> bool:
 
     Raises `Misuse` for what cannot be run, `ProgramErrors` for a program with errors.
     """
-    config = ControllerConfig() if options.config is None else load_config(options.config, options.firmware)
+    files = Companions.of(options.program, options.positions, options.config)
+    config = ControllerConfig() if files.config is None else load_config(files.config, options.firmware)
     for change in options.inputs:
         check_pin(change.pin, change.value)
-    positions = {} if options.positions is None else {0: options.positions}
+    positions = {} if files.positions is None else {0: files.positions}
     try:
-        banks = read_banks({0: options.program}, positions, config, dialect_for(options.firmware))
+        banks = read_banks({0: options.program}, positions, config, dialect_for(options.firmware), option="--positions FILE")
     except ProgramErrors as errors:
         _warn(errors.findings, warn)
         raise
     _warn(banks.findings, warn)
+    if banks.programs[0].uses_positions and not banks.positions:
+        raise Misuse(f"{options.program} moves to rows of the position table: give it with --positions FILE")
 
     trace = None if options.trace is None else Trace([NAME])
     bench = Bench(
@@ -95,8 +101,10 @@ def run(options: WbcRun, say: Say, warn: Say) -> bool:
     outcome = Outcome(options, ending, time.perf_counter() - begin)
     wrong = any(happening.code in _WRONG for happening in bench.happened)
     if options.as_json:
-        say(json.dumps(_data(bench, outcome, wrong=wrong), ensure_ascii=False, indent=2))
+        say(json.dumps(_data(bench, outcome, files, wrong=wrong), ensure_ascii=False, indent=2))
     else:
+        if files.found:
+            say(str(files))
         _say_lines(bench, outcome, say)
     if trace is not None and options.trace is not None:
         _write(trace, options.trace, options.program.name, bench, ending.at)
@@ -125,12 +133,14 @@ def _say_lines(bench: Bench, outcome: Outcome, say: Say) -> None:
     if bench.happened:
         say("\n".join(_line(bench, happening) for happening in bench.happened))
     say(_ending(bench, outcome.ending))
-    shown: Any = state_of(bench.device, bench.now)
+    for text in bench.missing_switches():
+        say(f"  {text}")
+    shown: Any = state_of(bench.device, outcome.ending.at)
     for axis in shown["axes"]:
         if axis["enabled"] or axis["position_pulses"]:
             unit = axis["unit"]
-            speed = f", {axis['velocity']:g} {unit}/s" if axis["velocity"] else ""
-            say(f"  M{axis['axis']} at {axis['position']:g} {unit}{speed}, {axis['status_text']}")
+            speed = f", {real_text(axis['velocity'])} {unit}/s" if axis["velocity"] else ""
+            say(f"  M{axis['axis']} at {real_text(axis['position'])} {unit}{speed}, {axis['status_text']}")
     on = [name for name, level in shown["pins"].items() if level and not name.startswith("AIN")]
     say(f"  on: {', '.join(on) or 'nothing'}")
     virtual_s, wall_s = outcome.virtual_s, outcome.wall_s
@@ -161,15 +171,19 @@ def _ending(bench: Bench, ending: Ending) -> str:
     if place is None:
         return "ended by the limit of time"
     if ending.why == "waiting":
-        return f"it waits for ever in line {place.line}: {place.text}"
+        moving = [f"M{axis.number}" for axis in bench.device.axes if axis.profile.moving(ending.at)]
+        meanwhile = f", while {' and '.join(moving)} {'moves' if len(moving) == 1 else 'move'} on" if moving else ""
+        return f"it waits for ever in line {place.line}: {place.text}{meanwhile}"
     return f"ended by the limit of time (--for takes a longer one) in line {place.line}: {place.text}"
 
 
-def _data(bench: Bench, outcome: Outcome, *, wrong: bool) -> dict[str, object]:
+def _data(bench: Bench, outcome: Outcome, files: Companions, *, wrong: bool) -> dict[str, object]:
     options = outcome.options
     return {
         "version": JSON_VERSION,
         "file": str(options.program),
+        "positions": None if files.positions is None else str(files.positions),
+        "config": None if files.config is None else str(files.config),
         "language": "wbc",
         "firmware": bench.device.firmware.name,
         "ended": outcome.ending.why,
@@ -178,7 +192,8 @@ def _data(bench: Bench, outcome: Outcome, *, wrong: bool) -> dict[str, object]:
         "wall_s": outcome.wall_s,
         "ratio": outcome.ratio,
         "assumed": bench.assumed,
-        "state": state_of(bench.device, bench.now),
+        "missing_switches": bench.missing_switches(),
+        "state": state_of(bench.device, outcome.ending.at),
         "events": [_event_data(bench, happening) for happening in bench.happened],
     }
 

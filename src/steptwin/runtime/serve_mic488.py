@@ -164,7 +164,7 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
         line.faults.tell(face.notice)
         try:
             await _open(server, line, options, baud)
-            await face.show(server, _remarks(options))
+            await face.show(server, remarks(options, config, banks))
         finally:
             await server.close()
 
@@ -207,9 +207,23 @@ def _lines(options: Mic488Options) -> set[Line]:
     return serial | {Line.TCP} if options.tcp else serial
 
 
-def _remarks(options: Mic488Options) -> list[str]:
+def _empty_banks(config: ControllerConfig, banks: Banks) -> list[str]:
+    """A configuration that starts a program nobody gave lights ERR at power-on, as on the device: why, and what to do."""
+    bank, table = config.program.prog_bank, config.program.pos_bank
+    if not config.program.activate:
+        return []
+    begin = f"ERR is on: Activate=1 starts program bank {bank} at power-on"
+    program = banks.programs.get(bank)
+    if program is None:
+        return [f"{begin}, which is empty (--program {bank}=FILE)"]
+    if program.uses_positions and table not in banks.positions:
+        return [f"{begin} with position bank {table}, which is empty (--positions {table}=FILE)"]
+    return []
+
+
+def remarks(options: Mic488Options, config: ControllerConfig, banks: Banks) -> list[str]:
     """What the person who started this should know."""
-    remarks = []
+    remarks = _empty_banks(config, banks)
     if options.listen_any:
         remarks.append("Modbus has no authentication: whoever reaches these addresses moves the axes")
     if options.state is None and known_firmware(options.firmware).stored_user_registers:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
@@ -12,6 +13,8 @@ from steptwin.machine import SECOND, Edge, Nanos
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.config import ControllerConfig, ProgramConfig
 from steptwin.mic488.device import Event, Mic488
+from steptwin.mic488.homing import Homing
+from steptwin.mic488.inputs import index_input
 from steptwin.mic488.program import LoadedProgram, ProgramState
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
@@ -22,6 +25,8 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.compile import Cells, StepCode
 from steptwin.wbc.machine import Machine
 from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.real import real_text
+from steptwin.wbc.usage import homing_sides
 from steptwin.world.contacts import PositionSwitch, place
 from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.trace import Record, Trace
@@ -35,7 +40,9 @@ SLICE_NS: Nanos = 10 * SECOND
 """The longest stretch of time between two looks at whether anything is still going on."""
 
 ASSUMED_TRAVEL_S = 0.1
-"""How far below the place at power-on a KL switch is assumed: what VMAX covers in this time."""
+"""How far from the place at power-on a switch is assumed, for homing: what VMAX covers in this time."""
+ASSUMED_FAR_S = 10.0
+"""The same for KR where a program homes to both sides: it has to leave a way between the switches."""
 
 
 class Happening(NamedTuple):
@@ -65,8 +72,8 @@ class Ending(NamedTuple):
 class Bench:
     """The program starts at power-on. ``happened`` grows until somebody takes from it, in order of time.
 
-    Switches are placed where ``travels`` say; KL of an axis for which nothing is said is assumed below the place at power-on,
-    unless an input of the run moves its pin (`assumed` says what was assumed).
+    Switches are placed where ``travels`` say. For an axis they do not name, the switches its HOMEs look for are assumed near the
+    place at power-on, unless an input of the run moves their pin. ``assumed`` lists them as text.
     """
 
     def __init__(
@@ -87,6 +94,7 @@ class Bench:
         self._records: list[Record] = []
         self._statement: tuple[Nanos, int | None] = (-1, None)
         self._told_wait: int | None = None
+        self._switched: set[str] = set()
         steps = [self._watched(number, step) for number, step in enumerate(program.code.steps)]
         watched = replace(program, code=replace(program.code, steps=tuple(steps)))
         self.device = Mic488(
@@ -110,23 +118,64 @@ class Bench:
     def place_switches(self, travels: Sequence[Travel], driven: set[str]) -> None:
         """Put switches where ``travels`` say, or where they have to be for homing; not on the pins in ``driven``."""
         known = {travel.axis: travel for travel in travels}
+        homed = homing_sides(self.program.steps)
+        self._switched |= driven
         for axis in self.device.axes:
             config, travel = axis.config, known.get(axis.number)
-            low_u = high_u = None
             if travel is not None:
                 low_u, high_u = travel.low_u, travel.high_u
-            elif config.in_kl < len(self.device.inputs.pins) and f"IN{config.in_kl + 1}" not in driven:
-                low_u = -config.vel * ASSUMED_TRAVEL_S
-                place_ = f"{low_u:g} {config.unit_name}"
-                self.assumed.append(f"M{axis.number}: KL on IN{config.in_kl + 1} assumed at {place_} (--travel says otherwise)")
+            else:
+                low_u, high_u = self._assume(axis, homed.get(axis.number, frozenset()), driven)
             self._place(axis, "KL", config.in_kl, None, low_u)
             self._place(axis, "KR", config.in_kr, high_u, None)
+
+    def _assume(self, axis: Axis, sides: frozenset[int], driven: set[str]) -> tuple[float | None, float | None]:
+        """Where KL and KR of an axis have to be that is homed to ``sides`` (`homing_sides`); None for no switch."""
+        config = axis.config
+        has_kl, has_kr = (
+            number < len(self.device.inputs.pins) and f"IN{number + 1}" not in driven for number in (config.in_kl, config.in_kr)
+        )
+        if 0 in sides:
+            sides |= {-1 if has_kl else 1}
+        low_u = -config.vel * ASSUMED_TRAVEL_S if has_kl and -1 in sides else None
+        high_u = None
+        if has_kr and 1 in sides:
+            high_u = config.vel * (ASSUMED_FAR_S if -1 in sides else ASSUMED_TRAVEL_S)
+        for name, number, edge_u in (("KL", config.in_kl, low_u), ("KR", config.in_kr, high_u)):
+            if edge_u is not None:
+                where = f"{real_text(edge_u)} {config.unit_name}"
+                example = f"--travel M{axis.number}={'LOW..' if name == 'KL' else '..HIGH'} says otherwise"
+                self.assumed.append(f"M{axis.number}: {name} on IN{number + 1} assumed at {where} ({example})")
+        return low_u, high_u
+
+    def missing_switches(self) -> list[str]:
+        """Of every axis that homes: what it waits for, where nothing in the run can bring that about."""
+        homing = [(axis.number, self._missing(axis)) for axis in self.device.axes if axis.status is Status.HOMING]
+        return [f"M{number} homes {reason}" for number, reason in homing if reason is not None]
+
+    def _missing(self, axis: Axis) -> str | None:
+        homing = axis.homing
+        if homing.leg == Homing.TO_STOP:
+            return "to a mechanical stop: a run without a world has none"
+        if homing.leg == Homing.TO_INDEX:
+            pin = f"IN{index_input(axis.number - 1) + 1}"
+            missing = f"to channel C of its encoder on {pin}, which nothing switches: --input {pin}=1@TIME"
+            return None if pin in self._switched else missing
+        side = "KL" if homing.velocity_p < 0 else "KR"
+        if homing.sensor >= len(self.device.inputs.pins):
+            return f"to {side}, for which the configuration has no input (In{side} of [Axis{axis.number - 1}])"
+        pin = f"IN{homing.sensor + 1}"
+        if pin in self._switched:
+            return None
+        ends = "LOW.." if side == "KL" else "..HIGH"
+        return f"to {side} on {pin}, which nothing switches: --travel M{axis.number}={ends}"
 
     def _place(self, axis: Axis, name: str, number: int, low_u: float | None, high_u: float | None) -> None:
         if low_u is None and high_u is None:
             return
         if number >= len(self.device.inputs.pins):
             raise Misuse(f"--travel M{axis.number}: the configuration has no {name} for this axis")
+        self._switched.add(f"IN{number + 1}")
         low, high = (None if edge_u is None else round(edge_u * axis.gear) for edge_u in (low_u, high_u))
         closed = self.device.config.inputs[number].level == 1
         place(self._kernel, PositionSwitch(NAME, axis.number, low, high, PinName(NAME, f"IN{number + 1}"), closed))
@@ -185,7 +234,7 @@ class Bench:
         def step(machine: Machine, cells: Cells) -> int:
             self._note(machine.now, number)
             following = code(machine, cells)
-            self._tell(machine.now, "delay", f"waits {(machine.not_before - machine.now) / SECOND:g} s", number)
+            self._tell(machine.now, "delay", f"waits {real_text((machine.not_before - machine.now) / SECOND)} s", number)
             return following
 
         return step
@@ -199,13 +248,16 @@ class Bench:
             following = code(machine, cells)
             after = read(machine.controller, machine.now)
             if after != before:
-                self._tell(machine.now, "register", f"{register.name} = {after:g}", number)
+                self._tell(machine.now, "register", f"{register.name} = {real_text(after)}", number)
             return following
 
         return step
 
     def _note(self, now: Nanos, number: int) -> None:
         """Step ``number`` is executed."""
+        if now == self._statement[0]:
+            # What the statement before it did to axes comes first, and keeps its line.
+            self.look(now)
         self._statement = now, number
         self._told_wait = None
         if self._trace is not None:
@@ -273,16 +325,21 @@ class Bench:
                 self._set_pin(waiting.popleft())
             due = self._kernel.deadline()
             if due is None and self.device.program.state is ProgramState.STOPPED and not waiting:
-                return Ending(self._last(), "ended")
+                return Ending(self._settled(), "ended")
             if self.now >= limit:
                 return Ending(limit, "limit")
             if due is None and not waiting and until_idle:
-                return Ending(self._last(), "waiting")
+                return Ending(self._settled(), "waiting")
             moment = limit if due is None else max(due, self.now + SLICE_NS)
             self._advance(min(moment, limit, waiting[0].time if waiting else limit))
 
-    def _last(self) -> Nanos:
-        return max((happening.time for happening in self.happened), default=0)
+    def _settled(self) -> Nanos:
+        """From when on nothing has happened, and every axis stands or keeps its velocity."""
+        last = max((happening.time for happening in self.happened), default=0)
+        for axis in self.device.axes:
+            profile = axis.profile
+            last = max(last, profile.start, *(profile.start + int(end) for end in profile.ends if end != inf))
+        return min(last, self.now)
 
     def _advance(self, now: Nanos) -> None:
         self._kernel.advance(now)
@@ -298,7 +355,7 @@ class Bench:
             self._records.clear()
 
     def _set_pin(self, change: TimedInput) -> None:
-        level = f"{change.value:g} V" if change.pin.startswith("AIN") else "on" if change.value else "off"
+        level = f"{real_text(change.value)} V" if change.pin.startswith("AIN") else "on" if change.value else "off"
         self._tell(self.now, "input", f"{change.pin} {level}")
         if self._trace is not None:
             self._records.append(Record(self.now, NAME, "edge", change.pin, change.value))
@@ -308,7 +365,7 @@ class Bench:
 def _words(axis: Axis, before: Status, now: Nanos) -> str:
     """What an axis does from now on."""
     name, unit, gear = f"M{axis.number}", axis.config.unit_name, axis.gear
-    place = f"{axis.coordinate_p(now) / gear:g} {unit}"
+    place = f"{real_text(axis.coordinate_p(now) / gear)} {unit}"
     match axis.status:
         case Status.OFF:
             return f"{name} off"
@@ -317,11 +374,11 @@ def _words(axis: Axis, before: Status, now: Nanos) -> str:
         case Status.ON:
             return f"{name} stands at {place}"
         case Status.VELOCITY if axis.velocity_p == 0.0:
-            return f"{name} slows down from {axis.profile.velocity(now) / gear:g} {unit}/s"
+            return f"{name} slows down from {real_text(axis.profile.velocity(now) / gear)} {unit}/s"
         case Status.VELOCITY:
-            return f"{name} runs at {axis.velocity_p / gear:g} {unit}/s"
+            return f"{name} runs at {real_text(axis.velocity_p / gear)} {unit}/s"
         case Status.POSITION:
-            return f"{name} goes to {(axis.target_p + axis.offset_p) / gear:g} {unit}"
+            return f"{name} goes to {real_text((axis.target_p + axis.offset_p) / gear)} {unit}"
         case Status.HOMING:
             return f"{name} homes"
         case status:
@@ -341,8 +398,8 @@ def parse_travel(text: str) -> list[Travel]:
             dots = ""
             low_u = high_u = None
         if not dots or not number.isdecimal() or not 1 <= int(number) <= AXES:
-            raise Misuse(f"--travel {part}: expected Mn=LOW..HIGH, such as M1=-10..250; either end may be left out")
+            raise Misuse(f"--travel {part}: expected Mn=LOW..HIGH, such as M1=-10..250 or M1=-10..")
         if low_u is not None and high_u is not None and low_u >= high_u:
-            raise Misuse(f"--travel {part}: {low_u:g} must be below {high_u:g}")
+            raise Misuse(f"--travel {part}: {real_text(low_u)} must be below {real_text(high_u)}")
         travels.append(Travel(int(number), low_u, high_u))
     return travels

@@ -54,6 +54,7 @@ def check(text: str, positions: PositionTable | None = None, setup: Setup | None
         diagnostics += usage.interrupts(executable, setup)
         if setup is not None:
             diagnostics += usage.unequal_axes(executable, setup)
+            diagnostics += usage.homing_without_end(executable, setup)
     wrong_somewhere = any(d.severity is Severity.ERROR for d in diagnostics)
     runs = resolution.complete and not wrong_somewhere
     return Checked(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics))

@@ -15,7 +15,7 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wbc import steps as s
 from steptwin.wbc.controller import Access, Reader, Tendency
 from steptwin.wbc.events import EVENTS
-from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, real
+from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, real, real_text
 from steptwin.wbc.registers import REAL, REAL_MAX, RegisterRow
 from steptwin.wbc.usage import sources
 
@@ -104,7 +104,7 @@ class _Compiler:
             case s.Delay():
                 return _delay(self._value(step.seconds), following)
             case s.Jump():
-                return _jump(step.target, (following, 0))
+                return _jump(step.target, following)
             case s.Return():
                 return _return
             case s.End():
@@ -281,7 +281,7 @@ def _taken(row: RegisterRow, name: str, *, calculated: bool) -> Callable[[float]
         if domain.whole:
             value = round(value)
         if not domain.has(value):
-            raise ProgramFault(f"{name} = {value:g}: permitted are numbers {domain}")
+            raise ProgramFault(f"{name} = {real_text(value)}: permitted are numbers {domain}")
         return value
 
     return taken
@@ -377,11 +377,11 @@ def _delay(seconds: Value, following: int) -> StepCode:
     return step
 
 
-def _jump(target: int, frame: tuple[int, Nanos]) -> StepCode:
+def _jump(target: int, following: int) -> StepCode:
     around = ~target
 
     def step(m: Machine, cells: Cells) -> int:
-        m.stack.append(frame)
+        m.push(following, 0)
         if m.handling:
             # WBC-3: from here on new interrupts are let in.
             m.handling = False
@@ -393,6 +393,11 @@ def _jump(target: int, frame: tuple[int, Nanos]) -> StepCode:
 
 def _return(m: Machine, cells: Cells) -> int:
     if not m.stack:
+        # WBC-1
+        if m.forgotten:
+            raise ProgramFault(
+                "the 16 places for RETURN were not enough, the oldest were forgotten: too many JUMPs without RETURN"
+            )
         raise ProgramFault("RETURN without a JUMP")
     following, not_before = m.stack.pop()
     if m.handling or not_before:

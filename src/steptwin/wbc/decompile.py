@@ -19,7 +19,8 @@ from steptwin.wbc.check import check
 from steptwin.wbc.events import INPUT_LABELS
 from steptwin.wbc.positions import PARAMETERS, PositionTable, number_text, table_of
 from steptwin.wbc.printer import format_text
-from steptwin.wbc.registers import REAL_MAX, ROWS
+from steptwin.wbc.real import shortest
+from steptwin.wbc.registers import ROWS
 from steptwin.wbc.syntax import POSITION_MARK, RECORD_MARK
 from steptwin.wire.crc import crc16
 
@@ -118,16 +119,7 @@ def _table(rows: tuple[bytes, ...]) -> tuple[PositionTable, dict[int, bytes]]:
 def _row_values(row: bytes) -> list[float | None]:
     mask = int.from_bytes(row[:2], "big")
     values = struct.unpack("<4f", row[2:])
-    return [_shortest(values[n]) if mask & 1 << n and math.isfinite(values[n]) else None for n in range(PARAMETERS)]
-
-
-def _shortest(value: float) -> float:
-    """The number with the fewest digits that is this REAL."""
-    for digits in range(1, 9):
-        candidate = float(f"{value:.{digits}g}")
-        if abs(candidate) <= REAL_MAX and _REAL.pack(candidate) == _REAL.pack(value):
-            return candidate
-    return value
+    return [shortest(values[n]) if mask & 1 << n and math.isfinite(values[n]) else None for n in range(PARAMETERS)]
 
 
 # ---------------------------------------------------------------------- records
@@ -211,7 +203,7 @@ class _Attempt:
     def _value(self, data: bytes) -> str | None:
         if data[0] in (im.WHOLE, im.FRACTION):
             (value,) = _REAL.unpack(data[1:])
-            return number_text(_shortest(value)) if math.isfinite(value) else None
+            return number_text(shortest(value)) if math.isfinite(value) else None
         return _register(data[0], data[1])
 
 

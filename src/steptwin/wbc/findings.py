@@ -120,4 +120,5 @@ POSITIONS_UNCHECKED = _row("W215", "positions are not checked without a position
 NOT_EXECUTABLE = _row("W216", "an unknown record of an image cannot be executed")
 STRAY_RETURN = _row("W217", "RETURN can be reached although no JUMP was taken")
 ALWAYS_FAILS = _row("W218", "a calculation that always stops the program with an error")
+HOME_WITHOUT_SWITCH = _row("W219", "HOME goes to a side for which the configuration has no input")
 TABLE_NAME = _row("W250", "a name of the position table cannot be written after @")

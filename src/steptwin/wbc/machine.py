@@ -85,6 +85,7 @@ class Machine(Stateful):
         "controller",
         "due",
         "effects",
+        "forgotten",
         "handling",
         "not_before",
         "now",
@@ -128,6 +129,8 @@ class Machine(Stateful):
         self.pc = 0
         self.stack: deque[tuple[int, Nanos]] = deque(maxlen=RETURNS)
         """Where RETURN goes on, and not before which moment (a DELAY that was interrupted, WBC-19)."""
+        self.forgotten = False
+        """A place for RETURN was pushed out since the stack was last empty (WBC-1)."""
         self.handling = False
         """In an interrupt, which keeps others waiting (WBC-2)."""
         self.pending = 0
@@ -228,13 +231,18 @@ class Machine(Stateful):
 
     def _enter(self, code: Code, event: int, now: Nanos) -> None:
         self.pending &= ~(1 << event)
-        self.stack.append((self.pc, self.not_before))
+        self.push(self.pc, self.not_before)
         self.pc = code.entries[event].step
         self.handling = True
         self.waiting = False
         self.not_before = 0
         self.due = now
         self._trail = None
+
+    def push(self, step: int, not_before: Nanos) -> None:
+        """Remember where RETURN goes on; of more than `RETURNS` places the oldest is forgotten (WBC-1)."""
+        self.forgotten = bool(self.stack) and (self.forgotten or len(self.stack) == RETURNS)
+        self.stack.append((step, not_before))
 
     # ------------------------------------------------------------------ execution
 

@@ -16,6 +16,8 @@ from steptwin.wbc.registers import DINT, REAL_MAX
 
 QUARTER_DEG = 90.0
 _single = struct.Struct("<f")
+_EXACT = 2.0**53
+"""Below it every whole number is exact in a float."""
 
 
 class ProgramFault(Exception):
@@ -27,6 +29,23 @@ def real(value: float) -> float:
     if -REAL_MAX <= value <= REAL_MAX:
         return _single.unpack(_single.pack(value))[0]
     return REAL_MAX if value > 0.0 else -REAL_MAX
+
+
+def shortest(value: float) -> float:
+    """The number with the fewest digits that is this REAL; ``value`` is finite."""
+    single = real(value)
+    for digits in range(1, 9):
+        candidate = float(f"{single:.{digits}g}")
+        if real(candidate) == single and abs(candidate) <= REAL_MAX:
+            return candidate
+    return float(f"{single:.9g}")
+
+
+def real_text(value: float) -> str:
+    """A number for people: a whole one with all its digits, any other in the shortest form that reads back as the same REAL."""
+    if value == round(value) and abs(value) < _EXACT:
+        return str(round(value))
+    return f"{shortest(value):.9g}"
 
 
 def whole(value: float) -> int:
@@ -86,7 +105,7 @@ def _tangent(degrees: float) -> float:
     angle_q = _quarters(degrees)
     below = cosine(angle_q)
     if below == 0.0:
-        raise ProgramFault(f"tg({degrees:g}) does not exist")
+        raise ProgramFault(f"tg({real_text(degrees)}) does not exist")
     return sine(angle_q) / below
 
 
@@ -94,25 +113,25 @@ def _cotangent(degrees: float) -> float:
     angle_q = _quarters(degrees)
     below = sine(angle_q)
     if below == 0.0:
-        raise ProgramFault(f"ctg({degrees:g}) does not exist")
+        raise ProgramFault(f"ctg({real_text(degrees)}) does not exist")
     return cosine(angle_q) / below
 
 
 def _arcsine(x: float) -> float:
     if not -1.0 <= x <= 1.0:
-        raise ProgramFault(f"asin({x:g}) does not exist")
+        raise ProgramFault(f"asin({real_text(x)}) does not exist")
     return arcsine(x) * QUARTER_DEG
 
 
 def _arccosine(x: float) -> float:
     if not -1.0 <= x <= 1.0:
-        raise ProgramFault(f"acos({x:g}) does not exist")
+        raise ProgramFault(f"acos({real_text(x)}) does not exist")
     return arccosine(x) * QUARTER_DEG
 
 
 def _root(x: float) -> float:
     if x < 0.0:
-        raise ProgramFault(f"sqrt({x:g}) does not exist")
+        raise ProgramFault(f"sqrt({real_text(x)}) does not exist")
     return sqrt(x)
 
 

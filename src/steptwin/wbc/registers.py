@@ -139,6 +139,9 @@ ROWS = {row.key: row for row in REGISTERS}
 if len(ROWS) != len(REGISTERS):
     raise ValueError("a register is listed twice")
 
+ROW_0 = frozenset({"PTPM", "CIRCX", "CIRCY", "CIRCR", "CIRCA", "LINX", "LINY", "LINVEL"})
+"""Families that are the parameters of row 0 of the position table."""
+
 _NUMBERED = re.compile(r"(\$?[A-Z_]+?)([0-9]+)$")
 
 

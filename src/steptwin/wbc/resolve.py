@@ -13,7 +13,7 @@ from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS,
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.wbc.paths import names_no_axis, row_problem
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.registers import PREDEFINED, parts
+from steptwin.wbc.registers import PREDEFINED, ROW_0, parts
 from steptwin.wbc.scope import Scope
 from steptwin.wbc.statements import FUNCTIONS, HALTS, KEYWORDS, MOTIONS, ROW_MOTIONS, SET, STATEMENTS
 from steptwin.wbc.tree import (
@@ -39,7 +39,6 @@ from steptwin.wbc.tree import (
 SHORTEST_DELAY_S = 0.01
 _ALONE = {"ENDIF": s.EndIf, "RETURN": s.Return, "END": s.End, "PROGRESET": s.ProgReset, "WAITPOS": s.WaitPos}
 _BRANCHING = frozenset({"IF", "ELSE", "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
-_ROW_0 = frozenset({"PTPM", "CIRCX", "CIRCY", "CIRCR", "CIRCA", "LINX", "LINY", "LINVEL"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +70,7 @@ class _Resolver:
         self._records: dict[int, bytes] = {}
         self._lines: list[Statement] = []
         self._unchecked = False
+        self._told_unchecked = False
         self._writes_row_0 = False
 
     def resolution(self) -> Resolution:
@@ -93,7 +93,7 @@ class _Resolver:
         for line in self._program.lines:
             statement = line.statement
             if isinstance(statement, Assign):
-                self._writes_row_0 = self._writes_row_0 or self._scope.family(statement.target) in _ROW_0
+                self._writes_row_0 = self._writes_row_0 or self._scope.family(statement.target) in ROW_0
                 lines.append(statement)
             elif isinstance(statement, Record):
                 lines.append(statement)
@@ -354,6 +354,8 @@ class _Resolver:
         row = self._position(operand) if isinstance(operand, Position) else self._value(operand)
         if row is None:
             return None
+        if self._positions is None and not isinstance(operand, Position) and not (self._writes_row_0 and row == s.Literal(0.0)):
+            self._say_unchecked(operand)
         if isinstance(row, s.Literal) and self._positions is not None:
             index = self._row_index(operand, row.value)
             if index is None:
@@ -364,9 +366,7 @@ class _Resolver:
     def _position(self, position: Position) -> s.Literal | None:
         name = position.name
         if self._positions is None:
-            if not self._unchecked:
-                hint = "give the position table to have names and rows checked"
-                self._say(f.POSITIONS_UNCHECKED.at(position, "positions are not checked", hint))
+            self._say_unchecked(position)
             self._unchecked = True
             return s.Literal(0.0)
         index = self._positions.index(name.text)
@@ -377,9 +377,15 @@ class _Resolver:
         self._say(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, fix=meant and f"@{meant}"))
         return None
 
+    def _say_unchecked(self, place: Operand) -> None:
+        if not self._told_unchecked:
+            hint = "give the position table to have names and rows checked; the program does not start without one"
+            self._say(f.POSITIONS_UNCHECKED.at(place, "positions are not checked", hint))
+        self._told_unchecked = True
+
     def _row_index(self, place: Operand, value: float) -> int | None:
         rows = 0 if self._positions is None else len(self._positions.rows)
-        if 0 <= value < rows and value == int(value):
+        if (0 <= value < rows and value == int(value)) or (value == 0 and self._writes_row_0):
             return int(value)
         hint = f"the table has {_rows(rows)}, numbered from 0"
         self._say(f.UNKNOWN_POSITION.at(place, f"there is no row {value:g}", hint))

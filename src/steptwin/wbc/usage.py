@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 
 from steptwin.diagnostics import Diagnostic
 from steptwin.wbc import findings as f
@@ -21,12 +22,18 @@ _PLANAR_AXES = (1, 2)
 @dataclass(frozen=True, slots=True)
 class Setup:
     """What the checker needs of a configuration (`.cfg`): per axis GEAR in pulses per unit and the ramps in u/s², per input
-    the interrupt preset ``Int`` (0 off)."""
+    the interrupt preset ``Int`` (0 off).
+
+    ``homing_ends``: per axis whether homing to KL and to KR comes to an end, by a switch or without needing one.
+    ``most_speed_p``: what the pulse outputs give, in pulses/s.
+    """
 
     gears: tuple[float, ...]
     accelerations: tuple[float, ...]
     decelerations: tuple[float, ...]
     input_interrupts: tuple[int, ...]
+    homing_ends: tuple[tuple[bool, bool], ...] = ((True, True),) * 4
+    most_speed_p: float = inf
 
 
 def sources(step: s.Step) -> Iterator[s.Source]:
@@ -115,6 +122,45 @@ def _moved(step: s.Step, positions: PositionTable | None) -> tuple[int, ...]:
             return _PLANAR_AXES
         case _:
             return ()
+
+
+def homing_sides(steps: Sequence[s.Step]) -> dict[int, frozenset[int]]:
+    """The drives a program homes, each with the sides it goes to: -1 KL, 1 KR, 0 where the velocity is not known before."""
+    sides: dict[int, frozenset[int]] = {}
+    for step in steps:
+        if isinstance(step, s.Motion) and step.keyword == "HOME":
+            sides[step.axis] = sides.get(step.axis, frozenset()) | _signs(step.value, steps)
+    return sides
+
+
+def _signs(source: s.Source, steps: Sequence[s.Step]) -> frozenset[int]:
+    """Signs a value can have; 0 where that is not known, none for the number 0."""
+    if isinstance(source, s.Literal):
+        return frozenset({1 if source.value > 0 else -1}) if source.value else frozenset()
+    values = [step.value for step in steps if isinstance(step, s.Set) and step.target == source]
+    if isinstance(source, s.Variable) and values and all(isinstance(value, s.Literal) for value in values):
+        return frozenset().union(*(_signs(value, steps) for value in values if isinstance(value, s.Literal)))
+    return frozenset({0})
+
+
+def homing_without_end(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
+    """HOMEs to a side for which the configuration has no input."""
+    found: list[Diagnostic] = []
+    for step in executable.steps:
+        if not isinstance(step, s.Motion) or step.keyword != "HOME":
+            continue
+        signs = _signs(step.value, executable.steps)
+        to_kl, to_kr = setup.homing_ends[step.axis - 1]
+        if not signs or 0 in signs or (to_kl and -1 in signs) or (to_kr and 1 in signs):
+            continue
+        names = ("KR", "KL") if 1 in signs else ("KL", "KR")
+        message = f"HOME M{step.axis} goes to {names[0]}, but the configuration has no input for it"
+        other = to_kl if 1 in signs else to_kr
+        hint = f"give In{names[0]} of [Axis{step.axis - 1}] an input"
+        if other:
+            hint += f", or home to {names[1]} with a {'negative' if 1 in signs else 'positive'} velocity"
+        found.append(f.HOME_WITHOUT_SWITCH.at(step, message, hint))
+    return found
 
 
 def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic]:

@@ -19,13 +19,12 @@ from steptwin.mic488.config import BAUDS, ConfigError, ControllerConfig, examine
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
-from steptwin.mic488.program import LoadedProgram, load
+from steptwin.mic488.program import LoadedProgram, load, setup_of
 from steptwin.textcodec import decode
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
-from steptwin.wbc.usage import Setup
 from steptwin.wire.slave import Device
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Button, Switch, Zone
@@ -166,7 +165,7 @@ class _Builder:
             self._warn(Source(spec.positions, self._text(spec.positions)), findings)
             positions[0] = table
         if spec.program is not None:
-            checked = check(self._text(spec.program), positions.get(0), _setup(config), dialect_for(spec.firmware))
+            checked = check(self._text(spec.program), positions.get(0), setup_of(config), dialect_for(spec.firmware))
             if checked.errors:
                 shown = render(Source(spec.program, self._text(spec.program)), checked.errors)
                 raise Misuse(f"the program does not check:\n{shown}")
@@ -426,15 +425,6 @@ class _Builder:
 
 def _record_event(record: Recorder, machine: str, event: object) -> None:
     record(Record(event.time, machine, "event", event.code, event.text))  # type: ignore[attr-defined]
-
-
-def _setup(config: ControllerConfig) -> Setup:
-    return Setup(
-        gears=tuple(axis.gear for axis in config.axes),
-        accelerations=tuple(axis.acc for axis in config.axes),
-        decelerations=tuple(axis.dec for axis in config.axes),
-        input_interrupts=tuple(settings.interrupt for settings in config.inputs),
-    )
 
 
 def _image(text: str, name: str, kind: Variant) -> bytes:
