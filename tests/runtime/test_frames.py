@@ -10,7 +10,7 @@ from steptwin.mic488.device import Mic488
 from steptwin.runtime.frames import FrameLine, FrameLog, WatchedRtuPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import Direction, RtuSlavePort, TcpSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 IN_MM = ControllerConfig(axes=tuple(AxisConfig(unit=3, gear=100.0) for _ in range(4)))
 NOW: Nanos = 1_234_567_890
@@ -86,6 +86,11 @@ def test_a_broadcast_is_put_into_words(units: tuple[int, ...]) -> None:
     ]
 
 
+def test_mic_2_a_broadcast_on_tcp_to_several_units_is_put_into_words() -> None:
+    (said,) = logged("000100000006000517710000", units=(1, 2), tcp=True)
+    assert said.endswith("broadcast: write OUT2 = OFF")
+
+
 def test_frames_of_others_on_the_line_are_shown_and_not_interpreted() -> None:
     assert logged("09 03 27 24 00 02 8F FC") == ["    1.234568 s  pty     → 09 03 27 24 00 02 8f fc  unit 9 is not served here"]
 
@@ -100,7 +105,7 @@ def test_bytes_that_belong_to_no_frame_are_counted(timed: bool) -> None:
     observer = log.observer("rtu-1", tcp=False)
     timing = LineTiming(SerialLine(115200))
     port = WatchedRtuPort(
-        TimedRtuSlavePort(devices, timing, on_frame=observer) if timed else RtuSlavePort(devices, on_frame=observer),
+        TimedRtuSlavePort(TimedUnits(devices, timing), on_frame=observer) if timed else RtuSlavePort(devices, on_frame=observer),
         log,
         "rtu-1",
     )

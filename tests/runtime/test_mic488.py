@@ -11,12 +11,15 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
+from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.demo import demo_config
+from steptwin.runtime.links import Port
 from steptwin.runtime.memory import StateDirectory
-from steptwin.runtime.mic488 import Mic488Line
+from steptwin.runtime.mic488 import LineOptions, Mic488Line
+from steptwin.runtime.rfc2217 import over_network
+from steptwin.wire.rtu import UART_GAP_NS
 
 Ask = Callable[..., Any]
 Run = Callable[..., Any]
@@ -46,6 +49,70 @@ def asked(run: Run) -> Callable[..., list[Any]]:
 
 def line(*units: int, config: ControllerConfig | None = None, demo: bool = False) -> Mic488Line:
     return Mic488Line(config or ControllerConfig(), units or (1,), "1.70", demo=demo)
+
+
+# ---------------------------------------------------------------------- ports
+
+REQUEST = bytes.fromhex("01 03 27 24 00 02 8E B4")
+ANSWER = bytes.fromhex("01 03 04 00 00 00 00 FA 33")
+BYTE_LINKS: dict[str, Callable[[Mic488Line], Port]] = {
+    "pty": lambda line: line.rtu_port("pty"),
+    "serial": lambda line: line.rtu_port("serial", UART_GAP_NS, baud=38400),
+    "RTU over TCP": lambda line: line.rtu_client_port(),
+    "RFC 2217": lambda line: over_network(line.rtu_client_port()),
+}
+
+
+def in_pieces(served: Mic488Line, port: Port, pause_ms: int, *pieces: bytes) -> bytes:
+    """What comes back when pieces arrive with pauses between them; the shell calls at every deadline."""
+    answer, now = b"", served.kernel.now
+    for piece in pieces:
+        answer += port.exchange(piece, now)
+        end = now + pause_ms * MILLISECOND
+        while (due := port.deadline()) is not None and due < end:
+            answer += b"".join(data for _, data in port.to_send(due))
+        now = end
+        served.kernel.advance(now)
+    return answer
+
+
+@pytest.mark.parametrize("pause_ms", [40, 50, 200, 1000])
+@pytest.mark.parametrize("link", BYTE_LINKS)
+def test_mic_15_a_request_in_pieces_is_answered_on_every_byte_transport(link: str, pause_ms: int) -> None:
+    served = line()
+    port = BYTE_LINKS[link](served)
+    assert in_pieces(served, port, pause_ms, REQUEST[:3], REQUEST[3:6], REQUEST[6:]) == ANSWER
+    (event,) = served.devices[1].events
+    assert event.code == "frame-pause"
+    assert event.text.startswith(f"a request had a pause of {pause_ms if link != 'serial' else pause_ms - 0.521:.3g} ms inside")
+
+
+def test_mic_15_a_broadcast_with_a_pause_is_an_event_of_every_unit() -> None:
+    served = line(1, 2)
+    port = served.rtu_port("pty")
+    write = bytes.fromhex("00 06 00 05 00 63 D8 33")
+    assert in_pieces(served, port, 2, write[:4], write[4:]) == b""
+    assert [[event.code for event in device.events] for device in served.devices.values()] == [["frame-pause"]] * 2
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_mic_15_strict_timing_drops_a_request_that_pauses(strict: bool) -> None:
+    served = Mic488Line(ControllerConfig(), (1,), "1.70", options=LineOptions(timing=True, strict=strict))
+    port = served.rtu_port("pty")
+    assert in_pieces(served, port, 50, REQUEST[:3], REQUEST[3:], b"") == (b"" if strict else ANSWER)
+    assert in_pieces(served, port, 50, REQUEST, b"") == ANSWER
+
+
+def test_mic_32_with_real_timing_modbus_tcp_is_a_gateway_to_the_same_controllers() -> None:
+    served = Mic488Line(ControllerConfig(), (1,), "1.70", options=LineOptions(timing=True))
+    rtu, tcp = served.rtu_port("pty"), served.tcp_port()
+    tcp.exchange(bytes.fromhex("000100000006010327240002"), 0)
+    assert tcp.deadline() == 2_083_334
+    tcp.to_send(2_083_334)
+    # While the gateway's response is on its way the controller hears nobody.
+    rtu.exchange(REQUEST, 2_083_334)
+    assert in_pieces(served, rtu, 100, b"") == b""
+    assert [data for _, data in tcp.to_send(served.kernel.now)] == [bytes.fromhex("00010000000701030400000000")]
 
 
 # ---------------------------------------------------------------------- pins

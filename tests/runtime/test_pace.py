@@ -248,25 +248,27 @@ class Client:
 ANSWER = with_crc(bytes.fromhex("01 03 04 00 00 43 16"))
 
 
-def test_a_standing_world_answers_what_takes_no_time(run: Run) -> None:
-    """Modbus TCP takes none; bytes on a serial line are on their way until time goes on."""
+@pytest.mark.parametrize("timing", ["real", "off"])
+@pytest.mark.parametrize("kind", ["tcp", "rtu"])
+def test_a_standing_world_answers_what_takes_no_time(run: Run, timing: str, kind: str) -> None:
+    """With real timing a request is on its way until time goes on."""
+    world = World.from_toml((EXAMPLES / "feeder.toml").read_text().replace('timing = "real"', f'timing = "{timing}"'))
+    request, answer = READ_POSITION, ANSWER
+    if kind == "tcp":
+        request, answer = bytes.fromhex("00 07 00 00 00 06") + request[:-2], bytes.fromhex("00 07 00 00 00 07") + answer[:-2]
 
     async def scene() -> None:
-        rig = Rig(feeder(), 0.0)
+        rig = Rig(world, 0.0)
         assert "to_ns" not in rig.do("step", for_ns=20 * SECOND)
-        tcp, rtu = Client(), Client()
-        by_tcp = Feed(rig.cell, PlacePort(rig.live, "bus", "tcp-1", "tcp"), tcp)
-        by_rtu = Feed(rig.cell, PlacePort(rig.live, "bus", "rtu-1", "rtu"), rtu)
-        by_tcp.take(bytes.fromhex("00 07 00 00 00 06 01 03 27 24 00 02"))
-        by_rtu.take(READ_POSITION)
+        client = Client()
+        feed = Feed(rig.cell, PlacePort(rig.live, "bus", f"{kind}-1", kind), client)
+        feed.take(request)
         await asyncio.sleep(100)
-        assert tcp.heard == bytes.fromhex("00 07 00 00 00 07") + ANSWER[:-2]
-        assert rtu.heard == b""
+        assert client.heard == (b"" if timing == "real" else answer)
         rig.do("step", for_ns=20 * MILLISECOND)
         await asyncio.sleep(0)
-        assert rtu.heard == ANSWER
-        by_tcp.close()
-        by_rtu.close()
+        assert client.heard == answer
+        feed.close()
         assert the_same_again(rig.close())
 
     run(scene())

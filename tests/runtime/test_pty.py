@@ -21,7 +21,7 @@ from steptwin.runtime.clock import Clock
 from steptwin.runtime.pty import PtyLink
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.kernel import Kernel
 
 INPUTS = bytes.fromhex("010213880008FD62")
@@ -48,8 +48,8 @@ def make_link(path: Path, *, timed: bool = False) -> PtyLink:
     kernel = Kernel()
     devices = {1: Mic488(ControllerConfig())}
     kernel.add("1", devices[1])
-    timing = LineTiming(SerialLine(38400))
-    return PtyLink(Cell(kernel, Clock()), path, lambda: TimedRtuSlavePort(devices, timing) if timed else RtuSlavePort(devices))
+    units = TimedUnits(devices, LineTiming(SerialLine(38400)))
+    return PtyLink(Cell(kernel, Clock()), path, lambda: TimedRtuSlavePort(units) if timed else RtuSlavePort(devices))
 
 
 class Program:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488
+from steptwin.wire.gateway import Gateway, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Active, Faults, FaultyPort, Line, Mic488Body, read, rig
 from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.trace import Record
@@ -61,10 +62,12 @@ class FaultRig:
             rig(self.kernel, str(unit), self.faults, Mic488Body(device, unit))
         self.records: list[Record] = []
         self.faults.sinks.append(self.records.append)
-        if line is Line.TCP:
+        if line is Line.TCP and is_timed:
+            self.inner = TcpGatewayPort(Gateway(TimedUnits(self.devices, LineTiming(SerialLine(9600)))))
+        elif line is Line.TCP:
             self.inner = TcpSlavePort(self.devices)
         elif is_timed:
-            self.inner = TimedRtuSlavePort(self.devices, LineTiming(SerialLine(9600)))
+            self.inner = TimedRtuSlavePort(TimedUnits(self.devices, LineTiming(SerialLine(9600))))
         else:
             self.inner = RtuSlavePort(self.devices)
         self.port = FaultyPort(self.inner, "link-1", self.faults, line, framed=self.inner, units=units)

@@ -31,6 +31,9 @@ def test_frames_are_those_of_pymodbus() -> None:
 frames = st.builds(encode_frame, st.integers(0, 0xFFFF), st.integers(0, 255), st.binary(min_size=1, max_size=253))
 
 
+LONGEST_FRAME = 6 + mbap.LONGEST_LENGTH
+
+
 @given(st.lists(frames, max_size=10), st.lists(st.integers(0, 600), max_size=20))
 def test_frames_come_whole_and_in_order_however_they_are_split(sent: list[bytes], places: list[int]) -> None:
     stream, framer = b"".join(sent), TcpFramer()
@@ -67,10 +70,10 @@ def test_whatever_comes_memory_is_bounded(pieces: list[bytes]) -> None:
     framer = TcpFramer()
     for data in pieces:
         for frame in framer.feed(data):
-            assert 8 <= len(frame.raw) <= mbap.LONGEST_FRAME
+            assert 8 <= len(frame.raw) <= LONGEST_FRAME
             if len(frame.raw) <= mbap.MAX_FRAME:
                 assert encode_frame(frame.transaction, frame.unit, frame.pdu) == frame.raw
-        assert len(framer.held) < mbap.LONGEST_FRAME
+        assert len(framer.held) < LONGEST_FRAME
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from steptwin.errors import Misuse
 from steptwin.wire import rtu
 from steptwin.wire.crc import crc16, with_crc
 from steptwin.wire.pdu import Read, Request, WriteRegister, WriteRegisters, decode_request, encode_request
-from steptwin.wire.rtu import BURSTY_GAP_NS, LATE_NS, Role, RtuFrame, RtuFramer, encode_frame, request_length, response_length
+from steptwin.wire.rtu import BURSTY_GAP_NS, PAUSE_NS, Role, RtuFrame, RtuFramer, encode_frame, request_length, response_length
 
 GAP = BURSTY_GAP_NS
 
@@ -140,7 +140,7 @@ def test_what_may_be_the_response_of_another_unit_delays_the_next_frame_by_a_gap
     assert framer.expire(GAP) == [RtuFrame(good, Role.REQUEST, 16)]
     framer = RtuFramer({1})
     framer.feed(wrong, 0)
-    assert framer.feed(good, GAP) == [RtuFrame(good, Role.REQUEST, 16)]
+    assert framer.feed(good, GAP) == [RtuFrame(good, Role.REQUEST, 16, begin=GAP)]
 
 
 def test_mic_15_a_pause_does_not_cut_a_frame() -> None:
@@ -159,11 +159,66 @@ def test_mic_15_a_pause_anywhere_does_not_cut_a_frame(body: str) -> None:
     for place in range(1, len(good)):
         framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
         framer.feed(good[:place], 0)
-        assert [frame.raw for frame in framer.feed(good[place:], LATE_NS)] == [good]
+        assert [frame.raw for frame in framer.feed(good[place:], PAUSE_NS)] == [good]
     for size in (1, 2, 3):
         framer = RtuFramer({1}, gap_ns=rtu.UART_GAP_NS)
         frames = [frame.raw for at in range(0, len(good), size) for frame in framer.feed(good[at : at + size], at * 1_000_000)]
         assert frames == [good]
+
+
+@pytest.mark.parametrize("gap_ns", [rtu.UART_GAP_NS, GAP])
+@pytest.mark.parametrize("pause_ms", [1, 20, 40, 50, 200, 1000, 2000])
+@pytest.mark.parametrize("sizes", [(3, 3, 2), (1, 7), (7, 1), (2, 4, 2), (1,) * 8])
+def test_mic_15_a_request_in_pieces_is_one_frame(sizes: tuple[int, ...], pause_ms: int, gap_ns: int) -> None:
+    """Nagle's algorithm and adapters make such pauses; a shell calls `expire` in each of them."""
+    framer, good, now, at = RtuFramer({1}, gap_ns), hexed("01 03 27 24 00 02"), 5, 0
+    frames: list[RtuFrame] = []
+    for size in sizes:
+        frames += framer.feed(good[at : at + size], now)
+        at, now = at + size, now + pause_ms * 1_000_000
+        deadline = framer.deadline()
+        if deadline is not None and deadline < now:
+            frames += framer.expire(deadline)
+    assert frames == [RtuFrame(good, Role.REQUEST, 8, begin=5, pause=pause_ms * 1_000_000)]
+
+
+@pytest.mark.parametrize("pause_ms", [0, 5, 30, 200, 1500, 3000])
+@pytest.mark.parametrize(
+    "body", ["01 03 27 24 00 02", "01 10 27 38 00 02 04 41 20 00 00", "02 03 27 24 00 02", "00 06 00 01 00 02"]
+)
+def test_mic_15_after_a_truncated_frame_the_next_request_is_answered(body: str, pause_ms: int) -> None:
+    """Found at once, or when the gap has passed; whole, and in two pieces with a pause of their own."""
+    truncated, good = hexed(body), hexed("01 10 27 38 00 02 04 41 20 00 01")
+    for kept in range(1, len(truncated)):
+        for cut_at, inside_ms in ((len(good), 0), (5, 0), (5, 3), (5, 60)):
+            framer = RtuFramer({1})
+            framer.feed(truncated[:kept], 0)
+            frames: list[RtuFrame] = []
+            now = pause_ms * 1_000_000
+            for piece in (good[:cut_at], good[cut_at:]):
+                frames += framer.feed(piece, now)
+                now += inside_ms * 1_000_000
+            frames += framer.expire(now + GAP)
+            assert [frame.raw for frame in frames] == [good], (kept, cut_at, inside_ms)
+
+
+def test_when_a_frame_began_and_the_longest_pause_inside_it() -> None:
+    framer, one, two = RtuFramer({1}), hexed("01 03 27 24 00 02"), hexed("01 10 27 38 00 02 04 41 20 00 00")
+    framer.feed(b"\xff" + one[:2], 100, 400)  # a byte takes 100
+    framer.feed(one[2:5], 1000, 1300)
+    frames = framer.feed(one[5:] + two[:1], 1500, 1900)
+    assert [(frame.raw, frame.begin, frame.pause) for frame in frames] == [(one, 200, 600)]
+    (frame,) = framer.feed(two[1:], 1950, 3000)
+    assert (frame.raw, frame.begin, frame.pause) == (two, 1800, 50)
+
+
+def test_mic_15_strict_framing_drops_a_frame_that_pauses() -> None:
+    good = hexed("01 03 27 24 00 02")
+    for pause, found in ((750_000, [good]), (750_001, [])):
+        framer = RtuFramer({1}, rtu.UART_GAP_NS, rtu.UART_GAP_NS)
+        framer.feed(good[:5], 0)
+        assert [frame.raw for frame in framer.feed(good[5:], pause)] == found, pause
+        assert [frame.raw for frame in framer.feed(good, 10_000_000)] == [good]
 
 
 def test_mic_15_a_beginning_given_up_does_not_delay_the_next_frame() -> None:
@@ -179,7 +234,7 @@ def test_mic_15_a_beginning_is_not_kept_for_ever() -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
     framer.feed(good[:5], 0)
-    assert framer.feed(good[5:], LATE_NS + 1) == []
+    assert framer.feed(good[5:], PAUSE_NS + 1) == []
     assert framer.rubbish == 5
 
 
@@ -317,7 +372,7 @@ def test_reserved_units_are_rubbish(unit: int) -> None:
     assert [frame.raw for frame in framer.feed(good, 1)] == [good]
 
 
-@given(st.lists(st.tuples(st.binary(max_size=300), st.integers(0, 2 * LATE_NS)), max_size=12))
+@given(st.lists(st.tuples(st.binary(max_size=300), st.integers(0, 2 * PAUSE_NS)), max_size=12))
 def test_whatever_comes_frames_are_intact_and_memory_is_bounded(pieces: list[tuple[bytes, int]]) -> None:
     framer, now, framed, fed = RtuFramer({1}), 0, 0, 0
     for data, pause in pieces:
@@ -337,7 +392,7 @@ def test_whatever_comes_frames_are_intact_and_memory_is_bounded(pieces: list[tup
 
 # What keeps the framer busiest: starts of frames everywhere, announcements of long ones.
 @pytest.mark.parametrize(
-    "pattern", ["01", "01 03", "01 10", "02 17", "01 10 00 00 00 7B F6", "00 10 10 10 10 10 F6", "41 41", "00", "FF"]
+    "pattern", ["01", "01 03", "01 10", "02 03", "02 17", "01 10 00 00 00 7B F6", "00 10 10 10 10 10 F6", "41 41", "00", "FF"]
 )
 def test_a_flood_of_rubbish_costs_a_bounded_number_of_looks_per_byte(pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
     looks = 0
@@ -357,7 +412,20 @@ def test_a_flood_of_rubbish_costs_a_bounded_number_of_looks_per_byte(pattern: st
         for at in range(0, len(data), size):
             framer.feed(data[at : at + size], 0)
         assert looks <= len(data) + 2 * (len(data) // size)
+        assert looks <= 2 * (rtu.MAX_LOOKS + 1) * (len(data) // size)
         assert len(framer.held) <= rtu.MAX_FRAME
+
+
+@pytest.mark.parametrize("pattern", ["01", "02 03", "01 10 00 00 00 7B F6"])
+def test_a_request_behind_a_flood_of_rubbish_is_found_when_the_gap_has_passed(pattern: str) -> None:
+    framer, good = RtuFramer({1}), hexed("01 03 27 24 00 02")
+    assert framer.feed(bytes.fromhex(pattern) * 2000 + good, 0) == []
+    assert [frame.raw for frame in framer.expire(GAP)] == [good]
+
+
+def test_requests_behind_each_other_are_no_rubbish() -> None:
+    """Any number comes in one delivery."""
+    assert len(RtuFramer({1}).feed(hexed("01 03 27 24 00 02") * 1000, 0)) == 1000
 
 
 @pytest.mark.parametrize(

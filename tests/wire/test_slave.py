@@ -24,7 +24,7 @@ from steptwin.wire.pdu import (
     encode_request,
 )
 from steptwin.wire.slave import Device, Direction, RtuSlavePort, SlavePort, TcpSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
 GAP = rtu.BURSTY_GAP_NS
@@ -237,7 +237,7 @@ def test_a_wire_port_gives_what_exchange_gives(new_bank: NewBank) -> None:
 
 
 def test_no_rubbish_breaks_a_line(bank: Any) -> None:
-    ports: list[SlavePort] = [RtuSlavePort({1: bank}), TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(38400)))]
+    ports: list[SlavePort] = [RtuSlavePort({1: bank}), TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(38400))))]
     for port in ports:
         assert port.exchange(b"GET / HTTP/1.1\r\n", 0) == b""
         assert port.broken is None
@@ -281,13 +281,47 @@ def test_mic_23_a_single_device_is_addressed_by_0_and_255_too(bank: Any, unit: i
     assert bank.registers[0] == 9
 
 
-@pytest.mark.parametrize(("units", "asked"), [([1], 2), ([1, 2], 0), ([1, 2], 255), ([1, 2], 3)])
+@pytest.mark.parametrize(("units", "asked"), [([1], 2), ([1, 2], 255), ([1, 2], 3)])
 def test_mic_23_any_other_unit_is_refused_as_a_gateway_does(new_bank: NewBank, units: list[int], asked: int) -> None:
     banks = {unit: new_bank() for unit in units}
     with pytest.raises(ModbusException) as refusal:
         over_tcp(TcpSlavePort(banks), asked, WriteRegister(0, 9))
     assert refusal.value.code == 0x0B
     assert not any(bank.executed for bank in banks.values())
+
+
+def test_mic_2_unit_0_on_tcp_is_a_broadcast_where_there_are_several_units(new_bank: NewBank) -> None:
+    banks = {unit: new_bank() for unit in (1, 2)}
+    seen: list[Direction] = []
+    port = TcpSlavePort(banks, on_frame=lambda now, way, raw: seen.append(way))
+    write = bytes.fromhex("06 00 05 00 63")
+    assert port.exchange(mbap.encode_frame(1, 0, write), 4) == b""
+    assert [bank.executed for bank in banks.values()] == [[(4, write)], [(4, write)]]
+    assert port.exchange(mbap.encode_frame(2, 0, bytes.fromhex("03 00 05 00 01")), 5) == b""
+    assert [len(bank.executed) for bank in banks.values()] == [1, 1]
+    assert seen == [Direction.IN, Direction.IN]
+
+
+@pytest.mark.parametrize("line", [None, SerialLine(9600)])
+def test_mic_15_a_pause_above_750_us_inside_a_request_is_reported_once_a_second(bank: Any, line: SerialLine | None) -> None:
+    reported: list[tuple[int, int]] = []
+    port = RtuSlavePort({1: bank}, line=line, on_pause=lambda unit, pause: reported.append((unit, pause)))
+    ask = with_crc(bytes.fromhex("01 03 00 05 00 01"))
+
+    def send(now: int, pause: int) -> None:
+        port.exchange(ask[:5], now)
+        # A line of 9600 bit/s takes 3.125 ms for three characters.
+        assert port.exchange(ask[5:], now + pause + (3_125_000 if line is not None else 0)) != b""
+
+    send(10**9, 750_000)
+    assert reported == []
+    send(2 * 10**9, 750_001)
+    assert reported == [(1, 750_001)]
+    send(25 * 10**8, 40_000_000)
+    send(4 * 10**9, 50_000_000)
+    port.exchange(with_crc(bytes.fromhex("02 03 00 05 00 01"))[:4], 10 * 10**9)  # to nobody here
+    port.exchange(with_crc(bytes.fromhex("02 03 00 05 00 01"))[4:], 11 * 10**9)
+    assert reported == [(1, 750_001), (1, 50_000_000)]
 
 
 @pytest.mark.parametrize("wrong", ["00 01 00 01 00 06 01 03 00 00 00 01", "00 01 00 00 00 01 01 03", "00 01 00 00 01 07 01 03"])

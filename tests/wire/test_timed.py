@@ -13,7 +13,7 @@ from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import Direction
-from steptwin.wire.timed import FRAME_INTERVAL_NS, LINE_CHARACTERS, QUEUE_FRAMES, LineTiming, TimedRtuSlavePort
+from steptwin.wire.timed import FRAME_INTERVAL_NS, LINE_CHARACTERS, LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
 LINE = SerialLine(38400)
@@ -45,7 +45,7 @@ def bank(new_bank: NewBank) -> Any:
 
 
 def test_mic_32_a_response_takes_the_time_of_the_wire(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     assert port.exchange(READ, 1000) == b""
     arrived = 1000 + READ_NS
     assert port.deadline() == arrived
@@ -61,7 +61,7 @@ def test_mic_32_a_response_takes_the_time_of_the_wire(bank: Any) -> None:
 
 
 def test_mic_32_exchange_returns_what_has_left_the_wire(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     port.exchange(READ, 0)
     run(port, READ_NS)
     assert port.exchange(b"", READ_NS + TURN + TOLD_NS) == TOLD
@@ -69,47 +69,81 @@ def test_mic_32_exchange_returns_what_has_left_the_wire(bank: Any) -> None:
 
 @pytest.mark.parametrize(("baud", "request_ns", "response_ns"), [(9600, 8_333_334, 7_291_667), (115200, 694_445, 607_639)])
 def test_mic_32_the_baud_rate_counts(bank: Any, baud: int, request_ns: int, response_ns: int) -> None:
-    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(baud), turnaround_ns=5))
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(baud), turnaround_ns=5)))
     port.receive(READ, 0)
     assert run(port, 10**9) == [(request_ns + 5 + response_ns, TOLD)]
 
 
 def test_mic_32_at_most_100_requests_a_second(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(115200)))
-    out, now = [], 0
-    while now < 1_000_000_000:
+    """A master that waits for each response loses none."""
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(115200))))
+    now = 0
+    for _ in range(100):
         port.receive(READ, now)
-        out += run(port, now + 2_500_000)
-        now += 2_500_000
+        ((now, _),) = run(port, now + 20_000_000)
     moments = [moment for moment, _ in bank.executed]
-    assert min(b - a for a, b in pairwise(moments)) == FRAME_INTERVAL_NS
-    assert len(moments) == 100
-    assert port.dropped == 400 - 100 - QUEUE_FRAMES
-    assert len(out) == 100
+    assert {b - a for a, b in pairwise(moments)} == {FRAME_INTERVAL_NS}
+    assert port.dropped == 0
 
 
-def test_mic_32_sixteen_wait_and_the_rest_is_dropped(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(115200)))
+def test_mic_32_what_arrives_while_a_request_is_served_is_lost(bank: Any) -> None:
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(115200))))
     writes = [with_crc(bytes((1, 6, 0, 0, 0, n))) for n in range(40)]
     port.receive(b"".join(writes), 0)
-    out = [response for _, response in run(port, 10**9)]
-    # 694 us a request: number 0 is taken at 0.7 ms, number 1 at 10.7 ms. With number 17 sixteen wait; number 29 is the
-    # first to arrive after number 2 was taken at 20.7 ms, and at 30.7 ms all have come.
-    assert out == [*writes[:18], writes[29]]
-    assert port.dropped == 40 - len(out)
+    out = run(port, 10**9)
+    # 694 us a frame: number 0 has come at 0.694 ms and its response has left at 0.694 + 0.75 + 0.694 = 2.139 ms. The first to
+    # begin after that is number 4, at 2.778 ms; it is executed 10 ms after number 0, and its response has left at 12.139 ms.
+    assert [response for _, response in out] == [writes[n] for n in (0, 4, 18, 32)]
+    assert [moment for moment, _ in bank.executed] == [694_445, 10_694_445, 20_694_445, 30_694_445]
+    assert port.dropped == 36
 
 
-def test_mic_32_a_request_taken_makes_room_for_one_that_comes_at_that_moment(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(8000), turnaround_ns=0, interval_ns=20_000_000))
-    writes = [with_crc(bytes((0, 6, 0, 0, 0, n))) for n in range(1, 41)]  # number n has come at n times 10 ms
-    port.receive(b"".join(writes), 0)
-    run(port, 10**10)
-    # Every second one more waits; with number 32 there are 16. From then on each odd one comes when one is taken.
-    assert [pdu[-1] for _, pdu in bank.executed] == [*range(1, 34), 35, 37, 39]
+@pytest.mark.parametrize(("pause", "executed"), [(0, 2), (-1, 1)])
+def test_mic_32_a_request_that_began_before_the_response_had_left_is_lost(bank: Any, pause: int, executed: int) -> None:
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
+    port.receive(READ, 0)
+    sent = READ_NS + TURN + TOLD_NS
+    run(port, sent + pause - 1)
+    port.receive(READ[:1], sent + pause)
+    run(port, sent + 1_000_000)
+    port.receive(READ[1:], sent + 1_000_000)
+    run(port, 10**9)
+    assert (len(bank.executed), port.dropped) == (executed, 2 - executed)
+
+
+def test_mic_32_all_ports_of_a_controller_together(bank: Any, new_bank: NewBank) -> None:
+    other = new_bank()
+    units = TimedUnits({1: bank, 2: other}, TIMING)
+    first, second, third = (TimedRtuSlavePort(units) for _ in range(3))
+    first.receive(READ, 0)
+    run(first, READ_NS)
+    second.receive(READ, READ_NS)  # while the response of the first is on its way
+    third.receive(with_crc(bytes.fromhex("02 03 00 05 00 01")), READ_NS)
+    run(first, 10**9)
+    run(second, 10**9)
+    run(third, 10**9)
+    assert (len(bank.executed), len(other.executed)) == (1, 1)
+    assert (first.dropped, second.dropped, third.dropped) == (0, 1, 0)
+    later = READ_NS + TURN + TOLD_NS
+    second.receive(READ, later)
+    run(second, 10**9)
+    assert [moment for moment, _ in bank.executed] == [READ_NS, READ_NS + FRAME_INTERVAL_NS]
+
+
+def test_mic_32_a_port_that_goes_away_with_a_request_leaves_the_controller_free(bank: Any) -> None:
+    units = TimedUnits({1: bank}, TIMING)
+    gone, port = TimedRtuSlavePort(units), TimedRtuSlavePort(units)
+    gone.receive(READ, 0)
+    gone.to_send(READ_NS)
+    gone.receive(READ, 10_000_000)
+    gone.deadline()
+    del gone
+    port.receive(READ, 200_000_000)
+    assert len(run(port, 10**9)) == 1
 
 
 def test_mic_32_nothing_happens_before_it_could_be_known(bank: Any) -> None:
-    port = TimedRtuSlavePort({0x41: bank}, TIMING)
+    port = TimedRtuSlavePort(TimedUnits({0x41: bank}, TIMING))
     # Could be seven bytes of a request to unit 3; the request inside ends after six, 1.56 ms.
     port.receive(bytes.fromhex("03 05") + with_crc(bytes.fromhex("41 07")) + b"\xff", 0)
     port.receive(b"\xff", 1_700_000)
@@ -117,25 +151,27 @@ def test_mic_32_nothing_happens_before_it_could_be_known(bank: Any) -> None:
 
 
 def test_what_is_due_happens_before_what_comes(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     port.receive(READ, 0)
     port.receive(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
     assert bank.executed == [(READ_NS, READ[1:-2])]
 
 
 def test_mic_32_a_long_response_keeps_the_device_busy(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(9600)))
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(9600))))
     ask = with_crc(bytes.fromhex("01 03 00 00 00 7D"))
-    port.receive(ask + READ, 0)
-    (first, whole), (second, told) = run(port, 10**9)
-    assert first == 8_333_334 + TURN + 265_625_000
+    port.receive(ask, 0)
+    ((sent, whole),) = run(port, 10**9)
+    assert sent == 8_333_334 + TURN + 265_625_000
     assert len(whole) == 255
-    assert bank.executed[1][0] == first
-    assert (second, told) == (first + TURN + 7_291_667, TOLD)
+    port.receive(READ, sent - 1)
+    assert run(port, 10**9) == []
+    port.receive(READ, sent + 10_000_000)
+    assert run(port, 10**9) == [(sent + 10_000_000 + 8_333_334 + TURN + 7_291_667, TOLD)]
 
 
 def test_mic_32_characters_wait_for_the_line(bank: Any) -> None:
-    whole, pieces = TimedRtuSlavePort({1: bank}, TIMING), TimedRtuSlavePort({1: bank}, TIMING)
+    whole, pieces = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING)), TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     whole.receive(READ, 0)
     pieces.receive(READ[:3], 0)
     pieces.receive(READ[3:], 10)
@@ -144,7 +180,7 @@ def test_mic_32_characters_wait_for_the_line(bank: Any) -> None:
 
 
 def test_mic_32_traffic_of_others_takes_the_line_and_no_slot(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     foreign = with_crc(bytes.fromhex("02 03 00 00 00 01")) + with_crc(bytes.fromhex("02 03 02 12 34"))
     port.receive(foreign + READ, 0)
     arrived = LINE.duration(23)
@@ -152,16 +188,24 @@ def test_mic_32_traffic_of_others_takes_the_line_and_no_slot(bank: Any) -> None:
     assert bank.executed == [(arrived, READ[1:-2])]
 
 
-def test_mic_32_a_broadcast_is_executed_in_its_turn_and_not_answered(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, TIMING)
-    port.receive(with_crc(bytes.fromhex("00 06 00 05 00 63")) + READ, 0)
-    ((_, told),) = run(port, 10**9)
-    assert told == with_crc(bytes.fromhex("01 03 02 00 63"))
-    assert [moment for moment, _ in bank.executed] == [READ_NS, READ_NS + FRAME_INTERVAL_NS]
+def test_mic_32_a_broadcast_is_executed_by_each_unit_that_is_free_and_not_answered(bank: Any, new_bank: NewBank) -> None:
+    other = new_bank()
+    units = TimedUnits({1: bank, 2: other}, TIMING)
+    port, elsewhere = TimedRtuSlavePort(units), TimedRtuSlavePort(units)
+    elsewhere.receive(READ, 0)
+    run(elsewhere, READ_NS)
+    port.receive(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
+    assert run(port, 10**9) == []
+    assert [pdu[0] for _, pdu in bank.executed] == [3]
+    assert other.executed == [(2 * READ_NS, bytes.fromhex("06 00 05 00 63"))]
+    assert port.dropped == 1
+    port.receive(with_crc(bytes.fromhex("00 03 00 05 00 01")), 10**9)  # reads are ignored
+    assert run(port, 2 * 10**9) == []
+    assert (len(bank.executed), len(other.executed)) == (1, 1)
 
 
 def test_mic_32_a_flood_is_bounded_and_the_line_recovers(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     for now in range(0, 1000, 10):
         port.receive(b"\xff\x01\x41" * 10_000, now)
     assert port.overrun == 3_000_000 - LINE_CHARACTERS
@@ -174,7 +218,7 @@ def test_mic_32_a_flood_is_bounded_and_the_line_recovers(bank: Any) -> None:
 
 
 def test_mic_32_a_full_line_takes_nothing(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, LineTiming(SerialLine(115200)))
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(115200))))
     port.receive(bytes(4001), 0)
     port.receive(
         bytes(96), 86_805
@@ -185,8 +229,31 @@ def test_mic_32_a_full_line_takes_nothing(bank: Any) -> None:
     assert run(port, 10**12) == []
 
 
+def test_mic_15_a_pause_inside_a_frame_is_reported_and_with_strict_timing_drops_it(bank: Any) -> None:
+    reported: list[tuple[int, int]] = []
+    for strict, answers in ((False, 1), (True, 0)):
+        port = TimedRtuSlavePort(
+            TimedUnits({1: bank}, LineTiming(LINE, strict=strict)), on_pause=lambda unit, pause: reported.append((unit, pause))
+        )
+        port.receive(READ[:5], 0)
+        run(port, 3_000_000)
+        port.receive(READ[5:], 3_000_000)
+        assert len(run(port, 10**9)) == answers
+        port.receive(READ, 10**9)
+        assert len(run(port, 2 * 10**9)) == 1
+    assert reported == [(1, 3_000_000 - LINE.duration(5))]
+
+
+def test_mic_15_characters_that_follow_on_the_line_are_no_pause(bank: Any) -> None:
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(LINE, strict=True)))
+    port.receive(READ[:5], 0)
+    run(port, 1_900_000)
+    port.receive(READ[5:], 1_900_000)  # the first five take 1.3 ms
+    assert len(run(port, 10**9)) == 1
+
+
 def test_mic_15_frames_of_unknown_length_come_after_the_gap(bank: Any) -> None:
-    port = TimedRtuSlavePort({1: bank}, TIMING)
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     unknown = with_crc(bytes.fromhex("01 41 01 02 03"))
     port.receive(unknown, 0)
     cut = LINE.duration(7) + GAP
@@ -196,7 +263,7 @@ def test_mic_15_frames_of_unknown_length_come_after_the_gap(bank: Any) -> None:
 
 def test_an_observer_sees_frames_at_their_wire_time(bank: Any) -> None:
     seen: list[tuple[int, Direction, bytes]] = []
-    port = TimedRtuSlavePort({1: bank}, TIMING, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     foreign = with_crc(bytes.fromhex("02 06 00 00 00 01"))
     port.receive(READ + foreign, 0)
     run(port, 10**9)
@@ -216,7 +283,7 @@ def test_looking_in_between_changes_nothing(new_bank: NewBank, sent: list[tuple[
     results = []
     for looks in (0, 3):
         bank = new_bank()
-        port, now, out = TimedRtuSlavePort({1: bank}, TIMING), 0, []
+        port, now, out = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING)), 0, []
         for data, pause in sent:
             for part in range(1, looks + 1):
                 out += run(port, now + pause * part // (looks + 1))

@@ -57,9 +57,19 @@ def mic488(
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Holes of the register map read as 0 instead of being refused.")
     ] = False,
-    line_timing: Annotated[str, typer.Option(help="'real': RTU takes the time a wire would; 'off'.")] = "off",
+    line_timing: Annotated[
+        str,
+        typer.Option(
+            help="'real': requests take the time of the wire and of the controller; 'strict': and a pause above 0.75 ms inside a "
+            "frame drops it; 'off'."
+        ),
+    ] = "off",
     gap: Annotated[
-        float | None, typer.Option(help="Silence in ms after which rubbish is given up. Default: 0.75 on a serial port, else 20.")
+        float | None,
+        typer.Option(
+            help="Silence in ms after which bytes of no frame are given up: shorten it where requests are lost after rubbish. "
+            "It does not split frames, which may pause for 2 s. Default: 0.75 on a serial port, else 20."
+        ),
     ] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     log_frames: Annotated[

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import Edge, Nanos
+from steptwin.machine import MILLISECOND, Edge, Nanos
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.config import ANALOG_INPUTS, ControllerConfig
 from steptwin.mic488.encoder import Coupling, Motion
@@ -81,6 +81,17 @@ def check_turn(axis: int, counts: int) -> None:
         raise Misuse(f"no axis M{axis}: axes are M1 to M{AXES}")
     if not DINT_MIN <= counts <= DINT_MAX:
         raise Misuse(f"M{axis}: {counts} encoder counts at once: permitted {DINT_MIN}…{DINT_MAX}")
+
+
+def pause_observer(devices: Mapping[int, Mic488]) -> Callable[[int, Nanos], None]:
+    """For ports that serve ``devices``: an event for a request with a pause inside (unit, 0 for all; pause in ns), see MIC-15."""
+
+    def observe(unit: int, pause: Nanos) -> None:
+        text = f"a request had a pause of {pause / MILLISECOND:.3g} ms inside: the controller drops a frame at 0.75 ms (MIC-15)"
+        for device in devices.values() if unit == 0 else (devices[unit],):
+            device.event("frame-pause", text)
+
+    return observe
 
 
 _NO_BANKS: Mapping[int, Any] = MappingProxyType({})

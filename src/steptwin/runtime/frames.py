@@ -65,7 +65,7 @@ class FrameLog:
         first = next(iter(self._devices))
         if unit in self._devices:
             addressed, whose = unit, f"unit {unit}: " if several else ""
-        elif unit == BROADCAST and not tcp:
+        elif unit == BROADCAST and (several or not tcp):
             addressed, whose = first, "broadcast: "
         elif tcp and unit in ONE_DEVICE_UNITS and not several:
             addressed, whose = first, f"unit {unit}: "

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos, PinMachine
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Event, Mic488, check_pin, check_turn
+from steptwin.mic488.device import Event, Mic488, check_pin, check_turn, pause_observer
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
 from steptwin.mic488.vision import Com1Port
@@ -29,20 +29,26 @@ from steptwin.runtime.programbanks import Banks
 from steptwin.runtime.sharedreads import share_reads
 from steptwin.runtime.vision import Com1Link, uses_vision
 from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wire.gateway import Gateway, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import Device, RtuSlavePort, TcpSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import FaultyPort, Line, Mic488Body
 from steptwin.world.kernel import Kernel
 
 
 @dataclass(frozen=True, slots=True)
 class LineOptions:
-    """How requests are served. ``baud`` matters to real line timing only."""
+    """How requests are served.
+
+    With ``timing`` requests take the time of a wire at ``baud`` and of the controllers; ``strict`` as well: a pause above 750 µs
+    inside a frame drops it.
+    """
 
     baud: int = 38400
     timing: bool = False
+    strict: bool = False
     frames: bool = False
     """Whether frames are put into words."""
 
@@ -89,6 +95,11 @@ class Mic488Line:
         numbers = ", ".join(map(str, units))
         self.title = f"MIC488 firmware {firmware}, unit{'s' if len(units) > 1 else ''} {numbers}"
         self._served: Mapping[int, Device] = self.devices
+        self._on_pause = pause_observer(self.devices)
+        self._gateway: Gateway | None = None
+        if self.options.timing:
+            timing = LineTiming(SerialLine(self.options.baud), strict=self.options.strict)
+            self._gateway = Gateway(TimedUnits(self.devices, timing))
         self._connections = count(1)
         # WBC-15; nobody else pays for it.
         self._hears_records = len(units) == 1 and any(map(uses_vision, banks.programs.values()))
@@ -102,18 +113,23 @@ class Mic488Line:
     def tcp_port(self) -> Port:
         """A port for one more client."""
         link = f"tcp-{next(self._connections)}"
-        port = TcpSlavePort(self._served, on_frame=self.frames.observer(link, tcp=True) if self.options.frames else None)
+        observer = self.frames.observer(link, tcp=True) if self.options.frames else None
+        port: TcpSlavePort | TcpGatewayPort
+        if self._gateway is not None:
+            port = TcpGatewayPort(self._gateway, on_frame=observer)
+        else:
+            port = TcpSlavePort(self._served, on_frame=observer)
         return FaultyPort(port, link, self.faults.faults, Line.TCP, framed=port, units=tuple(self.devices))
 
-    def rtu_port(self, link: str, gap_ns: Nanos = BURSTY_GAP_NS) -> Port:
-        """A port for one more program on the line, or client of it."""
+    def rtu_port(self, link: str, gap_ns: Nanos = BURSTY_GAP_NS, *, baud: int | None = None) -> Port:
+        """A port for one more program on the line, or client of it; ``baud`` where a real line delivers the characters."""
         observer = self.frames.observer(link, tcp=False) if self.options.frames else None
         port: RtuSlavePort | TimedRtuSlavePort
-        if self.options.timing:
-            timing = LineTiming(SerialLine(self.options.baud))
-            port = TimedRtuSlavePort(self._served, timing, gap_ns=gap_ns, on_frame=observer)
+        if self._gateway is not None:
+            port = TimedRtuSlavePort(self._gateway.units, gap_ns=gap_ns, on_frame=observer, on_pause=self._on_pause)
         else:
-            port = RtuSlavePort(self._served, gap_ns=gap_ns, on_frame=observer)
+            line = None if baud is None else SerialLine(baud)
+            port = RtuSlavePort(self._served, gap_ns=gap_ns, line=line, on_frame=observer, on_pause=self._on_pause)
         shared = Com1Link(Com1Port(self._only_device(), port)) if self._hears_records else port
         watched = WatchedRtuPort(shared, self.frames, link) if self.options.frames else shared
         return FaultyPort(watched, link, self.faults.faults, Line.RTU, framed=port, units=tuple(self.devices))

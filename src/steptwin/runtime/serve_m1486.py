@@ -56,7 +56,7 @@ class M1486Options:
 
 def serve(options: M1486Options) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
-    check_line_timing(options.line_timing)
+    check_line_timing(options.line_timing, "real")
     check_name(options.name)
     kind = variant(options.variant)
     baud_pins(kind, options.baud)

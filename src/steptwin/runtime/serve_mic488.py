@@ -70,7 +70,7 @@ class Mic488Options:
 
 def serve(options: Mic488Options) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
-    check_line_timing(options.line_timing)
+    check_line_timing(options.line_timing, "real", "strict")
     if options.baud is not None and options.baud not in BAUDS:
         raise Misuse(f"--baud {options.baud}: permitted are {', '.join(map(str, BAUDS))} bit/s")
     if options.demo and options.config is not None:
@@ -155,7 +155,12 @@ async def _serve(options: Mic488Options, config: ControllerConfig, units: list[i
             statement_time=options.statement_time,
             state=open_state(stack, options.state),
             demo=options.demo,
-            options=LineOptions(baud=baud, timing=options.line_timing == "real", frames=live or options.log_frames),
+            options=LineOptions(
+                baud=baud,
+                timing=options.line_timing != "off",
+                strict=options.line_timing == "strict",
+                frames=live or options.log_frames,
+            ),
         )
         cell = Cell(line.kernel, Clock())
         line.share_reads(cell)
@@ -186,7 +191,7 @@ async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: 
         await server.open_pty(options.pty, RTU, lambda: line.rtu_port("pty", bursty))
     if options.serial is not None:
         uart = UART_GAP_NS if gap is None else gap
-        await server.open_serial(options.serial, baud, RTU, lambda: line.rtu_port("serial", uart))
+        await server.open_serial(options.serial, baud, RTU, lambda: line.rtu_port("serial", uart, baud=baud))
     if options.tcp is not None:
         await server.open_tcp("tcp", parse_address(options.tcp, listen_any=options.listen_any), TCP, line.tcp_port)
     if options.rtu_tcp is not None:

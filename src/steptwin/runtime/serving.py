@@ -16,9 +16,10 @@ def check_name(name: str) -> None:
         raise Misuse(f"--name {name!r}: permitted are 1 to {LONGEST_NAME} letters, digits, '-' and '_'")
 
 
-def check_line_timing(wanted: str) -> None:
-    if wanted not in ("real", "off"):
-        raise Misuse(f"--line-timing {wanted}: permitted are 'real' and 'off'")
+def check_line_timing(wanted: str, *real: str) -> None:
+    """`Misuse` unless ``wanted`` is one of the ways of ``real`` timing or ``off``."""
+    if wanted not in (*real, "off"):
+        raise Misuse(f"--line-timing {wanted}: permitted are {', '.join(map(repr, real))} and 'off'")
 
 
 def shows_live_view(output: Output, *, log_frames: bool) -> bool:

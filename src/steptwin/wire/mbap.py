@@ -21,7 +21,6 @@ MAX_FRAME = HEADER_BYTES + MAX_PDU
 LONGEST_LENGTH = 1 + 6 + 255
 """Of a function 16 with the largest byte count: too long for the protocol, but taken, so that a quantity above the permitted
 one is answered with exception 03 (MIC-24) and not with a closed connection."""
-LONGEST_FRAME = HEADER_BYTES - 1 + LONGEST_LENGTH
 
 _HEADER = struct.Struct(">HHHB")
 _PROTOCOL_AND_LENGTH = struct.Struct(">HH")

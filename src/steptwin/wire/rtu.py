@@ -14,11 +14,12 @@ from __future__ import annotations
 
 import enum
 import re
+from collections import deque
 from collections.abc import Collection
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, Nanos
+from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.wire.crc import crc16, with_crc
 from steptwin.wire.pdu import REFUSED
@@ -31,9 +32,12 @@ MAX_FRAME = 256
 # MIC-15: the manual's gap belongs to a real UART; elsewhere delivery is bursty.
 UART_GAP_NS: Nanos = 750 * MICROSECOND
 BURSTY_GAP_NS: Nanos = 20 * MILLISECOND
-# UART FIFOs and USB adapters (16 ms latency timer) hand over one frame in pieces with more than 750 us between them. The
-# beginning of a frame is therefore kept beyond the gap for as long as such a piece can be late, and no longer.
-LATE_NS: Nanos = 50 * MILLISECOND
+# USB adapters (16 ms latency timer), Nagle's algorithm (40 to 200 ms) and masters that write byte by byte deliver one frame in
+# pieces. The beginning of a frame is kept this long; a new frame behind it is found at once all the same.
+PAUSE_NS: Nanos = 2 * SECOND
+MAX_LOOKS = MAX_FRAME
+"""Places in one delivery at which no frame begins and that are examined; behind them only the last 256 bytes are kept, until
+the gap has passed. It bounds the cost of rubbish."""
 
 # function: (length of the frame, index of a byte to be added to it or 0). Modbus application protocol V1.1b3, section 6.
 _REQUEST_LENGTHS = {
@@ -79,6 +83,10 @@ class RtuFrame(NamedTuple):
     role: Role
     end: int
     """How many bytes had been fed up to and with the last of this frame."""
+    begin: Nanos = 0
+    """When its first byte came."""
+    pause: Nanos = 0
+    """The longest silence inside it."""
 
     @property
     def unit(self) -> int:
@@ -87,6 +95,16 @@ class RtuFrame(NamedTuple):
     @property
     def pdu(self) -> bytes:
         return self.raw[1:-2]
+
+
+class _Piece(NamedTuple):
+    """Bytes that came without a pause between them."""
+
+    first: int
+    """How many bytes had been fed before."""
+    size: int
+    begin: Nanos
+    end: Nanos
 
 
 def encode_frame(unit: int, pdu: bytes) -> bytes:
@@ -126,16 +144,18 @@ class RtuFramer(Stateful):
     """Cuts the frames of one line, at most 256 bytes held between calls.
 
     ``own`` are the units on this side: what begins with one of them, or with the broadcast address, can only be a request
-    (an adapter that echoes has to be silenced before). Call `expire` when `deadline` has come.
+    (an adapter that echoes has to be silenced before). ``gap_ns`` is the silence after which bytes of no frame are given up,
+    ``pause_ns`` the longest silence inside a frame (the gap, when that is longer). Call `expire` when `deadline` has come.
     """
 
-    __slots__ = ("_asked", "_burst", "_fed", "_framed", "_last", "_own", "_scan", "gap_ns", "held")
-    FIXED = frozenset({"_own", "gap_ns"})
+    __slots__ = ("_asked", "_burst", "_fed", "_framed", "_last", "_own", "_pause_ns", "_pieces", "_scan", "gap_ns", "held")
+    FIXED = frozenset({"_own", "_pause_ns", "gap_ns"})
 
-    def __init__(self, own: Collection[int] = (), gap_ns: Nanos = BURSTY_GAP_NS) -> None:
+    def __init__(self, own: Collection[int] = (), gap_ns: Nanos = BURSTY_GAP_NS, pause_ns: Nanos = PAUSE_NS) -> None:
         if gap_ns < 1:
             raise Misuse(f"a gap of {gap_ns} ns is not positive")
         self.gap_ns = gap_ns
+        self._pause_ns = pause_ns
         self.held = bytearray()
         """Bytes not yet cut. Always the same object; empty means in step."""
         self._own = frozenset(own)
@@ -145,6 +165,7 @@ class RtuFramer(Stateful):
         self._fed = 0
         self._framed = 0
         self._asked: tuple[int, int] | None = None  # unit and function of the last request, until its response
+        self._pieces: deque[_Piece] = deque()  # what `held` is made of; the first may begin before it
 
     @property
     def fed(self) -> int:
@@ -170,13 +191,16 @@ class RtuFramer(Stateful):
         """The frames completed by ``data``, whose first byte came at ``now`` and whose last at ``end`` (default ``now``)."""
         if self.held:
             frames = self.expire(now)
-            if now - self._last > LATE_NS and len(self.held) == self._burst:
+            if now - self._last > self._pause_ns and len(self.held) == self._burst:
                 self._drop(len(self.held))
         else:
             frames = []
+        if not data:
+            return frames
+        self._last = now if end is None else end
+        self._pieces.append(_Piece(self._fed, len(data), now, self._last))
         self.held += data
         self._fed += len(data)
-        self._last = now if end is None else end
         self._cut_frames(frames)
         return frames
 
@@ -217,7 +241,7 @@ class RtuFramer(Stateful):
     def _cut_frames(self, frames: list[RtuFrame]) -> None:
         held = self.held
         size = len(held)
-        done = 0
+        done = looks = 0
         start = self._scan
         while start < size:
             length, role = self._look(start, waiting=True)
@@ -229,6 +253,10 @@ class RtuFramer(Stateful):
             if length == 0:
                 break
             if length < 0:
+                looks += 1
+                if looks == MAX_LOOKS and size - start > MAX_FRAME:
+                    self._drop(size - MAX_FRAME)
+                    return
                 start = self._next_start(start + 1)
                 continue
             self._take(start, length, role, frames)
@@ -250,13 +278,28 @@ class RtuFramer(Stateful):
         raw = bytes(self.held[start : start + length])
         self._framed += length
         self._asked = (raw[0], raw[1]) if role is Role.REQUEST else None
-        frames.append(RtuFrame(raw, role, self._fed - len(self.held) + start + length))
+        first = self._fed - len(self.held) + start
+        end = first + length
+        begin, pause, before = None, 0, 0
+        for piece in self._pieces:
+            if piece.first >= end:
+                break
+            if piece.first + piece.size > first:
+                if begin is None:
+                    begin = piece.begin + (piece.end - piece.begin) * (first - piece.first) // piece.size
+                else:
+                    pause = max(pause, piece.begin - before)
+            before = piece.end
+        frames.append(RtuFrame(raw, role, end, begin or 0, pause))
 
     def _drop(self, count: int) -> None:
         """Forget the first ``count`` bytes; what remains is looked at from its start."""
         del self.held[:count]
         self._burst = 0
         self._scan = 0
+        pieces, first = self._pieces, self._fed - len(self.held)
+        while pieces and pieces[0].first + pieces[0].size <= first:
+            pieces.popleft()
 
     def _look(self, start: int, *, waiting: bool) -> tuple[int, Role]:
         """Length and role of the frame that begins at ``start``; length 0: it may still become one, -1: it cannot."""

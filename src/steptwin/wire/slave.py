@@ -7,14 +7,15 @@ to be answered now; `receive` and `to_send` are the same as a `steptwin.machine.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos, WirePort
+from steptwin.machine import SECOND, Nanos, WirePort
 from steptwin.state import Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import crc16, with_crc
+from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import GATEWAY_TARGET_FAILED, REFUSED, WRITE_MULTIPLE_REGISTERS, WRITES, exception_pdu
 
 _PLAIN = bytes(3)
@@ -35,7 +36,14 @@ class Direction(enum.Enum):
 
 
 FrameObserver: TypeAlias = Callable[[Nanos, Direction, bytes], None]
-"""Told of every whole frame as it is on the wire, foreign ones and broadcasts too."""
+"""Called with every whole frame as it is on the wire, foreign ones and broadcasts too."""
+
+PauseObserver: TypeAlias = Callable[[int, Nanos], None]
+"""Called with the unit of a request just served (0: broadcast) and the silence inside it, where that is longer than the
+750 µs after which the device drops a frame (MIC-15)."""
+
+PAUSE_REPORT_NS: Nanos = SECOND
+"""One port reports pauses at most this often."""
 
 
 class SlavePort(WirePort, Protocol):
@@ -73,9 +81,7 @@ def execute_frame(devices: Mapping[int, Device], frame: rtu.RtuFrame, now: Nanos
     if not 0 < function < REFUSED:
         return b""
     if unit == rtu.BROADCAST:
-        if function in WRITES:
-            for device in devices.values():
-                device.execute(raw[1:-2], now)
+        broadcast(devices.values(), raw[1:-2], now)
         return b""
     device = devices.get(unit)
     if device is None:
@@ -83,26 +89,63 @@ def execute_frame(devices: Mapping[int, Device], frame: rtu.RtuFrame, now: Nanos
     return with_crc(raw[:1] + device.execute(raw[1:-2], now))
 
 
-class RtuSlavePort(Stateful):
-    """One RTU line, by default without the time a wire takes (`steptwin.wire.timed` has it).
+def broadcast(devices: Iterable[Device], pdu: bytes, now: Nanos) -> None:
+    """A request to unit 0: every device executes a write, reads are ignored (MIC-2)."""
+    if pdu[0] in WRITES:
+        for device in devices:
+            device.execute(pdu, now)
 
-    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15).
+
+def tcp_response(request: bytes, pdu: bytes) -> bytes:
+    """The Modbus TCP frame that answers the frame ``request`` with ``pdu``."""
+    return request[:4] + (len(pdu) + 1).to_bytes(2, "big") + request[6:7] + pdu
+
+
+class PauseReports(Stateful):
+    """Reports requests with a pause inside that the device would have dropped."""
+
+    __slots__ = ("_next", "_observer")
+    FIXED = frozenset({"_observer"})
+
+    def __init__(self, observer: PauseObserver | None) -> None:
+        self._observer = observer
+        self._next: Nanos = 0
+
+    def served(self, frame: rtu.RtuFrame, now: Nanos) -> None:
+        if frame.pause > rtu.UART_GAP_NS and now >= self._next and self._observer is not None:
+            self._next = now + PAUSE_REPORT_NS
+            self._observer(frame.unit, frame.pause)
+
+
+class RtuSlavePort(Stateful):
+    """One RTU line without the time a wire takes (`steptwin.wire.timed` has it).
+
+    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15). ``line`` tells how long the
+    characters of a delivery took; without it a delivery takes no time.
     """
 
     broken = None
     """A line cannot be broken by what is on it; a connection can."""
 
-    __slots__ = ("_devices", "_framer", "_held", "_out", "on_frame")
-    FIXED = frozenset({"_devices", "_held", "on_frame"})
+    __slots__ = ("_devices", "_framer", "_held", "_line", "_out", "_pauses", "on_frame")
+    FIXED = frozenset({"_devices", "_held", "_line", "on_frame"})
 
     def __init__(
-        self, devices: Mapping[int, Device], *, gap_ns: Nanos = rtu.BURSTY_GAP_NS, on_frame: FrameObserver | None = None
+        self,
+        devices: Mapping[int, Device],
+        *,
+        gap_ns: Nanos = rtu.BURSTY_GAP_NS,
+        line: SerialLine | None = None,
+        on_frame: FrameObserver | None = None,
+        on_pause: PauseObserver | None = None,
     ) -> None:
         check_units(devices)
         self._devices = dict(devices)
         self._framer = rtu.RtuFramer(self._devices, gap_ns)
         self._held = self._framer.held
+        self._line = line
         self._out: list[tuple[Nanos, bytes]] = []
+        self._pauses = PauseReports(on_pause)
         self.on_frame = on_frame
 
     @property
@@ -125,7 +168,8 @@ class RtuSlavePort(Stateful):
                         self.on_frame(now, Direction.IN, data)
                         self.on_frame(now, Direction.OUT, response)
                     return response
-        return self._execute(self._framer.feed(data, now), now)
+        begin = now if self._line is None else now - self._line.duration(size)
+        return self._execute(self._framer.feed(data, begin, now), now)
 
     def _execute(self, frames: list[rtu.RtuFrame], now: Nanos) -> bytes:
         responses = []
@@ -135,6 +179,8 @@ class RtuSlavePort(Stateful):
                 self.on_frame(now, Direction.IN, frame.raw)
                 if response:
                     self.on_frame(now, Direction.OUT, response)
+            if frame.pause and (frame.unit == rtu.BROADCAST or frame.unit in self._devices):
+                self._pauses.served(frame, now)
             responses.append(response)
         return b"".join(responses)
 
@@ -158,9 +204,9 @@ class RtuSlavePort(Stateful):
 class TcpSlavePort(Stateful):
     """One Modbus TCP connection. ``devices`` is read once.
 
-    MIC-23: a single device is addressed by 0 and 255 too. Any other unit is answered with exception 0B, as gateways do: a
-    client that waits for a response is told at once that nobody is there. When `broken` says why, the shell sends what it
-    has and closes the connection.
+    MIC-23: a single device is addressed by 0 and 255 too. With several, 0 is a broadcast, which is not answered (MIC-2). Any
+    other unit is answered with exception 0B at once, as gateways do. When `broken` says why, the shell sends what it has and
+    closes the connection.
     """
 
     __slots__ = ("_devices", "_framer", "_out", "on_frame")
@@ -193,12 +239,19 @@ class TcpSlavePort(Stateful):
         return b"".join([self._answer(frame.raw, now) for frame in framer.feed(data)])
 
     def _answer(self, raw: bytes, now: Nanos) -> bytes:
-        device = self._devices.get(raw[6])
-        pdu = exception_pdu(raw[7], GATEWAY_TARGET_FAILED) if device is None else device.execute(raw[7:], now)
-        response = raw[:4] + (len(pdu) + 1).to_bytes(2, "big") + raw[6:7] + pdu
+        unit, pdu = raw[6], raw[7:]
+        device = self._devices.get(unit)
+        if device is not None:
+            response = tcp_response(raw, device.execute(pdu, now))
+        elif unit == rtu.BROADCAST:
+            broadcast(self._devices.values(), pdu, now)
+            response = b""
+        else:
+            response = tcp_response(raw, exception_pdu(pdu[0], GATEWAY_TARGET_FAILED))
         if self.on_frame is not None:
             self.on_frame(now, Direction.IN, raw)
-            self.on_frame(now, Direction.OUT, response)
+            if response:
+                self.on_frame(now, Direction.OUT, response)
         return response
 
     def receive(self, data: bytes, now: Nanos) -> None:

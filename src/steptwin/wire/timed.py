@@ -1,26 +1,28 @@
-"""An RTU slave port on a line that takes its time.
+"""Controllers that take the time a serial line and their own firmware take (MIC-32).
 
-MIC-32: each character takes its bit times in both directions, a request is there when its last character has arrived, the
-device takes one request at a time and at most 100 a second; up to 16 wait, what comes beyond them is dropped.
+Each character takes its bit times in both directions. A request is there when its last character has arrived; a controller has
+one request at a time, on whichever of its ports it came, and executes at most 100 a second. What arrives at it meanwhile is
+lost, as on a UART without a buffer (`steptwin.wire.gateway` waits instead).
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.wire import rtu
+from steptwin.wire.crc import with_crc
 from steptwin.wire.line import CharacterClock, SerialLine
-from steptwin.wire.slave import Device, Direction, FrameObserver, check_units, execute_frame
+from steptwin.wire.pdu import REFUSED, WRITES
+from steptwin.wire.slave import Device, Direction, FrameObserver, PauseObserver, PauseReports, check_units
 
-# MIC-32: the highest rate the manual gives, and the length of the queue.
+# MIC-32: the highest rate the manual gives.
 FRAME_INTERVAL_NS: Nanos = 10 * MILLISECOND
-QUEUE_FRAMES = 16
-LINE_CHARACTERS = QUEUE_FRAMES * rtu.MAX_FRAME
+LINE_CHARACTERS = 16 * rtu.MAX_FRAME
 """More characters than this never wait for the line: a real sender would not have got rid of them yet."""
 
 
@@ -29,12 +31,14 @@ class LineTiming:
     """How fast a line and the device on it are.
 
     ``turnaround_ns`` passes between the request and the first character of the response; it cannot be shorter than the
-    gap that ends the request, which is its default. ``interval_ns`` is the least time between two requests taken.
+    gap that ends the request, which is its default. ``interval_ns`` is the least time between two requests executed.
+    ``strict``: a pause above 750 µs inside a frame ends it, so that the device drops it (MIC-15).
     """
 
     line: SerialLine
     turnaround_ns: Nanos = rtu.UART_GAP_NS
     interval_ns: Nanos = FRAME_INTERVAL_NS
+    strict: bool = False
 
     def __post_init__(self) -> None:
         if self.turnaround_ns < 0:
@@ -43,10 +47,51 @@ class LineTiming:
             raise Misuse(f"a frame interval of {self.interval_ns} ns is negative")
 
 
+class TimedUnits(Stateful):
+    """Controllers behind any number of ports, and until when each is busy with a request. ``devices`` is read once."""
+
+    __slots__ = ("_busy", "_next", "devices", "timing")
+    FIXED = frozenset({"devices", "timing"})
+
+    def __init__(self, devices: Mapping[int, Device], timing: LineTiming) -> None:
+        check_units(devices)
+        self.devices = dict(devices)
+        self.timing = timing
+        self._busy = dict.fromkeys(devices, 0)
+        self._next = dict.fromkeys(devices, 0)  # when each may execute its next request
+
+    def addressed(self, unit: int, function: int) -> list[int]:
+        """The units that a request is for; none for a foreign unit or a broadcast that is no write (MIC-2)."""
+        if unit == rtu.BROADCAST:
+            return list(self.devices) if function in WRITES else []
+        return [unit] if unit in self.devices and 0 < function < REFUSED else []
+
+    def busy_until(self, units: Iterable[int]) -> Nanos:
+        """When the last of ``units`` has done with its present request."""
+        return max((self._busy[unit] for unit in units), default=0)
+
+    def execution(self, units: Iterable[int], arrival: Nanos) -> Nanos:
+        """When a request that arrives at ``arrival`` is executed by the last of ``units``."""
+        return max(arrival, *(self._next[unit] for unit in units))
+
+    def take(self, unit: int, arrival: Nanos) -> Nanos:
+        """``unit`` has a request from ``arrival`` on, until `done`; returns when it executes it."""
+        start = max(arrival, self._next[unit])
+        # Should the port that took it go away: until the longest response would have been sent.
+        self._busy[unit] = start + self.timing.turnaround_ns + self.timing.line.duration(rtu.MAX_FRAME)
+        return start
+
+    def done(self, unit: int, executed: Nanos, sent: Nanos) -> None:
+        """The request of ``unit`` was executed; its response has left at ``sent``."""
+        self._next[unit] = executed + self.timing.interval_ns
+        self._busy[unit] = sent
+
+
 class TimedRtuSlavePort(Stateful):
     """As `steptwin.wire.slave.RtuSlavePort`, with line timing. Responses leave when their last character would have.
 
-    Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due.
+    Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due. ``gap_ns`` is the
+    silence after which rubbish is given up; with strict timing 750 µs.
     """
 
     broken = None
@@ -54,40 +99,41 @@ class TimedRtuSlavePort(Stateful):
 
     __slots__ = (
         "_arriving",
-        "_devices",
         "_framer",
-        "_free",
+        "_in_hand",
         "_incoming",
         "_outgoing",
+        "_pauses",
         "_responses",
-        "_timing",
-        "_waiting",
+        "_units",
         "dropped",
         "on_frame",
         "overrun",
     )
-    FIXED = frozenset({"_devices", "_timing", "on_frame"})
+    FIXED = frozenset({"_units", "on_frame"})
 
     def __init__(
         self,
-        devices: Mapping[int, Device],
-        timing: LineTiming,
+        units: TimedUnits,
         *,
         gap_ns: Nanos = rtu.BURSTY_GAP_NS,
         on_frame: FrameObserver | None = None,
+        on_pause: PauseObserver | None = None,
     ) -> None:
-        check_units(devices)
-        self._devices = dict(devices)
-        self._timing = timing
-        self._framer = rtu.RtuFramer(self._devices, gap_ns)
+        self._units = units
+        timing = units.timing
+        if timing.strict:
+            self._framer = rtu.RtuFramer(units.devices, rtu.UART_GAP_NS, rtu.UART_GAP_NS)
+        else:
+            self._framer = rtu.RtuFramer(units.devices, gap_ns)
         self._incoming = CharacterClock(timing.line)
         self._outgoing = CharacterClock(timing.line)
         self._arriving: deque[tuple[Nanos, rtu.RtuFrame]] = deque()  # frames whose last character comes at that time
-        self._waiting: deque[rtu.RtuFrame] = deque()  # arrived, not yet taken
-        self._free: Nanos = 0  # from when on the device takes the next request
+        self._in_hand: list[tuple[Nanos, int, rtu.RtuFrame]] = []  # when which unit executes what it has taken
         self._responses: deque[tuple[Nanos, bytes]] = deque()
+        self._pauses = PauseReports(on_pause)
         self.dropped = 0
-        """Requests that found the queue full."""
+        """Requests lost because the controller was busy; a broadcast counts once for each."""
         self.overrun = 0
         """Characters that found no room on the line."""
         self.on_frame = on_frame
@@ -126,25 +172,26 @@ class TimedRtuSlavePort(Stateful):
         return out
 
     def deadline(self) -> Nanos | None:
-        moments = [self._framer.deadline(), self._service()]
+        moments = [moment for moment, *_ in self._in_hand]
+        gap = self._framer.deadline()
+        if gap is not None:
+            moments.append(gap)
         if self._arriving:
             moments.append(self._arriving[0][0])
         if self._responses:
             moments.append(self._responses[0][0])
-        return min((moment for moment in moments if moment is not None), default=None)
-
-    def _service(self) -> Nanos | None:
-        return self._free if self._waiting else None
+        return min(moments, default=None)
 
     def _run(self, now: Nanos) -> None:
         """Everything due until ``now``: arrivals and executions in the order of their moments."""
         for frame in self._framer.expire(now):
             self._arriving.append((now, frame))
         while True:
-            service = self._service()
+            execution = min(self._in_hand, key=_moment, default=None)
             arrival = self._arriving[0][0] if self._arriving else None
-            if service is not None and service <= now and (arrival is None or service <= arrival):
-                self._serve(service, now)
+            if execution is not None and execution[0] <= now and (arrival is None or execution[0] <= arrival):
+                self._in_hand.remove(execution)
+                self._execute(*execution, now)
             elif arrival is not None and arrival <= now:
                 self._arrive(arrival)
             else:
@@ -154,19 +201,21 @@ class TimedRtuSlavePort(Stateful):
         _, frame = self._arriving.popleft()
         if self.on_frame is not None:
             self.on_frame(moment, Direction.IN, frame.raw)
-        if frame.unit != rtu.BROADCAST and frame.unit not in self._devices:
-            return
-        if len(self._waiting) == QUEUE_FRAMES:
-            self.dropped += 1
-            return
-        if not self._waiting:
-            self._free = max(self._free, moment)
-        self._waiting.append(frame)
+        for unit in self._units.addressed(frame.unit, frame.raw[1]):
+            if frame.begin < max(self._units.busy_until((unit,)), self._outgoing.end):
+                self.dropped += 1
+            else:
+                self._in_hand.append((self._units.take(unit, moment), unit, frame))
 
-    def _serve(self, moment: Nanos, now: Nanos) -> None:
-        response = execute_frame(self._devices, self._waiting.popleft(), now)
-        self._free = moment + self._timing.interval_ns
-        if response:
-            sent = self._outgoing.send(len(response), moment + self._timing.turnaround_ns)
-            self._free = max(self._free, sent)
+    def _execute(self, moment: Nanos, unit: int, frame: rtu.RtuFrame, now: Nanos) -> None:
+        response = with_crc(frame.raw[:1] + self._units.devices[unit].execute(frame.pdu, now))
+        sent = moment
+        if frame.unit != rtu.BROADCAST:
+            sent = self._outgoing.send(len(response), moment + self._units.timing.turnaround_ns)
             self._responses.append((sent, response))
+        self._units.done(unit, moment, sent)
+        self._pauses.served(frame, now)
+
+
+def _moment(execution: tuple[Nanos, int, rtu.RtuFrame]) -> Nanos:
+    return execution[0]

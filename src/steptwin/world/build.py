@@ -25,7 +25,6 @@ from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
-from steptwin.wire.slave import Device
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Button, Switch, Zone
 from steptwin.world.course import Build
@@ -179,7 +178,7 @@ class _Builder:
     def _m1486(self, spec: M1486Spec) -> M1486:
         kind = variant(spec.variant)
         image = b"" if spec.program is None else _image(self._text(spec.program), spec.program, kind)
-        timed = any(line.name == spec.line and line.timing == "real" for line in self.spec.lines)
+        timed = any(line.name == spec.line and line.timing != "off" for line in self.spec.lines)
         baud = spec.baud
         if baud is None:
             baud = next((line.baud for line in self.spec.lines if line.name == spec.line), None)
@@ -247,12 +246,12 @@ class _Builder:
 
     def _make_lines(self) -> None:
         for spec in self.spec.lines:
-            self._told(spec.path, partial(self._line, spec.name, spec.kind, spec.baud, spec.timing == "real"))
+            self._told(spec.path, partial(self._line, spec.name, spec.kind, spec.baud, spec.timing))
 
-    def _line(self, name: str, kind: str, baud: int | None, is_timed: bool) -> None:
+    def _line(self, name: str, kind: str, baud: int | None, timed: str) -> None:
         plan, kernel = self.plan, self.plan.kernel_of[name]
         chips: list[M1486] = []
-        devices: dict[int, Device] = {}
+        devices: dict[int, Mic488] = {}
         names: dict[int, str] = {}
         for spec in (*self.spec.mic488, *self.spec.m1486):
             if spec.line != name:
@@ -275,9 +274,11 @@ class _Builder:
             raise Misuse(f"baud = {baud}: a MIC488 has {', '.join(map(str, BAUDS))} bit/s")
         line: Line
         if kind == "m1486":
+            if timed == "strict":
+                raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")
             line = ChipLine(kernel, name, plan.record, plan.faults, chips)
         else:
-            timing = timing_of(baud or DEFAULT_BAUD) if is_timed else None
+            timing = None if timed == "off" else timing_of(baud or DEFAULT_BAUD, strict=timed == "strict")
             line = ModbusLine(kernel, name, plan.record, plan.faults, devices=devices, timing=timing)
         kernel.add_part(line)
         plan.lines[name] = line

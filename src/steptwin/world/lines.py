@@ -13,11 +13,12 @@ from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.line import SerialChain
 from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488, pause_observer
 from steptwin.state import Plain, Stateful
+from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
-from steptwin.wire.rtu import BURSTY_GAP_NS
-from steptwin.wire.slave import Device, Direction, RtuSlavePort, TcpSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort
+from steptwin.wire.slave import Direction, RtuSlavePort, TcpSlavePort
+from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
 from steptwin.world.faults import Line as FaultLine
 from steptwin.world.kernel import Kernel
@@ -178,10 +179,10 @@ class Line(Stateful):
 
 
 class ModbusLine(Line):
-    """Controllers with different units on one line. With ``timing`` RTU takes the time a wire takes."""
+    """Controllers with different units on one line. With ``timing`` requests take the time of a wire and of the controllers."""
 
-    __slots__ = ("devices", "master", "timing")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"devices", "timing"}) | Line.FIXED
+    __slots__ = ("_timed", "devices", "master")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"devices"}) | Line.FIXED
 
     kinds = ("rtu", "tcp")
     fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"rtu": FaultLine.RTU, "tcp": FaultLine.TCP}
@@ -193,12 +194,15 @@ class ModbusLine(Line):
         record: Recorder | None,
         faults: Faults,
         *,
-        devices: Mapping[int, Device],
+        devices: Mapping[int, Mic488],
         timing: LineTiming | None,
     ) -> None:
         super().__init__(kernel, name, record, faults)
         self.devices = devices
-        self.timing = timing
+        self._timed: tuple[TimedUnits, Gateway] | None = None
+        if timing is not None:
+            units = TimedUnits(devices, timing)
+            self._timed = units, Gateway(units)
         self.master = Master(self._ask, 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
         """Who asks for the scripts."""
 
@@ -227,11 +231,17 @@ class ModbusLine(Line):
         def observe(now: Nanos, direction: Direction, data: bytes) -> None:
             self._tell(now, place, direction, data)
 
+        on_pause = pause_observer(self.devices)
+        if self._timed is None:
+            if kind == "tcp":
+                return TcpSlavePort(self.devices, on_frame=observe)
+            return RtuSlavePort(self.devices, on_frame=observe, on_pause=on_pause)
+        units, gateway = self._timed
         if kind == "tcp":
-            return TcpSlavePort(self.devices, on_frame=observe)
-        if self.timing is None:
-            return RtuSlavePort(self.devices, gap_ns=BURSTY_GAP_NS, on_frame=observe)
-        return TimedRtuSlavePort(self.devices, self.timing, gap_ns=BURSTY_GAP_NS, on_frame=observe)
+            return TcpGatewayPort(gateway, on_frame=observe)
+        if place == SCRIPTS:
+            return ScriptPort(gateway, on_frame=observe)
+        return TimedRtuSlavePort(units, on_frame=observe, on_pause=on_pause)
 
     def _framed(self, port: Any) -> Any:
         return port
@@ -278,5 +288,5 @@ class ChipLine(Line):
         place.inner.pending = list(pending)
 
 
-def timing_of(baud: int) -> LineTiming:
-    return LineTiming(SerialLine(baud))
+def timing_of(baud: int, *, strict: bool) -> LineTiming:
+    return LineTiming(SerialLine(baud), strict=strict)

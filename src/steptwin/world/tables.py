@@ -74,7 +74,12 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         Key("name", name_value, "how controllers and scripts name it"),
         _optional(word("modbus", "m1486"), "kind", "modbus (MIC488) or m1486", "modbus"),
         _optional(whole(300, 1_000_000), "baud", "bit/s; default 38400, the highest of the chips"),
-        _optional(word("real", "off"), "timing", "real: characters take their time; off", "off"),
+        _optional(
+            word("real", "strict", "off"),
+            "timing",
+            "real: characters take their time; strict (modbus): and a pause above 750 us drops a frame; off",
+            "off",
+        ),
         _optional(_texts, "tcp", "HOST:PORT for live clients (Modbus TCP, or raw characters)"),
         _optional(_texts, "rtu_tcp", "HOST:PORT for live clients of RTU over TCP"),
         _optional(_texts, "pty", "path of a pseudo terminal for a live client"),

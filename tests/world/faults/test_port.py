@@ -92,11 +92,11 @@ def test_gap_is_silence_within_an_answer() -> None:
 
 
 def test_a_gap_in_a_request_ends_it_where_the_twin_gives_the_beginning_up() -> None:
-    """The twin keeps the beginning of a frame for 50 ms (`steptwin.wire.rtu.LATE_NS`), and not longer."""
-    for gap, answers in ((10, 1), (40, 1), (60, 0)):
+    """The twin keeps the beginning of a frame for 2 s (`steptwin.wire.rtu.PAUSE_NS`), and not longer."""
+    for gap, answers in ((10, 1), (60, 1), (2000, 1), (2001, 0)):
         rig = FaultRig(f"gap direction=in nth=5 for_ms={gap}")
         rig.send(REQUEST)
-        assert len(rig.arrivals()) == answers, gap
+        assert len(rig.arrivals(3.0)) == answers, gap
 
 
 def test_split_delivers_in_pieces() -> None:
@@ -233,15 +233,25 @@ def test_crc_and_echo_do_not_exist_on_tcp() -> None:
 
 
 def test_faults_of_frames_on_a_line_that_takes_its_time() -> None:
-    """9600 bit/s: the answer to the second request is the one that is spoilt, though both were sent at once."""
-    rig = FaultRig("crc address=100", is_timed=True)
-    rig.send(REQUEST + rtu(1, bytes.fromhex("03 00 64 00 01")) + rtu(1, bytes.fromhex("03 00 01 00 01")))
+    """9600 bit/s: the answer to the second request is the one that is spoilt, though all were sent at once."""
+    rig = FaultRig("wrong-unit address=100", line=Line.TCP, is_timed=True)
+    rig.send(tcp(1, 1, READ) + tcp(2, 1, bytes.fromhex("03 00 64 00 01")) + tcp(3, 1, bytes.fromhex("03 00 01 00 01")))
+    assert [(data[1], data[6]) for _, data in rig.arrivals()] == [(1, 2), (2, 2), (3, 1)]
+    rig = FaultRig("wrong-unit function=6", line=Line.TCP, is_timed=True)
+    rig.send(tcp(1, 1, READ) + tcp(2, 1, WRITE) + tcp(3, 1, READ))
+    assert [(data[1], data[6]) for _, data in rig.arrivals()] == [(1, 1), (2, 2), (3, 1)]
+    rig = FaultRig("crc nth=1", is_timed=True)
+    rig.send(REQUEST + REQUEST)  # on the line itself the second is lost
     heard = [data for _, data in rig.arrivals()]
-    assert [frame[-2:] == crc(frame[:-2]) for frame in heard] == [False, False, True]
-    rig = FaultRig("crc function=6", is_timed=True)
-    rig.send(REQUEST + rtu(1, WRITE) + REQUEST)
-    heard = [data for _, data in rig.arrivals()]
-    assert [frame[-2:] == crc(frame[:-2]) for frame in heard] == [True, False, True]
+    assert [frame[-2:] == crc(frame[:-2]) for frame in heard] == [False]
+
+
+def test_an_answer_that_overtakes_others_leaves_them_their_faults() -> None:
+    """The seventeenth request is refused at once, while sixteen wait."""
+    rig = FaultRig("wrong-unit nth=3", line=Line.TCP, is_timed=True)
+    refused = rig.send(b"".join(tcp(n, 1, READ) for n in range(1, 18)))
+    assert refused == tcp(17, 1, b"\x83\x06")
+    assert [data[6] for _, data in rig.arrivals(2.0)] == [1, 2] + [1] * 14
 
 
 def test_an_answer_asked_for_before_the_fault_was_set_comes_whole() -> None:

@@ -15,7 +15,7 @@ from steptwin.world.faults.stream import spoil
 from steptwin.world.faults.table import Layer, Line
 
 _ASKED = 64
-"""More requests than this never wait for their answers (`steptwin.wire.timed.QUEUE_FRAMES`)."""
+"""More requests than this never wait for their answers (`steptwin.wire.gateway.QUEUE_REQUESTS`)."""
 
 
 class InnerPort(Protocol):
@@ -254,17 +254,20 @@ class FaultyPort(Stateful):
             self._fresh.append((moment, sent.delay, held + sent.answer))
 
     def _request_of(self, raw: bytes) -> bytes | None:
-        """The oldest request that ``raw`` can be the answer to; older ones get none any more."""
-        unit, function = self._key(raw)
-        for _ in range(len(self._asked)):
-            asked = self._asked.popleft()
-            if self._key(asked) == (unit, function):
+        """The oldest request that ``raw`` can be the answer to; on RTU older ones get none any more."""
+        key = self._key(raw)
+        for place, asked in enumerate(self._asked):
+            if self._key(asked) == key:
+                for _ in range(place if self._line is Line.RTU else 0):
+                    self._asked.popleft()
+                self._asked.remove(asked)
                 return asked
         return None
 
-    def _key(self, raw: bytes) -> tuple[int, int]:
-        unit = raw[0] if self._line is Line.RTU else raw[6]
-        return unit, pdu_of(self._line, raw)[0] & 0x7F
+    def _key(self, raw: bytes) -> tuple[bytes, int]:
+        """What a request and its answer have in common: the unit (on TCP after the transaction) and the function."""
+        head = raw[:1] if self._line is Line.RTU else raw[:2] + raw[6:7]
+        return head, pdu_of(self._line, raw)[0] & 0x7F
 
     def _addressed(self, unit: int) -> int:
         return self._units[0] if self._line is Line.TCP and len(self._units) == 1 and unit in (0, 255) else unit

@@ -1,0 +1,257 @@
+"""A gateway in front of a line with timing (MIC-32).
+
+All its ports share one line, on which the gateway is the only master: requests wait for their turn in the order in which they
+came, and each takes the time of its characters, of the controller and of the response. What finds the queue full is refused with
+exception 06.
+"""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections import deque
+from typing import NamedTuple
+from weakref import WeakSet
+
+from steptwin.machine import Nanos
+from steptwin.state import Plain, Stateful
+from steptwin.wire import mbap, rtu
+from steptwin.wire.crc import with_crc
+from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, exception_pdu
+from steptwin.wire.slave import Direction, FrameObserver, tcp_response
+from steptwin.wire.timed import TimedUnits
+
+QUEUE_REQUESTS = 16
+"""Requests of all ports of one kind that wait for the line at once."""
+RTU_BYTES = 3
+"""Unit and CRC, which an RTU frame has beside its PDU."""
+
+
+class _Waiting(NamedTuple):
+    """A request in the queue."""
+
+    since: Nanos
+    number: int
+    """Counted over all ports of the gateway."""
+    units: tuple[int, ...]
+    raw: bytes
+    pdu: bytes
+
+
+class Gateway(Stateful):
+    """The line behind any number of ports, and whose turn it is."""
+
+    __slots__ = ("_count", "_free", "_waiting_ports", "units")
+    FIXED = frozenset({"_waiting_ports", "units"})
+
+    def __init__(self, units: TimedUnits) -> None:
+        self.units = units
+        self._free: Nanos = 0  # when the last response has left the line
+        self._count = 0
+        # A connection that is closed takes its requests with it.
+        self._waiting_ports: WeakSet[GatewayPort] = WeakSet()
+
+    def enqueue(self, port: GatewayPort, units: tuple[int, ...], raw: bytes, pdu: bytes, now: Nanos) -> bool:
+        """Have a request of ``port`` wait for the line; False when the queue is full."""
+        if sum(len(other.waiting) for other in self._waiting_ports if type(other) is type(port)) >= QUEUE_REQUESTS:
+            return False
+        self._count += 1
+        port.waiting.append(_Waiting(now, self._count, units, raw, pdu))
+        self._waiting_ports.add(port)
+        return True
+
+    def restored(self, port: GatewayPort) -> None:
+        """The state of ``port`` was put back."""
+        if port.waiting:
+            self._waiting_ports.add(port)
+        else:
+            self._waiting_ports.discard(port)
+
+    def deadline(self) -> Nanos | None:
+        """When the next request is executed."""
+        port = self._next_port()
+        return None if port is None else self._due(port.waiting[0])
+
+    def run(self, now: Nanos) -> None:
+        """Execute the requests that are due until ``now``."""
+        while (port := self._next_port()) is not None and (due := self._due(port.waiting[0])) <= now:
+            self._serve(port, due, now)
+
+    def _next_port(self) -> GatewayPort | None:
+        return min(self._waiting_ports, key=_turn, default=None)
+
+    def _due(self, request: _Waiting) -> Nanos:
+        begin = max(request.since, self._free, self.units.busy_until(request.units))
+        arrival = begin + self.units.timing.line.duration(len(request.pdu) + RTU_BYTES)
+        return self.units.execution(request.units, arrival)
+
+    def _serve(self, port: GatewayPort, moment: Nanos, now: Nanos) -> None:
+        request = port.waiting.popleft()
+        if not port.waiting:
+            self._waiting_ports.discard(port)
+        port.on_line(request.raw, moment)
+        timing = self.units.timing
+        self._free = moment
+        for unit in request.units:
+            response = self.units.devices[unit].execute(request.pdu, now)
+            if not port.is_broadcast(request.raw):
+                self._free = moment + timing.turnaround_ns + timing.line.duration(len(response) + RTU_BYTES)
+                port.respond(request.raw, response, self._free)
+            self.units.done(unit, moment, self._free)
+
+
+def _turn(port: GatewayPort) -> tuple[Nanos, int]:
+    return port.waiting[0][:2]
+
+
+class GatewayPort(Stateful):
+    """Base of the ports of a `Gateway`; responses leave when they have come over the line. Call `to_send` at every `deadline`."""
+
+    __slots__ = ("__weakref__", "_gateway", "_responses", "on_frame", "waiting")
+    FIXED = frozenset({"__weakref__", "_gateway", "on_frame"})
+
+    def __init__(self, gateway: Gateway, *, on_frame: FrameObserver | None = None) -> None:
+        self._gateway = gateway
+        self._responses: list[tuple[Nanos, bytes]] = []
+        self.waiting: deque[_Waiting] = deque()
+        self.on_frame = on_frame
+
+    def _requests(self, data: bytes, now: Nanos) -> list[bytes]:
+        """The frames completed by ``data``."""
+        raise NotImplementedError
+
+    def _addressed(self, raw: bytes) -> tuple[tuple[int, ...], bytes]:
+        """The units a request is for, and its PDU."""
+        raise NotImplementedError
+
+    def is_broadcast(self, raw: bytes) -> bool:
+        """Whether a request is not answered."""
+        raise NotImplementedError
+
+    def _response(self, raw: bytes, pdu: bytes) -> bytes:
+        """The frame that answers the request ``raw`` with ``pdu``."""
+        raise NotImplementedError
+
+    def _nobody(self, raw: bytes, now: Nanos) -> None:
+        """A request is for a unit that is not served."""
+
+    def set_state(self, plain: Plain) -> None:
+        super().set_state(plain)
+        self._gateway.restored(self)
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        self.receive(data, now)
+        return b"".join([response for _, response in self.to_send(now)])
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        self._gateway.run(now)
+        for raw in self._requests(data, now):
+            self._ask(raw, now)
+
+    def on_line(self, raw: bytes, moment: Nanos) -> None:
+        """The request ``raw`` is executed at ``moment``."""
+
+    def _ask(self, raw: bytes, now: Nanos) -> None:
+        units, pdu = self._addressed(raw)
+        if not units:
+            if not self.is_broadcast(raw):
+                self._nobody(raw, now)
+        elif not self._gateway.enqueue(self, units, raw, pdu, now) and not self.is_broadcast(raw):
+            self.respond(raw, exception_pdu(pdu[0], DEVICE_BUSY), now)
+
+    def respond(self, raw: bytes, pdu: bytes, moment: Nanos) -> None:
+        """The answer ``pdu`` to the request ``raw`` leaves at ``moment``."""
+        insort(self._responses, (moment, self._response(raw, pdu)), key=lambda response: response[0])
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        self._gateway.run(now)
+        out = []
+        while self._responses and self._responses[0][0] <= now:
+            moment, response = self._responses.pop(0)
+            out.append((moment, response))
+            if self.on_frame is not None:
+                self.on_frame(moment, Direction.OUT, response)
+        return out
+
+    def deadline(self) -> Nanos | None:
+        moments = [self._responses[0][0]] if self._responses else []
+        due = self._gateway.deadline() if self.waiting else None
+        if due is not None:
+            moments.append(due)
+        return min(moments, default=None)
+
+
+class TcpGatewayPort(GatewayPort):
+    """One Modbus TCP connection, as `steptwin.wire.slave.TcpSlavePort` otherwise (MIC-2, MIC-23)."""
+
+    __slots__ = ("_framer",)
+
+    def __init__(self, gateway: Gateway, *, on_frame: FrameObserver | None = None) -> None:
+        super().__init__(gateway, on_frame=on_frame)
+        self._framer = mbap.TcpFramer()
+
+    @property
+    def broken(self) -> str | None:
+        """Why the connection has to be closed, or None."""
+        return self._framer.broken
+
+    def _requests(self, data: bytes, now: Nanos) -> list[bytes]:
+        requests = [frame.raw for frame in self._framer.feed(data)]
+        if self.on_frame is not None:
+            for raw in requests:
+                self.on_frame(now, Direction.IN, raw)
+        return requests
+
+    def _addressed(self, raw: bytes) -> tuple[tuple[int, ...], bytes]:
+        units, unit, pdu = self._gateway.units, raw[6], raw[mbap.HEADER_BYTES :]
+        if len(units.devices) == 1 and unit in (0, 255):
+            return tuple(units.devices), pdu
+        if unit == rtu.BROADCAST:
+            return tuple(units.addressed(unit, pdu[0])), pdu
+        return (unit,) if unit in units.devices else (), pdu
+
+    def is_broadcast(self, raw: bytes) -> bool:
+        return raw[6] == rtu.BROADCAST and len(self._gateway.units.devices) > 1
+
+    def _response(self, raw: bytes, pdu: bytes) -> bytes:
+        return tcp_response(raw, pdu)
+
+    def _nobody(self, raw: bytes, now: Nanos) -> None:
+        self.respond(raw, exception_pdu(raw[7], GATEWAY_TARGET_FAILED), now)
+
+
+class ScriptPort(GatewayPort):
+    """RTU frames of the scripts of a world: their requests wait for those of Modbus TCP clients instead of getting lost.
+
+    A request is observed when it is executed; one that nobody serves is not.
+    """
+
+    broken = None
+    __slots__ = ("_framer",)
+
+    def __init__(self, gateway: Gateway, *, on_frame: FrameObserver | None = None) -> None:
+        super().__init__(gateway, on_frame=on_frame)
+        self._framer = rtu.RtuFramer(gateway.units.devices)
+
+    def _requests(self, data: bytes, now: Nanos) -> list[bytes]:
+        return [frame.raw for frame in self._framer.feed(data, now)]
+
+    def _addressed(self, raw: bytes) -> tuple[tuple[int, ...], bytes]:
+        return tuple(self._gateway.units.addressed(raw[0], raw[1])), raw[1:-2]
+
+    def is_broadcast(self, raw: bytes) -> bool:
+        return raw[0] == rtu.BROADCAST
+
+    def _response(self, raw: bytes, pdu: bytes) -> bytes:
+        return with_crc(raw[:1] + pdu)
+
+    def on_line(self, raw: bytes, moment: Nanos) -> None:
+        if self.on_frame is not None:
+            self.on_frame(moment, Direction.IN, raw)
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        for frame in self._framer.expire(now):
+            self._ask(frame.raw, now)
+        return super().to_send(now)
+
+    def deadline(self) -> Nanos | None:
+        return min((due for due in (super().deadline(), self._framer.deadline()) if due is not None), default=None)
