@@ -8,6 +8,7 @@ import pytest
 
 from steptwin.errors import LineFailure, Refusal
 from steptwin.host.exchange import Exchanger, Job, LineLost, More, NoAnswer, Overtaken
+from steptwin.host.permission import Permission
 from steptwin.machine import MILLISECOND
 
 TIMEOUT = 300 * MILLISECOND
@@ -191,7 +192,7 @@ def test_what_is_not_allowed_any_more_is_not_sent() -> None:
     e = engine()
     allowed = [True]
     submit(e, "one")
-    job = submit(e, "two", allowed=lambda: allowed[0])
+    job = submit(e, "two", permission=Permission(lambda: 0, 1, lambda: not allowed[0]))
     later = submit(e, "three")
     e.step(0)
     allowed[0] = False
@@ -205,7 +206,7 @@ def test_what_is_not_allowed_any_more_is_not_sent() -> None:
 def test_a_repetition_that_is_not_allowed_any_more_is_told_as_such() -> None:
     e = engine()
     allowed = [True]
-    job = submit(e, "one", most=3, allowed=lambda: allowed[0])
+    job = submit(e, "one", most=3, permission=Permission(lambda: 0, 1, lambda: not allowed[0]))
     e.step(0)
     allowed[0] = False
     assert e.step(e.deadline() or 0) == b""

@@ -16,6 +16,7 @@ from steptwin.host import LineLost, Mic488, NoAnswer, Overtaken, Untold
 from steptwin.host.blocking import finish
 from steptwin.host.exchange import Job
 from steptwin.host.modbus import Query, words
+from steptwin.host.permission import Permission
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.wire.pdu import Read, WriteCoil
 
@@ -119,7 +120,8 @@ def test_a_waiting_motion_is_not_begun_after_a_stop() -> None:
     finish(line.open())
     stopped = [False]
     engine = line._engine
-    motion: Job[Query, bytes] = Job(Query(1, WriteCoil(2008, True)), TIMEOUT, most=3, allowed=lambda: not stopped[0])
+    permission = Permission(wire.clock, TIMEOUT, lambda: stopped[0])
+    motion: Job[Query, bytes] = Job(Query(1, WriteCoil(2008, True)), TIMEOUT, most=3, permission=permission)
     engine.submit(motion)
     stopped[0] = True
     finish(line.exchange(Job(Query(1, M1_STOP), TIMEOUT, urgent=True)))

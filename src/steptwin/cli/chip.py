@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from steptwin.cli.device import complain, number_of, print_json, shown, table
+from steptwin.cli.device import HeldUp, complain, number_of, print_json, shown, table
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -181,9 +181,12 @@ def move(
     log_frames: bool,
 ) -> ChipMoveEnd | None:
     """Full steps. Ctrl-C stops it."""
+    held_up = HeldUp()
     with opened_chip(address, log_frames=log_frames) as chip:
+        held_up.check()
         if velocity is not None:
             chip.configure(velocity=velocity)
+        held_up.check()
         try:
             (chip.move_by if by else chip.move_to)(target)
             return chip.wait(timeout, check=False) if wait else None
@@ -225,8 +228,10 @@ def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
     addresses = _addressed(text, address.chip, file)
     with M1486Line(address.place, baud=address.baud, log=complain if log_frames else None) as line:
         chips = {a: M1486(line, a, variant=address.variant, timeout_s=address.timeout) for a in addresses}
+        held_up = HeldUp()
         for chip in chips.values():
             chip.open()
+            held_up.check()
         with _progress(file.name) as tell:
             uploaded = download_to(chips.values(), text, first=chips.get(address.chip), progress=tell, name=str(file))
     title = next(iter(chips.values())).variant.title

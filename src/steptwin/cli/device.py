@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import time
 from collections.abc import Generator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import LineFailure, Misuse, Refusal
 
 if TYPE_CHECKING:
     from steptwin.host import Mic488
@@ -111,6 +112,23 @@ def number_of(value: str, whole: str) -> float:
 
 
 # ---------------------------------------------------------------------- what people read
+
+
+class HeldUp:
+    """Finds out that the command was suspended between two of its steps: nothing is to move any more by what was asked before."""
+
+    LIMIT_S = 20.0
+    """Longer than any step that comes before a motion: opening an E type takes about five seconds."""
+
+    def __init__(self) -> None:
+        self._at = time.monotonic()
+
+    def check(self) -> None:
+        """Immediately before a motion. Raises `Refusal` when too much time has passed since the last step."""
+        away_s = time.monotonic() - self._at
+        if away_s > self.LIMIT_S:
+            raise Refusal(f"not moved: the command was suspended, or held up by the line, for {away_s:.0f} s; give it again")
+        self._at = time.monotonic()
 
 
 def tell_under_way(names: Sequence[str]) -> None:

@@ -21,6 +21,7 @@ from steptwin.cli.chip import stop as chip_stop
 from steptwin.cli.device import (
     Axes,
     Device,
+    HeldUp,
     Json,
     LogFrames,
     axes_of,
@@ -94,10 +95,14 @@ def move(
         return
     values = tied(targets)
 
+    held_up = HeldUp()
+
     def begin(mic: Mic488, begun: set[int]) -> None:
+        held_up.check()
         if velocity is not None:
             for axis in values:
                 mic.axis(axis).set_ramp(velocity=velocity)
+        held_up.check()
         if len(values) > 1:
             (mic.move_together_by if by else mic.move_together)(values)
         else:
@@ -150,8 +155,11 @@ def home(
     """Home axes, at the velocities given. Exit code 1 when one does not arrive."""
     values = tied(velocities)
 
+    held_up = HeldUp()
+
     def begin(mic: Mic488, begun: set[int]) -> None:
         for axis, velocity in values.items():
+            held_up.check()
             mic.axis(axis).home(velocity)
             begun.add(axis)
 
@@ -225,7 +233,9 @@ def jog(
         raise Misuse("without a terminal nobody can press a key: give the time, --seconds")
     if seconds is not None and not seconds > 0.0:
         raise Misuse(f"--seconds {seconds:g}: permitted are more than 0")
+    held_up = HeldUp()
     with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible(), _keys() as pressed:
+        held_up.check()
         held = mic.axis(axis).jog(speed, hold_s=hold)
         try:
             with held:

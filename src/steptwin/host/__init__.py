@@ -7,7 +7,7 @@ Errors are `steptwin.errors.Misuse`, `Refusal` and `LineFailure`; what is listed
 
 from __future__ import annotations
 
-from steptwin.host.exchange import LineLost, NoAnswer, Overtaken
+from steptwin.host.exchange import LineLost, NoAnswer, Overtaken, SentLate, TooLate
 from steptwin.host.mic488.axis import AsyncAxis
 from steptwin.host.mic488.driver import AsyncMic488, Mic488Status, load_config
 from steptwin.host.mic488.failures import MoveFailed, NoMic488, NotReady, Refused, Untold
@@ -44,7 +44,9 @@ __all__ = [
     "ProgramState",
     "Reason",
     "Refused",
+    "SentLate",
     "Snapshot",
+    "TooLate",
     "Untold",
     "UserRegisters",
     "UserView",

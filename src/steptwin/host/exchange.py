@@ -1,7 +1,7 @@
 """One line, one exchange at a time: who is next, what is sent, what counts as its answer, when to give up. No I/O, no clock.
 
 A shell (`steptwin.host.threads`, `steptwin.host.tasks`) has the bytes and the time. It calls `step` whenever `deadline` has
-come or something was submitted, sends what `step` returns, and hands what it receives to `receive`.
+come or something was submitted, sends what `step` returns, calls `written`, and hands what it receives to `receive`.
 
 The order of those who wait: an urgent job (a stop) is the next on the line whatever waits. Otherwise first come, first served;
 a device that was asked just now is given its pause, and jobs for other devices may go first meanwhile. Nothing is sent while
@@ -17,6 +17,7 @@ from collections.abc import Callable, Hashable
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from steptwin.errors import LineFailure, Refusal, SteptwinError
+from steptwin.host.permission import Permission
 from steptwin.machine import SECOND, Nanos
 
 
@@ -122,14 +123,39 @@ class Overtaken(Refusal):
         super().__init__(f"'{request}' was not sent{sent}: a stop was given meanwhile")
 
 
-class Job(Generic[Q, A]):
-    """An exchange somebody waits for.
+class TooLate(Refusal):
+    """Something was not sent: too much time had passed since it was asked for, as when the program was suspended."""
 
-    ``most``: how often it may be sent; more than once only if repeating it cannot move anything twice. ``allowed`` is asked
-    before each time. ``tell`` is called when it is done.
+    def __init__(self, request: object, patience_ns: Nanos) -> None:
+        super().__init__(
+            f"'{request}' was not sent: it was asked for more than {patience_ns / SECOND:g} s ago; the program was suspended, or "
+            "the line was busy. Ask for it again"
+        )
+
+
+class SentLate(LineFailure):
+    """Something was sent too long after it was asked for: the program was suspended while it was sent."""
+
+    uncertain = True
+
+    def __init__(self, request: object, patience_ns: Nanos) -> None:
+        super().__init__(
+            f"'{request}' was sent more than {patience_ns / SECOND:g} s after it was asked for, because the program was "
+            "suspended at that moment; a motion that began by it was stopped"
+        )
+
+
+class Job(Generic[Q, A]):
+    """An exchange that is waited for.
+
+    ``most``: how often it may be sent; more than once only if repeating it cannot move anything twice. ``permission`` is checked
+    before anything of it is sent. ``tell`` is called when it is done.
     """
 
-    __slots__ = ("_answer", "_error", "allowed", "attempts", "done", "most", "request", "tell", "timeout_ns", "urgent")
+    __slots__ = (
+        "_answer", "_error", "attempts", "done", "is_late", "missed", "most", "permission", "request", "tell", "timeout_ns",
+        "urgent",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -138,15 +164,19 @@ class Job(Generic[Q, A]):
         *,
         most: int = 1,
         urgent: bool = False,
-        allowed: Callable[[], bool] | None = None,
+        permission: Permission | None = None,
     ) -> None:
         self.request = request
         self.timeout_ns = timeout_ns
         self.most = most
         self.urgent = urgent
-        self.allowed = allowed
+        self.permission = permission
         self.attempts = 0
         """How often it has been sent in vain."""
+        self.missed: LineFailure | None = None
+        """Why the last attempt was in vain."""
+        self.is_late = False
+        """Whether it was sent although its permission had expired: the program was suspended between check and sending."""
         self.done = False
         self.tell: Callable[[], object] | None = None
         self._answer: A | None = None
@@ -158,7 +188,21 @@ class Job(Generic[Q, A]):
             raise self._error
         return self._answer  # type: ignore[return-value]
 
+    def refusal(self) -> SteptwinError | None:
+        """Why nothing of it may be sent now; None while it may."""
+        permission = self.permission
+        if permission is None:
+            return None
+        if permission.is_stopped():
+            return Overtaken(self.request, self.attempts)
+        if permission.has_expired():
+            return self.missed or TooLate(self.request, permission.patience_ns)
+        return None
+
     def succeed(self, answer: A) -> None:
+        if self.is_late and self.permission is not None:
+            self.fail(SentLate(self.request, self.permission.patience_ns))
+            return
         self._answer = answer
         self.done = True
         if self.tell is not None:
@@ -272,9 +316,10 @@ class Exchanger(Generic[Q, A]):
             if job.done:
                 queue.remove(job)
                 continue
-            if job.allowed is not None and not job.allowed():
+            refusal = job.refusal()
+            if refusal is not None:
                 queue.remove(job)
-                job.fail(Overtaken(job.request, job.attempts))
+                job.fail(refusal)
                 continue
             begin = self._next.get(job.request.device, 0)
             if begin < free:
@@ -294,8 +339,21 @@ class Exchanger(Generic[Q, A]):
     def _go_on(self, job: Job[Q, A], now: Nanos) -> bytes:
         more = self._more
         self._more = None
+        refusal = job.refusal()
+        if refusal is not None or (job.done and job.permission is not None):
+            self.discipline.abandon(now)
+            self._current = None
+            if refusal is not None and not job.done:
+                job.fail(refusal)
+            return self._begin(now)
         self._sent(job, now)
         return b"" if more is None else more.data
+
+    def written(self) -> None:
+        """The bytes `step` has returned are on their way. The program may have been suspended since."""
+        job = self._current
+        if job is not None and job.permission is not None and job.permission.has_expired():
+            job.is_late = True
 
     def _sent(self, job: Job[Q, A], now: Nanos) -> None:
         self._deadline = now + job.timeout_ns + self.discipline.allowance_ns(job.request)
@@ -305,9 +363,12 @@ class Exchanger(Generic[Q, A]):
     def _missed(self, job: Job[Q, A], error: LineFailure) -> None:
         """An attempt was in vain: try again before the others of its rank, or give up."""
         job.attempts += 1
+        job.missed = error
         if job.done:
             return
-        if job.attempts < job.most:
+        if job.is_late and job.permission is not None:
+            job.fail(SentLate(job.request, job.permission.patience_ns))
+        elif job.attempts < job.most:
             (self._urgent if job.urgent else self._waiting).appendleft(job)
         else:
             job.fail(error)

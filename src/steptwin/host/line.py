@@ -5,7 +5,7 @@ Tasks wait on a `steptwin.host.tasks.TaskLine`, threads on a `steptwin.host.thre
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol
 
@@ -15,6 +15,9 @@ from steptwin.machine import Nanos
 
 LONGEST_WAIT_S = 1e6
 """Nobody waits longer for a motion: eleven days."""
+
+
+LOCK_SLICE_S = 1.0
 
 
 class Line(Protocol[Q, A]):
@@ -42,8 +45,11 @@ class Line(Protocol[Q, A]):
 
     def now(self) -> Nanos: ...
 
-    def lock(self, key: Hashable) -> AbstractAsyncContextManager[object]:
-        """For several exchanges that belong together; the same key gives the same lock."""
+    def lock(self, key: Hashable, waiting: Callable[[], object] | None = None) -> AbstractAsyncContextManager[object]:
+        """For several exchanges that belong together; the same key gives the same lock.
+
+        ``waiting`` is called every `LOCK_SLICE_S` while another holds it, so that waiting can be told from being suspended.
+        """
         ...
 
     async def close(self) -> None: ...

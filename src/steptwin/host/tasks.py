@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from contextlib import AbstractAsyncContextManager
 from typing import Any, Generic, cast
 
 from steptwin.errors import Misuse
 from steptwin.host.exchange import A, Exchanger, Job, LineLost, Q
+from steptwin.host.line import LOCK_SLICE_S
 from steptwin.host.place import Endpoint, reason
 from steptwin.machine import SECOND, Nanos
 
@@ -99,6 +101,7 @@ class TaskLine(Generic[Q, A]):
         data = engine.step(self.now())
         if data:
             transport.write(data)
+            engine.written()
         due = engine.deadline()
         if due is not None and (self._timer is None or due < self._timer_ns):
             self._arm(due)
@@ -141,8 +144,9 @@ class TaskLine(Generic[Q, A]):
     async def sleep(self, seconds: float) -> None:
         await asyncio.sleep(max(seconds, 0.0))
 
-    def lock(self, key: Hashable) -> asyncio.Lock:
-        return self._locks.setdefault(key, asyncio.Lock())
+    def lock(self, key: Hashable, waiting: Callable[[], object] | None = None) -> AbstractAsyncContextManager[object]:
+        lock = self._locks.setdefault(key, asyncio.Lock())
+        return lock if waiting is None else _SlicedLock(lock, waiting)
 
     async def close(self) -> None:
         self._closed = True
@@ -163,6 +167,33 @@ class TaskLine(Generic[Q, A]):
         error = LineLost(f"the line {self.place} was closed")
         self._engine.lost(error)
         self._engine.fail_all(error)
+
+
+class _SlicedLock:
+    """See `steptwin.host.line.Line.lock`. Whoever waits keeps the place in the queue."""
+
+    __slots__ = ("_lock", "_waiting")
+
+    def __init__(self, lock: asyncio.Lock, waiting: Callable[[], object]) -> None:
+        self._lock = lock
+        self._waiting = waiting
+
+    async def __aenter__(self) -> None:
+        if not self._lock.locked():
+            await self._lock.acquire()
+            return
+        acquiring = asyncio.ensure_future(self._lock.acquire())
+        try:
+            while not (await asyncio.wait({acquiring}, timeout=LOCK_SLICE_S))[0]:
+                self._waiting()
+        except asyncio.CancelledError:
+            if acquiring.done() and not acquiring.cancelled():
+                self._lock.release()
+            acquiring.cancel()
+            raise
+
+    async def __aexit__(self, *_: object) -> None:
+        self._lock.release()
 
 
 class _Connection(asyncio.Protocol):

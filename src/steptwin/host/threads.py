@@ -16,6 +16,7 @@ from typing import Any, Generic
 
 from steptwin.errors import Misuse
 from steptwin.host.exchange import A, Exchanger, Job, LineLost, Q
+from steptwin.host.line import LOCK_SLICE_S
 from steptwin.host.place import Channel, Endpoint
 from steptwin.machine import SECOND, Nanos
 
@@ -40,7 +41,7 @@ class ThreadLine(Generic[Q, A]):
         self._closed = False
         self._changed = threading.Condition(threading.Lock())
         self._leading = False  # whether some thread runs the line
-        self._locks: dict[Hashable, ThreadLock] = {}
+        self._locks: dict[Hashable, threading.Lock] = {}
 
     @property
     def place(self) -> str:
@@ -111,6 +112,7 @@ class ThreadLine(Generic[Q, A]):
         data = engine.step(now)
         if data:
             channel.write(data)
+            engine.written()
         due = engine.deadline()
         if due is None or job.done:
             return
@@ -140,8 +142,8 @@ class ThreadLine(Generic[Q, A]):
         if seconds > 0.0:
             self._sleeping(seconds)
 
-    def lock(self, key: Hashable) -> ThreadLock:
-        return self._locks.setdefault(key, ThreadLock())
+    def lock(self, key: Hashable, waiting: Callable[[], object] | None = None) -> ThreadLock:
+        return ThreadLock(self._locks.setdefault(key, threading.Lock()), waiting)
 
     async def close(self) -> None:
         """Close the line. What other threads wait for ends with `LineLost`, at the latest when it times out."""
@@ -157,15 +159,20 @@ class ThreadLine(Generic[Q, A]):
 
 
 class ThreadLock:
-    """A lock for threads that is entered like one for tasks."""
+    """A lock for threads that is entered like one for tasks; ``waiting`` as of `steptwin.host.line.Line.lock`."""
 
-    __slots__ = ("_lock",)
+    __slots__ = ("_lock", "_waiting")
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
+    def __init__(self, lock: threading.Lock, waiting: Callable[[], object] | None) -> None:
+        self._lock = lock
+        self._waiting = waiting
 
     async def __aenter__(self) -> None:
-        self._lock.acquire()
+        if self._waiting is None:
+            self._lock.acquire()
+            return
+        while not self._lock.acquire(timeout=LOCK_SLICE_S):
+            self._waiting()
 
     async def __aexit__(self, *_: object) -> None:
         self._lock.release()

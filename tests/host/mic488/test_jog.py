@@ -11,6 +11,8 @@ from host_rig import Fault, Wire, async_driver, driver, run_virtual, task_line
 from steptwin.errors import Misuse
 from steptwin.host import Mic488, NotReady, Reason, Untold
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.mic488.registers import register_map
+from steptwin.wire import pdu
 
 REACH = 5.0 * 0.4 + 5.0**2 / (2 * 50.0)
 """mm that 5 mm/s go in 0.4 s and then braking with 50 mm/s²."""
@@ -216,3 +218,63 @@ def test_the_hold_time_is_a_choice() -> None:
         before = wire.now
         jog.hold()
         assert wire.now - before == pytest.approx(SECOND // 4, abs=50 * MILLISECOND)
+
+
+MAP = register_map("1.70")
+
+
+def by_another_master(wire: Wire, request: pdu.Request) -> None:
+    wire.twin.execute(pdu.encode_request(request), wire.now)
+
+
+def jog_moves(wire: Wire) -> int:
+    """How many times a jog told the axis to move on."""
+    head = pdu.encode_request(pdu.WriteRegisters(MAP.of("POS_REL", 1).address, (0, 0)))[:3]
+    return sum(frame[1:].startswith(head) for _, frame in wire.sent)
+
+
+STOPS: dict[str, tuple[pdu.Request, Reason]] = {
+    "M1_STOP": (pdu.WriteCoil(MAP.of("STOP", 1).address, True), Reason.STOPPED),
+    "M_STOP": (pdu.WriteRegister(MAP.of("M_STOP").address, 1), Reason.STOPPED),
+    "M1_EN": (pdu.WriteCoil(MAP.of("EN", 1).address, False), Reason.DISABLED),
+    "M1_VEL_ABS, still braking": (pdu.WriteRegisters(MAP.of("VEL_ABS", 1).address, (0, 0)), Reason.DIVERTED),
+    "M1_HOME": (pdu.WriteRegisters(MAP.of("HOME", 1).address, (0, 0x40A0)), Reason.DIVERTED),
+}
+
+
+@pytest.mark.parametrize("stop", STOPS)
+def test_what_another_master_tells_the_axis_ends_the_jog_and_nothing_more_is_sent(stop: str) -> None:
+    request, reason = STOPS[stop]
+    wire, mic = ready()
+    mic.axis(1).set_ramp(dec=10.0)  # braking takes half a second
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        assert jog_moves(wire) == 2
+        wire.sleep(0.09)
+        by_another_master(wire, request)
+        assert not jog.hold()
+        assert not jog.hold()
+        assert jog.end is not None
+        assert jog.end.reason is reason
+    assert jog_moves(wire) == 2
+    if reason is not Reason.DIVERTED:
+        stood = wire.position()
+        wire.rest(10.0)
+        assert wire.position() == stood
+
+
+def test_a_program_that_is_suspended_while_it_reads_the_status_does_not_move_the_axis_again() -> None:
+    """The answer says that the axis moves; it is seconds old when the program goes on."""
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        wire.before_read = lambda: wire.sleep(5.0)
+        assert not jog.hold()
+        wire.before_read = None
+        stood = wire.position()
+        assert str(jog.end).startswith("M1: not held (5.")
+        assert not jog.hold()
+    assert jog_moves(wire) == 2
+    wire.rest(10.0)
+    assert (wire.moving(), wire.position()) == (False, stood)
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}

@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 from steptwin.diagnostics import Severity, Source, render
 from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.host.exchange import SentLate
 from steptwin.host.m1486.failures import Busy, DoubtfulMove, FileGivenUp
 from steptwin.host.m1486.motion import UNKNOWN_S, ChipMotion, Told
 from steptwin.host.m1486.settings import ChipSettings, after_reset
 from steptwin.host.m1486.talk import WHO
 from steptwin.host.m1486.unit import Unit
+from steptwin.host.permission import Permission
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import Command, Program
 from steptwin.m1486.variants import Store, Variant
@@ -94,7 +96,7 @@ class _Typist:
     def __init__(self, unit: Unit, tell: Callable[[int], object]) -> None:
         self._unit = unit
         self._tell = tell
-        self._guard = unit.stop_guard()
+        self._permission = unit.permission()
         self._capacity = unit.variant.input_bits // 8
         self._typed = 0  # characters that may lie in the input buffer
 
@@ -102,7 +104,7 @@ class _Typist:
         unit = self._unit
         uploaded = b""
         index = 0
-        async with unit.turn():
+        async with unit.turn(self._permission):
             await unit.rest()
             while index < len(commands):
                 if commands[index].key == "[":
@@ -112,6 +114,7 @@ class _Typist:
                 else:
                     uploaded += await self._command(commands[index])
                     index += 1
+                self._permission.extend()
                 self._tell(index)
         return uploaded
 
@@ -120,7 +123,9 @@ class _Typist:
         await self._empty()
         if unit.variant.store is Store.EEPROM:
             await reset(unit)
-        await type_file(unit, [str(command).lower() for command in commands], self._guard, lambda count: self._tell(done + count))
+        await type_file(
+            unit, [str(command).lower() for command in commands], self._permission, lambda count: self._tell(done + count)
+        )
         self._typed = self._capacity
 
     async def _command(self, command: Command) -> bytes:
@@ -136,7 +141,7 @@ class _Typist:
         if self._typed + len(text) + 1 + len(WHO) + 1 > self._capacity - 3:
             await self._empty()
         if text[0] in _MOVES:
-            await begin(unit, text, ChipMotion.BLOCK, self._guard)
+            await begin(unit, text, ChipMotion.BLOCK, self._permission)
         else:
             unit.notes.settings = ChipSettings()
             if command.key == "U":
@@ -151,12 +156,12 @@ class _Typist:
     async def _empty(self) -> None:
         """Until the chip has done all it was told: its buffer is empty then. Raises `Busy` after a minute."""
         unit = self._unit
-        if await unit.asks_who(round(UNKNOWN_S * SECOND)) is None:
+        if await unit.asks_who(round(UNKNOWN_S * SECOND), self._permission) is None:
             raise Busy(f"{unit.place}: {unit.name} takes no more: it {unit.why_busy()}")
         self._typed = 0
 
 
-async def type_file(unit: Unit, lines: Sequence[str], guard: Callable[[], bool], tell: Callable[[int], object]) -> None:
+async def type_file(unit: Unit, lines: Sequence[str], permission: Permission, tell: Callable[[int], object]) -> None:
     """Type a file from ``[`` to ``]``, which makes it run.
 
     When something goes wrong before, nothing of it runs: the chip is reset, which is how the manual has a file given up (chapter
@@ -167,9 +172,10 @@ async def type_file(unit: Unit, lines: Sequence[str], guard: Callable[[], bool],
             await unit.say(line, once=True, retype=count == 1)
             if unit.talk.nearly_full:
                 await unit.line.sleep(FULL_PAUSE_NS / SECOND)
+            permission.extend()
             tell(count)
-        await begin(unit, lines[-1], ChipMotion.BLOCK, guard, retype=False)
-    except DoubtfulMove:
+        await begin(unit, lines[-1], ChipMotion.BLOCK, permission, retype=False)
+    except (DoubtfulMove, SentLate):
         raise
     except (LineFailure, Refusal) as failure:
         try:
@@ -190,7 +196,7 @@ async def begin(
     unit: Unit,
     text: str,
     kind: ChipMotion,
-    guard: Callable[[], bool],
+    permission: Permission,
     *,
     target_u: int | None = None,
     duration_s: float | None = None,
@@ -210,7 +216,10 @@ async def begin(
 
     notes.motion = None
     try:
-        await unit.say(text, once=True, allowed=guard, retype=retype)
+        await unit.act(text, permission, once=True, retype=retype, program=kind is ChipMotion.BLOCK)
+    except SentLate:
+        told(None, None)
+        raise
     except LineFailure as failure:
         if not getattr(failure, "uncertain", False):
             raise

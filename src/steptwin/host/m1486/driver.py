@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from math import isfinite
 
 from steptwin.errors import LineFailure, Misuse
@@ -14,6 +14,7 @@ from steptwin.host.m1486.motion import UNKNOWN_S, ChipMotion, ChipMoveEnd, Told
 from steptwin.host.m1486.settings import COMMANDS, checked_number
 from steptwin.host.m1486.unit import SLICE_NS
 from steptwin.host.m1486.waiting import wait_for
+from steptwin.host.permission import Permission
 from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.functions import FUNCTIONS, RECOVER
 from steptwin.m1486.unit import MASK
@@ -46,11 +47,11 @@ class AsyncM1486(AsyncChip):
         """
         target = self._counter_of(position)
         unit = self._unit
-        guard = unit.stop_guard()
-        async with unit.turn():
+        permission = unit.permission()
+        async with unit.turn(permission):
             before = await unit.read_number(1)
             self._check_position()
-            await self._move(f"g{target}" if target else "h", target - before, target, guard)
+            await self._move(f"g{target}" if target else "h", target - before, target, permission)
 
     async def move_by(self, distance: float) -> None:
         """Begin to move by a distance, rounded to a microstep. Errors as `move_to`."""
@@ -60,32 +61,32 @@ class AsyncM1486(AsyncChip):
         if abs(distance_u) > LARGEST:
             raise Misuse(f"distance {distance:g} {self.unit} is outside ±{LARGEST / self.scale_u:g} {self.unit}")
         unit = self._unit
-        guard = unit.stop_guard()
-        async with unit.turn():
+        permission = unit.permission()
+        async with unit.turn(permission):
             before = await unit.read_number(1)
             text = f"{'f' if distance_u > 0 else 'b'}{abs(distance_u)}"
-            await self._move(text, distance_u, before + distance_u & MASK, guard)
+            await self._move(text, distance_u, before + distance_u & MASK, permission)
 
-    async def _move(self, specification: str, distance_u: int, target_u: int, guard: Callable[[], bool]) -> None:
+    async def _move(self, specification: str, distance_u: int, target_u: int, permission: Permission) -> None:
         if distance_u == 0:
             notes = self._unit.notes
             notes.motion = Told(ChipMotion.MOVE, self.line.now(), notes.stops, target_u, 0.0)
             return
         await self._unit.say(specification)
         duration = self.settings.travel_s(distance_u, self.variant)
-        await begin(self._unit, "r", ChipMotion.MOVE, guard, target_u=target_u, duration_s=duration)
+        await begin(self._unit, "r", ChipMotion.MOVE, permission, target_u=target_u, duration_s=duration)
 
     async def run(self, direction: int, velocity: float | None = None) -> None:
         """Run until stopped, in direction +1 or −1; ``velocity`` sets V first (full steps/s)."""
         if direction not in (1, -1):
             raise Misuse(f"direction {direction}: permitted are 1 and -1")
+        permission = self._unit.permission()
         if velocity is not None:
             await self.configure(velocity=velocity)
-        guard = self._unit.stop_guard()
-        async with self._unit.turn():
+        async with self._unit.turn(permission):
             await self._unit.rest()
             await self._unit.say("g+" if direction > 0 else "g-")
-            await begin(self._unit, "r", ChipMotion.ENDLESS, guard)
+            await begin(self._unit, "r", ChipMotion.ENDLESS, permission)
 
     async def seek(self, direction: int, line: int) -> None:
         """Begin to move at start/stop speed until a line has its end level: low for B1–3, 8–11, 16–19, else high.
@@ -95,20 +96,20 @@ class AsyncM1486(AsyncChip):
         if direction not in (1, -1):
             raise Misuse(f"direction {direction}: permitted are 1 and -1")
         checked_number(")", line, self.variant, "the line to seek")
-        guard = self._unit.stop_guard()
-        async with self._unit.turn():
+        permission = self._unit.permission()
+        async with self._unit.turn(permission):
             await self._unit.rest()
             await self._unit.say(f":{line}")
-            await begin(self._unit, ")" if direction > 0 else "(", ChipMotion.SEEK, guard)
+            await begin(self._unit, ")" if direction > 0 else "(", ChipMotion.SEEK, permission)
 
     async def start_program(self, label: int) -> None:
         """Go to a label of what is in the command memory. Its number goes through the internal variable, as of `seek`."""
         checked_number("j", label, self.variant, "the label")
-        guard = self._unit.stop_guard()
-        async with self._unit.turn():
+        permission = self._unit.permission()
+        async with self._unit.turn(permission):
             await self._unit.rest()
             await self._unit.say(f":{label}")
-            await begin(self._unit, "j", ChipMotion.BLOCK, guard)
+            await begin(self._unit, "j", ChipMotion.BLOCK, permission)
 
     async def stop(self) -> None:
         """K: brake with the ramp. Goes before everything that waits for the line; moves that wait are not begun any more.
@@ -123,8 +124,9 @@ class AsyncM1486(AsyncChip):
 
     async def recover(self) -> None:
         """C75: what Kill has stopped goes on, where function 51 is OFF. A program may move the motor at once."""
-        async with self._unit.turn():
-            await self._unit.say("c75", stored=False)
+        permission = self._unit.permission()
+        async with self._unit.turn(permission):
+            await self._unit.act("c75", permission, stored=False, program=True)
             self._unit.notes.is_killed = False
 
     async def stop_program(self, timeout_s: float = 10.0) -> None:
@@ -137,10 +139,11 @@ class AsyncM1486(AsyncChip):
         if notes.motion is None or notes.motion.kind is not ChipMotion.ENDLESS:
             notes.is_position_valid = False
         await unit.kill(program=True)
-        async with unit.turn():
+        permission = unit.permission()
+        async with unit.turn(permission):
             unit.talk.settle(unit.address)  # questions went with the program
             if notes.function(RECOVER) is not True:
-                await unit.say("c75", stored=False)
+                await unit.act("c75", permission, stored=False, program=True)
             notes.is_killed = False
             notes.motion = None
             if await unit.asks_who(round(timeout_s * SECOND)) is None:
@@ -173,10 +176,11 @@ class AsyncM1486(AsyncChip):
         typed = unit.checked(text)
         if typed[0] not in _TYPED:
             raise Misuse(f"{text!r} is no command to type alone: motions, files and questions have methods of their own")
-        async with unit.turn():
+        permission = unit.permission()
+        async with unit.turn(permission):
             await unit.rest()
             self._learn(typed)
-            await unit.say(typed, once=typed[0] in "d+-*/", acts=True)
+            await unit.act(typed, permission, once=typed[0] in "d+-*/")
 
     def _learn(self, typed: str) -> None:
         """Settings typed by hand are known again when they are configured."""
@@ -205,10 +209,10 @@ class AsyncM1486(AsyncChip):
                 raise Misuse(f"{command!r} has no place in a block")
         if 8 + sum(memory_bits(command[0].upper()) for command in (*typed, MARK)) > unit.variant.memory_bits - 8:
             raise Misuse(f"the block is larger than the command memory of {unit.variant.title}, {unit.variant.memory_bits} bits")
-        guard = unit.stop_guard()
-        async with unit.turn():
+        permission = unit.permission()
+        async with unit.turn(permission):
             await unit.rest()
-            await type_file(unit, ["[", *typed, MARK, "]"], guard, lambda count: None)
+            await type_file(unit, ["[", *typed, MARK, "]"], permission, lambda count: None)
             if unit.notes.motion is not None:
                 unit.notes.motion.is_marked = True
         return await self.wait(timeout_s if timeout_s is not None else UNKNOWN_S)

@@ -6,17 +6,17 @@ say whose they are. A stop goes in between.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager, suppress
 
 from steptwin.errors import LineFailure, Misuse
-from steptwin.host.exchange import Job, NoAnswer
+from steptwin.host.exchange import Job, NoAnswer, Overtaken, SentLate, TooLate
 from steptwin.host.line import Line
 from steptwin.host.m1486.failures import Busy, Garbled, NoEcho, Restarted, WrongType, untold
 from steptwin.host.m1486.lines import TALK
 from steptwin.host.m1486.motion import Told
 from steptwin.host.m1486.settings import ChipSettings
 from steptwin.host.m1486.talk import SPOILER, WHO, CharacterTalk, Say, Sort, chip_name
+from steptwin.host.permission import Permission
 from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN, TABLE
 from steptwin.m1486.lines import INTERFACES, Interface
 from steptwin.m1486.ranges import out_of_range
@@ -33,6 +33,8 @@ WAKE_COMMANDS = 5
 """What `Unit.wake` has typed when all goes well, and a question."""
 EVERYBODY = "xg\rxg\r"
 """All chips listen from now on. The first may meet the rest of something else."""
+PATIENCE_NS: Nanos = 10 * SECOND
+"""A motion is not begun when so much time has passed without progress towards it."""
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Whoever listens for an answer that is owed lets a stop go first this often."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
@@ -120,13 +122,15 @@ class Unit:
             raise Misuse(f"{self.place}: {self.name} is not open")
         return self.notes.variant
 
-    def turn(self) -> AbstractAsyncContextManager[object]:
-        return self.line.lock("m1486 turn")
+    def turn(self, permission: Permission | None = None) -> AbstractAsyncContextManager[object]:
+        """The line for exchanges that belong together. Waiting for it extends ``permission``."""
+        return self.line.lock("m1486 turn", None if permission is None else permission.extend)
 
-    def stop_guard(self) -> Callable[[], bool]:
-        """Whether it was not stopped since now."""
+    def permission(self) -> Permission:
+        """Permission for a motion that is asked for now, until the chip is stopped or nothing goes on for too long."""
         before = self.notes.stops
-        return lambda: self.notes.stops == before
+        patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
+        return Permission(self.line.now, patience_ns, lambda: self.notes.stops != before)
 
     # ------------------------------------------------------------------ exchanges
 
@@ -136,9 +140,11 @@ class Unit:
         *,
         timeout_ns: Nanos | None = None,
         urgent: bool = False,
-        allowed: Callable[[], bool] | None = None,
+        permission: Permission | None = None,
     ) -> bytes:
-        job: Job[Say, bytes] = Job(say, self.timeout_ns if timeout_ns is None else timeout_ns, urgent=urgent, allowed=allowed)
+        job: Job[Say, bytes] = Job(
+            say, self.timeout_ns if timeout_ns is None else timeout_ns, urgent=urgent, permission=permission
+        )
         return await self.line.exchange(job)
 
     async def _blind(self, text: str, pause_ns: Nanos, *, urgent: bool = False) -> None:
@@ -228,7 +234,7 @@ class Unit:
         acts: bool = False,
         retype: bool = True,
         answers: bool = False,
-        allowed: Callable[[], bool] | None = None,
+        permission: Permission | None = None,
         stored: bool = True,
     ) -> bytes:
         """Type a command. ``once``: CR is sent once only, because doing it twice is not as good as once. ``acts``: what the chip
@@ -242,7 +248,7 @@ class Unit:
             await self._ready()
             say = Say(self.address, text, answers=answers, acts=once or acts)
             try:
-                answer = await self._exchange(say, allowed=allowed, timeout_ns=self._patience(answers))
+                answer = await self._exchange(say, permission=permission, timeout_ns=self._patience(answers))
             except (Garbled, NoAnswer) as error:
                 failure = error
                 if isinstance(error, NoAnswer) and not say.committed:
@@ -256,6 +262,31 @@ class Unit:
         if failure is None:
             raise Misuse("no tries")
         raise failure
+
+    async def act(
+        self,
+        text: str,
+        permission: Permission,
+        *,
+        once: bool = False,
+        retype: bool = True,
+        stored: bool = True,
+        program: bool = False,
+    ) -> None:
+        """Type a command that may move the motor, as `say`; ``program``: it starts a program. Nothing of it stays in the chip
+        when the permission has ended.
+
+        Raises `Overtaken`, `TooLate`; `SentLate` when it was sent too late, and then the motor was stopped.
+        """
+        try:
+            await self.say(text, once=once, acts=True, permission=permission, retype=retype, stored=stored)
+        except (Overtaken, TooLate):
+            await self.drop_line()
+            raise
+        except SentLate:
+            self.notes.is_position_valid = False
+            await self.kill(program=program)
+            raise
 
     def _patience(self, answers: bool) -> Nanos:
         """An answer may have to wait for the EEPROM, of a chip whose type is not known for all that `wake` has typed."""
@@ -276,12 +307,15 @@ class Unit:
 
     # ------------------------------------------------------------------ is it at rest, who is it
 
-    async def asks_who(self, patience_ns: Nanos = 0) -> int | None:
-        """The type letter, once the chip has done all it was told; None if it has not within ``patience_ns`` or a time-out."""
+    async def asks_who(self, patience_ns: Nanos = 0, permission: Permission | None = None) -> int | None:
+        """The type letter, once the chip has done all it was told; None if it has not within ``patience_ns`` or a time-out.
+
+        Waiting for it extends ``permission``.
+        """
         patience_ns = max(patience_ns, self._patience(True))
         if not self.talk.owes(self.address):
             await self.ask()
-        letter = await self._listen(patience_ns)
+        letter = await self._listen(patience_ns, permission)
         if letter is None and self.talk.owes(self.address) == 1:
             await self.ask()  # the answer may have been lost
             letter = await self._listen(self._patience(True))
@@ -307,7 +341,7 @@ class Unit:
         self.talk.came.pop(self.address, None)
         await self.say(WHO)
 
-    async def _listen(self, patience_ns: Nanos) -> int | None:
+    async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
         """Wait for a letter that is owed, in slices, so that a stop comes in between."""
         talk = self.talk
         limit = self.line.now() + patience_ns
@@ -316,6 +350,8 @@ class Unit:
             try:
                 return (await self._exchange(listening, timeout_ns=SLICE_NS))[0]
             except NoAnswer:
+                if permission is not None:
+                    permission.extend()
                 if self.line.now() >= limit:
                     return talk.came.pop(self.address, None)
         return talk.came.pop(self.address)
@@ -389,6 +425,12 @@ class Unit:
             self.notes.note_function(REPORT, on=False)
 
     # ------------------------------------------------------------------ stopping
+
+    async def drop_line(self) -> None:
+        """Have the chip drop what was typed without its CR: the next CR on the line, whoever sends it, would carry it out."""
+        if self.talk.dirty:
+            with suppress(NoAnswer, Garbled):
+                await self._exchange(Say(self.address, "", sort=Sort.SELECT, acts=False))
 
     async def kill(self, *, program: bool = False) -> None:
         """K, before everything that waits for the line; ``program``: and wrong data before it. Raises `steptwin.host.Untold`."""

@@ -122,11 +122,11 @@ class AsyncAxis:
 
     async def _begin(self, kind: Kind, value_u: float) -> None:
         unit = self._unit
-        allowed = unit.stop_guard(self.number)
-        async with unit.lock():
+        permission = unit.permission(self.number)
+        async with unit.lock(), unit.stopping_if_late(self.number):
             control = await unit.ready(self.number)
             self._motion = None
-            await unit.set_axis(_KEYS[kind], self.number, value_u, control.data_type, allowed=allowed)
+            await unit.set_axis(_KEYS[kind], self.number, value_u, control.data_type, permission=permission)
             self.told(kind, value_u, control)
 
     def told(self, kind: Kind, value_u: float, control: Control | None) -> None:
@@ -191,11 +191,11 @@ class AsyncAxis:
         if not on:
             await unit.write(item, False, urgent=True, most=URGENT_TRIES)
             return
-        allowed = unit.stop_guard(self.number)
-        async with unit.lock():
+        permission = unit.permission(self.number)
+        async with unit.lock(), unit.stopping_if_late(self.number):
             await unit.ready(self.number)
             self._motion = None
-            await unit.write(item, True, allowed=allowed)
+            await unit.write(item, True, permission=permission)
 
     # ------------------------------------------------------------------ ranges
 

@@ -9,17 +9,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import Misuse
 from steptwin.files import read_bytes
 from steptwin.host.line import Line
 from steptwin.host.mic488 import identify, snapshot
 from steptwin.host.mic488.axis import AsyncAxis
-from steptwin.host.mic488.failures import untold
 from steptwin.host.mic488.group import trigger
 from steptwin.host.mic488.lines import AsyncModbusLine
 from steptwin.host.mic488.motion import Kind, MoveEnd
 from steptwin.host.mic488.program import AsyncProgram
-from steptwin.host.mic488.unit import URGENT_TRIES, Unit, check_axis
+from steptwin.host.mic488.unit import Unit, axis_mask, check_axis
 from steptwin.host.mic488.user import AsyncUserRegisters
 from steptwin.host.mic488.values import Value, named
 from steptwin.host.mic488.waiting import wait_for
@@ -27,7 +26,7 @@ from steptwin.host.modbus import Query, check_unit, words
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig, read_config
 from steptwin.mic488.inifile import IniFile
-from steptwin.mic488.registermap import DataType
+from steptwin.mic488.registermap import DataType, Effect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
 from steptwin.wire import pdu
 
@@ -199,7 +198,7 @@ class AsyncMic488:
 
     async def enable(self, *axes: int) -> None:
         """Switch drives on in the same instant; without axes all four."""
-        await self._unit.write(self._unit.item("M_ENABLE"), _mask(axes))
+        await self._unit.write(self._unit.item("M_ENABLE"), axis_mask(axes or ALL_AXES))
 
     async def disable(self, *axes: int) -> None:
         """Switch drives off in the same instant; without axes all four. Goes before everything that waits for the line."""
@@ -214,15 +213,8 @@ class AsyncMic488:
         await self.stop()
 
     async def _halt(self, key: str, axes: Sequence[int], what: str) -> None:
-        unit = self._unit
-        mask = _mask(axes)
-        chosen = axes or ALL_AXES
-        for axis in chosen:
-            unit.notes.stops[axis] += 1
-        try:
-            await unit.write(unit.item(key), mask, urgent=True, most=URGENT_TRIES)
-        except LineFailure as failure:
-            raise untold(" ".join(f"M{axis}" for axis in chosen), what, failure) from failure
+        chosen = [check_axis(axis) for axis in axes or ALL_AXES]
+        await self._unit.stop(chosen, key, what)
         for axis in chosen:
             self._axes[axis].forget()
 
@@ -268,10 +260,12 @@ class AsyncMic488:
         """
         unit = self._unit
         item = named(unit.registers, name)
-        data_type = (await unit.control()).data_type
         axis = item.register.axis
-        guard = unit.stop_guard(axis) if axis else None
-        await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, allowed=guard)
+        moved = () if item.register.effect not in (Effect.MOVE, Effect.ADD) else ALL_AXES if axis is None else (axis,)
+        permission = unit.permission(*moved) if moved else None
+        data_type = (await unit.control()).data_type
+        async with unit.stopping_if_late(*moved):
+            await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
 
     async def registers(self, address: int, count: int) -> tuple[int, ...]:
         """Raw holding registers."""
@@ -297,7 +291,3 @@ class AsyncMic488:
         if dry_run:
             return await snapshot.changes(self._unit, kept, counters=counters, outputs=outputs)
         return await snapshot.put_back(self._unit, kept, counters=counters, outputs=outputs)
-
-
-def _mask(axes: Sequence[int]) -> int:
-    return sum(1 << check_axis(axis) - 1 for axis in set(axes or ALL_AXES))

@@ -9,7 +9,7 @@ from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.host.mic488.axis import AsyncAxis
 from steptwin.host.mic488.failures import Untold
 from steptwin.host.mic488.motion import Kind
-from steptwin.host.mic488.unit import Unit, check_axis
+from steptwin.host.mic488.unit import Unit, axis_mask, check_axis
 
 _REGISTERS = {
     Kind.POSITION: ("POS_ABS", "AXIS_POS_ABS_TRIG"),
@@ -31,14 +31,15 @@ async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values:
         axes[axis].check(kind, values[axis])
     register, starter = _REGISTERS[kind]
     mode = unit.item("AXIS_CTR_MODE")
-    allowed = unit.stop_guard(*chosen)
+    permission = unit.permission(*chosen)
     async with unit.lock():
         control = await unit.ready(*chosen)
         try:
-            await unit.write(mode, TRIGGER, allowed=allowed)
-            for axis in chosen:
-                await unit.set_axis(register, axis, values[axis], control.data_type, allowed=allowed)
-            await unit.write(unit.item(starter), sum(1 << axis - 1 for axis in chosen), allowed=allowed)
+            async with unit.stopping_if_late(*chosen):
+                await unit.write(mode, TRIGGER, permission=permission)
+                for axis in chosen:
+                    await unit.set_axis(register, axis, values[axis], control.data_type, permission=permission)
+                await unit.write(unit.item(starter), axis_mask(chosen), permission=permission)
         except BaseException:
             with contextlib.suppress(SteptwinError):
                 await unit.write(mode, DIRECT)

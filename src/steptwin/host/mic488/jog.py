@@ -18,11 +18,12 @@ from types import TracebackType
 from typing import Self
 
 from steptwin.errors import LineFailure, Misuse, SteptwinError
-from steptwin.host.exchange import Overtaken
+from steptwin.host.exchange import Overtaken, SentLate, TooLate
 from steptwin.host.mic488.failures import NotReady, Untold
-from steptwin.host.mic488.motion import MOVING, Kind, Motion, MoveEnd, Reason, reason_of, status_text
+from steptwin.host.mic488.motion import Kind, Motion, MoveEnd, Reason, reason_of, status_text
 from steptwin.host.mic488.unit import Control, Unit
 from steptwin.host.mic488.waiting import dynamics
+from steptwin.host.permission import Permission
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.status import Status
 
@@ -62,10 +63,12 @@ class AsyncJog:
         self._hold_s = hold_s
         self._told = told
         self._renew_ns: Nanos = round(hold_s / RENEWALS * SECOND)
+        # A jog begins at once or not at all: preparing it takes four exchanges, of which two may be repeated.
+        self._begin_ns: Nanos = round(hold_s * SECOND) + 2 * unit.timeout_ns
         self._reach_u = 0.0
         self._vmax_u: float | None = None
         self._held_ns: Nanos | None = None  # when it was held last
-        self._allowed = unit.stop_guard(axis)
+        self._permission: Permission | None = None
         self.end: MoveEnd | None = None
         """Why the axis does not run any more."""
 
@@ -76,7 +79,7 @@ class AsyncJog:
 
     async def __aenter__(self) -> Self:
         unit, axis = self._unit, self._axis
-        self._allowed = unit.stop_guard(axis)
+        begin = unit.permission(axis, patience_ns=self._begin_ns)
         async with unit.lock():
             control = await unit.ready(axis)
             self._told(Kind.DISTANCE, self._velocity_u, control)
@@ -93,40 +96,49 @@ class AsyncJog:
                 self._vmax_u = vmax
                 await unit.set_axis("VMAX", axis, speed, control.data_type)
         try:
-            self._held_ns = unit.line.now()
-            await self._renew(control)
+            await self._move(control, begin)
+            self._permission = Permission(unit.line.now, round(self._hold_s * SECOND), begin.is_stopped)
+            self._permission.extend(self._held_ns)
+        except Overtaken:
+            self._held_ns, self._permission = unit.line.now(), begin
+            self._stopped(Reason.STOPPED, "by this program")
         except SteptwinError as error:
             with contextlib.suppress(SteptwinError):
                 await self._put_back()
-            if isinstance(error, LineFailure):
+            if isinstance(error, LineFailure) and not isinstance(error, SentLate):
                 raise self._untold("may have begun to jog", error) from error
             raise
         return self
 
     async def hold(self) -> bool:
         """Let the axis run on; False when it has stopped. Raises `Untold` when the controller cannot be told in time."""
-        if self._held_ns is None:
+        unit, permission = self._unit, self._permission
+        if permission is None or self._held_ns is None:
             raise Misuse("a jog is held inside its with block")
         if self.end is not None:
             return False
-        unit = self._unit
         await unit.line.sleep((self._held_ns + self._renew_ns - unit.line.now()) / SECOND)
-        deadline = self._held_ns + round(self._hold_s * SECOND)
-        if unit.line.now() > deadline:
-            # Whoever held the button was away: it must not go on by itself when he comes back.
-            self._stopped(Reason.NOT_HELD, f"{(unit.line.now() - self._held_ns) / SECOND:.2f} s since it was held")
-            return False
-        while True:
+        while not permission.has_expired():
             try:
                 control = await self._look()
-                if self._has_ended(control):
-                    return False
-                await self._renew(control)
+                if permission.has_expired():
+                    break  # the answer may be old
+                self._judge(control.axes[self._axis - 1])
+                if self.end is None:
+                    await self._move(control, permission)
+                    permission.extend(self._held_ns)
+            except Overtaken:
+                self._stopped(Reason.STOPPED, "by this program")
+            except (TooLate, SentLate):
+                break
             except LineFailure as failure:
-                if unit.line.now() < deadline:
+                if not permission.has_expired():
                     continue
                 raise self._untold("cannot be held any more", failure) from failure
             return self.end is None
+        # Whoever held the button was away: the axis must not go on by itself afterwards.
+        self._not_held()
+        return False
 
     async def _look(self) -> Control:
         control = await self._unit.control(timeout_ns=self._exchange_ns())
@@ -138,29 +150,29 @@ class AsyncJog:
         """A lost answer must not take the time in which another could be had."""
         return min(self._unit.timeout_ns, self._renew_ns)
 
-    async def _renew(self, control: Control) -> None:
-        unit = self._unit
+    async def _move(self, control: Control, permission: Permission) -> None:
+        """Let the axis run for the hold time from now on."""
+        unit, axis = self._unit, self._axis
         distance = self._reach_u if self._velocity_u > 0.0 else -self._reach_u
         at = unit.line.now()
-        try:
+        async with unit.stopping_if_late(axis):
             await unit.set_axis(
-                "POS_REL", self._axis, distance, control.data_type, allowed=self._allowed, timeout_ns=self._exchange_ns()
+                "POS_REL", axis, distance, control.data_type, permission=permission, timeout_ns=self._exchange_ns()
             )
-        except Overtaken:
-            self._stopped(Reason.STOPPED, "by this program")
-        else:
-            self._held_ns = at
+        self._held_ns = at
 
-    def _has_ended(self, control: Control) -> bool:
-        status = control.axes[self._axis - 1]
-        if status in MOVING:
-            return False
+    def _judge(self, status: int) -> None:
+        """Find the end of the jog in the status of the axis."""
+        if status == Status.POSITION:
+            return
+        if status in (Status.VELOCITY, Status.HOMING):
+            self._stopped(Reason.DIVERTED, status_text(status))
+            return
         motion = Motion(Kind.DISTANCE, self._reach_u, self._held_ns or 0, Status.ON)
         reason = reason_of(status, motion)
-        self._stopped(
-            Reason.NOT_HELD if reason is Reason.TARGET else reason, status_text(status) if reason is Reason.STOPPED else ""
-        )
-        return True
+        if reason is Reason.TARGET or status == Status.CORRECTION:
+            reason = Reason.NOT_HELD
+        self._stopped(reason, status_text(status) if reason is Reason.STOPPED else "")
 
     def _stopped(self, reason: Reason, detail: str) -> None:
         unit = self._unit
@@ -177,15 +189,24 @@ class AsyncJog:
     async def release(self) -> None:
         """Ramp down, and put VMAX back. Raises `Untold` when the controller cannot be told."""
         unit = self._unit
-        if self.end is None and self._held_ns is not None and self._allowed():
+        if self.end is None and self._held_ns is not None:
             try:
-                data_type = unit.wording.data_type
-                await unit.set_axis("VEL_ABS", self._axis, 0.0, data_type, allowed=self._allowed)
+                # Not when it is too late: the axis is at rest then, and may be moved by another master.
+                await unit.set_axis("VEL_ABS", self._axis, 0.0, unit.wording.data_type, permission=self._permission)
+            except Overtaken:
+                self._stopped(Reason.STOPPED, "by this program")
+            except (TooLate, SentLate):
+                self._not_held()
             except LineFailure as failure:
                 raise self._untold("cannot be told to stop", failure) from failure
-            self._stopped(Reason.RELEASED, "")
-            self._told(Kind.VELOCITY, 0.0, None)
+            else:
+                self._stopped(Reason.RELEASED, "")
+                self._told(Kind.VELOCITY, 0.0, None)
         await self._put_back()
+
+    def _not_held(self) -> None:
+        held = self._held_ns or 0
+        self._stopped(Reason.NOT_HELD, f"{(self._unit.line.now() - held) / SECOND:.2f} s since it was held")
 
     async def _put_back(self) -> None:
         vmax, self._vmax_u = self._vmax_u, None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 
 from steptwin.errors import LineFailure
+from steptwin.host.exchange import SentLate
 from steptwin.host.mic488.failures import untold
 from steptwin.host.mic488.unit import URGENT_TRIES, Unit
 from steptwin.mic488.registers import AXES
@@ -35,8 +36,12 @@ class AsyncProgram:
 
     async def start(self) -> None:
         """Start the chosen program, or go on with a paused one. Sent once only: a lost answer leaves it open whether it runs."""
-        guard = self._unit.stop_guard(*range(1, AXES + 1))
-        await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, allowed=guard)
+        permission = self._unit.permission(*range(1, AXES + 1))
+        try:
+            await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
+        except SentLate:
+            await self.stop()
+            raise
 
     async def pause(self) -> None:
         await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.PAUSED, urgent=True)

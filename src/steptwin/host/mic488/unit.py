@@ -5,18 +5,19 @@ Suffixes: ``_u`` configured units, ``_p`` pulses, ``_ns`` nanoseconds, ``_s`` se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractAsyncContextManager
+from collections.abc import AsyncGenerator, Iterable, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import NamedTuple
 
-from steptwin.errors import Misuse
-from steptwin.host.exchange import Job
+from steptwin.errors import LineFailure, Misuse
+from steptwin.host.exchange import Job, SentLate
 from steptwin.host.line import Line
-from steptwin.host.mic488.failures import NotReady, Refused
+from steptwin.host.mic488.failures import NotReady, Refused, untold
 from steptwin.host.mic488.frames import FrameWords
-from steptwin.host.mic488.values import Block, Item, Value, View, encoded, plan, repeatable, user_item
+from steptwin.host.mic488.values import Block, Item, Value, View, encoded, moves, plan, repeatable, user_item
 from steptwin.host.modbus import Query, bits, words
-from steptwin.machine import Nanos
+from steptwin.host.permission import Permission
+from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.describe import Scale, Wording
 from steptwin.mic488.registermap import DataType, RegisterMap, Type
@@ -27,6 +28,8 @@ from steptwin.wire import pdu
 QUERIES_KEPT = 256
 URGENT_TRIES = 5
 """How often a stop is sent before it is given up."""
+PATIENCE_NS: Nanos = 5 * SECOND
+"""What changes something is sent at most so long after it was asked for."""
 
 
 class Control(NamedTuple):
@@ -117,19 +120,21 @@ class Unit:
         request: pdu.Request,
         *,
         urgent: bool = False,
-        allowed: Callable[[], bool] | None = None,
+        permission: Permission | None = None,
         timeout_ns: Nanos | None = None,
         most: int | None = None,
     ) -> bytes:
         """The answer PDU. Raises `Refused` or a `LineFailure`."""
         if most is None:
             most = self.tries if repeatable(self.registers, request) else 1
-        return await self._exchange(Query(self.number, request, self.wording.request), urgent, allowed, timeout_ns, most)
+        if permission is None and moves(self.registers, request):
+            permission = self.permission()
+        return await self._exchange(Query(self.number, request, self.wording.request), urgent, permission, timeout_ns, most)
 
     async def _exchange(
-        self, query: Query, urgent: bool, allowed: Callable[[], bool] | None, timeout_ns: Nanos | None, most: int
+        self, query: Query, urgent: bool, permission: Permission | None, timeout_ns: Nanos | None, most: int
     ) -> bytes:
-        job: Job[Query, bytes] = Job(query, timeout_ns or self.timeout_ns, most=most, urgent=urgent, allowed=allowed)
+        job: Job[Query, bytes] = Job(query, timeout_ns or self.timeout_ns, most=most, urgent=urgent, permission=permission)
         try:
             return await self.line.exchange(job)
         except pdu.ModbusException as exception:
@@ -179,14 +184,14 @@ class Unit:
         *,
         data_type: DataType = DataType.REAL,
         urgent: bool = False,
-        allowed: Callable[[], bool] | None = None,
+        permission: Permission | None = None,
         timeout_ns: Nanos | None = None,
         most: int | None = None,
     ) -> None:
         """Write a value as it travels with ``data_type``."""
         axis = item.register.axis
         request = encoded(item, value, data_type, self.unit_name(axis) if axis else "u")
-        await self.ask(request, urgent=urgent, allowed=allowed, timeout_ns=timeout_ns, most=most)
+        await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most=most)
 
     async def read_user(self, number: int, view: View, count: int) -> list[Value]:
         """``count`` user registers from ``number`` on, seen as ``view``."""
@@ -239,13 +244,13 @@ class Unit:
         value_u: float,
         data_type: DataType,
         *,
-        allowed: Callable[[], bool] | None = None,
+        permission: Permission | None = None,
         timeout_ns: Nanos | None = None,
     ) -> None:
         """Write a register of an axis, in units."""
         item = self.item(key, axis)
         value = self.travelling(item, value_u, data_type)
-        await self.write(item, value, data_type=data_type, allowed=allowed, timeout_ns=timeout_ns)
+        await self.write(item, value, data_type=data_type, permission=permission, timeout_ns=timeout_ns)
 
     # ------------------------------------------------------------------ what it is doing
 
@@ -283,11 +288,36 @@ class Unit:
         """For exchanges that nobody else's motion commands may come between."""
         return self.line.lock(("mic488", self.number))
 
-    def stop_guard(self, *axes: int) -> Callable[[], bool]:
-        """Whether none of the axes was stopped since now."""
+    def permission(self, *axes: int, patience_ns: Nanos | None = None) -> Permission:
+        """Permission for what is asked for now, until one of the axes is stopped or it is too late."""
         stops = self.notes.stops
         before = [stops[axis] for axis in axes]
-        return lambda: [stops[axis] for axis in axes] == before
+        if patience_ns is None:
+            patience_ns = max(PATIENCE_NS, 2 * self.tries * self.timeout_ns)
+        return Permission(self.line.now, patience_ns, lambda: [stops[axis] for axis in axes] != before)
+
+    @asynccontextmanager
+    async def stopping_if_late(self, *axes: int) -> AsyncGenerator[None]:
+        """Stop the axes when what moves them was sent too late (`SentLate`)."""
+        try:
+            yield
+        except SentLate:
+            await self.stop(axes)
+            raise
+
+    async def stop(self, axes: Sequence[int], key: str = "M_STOP", what: str = "stopped") -> None:
+        """Stop axes in the same instant, before everything that waits for the line. Raises `Untold`."""
+        for axis in axes:
+            self.notes.stops[axis] += 1
+        try:
+            await self.write(self.item(key), axis_mask(axes), urgent=True, most=URGENT_TRIES)
+        except LineFailure as failure:
+            raise untold(" ".join(f"M{axis}" for axis in axes), what, failure) from failure
+
+
+def axis_mask(axes: Iterable[int]) -> int:
+    """Axes as the bits of M_STOP and its like."""
+    return sum(1 << check_axis(axis) - 1 for axis in set(axes))
 
 
 def check_axis(axis: int) -> int:

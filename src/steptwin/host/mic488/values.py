@@ -237,18 +237,36 @@ def _block(group: list[Item]) -> Block:
 
 def repeatable(registers: RegisterMap, request: pdu.Request) -> bool:
     """Whether a request whose answer was lost may be sent again: only where that cannot move anything twice."""
+    if isinstance(request, pdu.Read) or _stops(registers, request):
+        return True
+    return all(register is not None and _repeatable(register) for register in _written(registers, request))
+
+
+def moves(registers: RegisterMap, request: pdu.Request) -> bool:
+    """Whether a request may begin a motion, or nobody knows."""
+    if isinstance(request, pdu.Read) or _stops(registers, request):
+        return False
+    return any(register is None or register.effect in (Effect.MOVE, Effect.ADD) for register in _written(registers, request))
+
+
+def _stops(registers: RegisterMap, request: pdu.Request) -> bool:
+    """Whether it stops the program. (Starting and pausing it depends on what happened meanwhile.)"""
+    if not isinstance(request, pdu.WriteRegister) or request.value != 0:
+        return False
+    register = registers.find(Space.HOLDING, request.address)
+    return register is not None and register.key == "PROGRAM_CTRL"
+
+
+def _written(registers: RegisterMap, request: pdu.Request) -> list[Register | None]:
     match request:
-        case pdu.Read():
-            return True
         case pdu.WriteCoil(address):
-            touched = [registers.find(Space.COIL, address)]
-        case pdu.WriteRegister(address, value):
-            touched = [registers.find(Space.HOLDING, address)]
-            if touched[0] is not None and touched[0].key == "PROGRAM_CTRL":
-                return value == 0  # stopping twice is stopping; starting and pausing depend on what happened meanwhile
+            return [registers.find(Space.COIL, address)]
+        case pdu.WriteRegister(address):
+            return [registers.find(Space.HOLDING, address)]
         case pdu.WriteRegisters(address, values):
-            touched = [piece.register for piece in registers.pieces(Space.HOLDING, address, len(values))]
-    return all(register is not None and _repeatable(register) for register in touched)
+            return [piece.register for piece in registers.pieces(Space.HOLDING, address, len(values))]
+        case _:
+            return [None]
 
 
 def _repeatable(register: Register) -> bool:

@@ -53,7 +53,7 @@ class Watch:
             if self._limit is None or (self._is_computed and corrects is not self._corrects):
                 self._limit = now + round(await self._time_out_s(status) * SECOND)
                 self._corrects = corrects
-            if now < self._limit:
+            if control.at < self._limit:  # only a status read after the limit tells that it is exceeded
                 return None
             return await self._end(Reason.OVERDUE, f"{status_text(status)} for {(now - self._begin) / SECOND:.1f} s")
         if motion is not None and status == motion.before and control.at < motion.at + SETTLE_NS:

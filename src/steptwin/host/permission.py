@@ -1,0 +1,47 @@
+"""Permission to send what moves something.
+
+A program can be suspended at any moment, by a debugger, SIGSTOP, the sleep of a laptop or a full memory, and go on hours later in
+the middle of what it did. Whoever stands at the machine then does not expect a motion that was asked for before. So a motion has
+a permission: it is checked immediately before anything is sent, by the clock, and expires.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from steptwin.machine import Nanos
+
+
+def never() -> bool:
+    """No stop applies."""
+    return False
+
+
+class Permission:
+    """Permission for a request that acts; it ends for good with a stop, or ``patience_ns`` after it was given or extended.
+
+    ``clock`` is that of the line; ``is_stopped`` tells whether a stop was given meanwhile.
+    """
+
+    __slots__ = ("_clock", "_has_expired", "_until", "is_stopped", "patience_ns")
+
+    def __init__(self, clock: Callable[[], Nanos], patience_ns: Nanos, is_stopped: Callable[[], bool] = never) -> None:
+        self._clock = clock
+        self.patience_ns = patience_ns
+        self.is_stopped = is_stopped
+        self._has_expired = False
+        self._until = clock() + patience_ns
+
+    def has_expired(self) -> bool:
+        """Whether it is too late to send anything."""
+        if not self._has_expired and self._clock() > self._until:
+            self._has_expired = True
+        return self._has_expired
+
+    def extend(self, since: Nanos | None = None) -> None:
+        """What was asked for makes progress (at ``since``, by default now). An expired permission stays expired."""
+        now = self._clock()
+        if now > self._until:
+            self._has_expired = True
+        elif not self._has_expired:
+            self._until = (now if since is None else since) + self.patience_ns

@@ -1,0 +1,89 @@
+"""Operations of the M1486 driver in a process that is suspended in the middle of them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from chip_rig import ChipWire, chip_line, chip_task_line
+from suspension import AT_THE_LAST_MOMENT, Suspension
+
+from steptwin.errors import SteptwinError
+from steptwin.host.blocking import finish
+from steptwin.host.m1486 import AsyncM1486
+
+SETTINGS = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
+RACE_U = 30 * 64
+"""Minimum microsteps that a motor makes which was started too late and is stopped at once: 0.15 s at 200 steps/s."""
+
+
+async def _move_and_wait(chip: AsyncM1486) -> None:
+    await chip.move_by(500.0)
+    await chip.wait()
+
+
+OPERATIONS: dict[str, Callable[[AsyncM1486], Awaitable[Any]]] = {
+    "move_to": lambda chip: chip.move_to(500.0),
+    "move_by": lambda chip: chip.move_by(500.0),
+    "run": lambda chip: chip.run(1),
+    "seek": lambda chip: chip.seek(1, 1),
+    "move and wait": _move_and_wait,
+    "run_block": lambda chip: chip.run_block(["f640", "r"]),
+    "start_program": lambda chip: chip.start_program(3),
+    "download": lambda chip: chip.download("[\nF640\nR\n]"),
+    "download of commands": lambda chip: chip.download("F640\nR"),
+    "recover": lambda chip: chip.recover(),
+}
+
+
+def trial(name: str, at: int | None, *, tasks: bool) -> tuple[int, str]:
+    """Do an operation with a suspension at point ``at``: how many points it has, and what was wrong."""
+    wire = ChipWire(addresses=(7,))
+    suspension = Suspension(wire)
+    line: Any = suspension.task(chip_task_line(wire)) if tasks else suspension.thread(chip_line(wire))
+    chip = AsyncM1486(line, 7)
+    stood: list[int] = []
+
+    def note() -> None:
+        # What was typed since stands behind the label too, the jump itself included: it goes round for ever, moving now and then.
+        is_going_round = name == "start_program" and b"j\r" in b"".join(data for _, data in wire.sent)
+        if not wire.moving(7) and not is_going_round:
+            stood.append(wire.true(7))
+
+    async def work() -> None:
+        await chip.open()
+        await chip.configure(**SETTINGS)  # type: ignore[arg-type]
+        if name == "recover":
+            # A program that Kill holds, because function 51 is OFF; it moves once it is let go on.
+            await chip.set_function(51, False)
+            await chip.download("[\n@3\nF64000\nR\nJ3\n]")
+            await line.sleep(0.3)
+            await chip.stop()
+            await line.sleep(3.0)
+        if name == "start_program":
+            await chip.download("[\n@3\nF640\nR\n]")
+            await chip.wait()
+        suspension.on_back = note
+        suspension.arm(at)
+        with contextlib.suppress(SteptwinError):
+            await OPERATIONS[name](chip)
+
+    if tasks:
+        suspension.run(work())
+    else:
+        finish(work())
+    points = suspension.count
+    if at is None:
+        assert wire.moving(7) or wire.true(7), f"{name} moves nothing"
+    if not stood:
+        return points, ""
+    suspension.at = None
+    last_moment = suspension.what in AT_THE_LAST_MOMENT
+    # Nothing that was typed stays in the chip, for the next CR on the line to carry out.
+    wire.send(b"\r")
+    wire.sleep(100.0)
+    moved = abs(wire.true(7) - stood[0])
+    if moved > (RACE_U if last_moment else 0):
+        return points, f"{name}, suspended {suspension.what} (point {at}): moved by {moved} min. microsteps"
+    return points, ""
