@@ -11,6 +11,8 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
+LONGEST_SHOWN = 400
+"""Characters of a source line in a message; of a longer one the part around the place."""
 _LINE_END = re.compile(r"\r\n|\n|\r")
 
 
@@ -101,6 +103,10 @@ def render(source: Source, diagnostics: Sequence[Diagnostic]) -> str:
         gutter = str(line)
         pad = " " * len(gutter)
         shown = text.expandtabs(4)
+        if len(shown) > LONGEST_SHOWN:
+            first = min(max(0, before - LONGEST_SHOWN // 2), len(shown) - LONGEST_SHOWN)
+            shown, before = shown[first : first + LONGEST_SHOWN], before - first
+            width = min(width, LONGEST_SHOWN - before) or 1
         parts.append(f"{source.name}:{line}:{column}: {d.severity.value} {d.code}: {d.message}")
         parts.append(f"  {gutter} | {shown}")
         parts.append(f"  {pad} | {' ' * before}{'^' * width}")

@@ -140,7 +140,7 @@ def test_another_seed_is_another_chance_and_stays_with_the_session(tmp_path: Pat
 
 def test_an_expectation_that_fails_is_exit_code_1(tmp_path: Path) -> None:
     world = tmp_path / "w.toml"
-    world.write_text('[[mic488]]\nname = "a"\n[[event]]\nat = 1\ndo = [{ expect = "a.M1.position > 3" }]\n')
+    world.write_text('[[mic488]]\nname = "a"\n[[event]]\nat = 1\nsteps = [{ expect = "a.M1.position > 3" }]\n')
     assert "expectation failed at 1 s: a.M1.position > 3" in invoke("run", str(world), "--for", "2s", code=1)
 
 

@@ -79,3 +79,30 @@ def test_a_lock_on_a_file_that_was_removed_meanwhile_is_none(tmp_path: Path, mon
     owned = Ownership(path)
     assert path.read_text() == f"{os.getpid()}\n"
     owned.release()
+
+
+def test_a_lock_file_that_is_a_link_is_refused_and_its_target_untouched(tmp_path: Path) -> None:
+    target = tmp_path / "precious"
+    target.write_text("precious")
+    (tmp_path / "soft").symlink_to(target)
+    (tmp_path / "hard").hardlink_to(target)
+    (tmp_path / "nowhere").symlink_to(tmp_path / "new")
+    for name, message in (("soft", "is a symbolic link"), ("hard", "is no lock file"), ("nowhere", "is a symbolic link")):
+        with pytest.raises(PermissionError, match=message):
+            Ownership(tmp_path / name)
+    assert target.read_text() == "precious"
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_lock_file_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "lock").write_text("")
+    owner = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: owner + 1)
+    with pytest.raises(PermissionError, match="is no lock file of this user"):
+        Ownership(tmp_path / "lock")
+
+
+def test_a_lock_file_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "lock")
+    with pytest.raises(PermissionError, match="is no lock file of this user"):
+        Ownership(tmp_path / "lock")

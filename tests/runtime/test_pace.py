@@ -37,7 +37,7 @@ CLOCKLESS = """
     steps = [{ wait = "1 s" }, { note = "tick" }]
     [[event]]
     when = "a.IN1"
-    do = [{ set = { "a.IN2" = 1 } }]
+    steps = [{ set = { "a.IN2" = 1 } }]
 """
 
 
@@ -225,7 +225,7 @@ def test_where_nothing_happens_any_more_a_step_says_so(run: Run) -> None:
 
 def test_a_script_that_stops_the_run_ends_a_step_and_the_command(run: Run) -> None:
     async def scene() -> None:
-        world = World.from_toml('[[mic488]]\nname = "a"\n[[event]]\nat = 1\ndo = [{ stop = "enough" }]\n')
+        world = World.from_toml('[[mic488]]\nname = "a"\n[[event]]\nat = 1\nsteps = [{ stop = "enough" }]\n')
         rig = Rig(world, 0.0)
         ended: list[Nanos] = []
         rig.live.on_stop = lambda: ended.append(world.now)
@@ -341,7 +341,7 @@ def test_what_cannot_be_done_is_told_and_changes_nothing(run: Run, what: str, re
 def test_a_session_goes_on_live_without_those_who_were_there(run: Run, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     description = (
         CLOCKLESS.replace('name = "a"', 'name = "a"\nline = "bus"', 1)
-        + '[[line]]\nname = "bus"\nkind = "modbus"\n[[event]]\nat = 5\ndo = [{ stop = "enough" }]\n'
+        + '[[line]]\nname = "bus"\nkind = "modbus"\n[[event]]\nat = 5\nsteps = [{ stop = "enough" }]\n'
     )
 
     async def scene() -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from damage import VALUES, WAYS, damaged
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, SteptwinError
 from steptwin.machine import SECOND
 from steptwin.runtime.session import load, save, session_of
 from steptwin.runtime.world import World
@@ -95,7 +97,7 @@ TICKING = """
     name = "a"
     [[event]]
     when = "a.IN2"
-    do = [{ note = "after that" }]
+    steps = [{ note = "after that" }]
     [[script]]
     name = "first"
     steps = [{ wait = "1 s" }, { set = { "a.IN1" = 1 } }, { stop = "enough" }, { note = "gone on" }]
@@ -134,13 +136,13 @@ CHAIN = """
     name = "t"
     [[event]]
     when = "t.IN3"
-    do = [{ set = { "t.IN4" = 1 } }]
+    steps = [{ set = { "t.IN4" = 1 } }]
     [[event]]
     when = "t.IN4 and not t.IN1"
-    do = [{ note = "IN4 before IN1" }]
+    steps = [{ note = "IN4 before IN1" }]
     [[event]]
     when = "t.IN1 and t.IN2"
-    do = [{ note = "both" }, { set = { "t.IN2" = 0 } }]
+    steps = [{ note = "both" }, { set = { "t.IN2" = 0 } }]
     [[script]]
     name = "s"
     steps = [{ wait = "1 s" }, { set = { "t.IN3" = 1 } }, { stop = "a" }, { stop = "b" }, { note = "x" }]
@@ -331,3 +333,20 @@ def test_digests_are_the_same_everywhere(name: str) -> None:
         world = World.load(EXAMPLES / f"{name}.toml")
         world.run(for_=30)
     assert world.trace.digest() == GOLDEN[name]
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(way=WAYS, value=VALUES)
+def test_a_session_of_other_values_is_refused_or_replayed(way: list[int], value: Any, tmp_path: Path) -> None:
+    world = World.from_toml('[[mic488]]\nname = "a"\nline = "l"\n[[line]]\nname = "l"\n')
+    world.outside(do.Set((("a", "IN3", 1.0),)))
+    world.outside(do.SetFault(read("crc nth=3 link=script")))
+    world.line["l"].send(b"\x01")
+    world.run(for_=0.5)
+    path = tmp_path / "s.json"
+    save(session_of(world), path)
+    path.write_text(json.dumps(damaged(json.loads(path.read_text()), way, value)))
+    with suppress(SteptwinError):
+        session = load(path)
+        if session.until <= world.now:
+            session.replay()

@@ -221,14 +221,14 @@ def test_events_act_once_again_and_again_or_when_a_condition_comes_true() -> Non
         """
         [[event]]
         at = "1 s"
-        do = [{ write = { "a.M1_EN" = 1, "a.M1_POS_ABS" = 20.0 } }]
+        steps = [{ write = { "a.M1_EN" = 1, "a.M1_POS_ABS" = 20.0 } }]
         [[event]]
         name = "clock"
         every = "2 s"
-        do = [{ note = "tick" }]
+        steps = [{ note = "tick" }]
         [[event]]
         when = "x.position > 60"
-        do = [{ set = { "b.IN9" = 1 } }, { stop = "far enough" }]
+        steps = [{ set = { "b.IN9" = 1 } }, { stop = "far enough" }]
         """
     )
     assert world.run(for_="1 min") == "far enough"
@@ -239,7 +239,7 @@ def test_events_act_once_again_and_again_or_when_a_condition_comes_true() -> Non
 
 
 def test_a_condition_that_comes_true_again_acts_again() -> None:
-    world = small('[[event]]\nwhen = "b.IN4"\ndo = [{ note = "pressed" }]\n')
+    world = small('[[event]]\nwhen = "b.IN4"\nsteps = [{ note = "pressed" }]\n')
     for _ in range(3):
         world.press("go", 0.1)
         world.run(for_=1)
@@ -443,8 +443,8 @@ PARTS = st.lists(
                 '[[axis.switch]]\nposition = 10.0\nwidth = 5.0\nto = "c.IN2"\nbounce = "4 ms"\n'
             ),
             '[[source]]\nto = "b.AIN1"\nkind = "sine"\nvalue = 5.0\namplitude = 3.0\n',
-            '[[event]]\nwhen = "x.position > 60"\ndo = [{ press = "go", for = "100 ms" }, { write = { "a.OUT1" = 1 } }]\n',
-            '[[event]]\nevery = "700 ms"\ndo = [{ write = { "b.M1_EN" = 1, "b.M1_POS_REL" = 13.0 } }]\n',
+            '[[event]]\nwhen = "x.position > 60"\nsteps = [{ press = "go", for = "100 ms" }, { write = { "a.OUT1" = 1 } }]\n',
+            '[[event]]\nevery = "700 ms"\nsteps = [{ write = { "b.M1_EN" = 1, "b.M1_POS_REL" = 13.0 } }]\n',
         ]
     ),
     unique=True,
@@ -651,7 +651,7 @@ def test_a_request_needs_a_line_of_controllers() -> None:
 
 
 def test_scripts_that_have_ended_are_forgotten() -> None:
-    world = small('[[event]]\nevery = "100 ms"\ndo = [{ press = "go", for = "10 ms" }]\n')
+    world = small('[[event]]\nevery = "100 ms"\nsteps = [{ press = "go", for = "10 ms" }]\n')
     world.run(for_=10.05)
     assert [script.name for script in world.scripts] == ["event-1"]
     world.run(until=10.105)

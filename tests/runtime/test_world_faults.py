@@ -230,7 +230,7 @@ def test_a_fault_that_cannot_happen_is_refused_from_files_and_from_python(world:
     assert f"world.toml:{line}:" in str(refused.value)
     given = ", ".join([f"kind = '{kind}'", *table.splitlines()])
     with pytest.raises(Misuse) as refused:
-        World.from_toml(f"{world}[[event]]\nat = 1\ndo = [{{ fault = {{ {given} }} }}]\n")
+        World.from_toml(f"{world}[[event]]\nat = 1\nsteps = [{{ fault = {{ {given} }} }}]\n")
     assert f"step 1: {message}" in str(refused.value)
 
 

@@ -192,7 +192,7 @@ def test_with_a_configuration_and_a_program_the_twin_is_that_machine(run: Run, p
         ("unit=300", "unit = 300: permitted are 1 to 247"),
         ("speed=0", "speed = 0: permitted are 0.001 to 1000"),
         ("firmware='9'", "1.23, 1.40, 1.70"),
-        ("config='no.cfg'", "cannot read the configuration"),
+        ("config='no.cfg'", "cannot read "),
         ("faults=['crc nth=3']", "fault crc happens on Modbus RTU: this twin serves Modbus TCP"),
         ("faults=['nonsense']", "nonsense"),
         ("3", "3 needs a name"),

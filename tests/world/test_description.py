@@ -31,11 +31,29 @@ def wrong(text: str) -> str:
         (TABLE + "[[axs]]\n", "w.toml:3:1: error D004: the file has no [axs]"),
         (TABLE + '[[fault]]\nkind = "crc"\nprobability = 2\n', "w.toml:5:1: error D003: [[fault]] (crc): probability = 2"),
         (TABLE + '[[fault]]\nkind = "stall"\naxis = 9\n', "w.toml:3:1: error D009: fault stall: axis = 9: permitted are 1 to 4"),
+        (f"[world]\nseed = {'9' * 400}\n", "w.toml:2:8: error D001: a value of 400 characters that is no text"),
+        (f"[world]\nseed = {'9' * 40}\n", "w.toml:2:1: error D001: a whole number of more than 64 bits"),
+        (f"[world]\nseed = 0x{'f' * 60}\n", "w.toml:2:1: error D001: a whole number of more than 64 bits"),
+        ("[world]\nseed = 1e400\n", "w.toml:2:1: error D003: [world]: seed: inf: permitted are whole numbers"),
+        (".".join("a" * 20_000) + " = 1\n", "w.toml:1:65: error D001: a key of more than 32 parts"),
+        (TABLE + "[mic488.M1]\nin_kl = 'IN21'\n", "in_kl: 'IN21': permitted are IN1 to IN20 or 'none'"),
+        (TABLE + "[mic488.M1]\nin_kl = 'IN33'\n", "in_kl: 'IN33': permitted are IN1 to IN20 or 'none'"),
+        (TABLE + "[mic488.M1]\nin_kr = 'IN٣'\n", "in_kr: 'IN٣': permitted are IN1 to IN20 or 'none'"),
+        (
+            TABLE + "[mic488.M1]\nin_kr = 21\n",
+            "in_kr: 21: permitted are IN1 to IN20 or 'none', or the number of the vendor",
+        ),
+        (TABLE + "[[event]]\nat = 1\ndo = [{ wait = 1 }]\n", "w.toml:5:1: error D004: [event] has no 'do'"),
+        (TABLE + "[[script]]\nname = 's'\n", "w.toml:3:1: error D005: [script]: steps is missing"),
+        (
+            '[world]\nname = """\n[[button]]\nname = 5\n"""\n' + TABLE + '[[button]]\nname = "b"\nto = "none.IN1"\n',
+            "w.toml:10:1: error D009: nothing is called 'none'",
+        ),
         ("world = 3\n", "w.toml:1:1: error D002: [world] is 3"),
         ("[mic488]\nname = 't'\n", "w.toml:1:1: error D002: [mic488] stands once"),
         ("[[mic488]]\nname = 'ось'\n", "'ось' is no name: expected a letter from A to Z, then letters, digits, '-' and '_'"),
         ("[[mic488]]\nname = 'tür'\n", "'tür' is no name: expected a letter from A to Z"),
-        (TABLE + "[[event]]\nat = 1\ndo = [{ send = 'bus', text = '→' }]\n", "text: '→': '→' is no character of a line"),
+        (TABLE + "[[event]]\nat = 1\nsteps = [{ send = 'bus', text = '→' }]\n", "text: '→': '→' is no character of a line"),
         ("[[mic488]]\nunit = 3\n", "w.toml:1:1: error D005: [mic488]: name is missing"),
         (TABLE + "unti = 3\n", "w.toml:3:1: error D004: [mic488] has no 'unti'; did you mean 'unit'?"),
         (TABLE + "unit = 300\n", "w.toml:3:1: error D003: [mic488]: unit: 300: permitted are whole numbers from 1 to 247"),
@@ -79,19 +97,19 @@ def wrong(text: str) -> str:
             AXIS + 'unit = "degree"\npitch = 1\n[axis.motor]\nmass = 1\ntorque = [[0, 1]]\n',
             "mass and forces need a unit of mm, cm, m",
         ),
-        (TABLE + "[[event]]\ndo = []\n", "an event needs one of at, every and when"),
-        (TABLE + '[[event]]\nat = "5 sec"\ndo = []\n', "w.toml:4:1: error D003: [event]: at: '5 sec' is no time"),
-        (TABLE + "[[event]]\nat = 1\ndo = [{ wiat = 1 }]\n", "step 1 has 'wiat'; did you mean 'wait'?"),
-        (TABLE + "[[event]]\nat = 1\ndo = [{ until = 'a >' }]\n", "condition 'a >' ends too early"),
+        (TABLE + "[[event]]\nsteps = []\n", "an event needs one of at, every and when"),
+        (TABLE + '[[event]]\nat = "5 sec"\nsteps = []\n', "w.toml:4:1: error D003: [event]: at: '5 sec' is no time"),
+        (TABLE + "[[event]]\nat = 1\nsteps = [{ wiat = 1 }]\n", "step 1 has 'wiat'; did you mean 'wait'?"),
+        (TABLE + "[[event]]\nat = 1\nsteps = [{ until = 'a >' }]\n", "condition 'a >' ends too early"),
         (TABLE + '[[line]]\nname = "bus"\n', "w.toml:3:1: error D009: nothing is on this line"),
         (TABLE + 'line = "bus"\n[[line]]\nname = "bus"\nbaud = 38401\n', "baud = 38401: a MIC488 has 9600, 19200, 38400,"),
         (TABLE + 'line = "bus"\n[[line]]\nname = "bus"\nkind = "m1486"\n', "'table' cannot be on a line of kind m1486"),
         (
             "x = " + "[" * 3000 + "]" * 3000,
-            "w.toml:1:1: error D001: this is no TOML of a world: tables and lists are nested too deeply",
+            "w.toml:1:38: error D001: values are nested more than 32 deep",
         ),
         (TABLE + '[fault]\nkind = "crc"\n', "w.toml:3:1: error D002: [fault] stands once"),
-        ('fault = ["crc"]\n' + TABLE, "w.toml:1:1: error D002: [[fault]] is 'crc'"),
+        ('fault = ["crc"]\n' + TABLE, "w.toml:1:10: error D002: [[fault]] is 'crc'"),
         (
             TABLE + '[[source]]\nto = "table.AIN1"\nkind = "ramp"\nover = 1\nrepeat = 0\n',
             "w.toml:7:1: error D003: [source]: repeat: 0",
@@ -100,7 +118,7 @@ def wrong(text: str) -> str:
             TABLE + '[[source]]\nto = "table.AIN1"\nperiod = "0 s"\n',
             "w.toml:5:1: error D003: [source]: period: '0 s': must be more than",
         ),
-        (TABLE + "[[event]]\nevery = 0\ndo = []\n", "w.toml:4:1: error D003: [event]: every: 0: must be more than 0"),
+        (TABLE + "[[event]]\nevery = 0\nsteps = []\n", "w.toml:4:1: error D003: [event]: every: 0: must be more than 0"),
         (TABLE + 'config = "no.cfg"\n', "w.toml:1:1: error D009: the content of the file 'no.cfg' is not given"),
         (TABLE + 'program = "no.prg"\n', "w.toml:1:1: error D009: the content of the file 'no.prg' is not given"),
         (TABLE + TABLE.replace("table", "Table"), "w.toml:4:1: error D006: 'Table' is taken by [[mic488]] 'table'"),
@@ -162,7 +180,7 @@ def wrong(text: str) -> str:
             AXIS + 'kind = "rotary"\n[axis.motor]\nmass = 1\ntorque = [[0, 1]]\n',
             "w.toml:8:1: error D007: mass means nothing for kind =",
         ),
-        (TABLE + "[[event]]\nat = 1\nonce = true\ndo = []\n", "w.toml:5:1: error D007: once means nothing without when"),
+        (TABLE + "[[event]]\nat = 1\nonce = true\nsteps = []\n", "w.toml:5:1: error D007: once means nothing without when"),
         ("[[fault]]\nkind = 'crcc'\n", "kind = 'crcc': permitted are"),
     ],
 )
@@ -191,7 +209,7 @@ steps = [
 [[event]]
 name = "e"
 when = "table.IN99 == 1"
-do = [{ turn = "table.M5", counts = 1 }, { fault = { kind = "stall", axis = 9 } }]
+steps = [{ turn = "table.M5", counts = 1 }, { fault = { kind = "stall", axis = 9 } }]
 """
 
 
@@ -203,8 +221,8 @@ def test_steps_that_speak_of_what_is_not_there_are_told_before_anything_runs() -
         "w.toml:11:3:",
         "w.toml:11:37:",
         "w.toml:16:1:",
-        "w.toml:17:7:",
-        "w.toml:17:42:",
+        "w.toml:17:10:",
+        "w.toml:17:45:",
     ]
     assert "step 2: no button is called 'nothing'" in lines[0]
     assert "step 4: firmware 1.70 has no register named 'M1_ENN'" in lines[1]
@@ -241,6 +259,19 @@ def test_durations(value: object, nanoseconds: int) -> None:
 def test_what_is_no_duration_is_misuse(value: object) -> None:
     with pytest.raises(ValueError, match=r"is no time|is too long"):
         duration(value)
+
+
+@pytest.mark.parametrize(
+    ("written", "number"), [('"IN1"', 0), ('"in20"', 19), ('"none"', 20), ('"NONE"', 20), ("0", 0), ("20", 20)]
+)
+def test_switches_are_inputs_by_name_or_none(written: str, number: int) -> None:
+    spec = read_world("w", f"{TABLE}[mic488.M1]\nin_kl = {written}\nin_kr = {written}\n")
+    assert spec.mic488[0].axes == {1: {"in_kl": number, "in_kr": number}}
+
+
+def test_more_than_anybody_reads_is_not_told() -> None:
+    text = "".join(f"unknown{n} = 1\n" for n in range(100_000))
+    assert wrong(text).count("error D004") == 100
 
 
 def test_the_configuration_of_a_controller_takes_words_and_numbers() -> None:

@@ -9,6 +9,9 @@ import typer
 
 from steptwin.errors import Misuse
 
+_LONGEST_UNIT = 10
+"""Digits; a longer number is nobody's unit."""
+
 Twin = Annotated[str | None, typer.Option(help="Name of the twin; default: the only one running.")]
 Unit = Annotated[str | None, typer.Option(help="Unit, where the twin serves several: slave address, or address of a chip.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
@@ -49,7 +52,7 @@ def encoder(
     """Turn, couple or block the encoder shafts of a running twin, or show them."""
     wanted: dict[str, int | str] = {}
     for change in changes or []:
-        match = re.fullmatch(r"(?i)M([1-9]\d*)(?:([+-]\d+)|=(\w+))", change.strip())
+        match = re.fullmatch(r"(?ai)M([1-9]\d{0,8})(?:([+-]\d{1,18})|=(\w+))", change.strip())
         if match is None:
             raise Misuse(f"{change!r}: expected M1+40, M1-40, M1=drive, M1=free or M1=blocked")
         wanted[match[1]] = int(match[2]) if match[2] else match[3].lower()
@@ -115,7 +118,7 @@ def _ask(twin: str | None, request: dict[str, object]) -> Any:
     from steptwin.runtime.control import ask
 
     unit = request.get("unit")
-    if isinstance(unit, str) and unit.isdecimal():
+    if isinstance(unit, str) and unit.isdecimal() and len(unit) < _LONGEST_UNIT:
         request = {**request, "unit": int(unit)}
     return ask(twin, request)
 

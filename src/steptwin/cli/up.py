@@ -75,7 +75,7 @@ def up(
 
 def sections() -> list[Section]:
     """The tables of a description, for people."""
-    from steptwin.world.script import ACTIONS
+    from steptwin.world.script import ACTIONS, REPEAT, STEPS
     from steptwin.world.tables import KEYS, TABLES
 
     found = [
@@ -90,7 +90,7 @@ def sections() -> list[Section]:
         (action.main.name, action.main.meaning, ", ".join(f"{key.name}: {key.meaning}" for key in action.others))
         for action in ACTIONS.values()
     ]
-    steps.append(("repeat", "how often", "steps: a list of steps"))
+    steps.append((REPEAT.name, REPEAT.meaning, f"{STEPS.name}: {STEPS.meaning}"))
     return [*found, Section("Steps of events and scripts", ("first key", "meaning", "more keys"), steps)]
 
 

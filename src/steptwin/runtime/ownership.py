@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import fcntl
 import os
+import stat
+from errno import ELOOP, EPERM
 from pathlib import Path
 
 from steptwin.errors import Misuse
@@ -17,16 +19,33 @@ class InUse(Misuse):
         super().__init__(f"{path} is in use by {owner}")
 
 
+def _open(path: Path) -> int:
+    """A lock file of this user, opened or made. Raises `OSError`."""
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
+    except OSError as error:
+        if error.errno == ELOOP:
+            raise PermissionError(EPERM, f"the lock file {path} is a symbolic link") from None
+        raise
+    found = os.fstat(file)
+    # A second name of the file would be a link as well.
+    if found.st_uid == os.getuid() and stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
+        return file
+    os.close(file)
+    raise PermissionError(EPERM, f"{path} is no lock file of this user")
+
+
 class Ownership:
     """A lock on the file ``path`` until `release`. The kernel gives it free when the process ends, however it ends.
 
-    Raises `InUse` when another process (or another `Ownership`) has it, `OSError` when the file cannot be made.
+    Raises `InUse` when another process (or another `Ownership`) has it, `OSError` when the file cannot be made, is a link or
+    belongs to another user: what is written into a lock file must not go elsewhere.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         while True:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            self._file = _open(path)
             try:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -43,7 +62,7 @@ class Ownership:
 
     def _is_at_path(self) -> bool:
         try:
-            return os.path.samestat(os.fstat(self._file), os.stat(self.path))
+            return os.path.samestat(os.fstat(self._file), os.lstat(self.path))
         except FileNotFoundError:
             return False
 

@@ -10,13 +10,13 @@ from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, get_type_hints
 
 from steptwin import __version__
 from steptwin.errors import Misuse
-from steptwin.files import read_bytes
+from steptwin.files import MOST_RECORDED_BYTES, read_bytes
 from steptwin.machine import SECOND, Nanos
+from steptwin.runtime.plaintypes import fitting
 from steptwin.runtime.textfiles import write_bytes
 from steptwin.runtime.world import World
 from steptwin.world import script as do
@@ -27,6 +27,8 @@ from steptwin.world.faults import Fault, parse
 from steptwin.world.plant import Given
 
 FORMAT = 1
+LONGEST_NUMBER = 100
+"""Digits of a whole number; what is permitted has far fewer."""
 
 _STEPS = {kind.__name__: kind for kind in ACTIONS}
 
@@ -135,13 +137,24 @@ def save(session: Session, path: Path | str) -> None:
 
 def load(path: Path | str) -> Session:
     """What `save` wrote. Raises `Misuse` for a file that cannot be read or is no session."""
+    content = read_bytes(Path(path), MOST_RECORDED_BYTES)
     try:
-        data = json.loads(read_bytes(Path(path)))
+        data = json.loads(content, parse_int=_whole, parse_constant=_finite)
         if data["steptwin_session"] != FORMAT:
             raise Misuse(f"{path} is a session of format {data['steptwin_session']}: this version reads {FORMAT}")
         return _session(data)
-    except (LookupError, TypeError, ValueError, RecursionError) as error:
+    except (LookupError, TypeError, ValueError, RecursionError, OverflowError, AttributeError) as error:
         raise error if isinstance(error, Misuse) else Misuse(f"{path} is no session of a world: {_why(error)}") from None
+
+
+def _whole(text: str) -> int:
+    if len(text) > LONGEST_NUMBER:
+        raise ValueError(f"a number has {len(text)} digits")
+    return int(text)
+
+
+def _finite(text: str) -> float:
+    raise ValueError(f"{text} is no number of a session")
 
 
 def _why(error: Exception) -> str:
@@ -152,49 +165,27 @@ def _why(error: Exception) -> str:
 
 def _session(data: Mapping[str, Any]) -> Session:
     """Raises `LookupError`, `TypeError` and `ValueError` for what is no session."""
-    until = _fitting("until_ns", data["until_ns"], int)
+    until = fitting("until_ns", data["until_ns"], int)
     if not 0 <= until <= LONGEST_NS:
         raise ValueError(f"until_ns is {until}: permitted are 0 to {LONGEST_NS}")
-    inputs = tuple(_given(_fitting("an input", item, dict)) for item in _fitting("inputs", data["inputs"], list))
+    inputs = tuple(_given(fitting("an input", item, dict)) for item in fitting("inputs", data["inputs"], list))
     times = [given.time for given in inputs]
     if times != sorted(times) or (times and times[0] < 0):
         raise ValueError("the moments of the inputs are not in order")
     return Session(
-        _fitting("name", data["name"], str),
-        _fitting("world", data["world"], str),
-        {name: b64decode(content) for name, content in _fitting("files", data["files"], dict).items()},
+        fitting("name", data["name"], str),
+        fitting("world", data["world"], str),
+        {name: b64decode(content) for name, content in fitting("files", data["files"], dict).items()},
         {
-            name: _fitting(f"firmware of {name}", firmware, str)
-            for name, firmware in _fitting("firmware", data["firmware"], dict).items()
+            name: fitting(f"firmware of {name}", firmware, str)
+            for name, firmware in fitting("firmware", data["firmware"], dict).items()
         },
-        _fitting("seed", data["seed"], int),
+        fitting("seed", data["seed"], int),
         inputs,
         until,
-        _fitting("digest", data["digest"], str),
-        _fitting("version", data["version"], str),
+        fitting("digest", data["digest"], str),
+        fitting("version", data["version"], str),
     )
-
-
-def _fitting(name: str, value: Any, wanted: Any) -> Any:
-    """The value, if it is of the type wanted; raises `TypeError`."""
-    if not _fits(value, wanted):
-        raise TypeError(f"{name} is {value!r}")
-    return value
-
-
-def _fits(value: Any, wanted: Any) -> bool:
-    """Whether a value is of a type as steps have them."""
-    parts = get_args(wanted)
-    if get_origin(wanted) in (Union, UnionType):
-        return any(_fits(value, part) for part in parts)
-    if get_origin(wanted) is tuple:
-        if not isinstance(value, tuple):
-            return False
-        parts = (parts[0],) * len(value) if parts[-1] is ... else parts
-        return len(parts) == len(value) and all(map(_fits, value, parts))
-    if wanted in (int, float):
-        return isinstance(value, int if wanted is int else int | float) and not isinstance(value, bool)
-    return isinstance(value, wanted)
 
 
 def _plain(what: Outside) -> dict[str, Any]:
@@ -217,13 +208,13 @@ def _given(item: dict[str, Any]) -> Given:
     kind = _STEPS[item["do"]]
     values = {key: _back(value) for key, value in item.items() if key not in ("time_ns", "settled", "do")}
     if kind is do.SetFault:
-        told = _fitting("fault of SetFault", item["fault"], dict)
+        told = fitting("fault of SetFault", item["fault"], dict)
         fault = {key: tuple(value) if isinstance(value, list) else value for key, value in told.items()}
         values = {"fault": parse({key: value for key, value in fault.items() if value != ""})}
     for name, wanted in get_type_hints(kind).items():
         if name in values:
-            _fitting(f"{name} of {item['do']}", values[name], wanted)
-    return Given(_fitting("time_ns", item["time_ns"], int), kind(**values), _fitting("settled", item["settled"], bool))
+            fitting(f"{name} of {item['do']}", values[name], wanted)
+    return Given(fitting("time_ns", item["time_ns"], int), kind(**values), fitting("settled", item["settled"], bool))
 
 
 def _back(value: Any) -> Any:

@@ -11,7 +11,7 @@ from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 
 _UNITS: dict[str, Nanos] = {"us": MICROSECOND, "ms": MILLISECOND, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}
 _LONGEST_H = 366 * 24
-_DURATION = re.compile(r"(\d+(?:\.\d+)?) *([a-z]*)\Z", re.ASCII)
+_DURATION = re.compile(r"(\d{1,30}(?:\.\d{1,30})?|\.\d{1,30}) *([a-z]*)\Z", re.ASCII)
 _INPUT = re.compile(r"([\w.&]+) *= *(-?\d+(?:\.\d+)?) *@ *(.+)\Z", re.ASCII)
 
 

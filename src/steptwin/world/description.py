@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 from steptwin.errors import Misuse
-from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, ControllerConfig
+from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, NO_INPUT, ControllerConfig
 from steptwin.mic488.config import Key as ConfigKey
 from steptwin.mic488.registers import AXES
 from steptwin.world.faults import Fault, parse
 from steptwin.world.names import check_names
 from steptwin.world.reader import Key, Path, Text, read_table
-from steptwin.world.script import Step, read_steps
+from steptwin.world.script import STEPS, read_steps
 from steptwin.world.sense import check_sense
 from steptwin.world.spec import (
     AxisSpec,
@@ -115,19 +115,21 @@ def _config(toml: Text, path: Path, table: Mapping[str, Any], rows: tuple[Config
 
 def _configured(row: ConfigKey) -> Callable[[Any], Any]:
     words = {text.upper(): number for number, text in row.choices.items() if text}
+    if row.attribute in ("in_kl", "in_kr"):
+        words = {f"IN{number}": number - 1 for number in range(1, INPUTS + 1)} | {"NONE": NO_INPUT}
+        permitted = f"IN1 to IN{INPUTS} or 'none', or the number of the vendor's file, 0 for IN1 to {NO_INPUT} for none"
+    else:
+        permitted = ", ".join(words)
 
     def read(value: Any) -> Any:
-        said = value
+        number = value
         if isinstance(value, str):
-            if row.attribute in ("in_kl", "in_kr") and value.upper().startswith("IN") and value[2:].isdecimal():
-                value = int(value[2:]) - 1
-            elif value.upper() in words:
-                value = words[value.upper()]
-            else:
-                raise Misuse(f"{value!r}: permitted are {', '.join(words)}" if words else f"{value!r} is no number")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not row.permits(value):
-            raise Misuse(f"{said!r} is not permitted")
-        return int(value) if row.whole and value == int(value) else value
+            if value.upper() not in words:
+                raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is no number")
+            number = words[value.upper()]
+        if isinstance(number, bool) or not isinstance(number, int | float) or not row.permits(number):
+            raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is not permitted")
+        return int(number) if row.whole and number == int(number) else number
 
     return read
 
@@ -163,31 +165,23 @@ def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec
 
 def _events(toml: Text) -> list[ScriptSpec]:
     found: list[ScriptSpec] = []
-    for row, table in _tables(toml, "event", ("do",)):
+    for row in _rows(toml, "event"):
         path = row["path"]
         if sum(row[key] is not None for key in ("at", "every", "when")) != 1:
             toml.wrong(path, "D007", "an event needs one of at, every and when")
             continue
         name = row.pop("name") or f"event-{path[1] + 1}"
-        steps = _steps(toml, (*path, "do"), table)
+        steps = read_steps(toml, (*path, STEPS.name), row.pop(STEPS.name))
         found.append(ScriptSpec(name=name, repeat=1, steps=steps, **row))
     return found
 
 
 def _scripts(toml: Text) -> list[ScriptSpec]:
     found: list[ScriptSpec] = []
-    for row, table in _tables(toml, "script", ("steps",)):
-        steps = _steps(toml, (*row["path"], "steps"), table)
+    for row in _rows(toml, "script"):
+        steps = read_steps(toml, (*row["path"], STEPS.name), row.pop(STEPS.name))
         found.append(ScriptSpec(**row, every=None, when=None, once=True, steps=steps))
     return found
-
-
-def _steps(toml: Text, path: Path, table: Mapping[str, Any]) -> tuple[Step, ...]:
-    key = str(path[-1])
-    if key not in table:
-        toml.wrong(path, "D005", f"{key} is missing", "a list of steps, such as [{ press = 'start' }, { wait = '1 s' }]")
-        return ()
-    return read_steps(toml, path, table[key])
 
 
 def _faults(toml: Text) -> list[Fault]:

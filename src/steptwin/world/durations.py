@@ -10,7 +10,7 @@ from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 
 UNITS: dict[str, Nanos] = {"us": MICROSECOND, "ms": MILLISECOND, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}
 LONGEST_NS: Nanos = 366 * 24 * UNITS["h"]
-_DURATION = re.compile(r"(\d+(?:\.\d+)?) *([a-z]*)\Z", re.ASCII)
+_DURATION = re.compile(r"(\d{1,30}(?:\.\d{1,30})?|\.\d{1,30}) *([a-z]*)\Z", re.ASCII)
 
 
 def duration(value: object) -> Nanos:

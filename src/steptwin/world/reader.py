@@ -7,21 +7,19 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any
 
 from steptwin.diagnostics import Diagnostic, Severity, Source, Span, in_order, render
 from steptwin.errors import Misuse
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.world.durations import duration
-
-Path: TypeAlias = tuple[str | int, ...]
-"""Where a value is: names of tables and keys, numbers in arrays."""
+from steptwin.world.tomlplaces import Path, TooMuch, find_places
 
 _MISSING: Any = object()
-_HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]]+?)\s*\]{1,2}\s*(?:#.*)?$")
-_KEY = re.compile(r"\s*([\w\"'.&-]+)\s*=\s*")
-_BRACKET = re.compile(r"""\"(?:\\.|[^\"\\\n])*\"|'[^'\n]*'|#[^\n]*|[\[\]{}]""")
-"""A bracket, or what may hold one that means nothing."""
+MOST_FINDINGS = 100
+"""After so many nobody reads on."""
+_LONGEST_MESSAGE = 400
+_WHOLE = range(-(1 << 63), 1 << 63)
 
 
 class WorldError(Misuse):
@@ -41,8 +39,13 @@ class Text:
         self.source = Source(name, text)
         self.findings: list[Diagnostic] = []
         self._near = NearMiss()
+        self._spans: dict[Path, Span] = {}
         try:
+            self._spans = find_places(text)
             self.data: dict[str, Any] = tomllib.loads(text)
+        except TooMuch as error:
+            self.wrong_at(error.span, "D001", str(error))
+            raise self.error() from None
         except tomllib.TOMLDecodeError as error:
             place = re.search(r"line (\d+), column (\d+)", str(error))
             start = len(text)
@@ -52,13 +55,30 @@ class Text:
             message = str(error).split(" (at ")[0]
             self.wrong_at(Span(start, min(start + 1, len(text))), "D001", f"this is no TOML: {message}")
             raise self.error() from None
-        except RecursionError:
-            self.wrong_at(Span(0, 0), "D001", "this is no TOML of a world: tables and lists are nested too deeply")
+        except (RecursionError, ValueError):
+            self.wrong_at(Span(0, 0), "D001", "this is no TOML of a world: it is nested too deeply, or a number is too long")
             raise self.error() from None
-        self._spans = _spans(text)
+        self._check_numbers((), self.data)
+
+    def _check_numbers(self, path: Path, value: object) -> None:
+        """TOML's whole numbers have 64 bits; `tomllib` takes any."""
+        if isinstance(value, dict):
+            for name, item in value.items():
+                self._check_numbers((*path, name), item)
+        elif isinstance(value, list):
+            for number, item in enumerate(value):
+                self._check_numbers((*path, number), item)
+        elif isinstance(value, int) and value not in _WHOLE:
+            self.wrong(path, "D001", "a whole number of more than 64 bits")
+            raise self.error()
 
     def wrong_at(self, span: Span, code: str, message: str, hint: str | None = None) -> None:
+        """Raises `WorldError` when there is more wrong than anybody reads."""
+        if len(message) > _LONGEST_MESSAGE and "\n" not in message:
+            message = f"{message[: _LONGEST_MESSAGE - 61]}…{message[-60:]}"
         self.findings.append(Diagnostic(code, Severity.ERROR, span, message, hint))
+        if len(self.findings) >= MOST_FINDINGS:
+            raise self.error()
 
     def wrong(self, path: Path, code: str, message: str, hint: str | None = None) -> None:
         """Something is wrong with the value at ``path``, or with what holds it."""
@@ -85,64 +105,6 @@ class Text:
         """`WorldError` if anything was wrong."""
         if self.findings:
             raise self.error()
-
-
-def _spans(text: str) -> dict[Path, Span]:
-    """Where tables and keys are. Keys of inline tables and what looks like keys in long strings are passed over."""
-    spans: dict[Path, Span] = {}
-    counts: dict[Path, int] = {}
-    current: Path = ()
-    offset = 0
-    for line in text.splitlines(keepends=True):
-        header, key = _HEADER.match(line), _KEY.match(line)
-        if header is not None:
-            current = _resolved(_parts(header[2]), counts, is_array=header[1] == "[[")
-            spans.setdefault(current, Span(offset + header.start(1), offset + len(line.rstrip())))
-        elif key is not None:
-            path = current
-            for part in _parts(key[1]):
-                path = (*path, part)
-                spans.setdefault(path, Span(offset + key.start(1), offset + len(line.split("#")[0].rstrip())))
-            if line.startswith("[", key.end()):
-                spans |= {(*path, n): span for n, span in enumerate(_items(text, offset + key.end()))}
-        offset += len(line)
-    return spans
-
-
-def _items(text: str, begin: int) -> list[Span]:
-    """The first lines of the tables in the array that begins there."""
-    found: list[Span] = []
-    depth = start = 0
-    for bracket in _BRACKET.finditer(text, begin):
-        if bracket[0] in "[{":
-            if depth == 1:
-                start = bracket.start()
-            depth += 1
-        elif bracket[0] in "]}":
-            depth -= 1
-            if depth == 0:
-                break
-            if depth == 1:
-                found.append(Span(start, start + len(text[start : bracket.end()].splitlines()[0])))
-    return found
-
-
-def _parts(dotted: str) -> list[str]:
-    return [part.strip().strip("\"'") for part in dotted.split(".")]
-
-
-def _resolved(parts: list[str], counts: dict[Path, int], *, is_array: bool) -> Path:
-    """A header with the numbers of the array tables it is in."""
-    path: Path = ()
-    for i, part in enumerate(parts):
-        path = (*path, part)
-        if is_array and i == len(parts) - 1:
-            counts[path] = counts.get(path, -1) + 1
-            for inner in [p for p in counts if len(p) > len(path) and p[: len(path)] == path and p[len(path)] == counts[path]]:
-                del counts[inner]
-        if path in counts:
-            path = (*path, counts[path])
-    return path
 
 
 # ---------------------------------------------------------------------- rows

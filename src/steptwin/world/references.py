@@ -11,8 +11,9 @@ from steptwin.mic488.device import Mic488, check_pin, check_turn
 from steptwin.world import script as do
 from steptwin.world.actions import master_of
 from steptwin.world.faults import Fault
-from steptwin.world.reader import Path
+from steptwin.world.script import STEPS
 from steptwin.world.spec import ScriptSpec
+from steptwin.world.tomlplaces import Path
 
 if TYPE_CHECKING:
     from steptwin.world.plant import Plant
@@ -28,7 +29,7 @@ def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
                 plant.condition(script.when)
             except Misuse as error:
                 text.wrong((*script.path, "when"), "D009", str(error))
-        _check(plant, script.steps, (*script.path, "steps" if script.path[0] == "script" else "do"), set_somewhere)
+        _check(plant, script.steps, (*script.path, STEPS.name), set_somewhere)
     text.check()
 
 
@@ -43,7 +44,7 @@ def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
 def _check(plant: Plant, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
     for n, step in enumerate(steps):
         if isinstance(step, do.Repeat):
-            _check(plant, step.steps, (*path, n, "steps"), set_somewhere)
+            _check(plant, step.steps, (*path, n, STEPS.name), set_somewhere)
         elif isinstance(step, do.ClearFault) and any(_may_be_called(fault, step.name) for fault in set_somewhere):
             pass
         else:

@@ -390,6 +390,16 @@ ACTIONS: Mapping[str, Action] = dict(
 )
 """What steps can be, by their first key. ``repeat`` has steps of its own and stands beside it."""
 
+REPEAT = Key("repeat", whole(1, 10**9), "how often")
+
+
+def _list(value: Any) -> Any:
+    return value
+
+
+STEPS = Key("steps", _list, "a list of steps, such as [{ press = 'start' }, { wait = '1 s' }]")
+"""Of events, scripts and ``repeat``; `read_steps` reads it."""
+
 
 def read_steps(text: Text, path: Path, value: object) -> tuple[Step, ...]:
     """Steps from a list of tables; what is wrong is told to ``text``."""
@@ -409,8 +419,8 @@ def _step(text: Text, path: Path, n: int, table: object) -> Step | None:
         text.wrong(path, "D002", f"step {n} is {table!r}", "expected a table, such as { wait = '1 s' }")
         return None
     if "repeat" in table:
-        values = read_table(text, path, table, (Key("repeat", whole(1, 10**9), "how often"),), ("steps",))
-        return Repeat(values.get("repeat", 1), read_steps(text, (*path, "steps"), table.get("steps", [])))
+        values = read_table(text, path, table, (REPEAT,), (STEPS.name,))
+        return Repeat(values.get("repeat", 1), read_steps(text, (*path, STEPS.name), table.get(STEPS.name, [])))
     kinds = [key for key in table if key in ACTIONS]
     if len(kinds) != 1:
         near = "".join(text.near(key, ACTIONS) for key in table if key not in ACTIONS)

@@ -27,6 +27,7 @@ from steptwin.world.reader import (
     whole,
     word,
 )
+from steptwin.world.script import STEPS
 
 _positive = number(0.0, above=True)
 _not_negative = number(0.0)
@@ -185,11 +186,13 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(positive_time, "every", "again and again"),
         _optional(text_value, "when", "a condition, such as 'x.position > 100'"),
         _optional(flag, "once", "when: only the first time the condition comes true", False),
+        STEPS,
     ),
     "script": (
         Key("name", name_value, "for the trace"),
         _optional(time_value, "at", "when it begins", 0),
         _optional(whole(1, 10**9), "repeat", "how often all of it is done", 1),
+        STEPS,
     ),
 }
 

@@ -88,5 +88,5 @@ def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(Misuse, match=r"cannot read .*no\.jsonl: No such file"):
         read_trace(tmp_path / "no.jsonl")
     (tmp_path / "bytes.jsonl").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(Misuse, match=r"cannot read .*: it is not text"):
+    with pytest.raises(Misuse, match=r"bytes\.jsonl:1: not the first line of a trace"):
         read_trace(tmp_path / "bytes.jsonl")

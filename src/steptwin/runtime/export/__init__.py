@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
+from steptwin.files import open_regular
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.runtime.export.axes import AxisView, AxisViews, axis_views
 from steptwin.runtime.export.progress import Progress, Watch, bar, unwatched
@@ -203,9 +204,5 @@ def read_trace(where: Path | str) -> SavedTrace:
     path = Path(where)
     if path.is_dir():
         path /= f"{NAME}.jsonl"
-    try:
-        with path.open(encoding="utf-8") as file:
-            return read_records(file, str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror or error if isinstance(error, OSError) else "it is not text"
-        raise Misuse(f"cannot read {path}: {why}") from error
+    with open_regular(path) as file:
+        return read_records(file, str(path))

@@ -11,7 +11,8 @@ position = base + centre + radius · cos((angle + turn · way) · 90°). Bytes a
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+import struct
+from collections.abc import Iterator, Mapping
 from math import inf
 from typing import IO, Any, NamedTuple
 
@@ -22,9 +23,15 @@ from steptwin.motion.divisions import Division, Microstepping, StepTrain
 from steptwin.motion.paths import ArcProfile, ArcSegment, Circular
 from steptwin.runtime.export.axes import AxisView, AxisViews, Mechanics, PhaseOutputs, StepOutputs
 from steptwin.runtime.export.progress import Progress
+from steptwin.runtime.plaintypes import fields_fit, fits, fitting, shown
+from steptwin.world.durations import LONGEST_NS as LATEST_NS
 from steptwin.world.trace import KINDS, Record, Trace
 
 FORMAT = 1
+LONGEST_LINE = 4 << 20
+"""Bytes of a line; a plan with thousands of segments has some 100 000."""
+LONGEST_NUMBER = 20
+"""Digits of a whole number, which has 64 bits at most."""
 _PROGRESS_EVERY = 5000
 
 
@@ -56,24 +63,43 @@ def write_records(trace: Trace, views: AxisViews, file: IO[str], progress: Progr
             progress(time)
 
 
-def read_records(lines: Iterable[str], name: str) -> SavedTrace:
-    """Raises `Misuse` with ``name`` and the line where they are not what `write_records` writes."""
+def read_records(file: IO[bytes], name: str) -> SavedTrace:
+    """Raises `Misuse` with ``name`` and the line where it is not what `write_records` writes."""
     saved: SavedTrace | None = None
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(_lines(file), 1):
         try:
-            data = json.loads(line)
+            if len(line) > LONGEST_LINE:
+                raise Misuse(f"a line of more than {LONGEST_LINE} bytes")
+            data = json.loads(line, parse_int=_whole)
             if saved is None:
                 saved = _head(data)
             else:
                 saved.trace.add(_record(data))
-        except (LookupError, TypeError, ValueError) as error:
-            what = error if isinstance(error, Misuse) else f"not {'the first line' if saved is None else 'a record'} of a trace"
-            raise Misuse(f"{name}:{number}: {what}") from error
+        except Misuse as error:
+            raise Misuse(f"{name}:{number}: {error}") from error
+        except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, struct.error) as error:
+            what = "the first line" if saved is None else "a record"
+            raise Misuse(f"{name}:{number}: not {what} of a trace") from error
     if saved is None:
         raise Misuse(f"{name} is empty: a trace begins with a line about itself")
-    if saved.trace.digest() != saved.digest:
-        raise Misuse(f"{name}: the records are not those that were written: their digest is not {saved.digest}")
+    try:
+        digest = saved.trace.digest()
+    except (Misuse, ArithmeticError, struct.error):
+        digest = ""
+    if digest != saved.digest:
+        raise Misuse(f"{name}: the records are not those that were written: their digest is not {shown(saved.digest)}")
     return saved
+
+
+def _lines(file: IO[bytes]) -> Iterator[bytes]:
+    while line := file.readline(LONGEST_LINE + 1):
+        yield line
+
+
+def _whole(text: str) -> int:
+    if len(text) > LONGEST_NUMBER:
+        raise ValueError(f"a number has {len(text)} digits")
+    return int(text)
 
 
 def _line(data: dict[str, Any]) -> str:
@@ -82,16 +108,44 @@ def _line(data: dict[str, Any]) -> str:
 
 def _head(data: dict[str, Any]) -> SavedTrace:
     if data["steptwin_trace"] != FORMAT:
-        raise Misuse(f"a trace of format {data['steptwin_trace']}: this version reads format {FORMAT}")
-    views = {(axis["machine"], axis["axis"]): _view_from_json(axis) for axis in data["axes"]}
-    return SavedTrace(Trace(data["machines"]), views, data["until_ns"], data["digest"], data.get("title", ""))
+        raise Misuse(f"a trace of format {shown(data['steptwin_trace'])}: this version reads format {FORMAT}")
+    views: dict[tuple[str, str], AxisView] = {}
+    for axis in data["axes"]:
+        view = _view_from_json(axis)
+        if not (fields_fit(view) and fields_fit(view.outputs) and view.pulses_per_unit):
+            raise TypeError("axes")
+        if view.mechanics is not None and not (fields_fit(view.mechanics) and view.mechanics.pulses_per_unit):
+            raise TypeError("mechanics")
+        views[fitting("machine", axis["machine"], str), fitting("axis", axis["axis"], str)] = view
+    machines = fitting("machines", tuple(data["machines"]), tuple[str, ...])
+    until = fitting("until_ns", data["until_ns"], int)
+    if not 0 <= until <= LATEST_NS:
+        raise Misuse(f"until_ns is {until}: permitted are 0 to {LATEST_NS}")
+    title = fitting("title", data.get("title", ""), str)
+    return SavedTrace(Trace(machines), views, until, fitting("digest", data["digest"], str), title)
 
 
 def _record(data: dict[str, Any]) -> Record:
     kind = data["kind"]
     if kind not in KINDS:
-        raise Misuse(f"no kind of record {kind!r}: kinds are {', '.join(KINDS)}")
-    return Record(data["time_ns"], data["machine"], kind, data["subject"], _from_json(data["value"]))
+        raise Misuse(f"no kind of record {shown(kind)}: kinds are {', '.join(KINDS)}")
+    value = _from_json(data["value"])
+    if not _is_value(kind, value):
+        raise Misuse(f"{shown(value)} is no value of a record of kind {kind!r}")
+    time = fitting("time_ns", data["time_ns"], int)
+    if not 0 <= time <= LATEST_NS:
+        raise Misuse(f"time_ns is {time}: permitted are 0 to {LATEST_NS}")
+    return Record(time, fitting("machine", data["machine"], str), kind, fitting("subject", data["subject"], str), value)
+
+
+def _is_value(kind: str, value: object) -> bool:
+    """Whether exports can show the value in a record of this kind; those of other kinds are shown as text."""
+    if kind == "plan":
+        return isinstance(value, Profile | StepTrain)
+    return kind not in _VALUES or fits(value, _VALUES[kind])
+
+
+_VALUES: Mapping[str, Any] = {"load": tuple[tuple[int, bool, int], ...], "edge": float, "frame": bytes}
 
 
 # ---------------------------------------------------------------------- values
@@ -120,8 +174,8 @@ def _from_json(value: Any) -> object:
         return bytes.fromhex(value["hex"])
     profile = _profile_from_json(value)
     if "divisions" in value:
-        divisions = tuple(Division(*division) for division in value["divisions"])
-        fine, coarse, limit = value["microstepping"]
+        divisions = tuple(Division(*fitting("a division", tuple(one), tuple[int, int])) for one in value["divisions"])
+        fine, coarse, limit = fitting("microstepping", tuple(value["microstepping"]), tuple[int, int, float | None])
         return StepTrain(profile, Microstepping(fine, coarse, inf if limit is None else limit), divisions)
     return profile
 
@@ -132,7 +186,8 @@ def _profile_to_json(profile: Profile) -> dict[str, object]:
 
 
 def _profile_from_json(data: dict[str, Any]) -> Profile:
-    start, base, final = data["start_ns"], data["base"], data["final"]
+    start, base = fitting("start_ns", data["start_ns"], int), fitting("base", data["base"], int)
+    final = fitting("final", data["final"], float)
     if any(isinstance(segment, dict) for segment in data["segments"]):
         return ArcProfile(start, base, tuple(_arc_from_json(segment) for segment in data["segments"]), final)
     return Profile(start, base, tuple(_segment_from_json(segment) for segment in data["segments"]), final)
@@ -149,13 +204,16 @@ def _segment_to_json(s: Segment | ArcSegment) -> object:
 
 
 def _segment_from_json(data: list[Any]) -> Segment:
-    end_s, *rest = data
+    end_s, *rest = fitting("a segment", tuple(data), tuple[float | None, float, float, float, float, float, int])
     return Segment(inf if end_s is None else end_s, *rest)
 
 
 def _arc_from_json(data: dict[str, Any]) -> ArcSegment:
-    end_s, way, course = data["end_s"], _segment_from_json(data["way"]), Circular(*data["course"])
-    return ArcSegment(inf if end_s is None else end_s, data["direction"], way, course, data["half"], data["end_p"])
+    end_s = fitting("end_s", data["end_s"], float | None)
+    course = Circular(*fitting("course", tuple(data["course"]), tuple[float, float, float, float]))
+    direction, half = fitting("direction", data["direction"], int), fitting("half", data["half"], int)
+    way, end_p = _segment_from_json(data["way"]), fitting("end_p", data["end_p"], float)
+    return ArcSegment(inf if end_s is None else end_s, direction, way, course, half, end_p)
 
 
 def _view_to_json(view: AxisView) -> dict[str, object]:
