@@ -1,18 +1,14 @@
-"""What README and getting-started tell a newcomer to type, typed against the demo."""
+"""What README and getting-started tell a newcomer to type into mbpoll, typed against the demo."""
 
 from __future__ import annotations
 
 import re
 import shlex
-import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 ROOT = Path(__file__).parents[2]
 
@@ -81,41 +77,8 @@ def test_the_pty_as_getting_started_polls_it(require_peer: Callable[[str], str],
     assert poll([require_peer("mbpoll"), *arguments[:-1], pty], 2) == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/getting-started.md"])
-def test_commands_for_a_running_twin(page: str, serve: Callable[..., Any]) -> None:
-    twin = serve("--demo")
-    typed = [arguments for _, *arguments in commands(page, "steptwin") if arguments[0] != "serve"]
-    assert len(typed) >= 3
-    for arguments in typed:
-        run = twin.command(*arguments)
-        assert (run.returncode, run.stderr) == (0, ""), arguments
-
-
 def test_every_option_of_serve_is_in_getting_started(serve: Callable[..., Any]) -> None:
     helped = serve().command("serve", "mic488", "--help").stdout
     offered = set(re.findall(r"^  (--[a-z-]+)", helped, re.MULTILINE)) - {"--help"}
     rows = re.findall(r"^\| (`--.*?) \|", (ROOT / "docs/getting-started.md").read_text(), re.MULTILINE)
     assert {option for row in rows for option in re.findall(r"`(--[a-z-]+)", row)} == offered
-
-
-def test_the_commands_about_programs(serve: Callable[..., Any], tmp_path: Path) -> None:
-    """Typed one after the other, in a copy of the examples; those after `serve` to the twin it starts."""
-    place = shutil.copytree(ROOT / "examples/mic488", tmp_path / "mic488")
-    twin = None
-    typed = [line for program in ("steptwin", "cmp") for line in commands("docs/wbc.md", program)]
-    assert len(typed) >= 9
-    for program, *arguments in typed:
-        if arguments[0] == "serve":
-            twin = serve(*(re.sub(r"\w+\.(cfg|prg|csv)$", lambda name: str(place / name[0]), word) for word in arguments[2:]))
-        elif twin is not None and arguments[0] in ("pin", "state"):
-            run = twin.command(*arguments)
-            assert (run.returncode, run.stderr) == (0, ""), arguments
-        else:
-            command = [program] if program == "cmp" else [str(Path(sys.executable).with_name("steptwin"))]
-            ended = subprocess.run([*command, *arguments], cwd=place, capture_output=True, text=True, check=False)
-            assert (ended.returncode, ended.stderr) == (0, ""), arguments
-            if arguments[1] == "feeder.prg" and arguments[0] == "run":
-                shown = re.search(r"^```text\n(.*?)^```", (ROOT / "docs/wbc.md").read_text(), re.MULTILINE | re.DOTALL)
-                assert shown is not None
-                assert shown[1] in ended.stdout
-    assert twin is not None

@@ -15,11 +15,12 @@ class NoTextual(SteptwinError):
 
 
 def monitor(device: str | None, hz: float) -> None:
-    """Watch a controller until the user ends it. Raises `Misuse`, or `NoTextual` naming the extra."""
+    """Watch a controller until the user ends it. Raises `Misuse`, or `NoTextual` with the command that installs it."""
     try:
         import textual  # noqa: F401
     except ImportError as error:
-        raise NoTextual("the monitor needs textual: pip install 'steptwin[monitor]', in a clone: make extras") from error
+        installs = "in a clone 'make extras' installs it, elsewhere 'pip install textual'"
+        raise NoTextual(f"the monitor needs textual: {installs}") from error
     from steptwin.monitor.app import Monitor
     from steptwin.monitor.session import session_at
 

@@ -192,7 +192,7 @@ def _check(name: str) -> None:
     if found.missing:
         raise Misuse(
             f"{name} needs {' and '.join(found.missing)}, which {'is' if len(found.missing) == 1 else 'are'} not installed: "
-            f"pip install 'steptwin[{found.extra}]', in a clone: make extras"
+            f"in a clone 'make extras' installs them, elsewhere 'pip install {' '.join(found.missing)}'"
         )
 
 

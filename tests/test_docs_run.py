@@ -1,0 +1,55 @@
+"""Every command and snippet of README and documentation does what it is there for, in the order of its page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from pages import PAGES, RUN, Reader, blocks
+
+WITH_CODE = [page for page in PAGES if any(block.language in RUN and block.reason is None for block in blocks(page))]
+
+NOT_RUN = {
+    "README.md": [
+        "it is the demo that the other blocks are run with",
+        "needs mbpoll; tests/peers/test_readme.py does it",
+        "runs this test",
+    ],
+    "docs/architecture.md": ["an excerpt"],
+    "docs/devices.md": ["needs a device, and goes on until Ctrl-C", "needs a device"],
+    "docs/getting-started.md": ["needs a package index", "needs mbpoll; tests/peers/test_readme.py does it"],
+    "docs/monitor.md": ["needs a device and a terminal"],
+    "docs/testing.md": ["needs devices"],
+}
+"""Blocks that are not run here, with the reason that stands before them in the source."""
+
+
+@pytest.mark.parametrize("page", WITH_CODE)
+def test_the_blocks_of_a_page_run(page: str, tmp_path: Path) -> None:
+    with Reader(tmp_path) as reader:
+        for block in blocks(page):
+            if block.language in RUN and block.reason is None:
+                reader.do(block)
+
+
+def test_what_is_not_run_is_known() -> None:
+    found = {page: [block.reason for block in blocks(page) if block.reason is not None] for page in PAGES}
+    assert {page: reasons for page, reasons in found.items() if reasons} == NOT_RUN
+
+
+def test_commands_are_in_blocks_that_are_run() -> None:
+    """A block in another language would not be run, and nobody would notice."""
+    known = {*RUN, "text"}
+    odd = [f"{b.page}:{b.line}: {b.language!r}" for page in PAGES for b in blocks(page) if b.language not in known]
+    assert [place for place in odd if "'{" not in place] == []
+    texts = [block for page in PAGES for block in blocks(page) if block.language == "text"]
+    hidden = [b for b in texts if any(line.lstrip("$ ").startswith("steptwin ") for line in b.code.splitlines())]
+    assert [f"{block.page}:{block.line}" for block in hidden] == []
+
+
+def test_the_excerpt_of_a_run_is_what_it_prints(tmp_path: Path) -> None:
+    (command,) = [line for b in blocks("docs/wbc.md") if b.language == "sh" for line in b.commands() if "run feeder.prg" in line]
+    (excerpt,) = [block.code for block in blocks("docs/wbc.md") if block.language == "text"]
+    with Reader(tmp_path) as reader:
+        reader.command("cd examples/mic488")
+        assert excerpt in reader.command(command)
