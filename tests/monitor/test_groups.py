@@ -34,7 +34,7 @@ def test_values_as_people_read_them() -> None:
 
 def test_without_textual_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "textual", None)
-    with pytest.raises(NoTextual, match=r"pip install 'steptwin\[monitor\]'"):
+    with pytest.raises(NoTextual, match=r"in a clone 'make extras' installs it, elsewhere 'pip install textual'"):
         monitor(None, 5.0)
 
 
