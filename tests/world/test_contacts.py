@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from itertools import pairwise
+from math import floor
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +16,7 @@ from steptwin.machine import MILLISECOND, SECOND, Edge
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.device import Mic488
 from steptwin.world.chance import Chance
-from steptwin.world.contacts import Button, CountedPosition, Switch, Zone
+from steptwin.world.contacts import Button, Circuit, CountedPosition, Switch, Zone
 from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.trace import Record
 
@@ -22,7 +26,8 @@ LIMITS = st.one_of(st.none(), st.integers(-30, 30))
 def zones() -> st.SearchStrategy[Zone]:
     def made(low: int | None, width: int | None, hysteresis: int, repeated: bool) -> Zone:
         high = None if width is None or low is None else low + width
-        period = None if not repeated or low is None or high is None else high - low + 2 * hysteresis + 7
+        fraction = Fraction(sum(ord(c) for c in f"{low}{width}") % 7, 7)
+        period = None if not repeated or low is None or high is None else high - low + 2 * hysteresis + 2 + fraction
         return Zone(low, high, hysteresis, period)
 
     return st.builds(made, LIMITS, st.one_of(st.none(), st.integers(0, 12)), st.integers(0, 4), st.booleans())
@@ -43,6 +48,46 @@ def test_the_predicted_edge_is_where_the_state_changes(zone: Zone, steps: list[i
         below, above = zone.edges(place, is_on=on)
 
 
+@given(
+    low=st.integers(-50, 50),
+    width=st.integers(0, 5),
+    period=st.fractions(10, 30, max_denominator=9),
+    place=st.integers(-3000, 3000),
+)
+def test_a_repeated_zone_is_at_every_turn_to_the_nearest_pulse(low: int, width: int, period: Fraction, place: int) -> None:
+    """Against every turn that can reach ``place``: nothing adds up over thousands of turns."""
+    zone = Zone(low, low + width, 0, period)
+    shifts = [floor(turn * period + Fraction(1, 2)) for turn in range(-400, 401)]
+    assert zone.on(place, was_on=False) is any(low + shift <= place <= low + width + shift for shift in shifts)
+
+
+@pytest.mark.parametrize("in_series", [False, True])
+def test_contacts_of_one_input_are_joined(in_series: bool) -> None:
+    """Two buttons, one of them NC: an input has what its contacts give it together, and only its changes are edges."""
+    edges: list[Record] = []
+    kernel = Kernel(record=edges.append)
+    device = Mic488(controller())
+    kernel.add("m", device)
+    circuit = Circuit(kernel, PinName("m", "IN3"), in_series=in_series)
+    buttons = [
+        Button(circuit, normally_closed=closed, bounce_ns=0, bounces=0, chance=Chance(0, "b"), lane=f"b{closed:d}")
+        for closed in (False, True)
+    ]
+    for button in buttons:
+        button.rest_at(button.normally_closed)
+        kernel.add_part(button)
+    circuit.close()
+    for now, (which, pressed) in enumerate([(0, True), (1, True), (0, False), (1, False), (0, True), (0, False)], start=1):
+        kernel.advance(now)
+        buttons[which].press(pressed, now)
+        kernel.settle()
+        closed = [buttons[0].pressed, not buttons[1].pressed]
+        assert device.pins()["IN3"] == float(all(closed) if in_series else any(closed))
+    levels = [record.value for record in edges if record.subject == "IN3"]
+    assert all(before != after for before, after in pairwise(levels)), "an edge where nothing changes"
+    assert [record.value for record in edges if record.subject == "b0"] == [0.0, 1.0, 0.0, 1.0, 0.0]
+
+
 def test_hysteresis_keeps_a_switch_on() -> None:
     zone = Zone(10, 20, 3)
     assert [zone.on(p, was_on=False) for p in (9, 10, 20, 21)] == [False, True, True, False]
@@ -51,7 +96,13 @@ def test_hysteresis_keeps_a_switch_on() -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [((5, 4), "low 5 imp is above high 4 imp"), ((0, 1, -1), "hysteresis of -1"), ((0, 10, 0, 10), "shorter than that")],
+    [
+        ((5, 4), "low 5 imp is above high 4 imp"),
+        ((0, 1, -1), "hysteresis of -1"),
+        ((0, 9, 0, 10), "zone of 10 imp, hysteresis included, comes again every 10 imp: it must be shorter"),
+        ((0, 5, 2, 10), "zone of 10 imp, hysteresis included"),
+        ((0, None, 0, 10), "two ends"),
+    ],
 )
 def test_zones_that_cannot_be_are_misuse(arguments: tuple, message: str) -> None:
     with pytest.raises(Misuse, match=message):
@@ -64,13 +115,12 @@ def test_a_bouncing_switch_comes_to_rest_within_its_time_and_the_same_way_again(
         kernel = Kernel(record=edges.append)
         device = Mic488(controller(AxisConfig(acc=1e4, vel=1e4)))
         kernel.add("m", device)
-        target = PinName("m", "IN1")
+        circuit = Circuit(kernel, PinName("m", "IN1"))
         chance = Chance(seed, "x")
         kernel.add_part(
-            Switch(
-                kernel, CountedPosition(device.axes[0]), Zone(100, None), target, bounce_ns=MILLISECOND, bounces=3, chance=chance
-            )
+            Switch(circuit, CountedPosition(device.axes[0]), Zone(100, None), 0, bounce_ns=MILLISECOND, bounces=3, chance=chance)
         )
+        circuit.close()
         device.execute(bytes.fromhex("06 271E 0001"), 0)
         device.execute(bytes.fromhex("10 2764 0002 04 0000 4348"), 0)  # POS_ABS M1 = 200
         kernel.advance(SECOND)
@@ -91,8 +141,10 @@ def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
     kernel.add("m", device)
     seen: list[Edge] = []
     kernel.observers.append(lambda name, edge: seen.append(edge))
-    button = Button(kernel, PinName("m", "IN3"), normally_closed=True, bounce_ns=0, bounces=0, chance=Chance(0, "b"))
+    circuit = Circuit(kernel, PinName("m", "IN3"))
+    button = Button(circuit, normally_closed=True, bounce_ns=0, bounces=0, chance=Chance(0, "b"))
     button.rest_at(True)
+    circuit.close()
     kernel.add_part(button)
     assert (device.pins()["IN3"], button.pressed) == (1.0, False)
     button.press(True, 0)

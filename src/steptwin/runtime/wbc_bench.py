@@ -357,7 +357,7 @@ class Bench:
     def _set_pin(self, change: TimedInput) -> None:
         level = f"{real_text(change.value)} V" if change.pin.startswith("AIN") else "on" if change.value else "off"
         self._tell(self.now, "input", f"{change.pin} {level}")
-        if self._trace is not None:
+        if self._trace is not None and (change.pin.startswith("AIN") or self.device.pins()[change.pin] != change.value):
             self._records.append(Record(self.now, NAME, "edge", change.pin, change.value))
         self.device.set_pin(change.pin, change.value, self.now)
 

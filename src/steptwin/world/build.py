@@ -26,7 +26,7 @@ from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.world.chance import Chance
-from steptwin.world.contacts import Button, Switch, Zone
+from steptwin.world.contacts import Button, Circuit, Switch, Zone
 from steptwin.world.course import Build
 from steptwin.world.description import config_of
 from steptwin.world.faults import Faults
@@ -94,6 +94,8 @@ class _Builder:
         self.plan.faults.sinks.append(record)
         self._driven: dict[PinName, Path] = {}
         """What drives each input."""
+        self._circuits: dict[PinName, tuple[Circuit, str | None]] = {}
+        """The contacts of inputs, and how they are said to be joined."""
         self._make_machines()
         spec.text.check()
         self._make_kernels()
@@ -110,6 +112,8 @@ class _Builder:
         for source in spec.sources:
             self._told(source.path, partial(self._source, source))
         spec.text.check()
+        for circuit, _ in self._circuits.values():
+            circuit.close()
 
     def _told(self, path: Path, action: Callable[[], None]) -> None:
         """Do something for the table at ``path``; what is wrong with it is told there."""
@@ -311,11 +315,12 @@ class _Builder:
         mechanism = Mechanism(kernel, machine, number, build, spec.name)
         kernel.add_part(mechanism)
         plan.axes[spec.name] = Fitted(spec, kernel, mechanism, scale)
-        for switch in spec.switches:
-            self._told(switch.path, partial(self._switch, plan.axes[spec.name], switch))
+        for n, switch in enumerate(spec.switches, start=1):
+            self._told(switch.path, partial(self._switch, plan.axes[spec.name], switch, f"{spec.name}.switch{n}"))
 
-    def _switch(self, axis: Fitted, spec: SwitchSpec) -> None:
-        pulses = axis.scale.nearest
+    def _switch(self, axis: Fitted, spec: SwitchSpec, lane: str) -> None:
+        scale = axis.scale
+        pulses = scale.nearest
         zone = Zone(None, None)
         if spec.below is not None:
             zone = Zone(None, pulses(spec.below), pulses(spec.hysteresis))
@@ -323,17 +328,20 @@ class _Builder:
             zone = Zone(pulses(spec.above), None, pulses(spec.hysteresis))
         elif spec.position is not None:
             half = 0.5 * spec.width
-            zone = Zone(pulses(spec.position - half), pulses(spec.position + half), pulses(spec.hysteresis))
-        target = self._input(spec.target, (*spec.path, "to"))
+            usual = scale.turn if axis.spec.kind == "rotary" else None
+            period = usual if spec.period is None else scale.pulses(spec.period)
+            zone = Zone(pulses(spec.position - half), pulses(spec.position + half), pulses(spec.hysteresis), period)
+        circuit = self._circuit(axis.kernel, spec.target, (*spec.path, "to"), spec.join)
         part = Switch(
-            axis.kernel,
+            circuit,
             axis.mechanism,
             zone,
-            target,
+            axis.kernel.now,
             normally_closed=spec.contact == "NC",
             bounce_ns=spec.bounce,
             bounces=spec.bounces,
-            chance=Chance(self.spec.seed, f"bounce {target}"),
+            chance=self._chance(circuit),
+            lane=lane,
         )
         axis.kernel.add_part(part)
 
@@ -375,9 +383,10 @@ class _Builder:
         if encoder.index:
             low = fitted.scale.nearest(encoder.offset)
             period = fitted.scale.pulses_per_rev
-            target = self._input((spec.drive[0], f"IN{index_input(mechanism.number - 1) + 1}"), (*encoder.path, "index"))
+            target = (spec.drive[0], f"IN{index_input(mechanism.number - 1) + 1}")
+            circuit = self._circuit(fitted.kernel, target, (*encoder.path, "index"), None)
             zone = Zone(low, low + encoder.index_width - 1, 0, period)
-            fitted.kernel.add_part(Switch(fitted.kernel, RotorMark(turned.mechanism), zone, target))
+            fitted.kernel.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now))
 
     # ------------------------------------------------------------------ wires, buttons, sources
 
@@ -398,6 +407,27 @@ class _Builder:
         self._driven[target] = path
         return target
 
+    def _circuit(self, kernel: Kernel, name: tuple[str, str], path: Path, join: str | None) -> Circuit:
+        """What a contact is part of: an input of its own, or one that it shares with contacts that are joined in the same way."""
+        target = PinName(*name)
+        there, their_join = self._circuits.get(target, (None, None))
+        if there is None:
+            circuit = Circuit(kernel, self._input(name, path), in_series=join == "series")
+            self._circuits[target] = circuit, join
+            return circuit
+        if join is None or join != their_join:
+            line = self.spec.text.line(self._driven[target])
+            raise Misuse(
+                f"{target} is driven already, from line {line}: contacts that share an input all have join = 'parallel', "
+                "or all join = 'series'"
+            )
+        return there
+
+    def _chance(self, circuit: Circuit) -> Chance:
+        """Of the contact that is put into a circuit next."""
+        number = f" {len(circuit.contacts) + 1}" if circuit.contacts else ""
+        return Chance(self.spec.seed, f"bounce {circuit.target}{number}")
+
     def _wire(self, source: tuple[str, str], target: tuple[str, str], path: Path, inverted: bool, delay: Nanos) -> None:
         kernel = self.plan.kernel_of[source[0]]
         check_terminal(self._machine(source[0]), PinName(*source), OUTPUT)
@@ -405,14 +435,14 @@ class _Builder:
 
     def _button(self, spec: ButtonSpec) -> None:
         kernel = self.plan.kernel_of[spec.target[0]]
-        target = self._input(spec.target, spec.path)
+        circuit = self._circuit(kernel, spec.target, spec.path, spec.join)
         button = Button(
-            kernel,
-            target,
+            circuit,
             normally_closed=spec.contact == "NC",
             bounce_ns=spec.bounce,
             bounces=spec.bounces,
-            chance=Chance(self.spec.seed, f"bounce {target}"),
+            chance=self._chance(circuit),
+            lane=spec.name,
         )
         button.rest_at(spec.contact == "NC")
         kernel.add_part(button)

@@ -1,4 +1,6 @@
-"""Contacts that drive inputs: switches that an axis runs over, and buttons that a person presses. Both may bounce.
+"""Contacts that drive inputs, alone or several in parallel or in series.
+
+They are switches that an axis runs over, and buttons that a person presses. All may bounce.
 
 Positions in pulses of whatever carries the switch.
 """
@@ -7,6 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from fractions import Fraction
+from math import floor
 from typing import ClassVar, Protocol
 
 from steptwin.errors import Misuse
@@ -56,92 +60,138 @@ class CountedPosition:
 class Zone:
     """Where a switch is on: from ``low`` to ``high`` (None: open), once on up to ``hysteresis`` further on both sides.
 
-    With ``period`` the zone comes again after so many pulses, in both directions.
+    With ``period`` (pulses) the zone comes again after each, in both directions, each time at the pulse nearest to it.
     """
 
     low: int | None
     high: int | None
     hysteresis: int = 0
-    period: int | None = None
+    period: Fraction | int | None = None
 
     def __post_init__(self) -> None:
         if self.low is not None and self.high is not None and self.low > self.high:
             raise Misuse(f"low {self.low} imp is above high {self.high} imp")
         if self.hysteresis < 0:
             raise Misuse(f"a hysteresis of {self.hysteresis} imp is negative")
-        if self.period is not None and (self.low is None or self.high is None or self.high - self.low >= self.period):
-            raise Misuse(f"a zone that comes again every {self.period} imp must be shorter than that")
+        if self.period is None:
+            return
+        if self.low is None or self.high is None:
+            raise Misuse("a zone that comes again has two ends")
+        width = self.high - self.low + 1 + 2 * self.hysteresis
+        if width >= self.period:
+            raise Misuse(
+                f"a zone of {width} imp, hysteresis included, comes again every {float(self.period):g} imp: it must be shorter"
+            )
 
-    def near(self, place: int) -> tuple[int | None, int | None]:
-        """The edges that matter at ``place``: those of the zone it is in, or of the last one below it."""
-        if self.period is None or self.low is None or self.high is None:
-            return self.low, self.high
-        shift = (place - self.low) // self.period * self.period
-        return self.low + shift, self.high + shift
+    def _turn(self, place: int) -> int:
+        """The last turn whose zone, with hysteresis, begins at or below ``place``."""
+        if self.period is None or self.low is None:
+            return 0
+        turn = floor((place - self.low + self.hysteresis) / Fraction(self.period)) + 1
+        while self._ends(turn)[0] - self.hysteresis > place:
+            turn -= 1
+        return turn
+
+    def _ends(self, turn: int) -> tuple[int, int]:
+        shift = 0 if self.period is None else floor(turn * self.period + Fraction(1, 2))
+        return (self.low or 0) + shift, (self.high or 0) + shift
+
+    def _near(self, place: int) -> tuple[int | None, int | None]:
+        """The zone that ``place`` is in, hysteresis included, or else the last one below it."""
+        return (self.low, self.high) if self.period is None else self._ends(self._turn(place))
 
     def on(self, place: int, *, was_on: bool) -> bool:
-        low, high = self.near(place)
+        low, high = self._near(place)
         more = self.hysteresis if was_on else 0
-        if self.period is not None and high is not None and low is not None and was_on and place >= low + self.period - more:
-            return True
         return (low is None or place >= low - more) and (high is None or place <= high + more)
 
     def edges(self, place: int, *, is_on: bool) -> tuple[int | None, int | None]:
         """Positions at which the state changes next, below and above ``place``."""
-        low, high = self.near(place)
-        more = self.hysteresis
+        low, high = self._near(place)
         if is_on:
-            if self.period is not None and high is not None and low is not None and place > high + more:
-                low, high = low + self.period, high + self.period
+            more = self.hysteresis
             return None if low is None else low - more - 1, None if high is None else high + more + 1
-        if self.period is not None:
-            if low is not None and high is not None and place <= high:
-                return high - self.period, low
-            return high, None if low is None else low + self.period
-        below = high if high is not None and place > high else None
-        above = low if low is not None and place < low else None
-        return below, above
+        if self.period is None:
+            below = high if high is not None and place > high else None
+            above = low if low is not None and place < low else None
+            return below, above
+        turn = self._turn(place)
+        if low is not None and place < low:
+            return self._ends(turn - 1)[1], low
+        return high, self._ends(turn + 1)[0]
+
+
+class Circuit:
+    """The contacts of an input: in series it is 1 while all are closed, else while any is."""
+
+    __slots__ = ("_kernel", "contacts", "in_series", "target")
+
+    def __init__(self, kernel: Kernel, target: PinName, *, in_series: bool = False) -> None:
+        kernel.check(target)
+        self._kernel = kernel
+        self.target = target
+        self.in_series = in_series
+        self.contacts: list[Contact] = []
+
+    def close(self) -> None:
+        """The input takes what its contacts give it now."""
+        levels = [contact.level for contact in self.contacts]
+        self._kernel.drive(self.target, float(all(levels) if self.in_series else any(levels)))
+
+    def mark(self) -> None:
+        """One of the contacts bounces from now on."""
+        self._kernel.mark()
+
+    def tell(self, lane: str, level: float) -> None:
+        """The level of one of the contacts, whatever the input has of it."""
+        self._kernel.tell(self.target.machine, "edge", lane, level)
 
 
 class Contact(Stateful):
     """A contact that may bounce. ``closed`` is what it comes to rest at.
 
-    A change bounces ``bounces`` times, at moments drawn from ``chance``, and rests within ``bounce_ns``.
+    A change bounces ``bounces`` times, at moments drawn from ``chance``, and rests within ``bounce_ns``. Its level is recorded
+    as ``lane``.
     """
 
     __slots__ = (
         "_bouncing",
         "_chance",
+        "_circuit",
         "_due",
-        "_kernel",
         "bounce_ns",
         "bounces",
         "closed",
+        "lane",
         "level",
         "normally_closed",
-        "target",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "normally_closed", "target"})
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_circuit", "lane", "normally_closed"})
 
     def __init__(
-        self, kernel: Kernel, target: PinName, *, normally_closed: bool, bounce_ns: Nanos, bounces: int, chance: Chance
+        self, circuit: Circuit, *, normally_closed: bool, bounce_ns: Nanos, bounces: int, chance: Chance, lane: str = ""
     ) -> None:
-        kernel.check(target)
-        self._kernel = kernel
+        self._circuit = circuit
         self._chance = chance
         self._bouncing: deque[Nanos] = deque()
         self._due: Nanos | None = None
-        self.target = target
+        self.lane = lane
         self.normally_closed = normally_closed
         self.bounce_ns = bounce_ns
         self.bounces = bounces
         self.closed = normally_closed
         self.level = normally_closed
+        circuit.contacts.append(self)
+
+    @property
+    def target(self) -> PinName:
+        """The input it drives."""
+        return self._circuit.target
 
     def rest_at(self, closed: bool) -> None:
-        """Its state before anything has happened."""
+        """Its state before anything has happened, which its input takes with `Circuit.close`."""
         self.closed = self.level = closed
-        self._kernel.drive(self.target, float(closed))
+        self._tell()
 
     def change(self, closed: bool, now: Nanos) -> None:
         if closed == self.closed:
@@ -163,7 +213,12 @@ class Contact(Stateful):
 
     def _put(self, closed: bool) -> None:
         self.level = closed
-        self._kernel.drive(self.target, float(closed))
+        self._tell()
+        self._circuit.close()
+
+    def _tell(self) -> None:
+        if self.lane:
+            self._circuit.tell(self.lane, float(self.level))
 
 
 class Button(Contact):
@@ -172,8 +227,9 @@ class Button(Contact):
     __slots__ = ()
 
     def press(self, pressed: bool, now: Nanos) -> None:
+        """Press or release it."""
         self.change(pressed is not self.normally_closed, now)
-        self._kernel.mark()
+        self._circuit.mark()
 
     @property
     def pressed(self) -> bool:
@@ -194,24 +250,25 @@ class Switch(Contact):
 
     def __init__(
         self,
-        kernel: Kernel,
+        circuit: Circuit,
         carriage: Carriage,
         zone: Zone,
-        target: PinName,
+        now: Nanos,
         *,
         normally_closed: bool = False,
         bounce_ns: Nanos = 0,
         bounces: int = 0,
         chance: Chance | None = None,
+        lane: str = "",
     ) -> None:
-        chance = chance or Chance(0, str(target))
-        super().__init__(kernel, target, normally_closed=normally_closed, bounce_ns=bounce_ns, bounces=bounces, chance=chance)
+        chance = chance or Chance(0, str(circuit.target))
+        super().__init__(circuit, normally_closed=normally_closed, bounce_ns=bounce_ns, bounces=bounces, chance=chance, lane=lane)
         self._carriage = carriage
         self._version: object = carriage.version()
         self.zone = zone
-        self.on = zone.on(carriage.place(kernel.now), was_on=False)
+        self.on = zone.on(carriage.place(now), was_on=False)
         self.rest_at(self.on is not normally_closed)
-        self._predict(carriage.place(kernel.now), kernel.now)
+        self._predict(carriage.place(now), now)
 
     def look(self, now: Nanos) -> None:
         if self._bouncing:
@@ -265,4 +322,6 @@ def place(kernel: Kernel, switch: PositionSwitch) -> None:
     except Misuse as error:
         raise Misuse(f"switch on {switch.target}: {error}") from None
     zone = Zone(switch.low, switch.high)
-    kernel.add_part(Switch(kernel, CountedPosition(drive), zone, switch.target, normally_closed=switch.normally_closed))
+    circuit = Circuit(kernel, switch.target)
+    kernel.add_part(Switch(circuit, CountedPosition(drive), zone, kernel.now, normally_closed=switch.normally_closed))
+    circuit.close()

@@ -74,6 +74,10 @@ class Wire:
         if self.delay < 0:
             raise Misuse(f"wire to {self.target}: a delay of {self.delay} ns is negative")
 
+    def carried(self, level: float) -> float:
+        """What arrives for a level of the source."""
+        return (0.0 if level else 1.0) if self.inverted else level
+
 
 class Flight(NamedTuple):
     """A level on its way along a wire."""
@@ -99,7 +103,7 @@ class Kernel:
     Whoever commands a machine directly (a request, a pin) at a moment first advances the kernel to that moment, so that
     nothing on a wire is late; what the command leads to settles with the next `advance`, `deadline` or `settle`.
 
-    ``record`` is told of every edge of an output and of a driven input, and of every new plan of an axis.
+    ``record`` gets the first level of each driven input, every edge of an output and of an input, and every new plan of an axis.
     """
 
     def __init__(self, now: Nanos = 0, record: Recorder | None = None) -> None:
@@ -152,10 +156,10 @@ class Kernel:
         self.mark()
 
     def connect(self, wire: Wire) -> None:
-        """Add a wire; without delay the target takes the source's present level at once."""
+        """Add a wire, along which the present level of the source has come to the target long ago."""
         self.check(wire.source)
         self.check(wire.target)
-        self._send(wire, self.machines[wire.source.machine].pins()[wire.source.pin])
+        self.drive(wire.target, wire.carried(self.machines[wire.source.machine].pins()[wire.source.pin]))
         self._wires.setdefault(wire.source, []).append(wire)
         self.mark()
 
@@ -185,20 +189,34 @@ class Kernel:
 
     def drive(self, target: PinName, level: float) -> None:
         """Give an input a level now; only a change is passed on."""
-        if self._levels.get(target) == level:
+        before = self._levels.get(target)
+        if before == level:
             return
         self._levels[target] = level
-        self.give(target, level)
+        self.give(target, level, is_first=before is None)
 
-    def give(self, target: PinName, level: float) -> None:
-        """An input takes a level now, which is recorded here: what its machine tells of the same edge is not."""
-        self.machines[target.machine].set_pin(target.pin, level, self.now)
-        if self._record is not None:
-            self._given[target] = self.now, level
-            self._record(Record(self.now, target.machine, "edge", target.pin, level))
+    def give(self, target: PinName, level: float, *, is_first: bool = False) -> None:
+        """An input is given a level now. What it has then, for a fault may hold it, is recorded where that is new or the first.
+
+        What its machine tells of the same edge is not recorded again.
+        """
+        machine, (_, pin) = self.machines[target.machine], target
+        if self._record is None:
+            machine.set_pin(pin, level, self.now)
+            return
+        before = machine.pins()[pin]
+        machine.set_pin(pin, level, self.now)
+        after = machine.pins()[pin]
+        if is_first or after != before:
+            self.take_as_recorded(target, self.now, after)
+            self._record(Record(self.now, target.machine, "edge", pin, after))
+
+    def take_as_recorded(self, target: PinName, now: Nanos, level: float) -> None:
+        """An edge of an input is in the trace already, should its machine tell of it."""
+        self._given[target] = now, level
 
     def _send(self, wire: Wire, value: float) -> None:
-        level = (0.0 if value else 1.0) if wire.inverted else value
+        level = wire.carried(value)
         if wire.delay:
             self._flights.append(Flight(self.now + wire.delay, wire.target, level))
         else:

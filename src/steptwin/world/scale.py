@@ -39,7 +39,16 @@ class Scale:
 
     def nearest(self, units: float) -> int:
         """The pulse nearest to a position."""
-        return floor(Fraction(str(units)) * self.pulses_per_unit + Fraction(1, 2))
+        return floor(self.pulses(units) + Fraction(1, 2))
+
+    def pulses(self, units: float) -> Fraction:
+        return Fraction(str(units)) * self.pulses_per_unit
+
+    @property
+    def turn(self) -> Fraction | None:
+        """Pulses in a turn of the axis itself, where its unit says what that is."""
+        revs = TURNS.get(self.unit)
+        return None if revs is None else self.pulses_per_unit / revs
 
 
 def scale_of(spec: AxisSpec, machine: Mic488 | M1486, number: int) -> Scale:

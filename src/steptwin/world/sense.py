@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from steptwin.world.reader import Path, Text
 
 _NEED: Mapping[str, Mapping[str, str]] = {
-    "switch": {"width": "position", "bounces": "bounce"},
+    "switch": {"width": "position", "period": "position", "bounces": "bounce"},
     "button": {"bounces": "bounce"},
     "encoder": {"offset": "index", "index_width": "index"},
     "event": {"once": "when"},

@@ -58,15 +58,20 @@ class M1486Spec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SwitchSpec:
-    """On at and below ``below``, at and above ``above``, or around ``position`` over ``width``; units of the axis."""
+    """On at and below ``below``, at and above ``above``, or around ``position`` over ``width``, again after each ``period``.
+
+    Units of the axis.
+    """
 
     target: tuple[str, str]
     below: float | None
     above: float | None
     position: float | None
     width: float
+    period: float | None
     hysteresis: float
     contact: str
+    join: str | None
     bounce: Nanos
     bounces: int
     path: Path = ()
@@ -134,6 +139,7 @@ class ButtonSpec:
     name: str
     target: tuple[str, str]
     contact: str
+    join: str | None
     bounce: Nanos
     bounces: int
     path: Path = ()

@@ -59,6 +59,9 @@ def _address(value: Any) -> int:
 
 
 _CONTACT = _optional(word("NO", "NC"), "contact", "NO (closed while on) or NC (open while on)", "NO")
+_JOIN = _optional(
+    word("parallel", "series"), "join", "contacts of one input: parallel (1 while any is closed) or series (while all are)"
+)
 _BOUNCE = (
     _optional(time_value, "bounce", "how long the contact bounces, such as '3 ms'", 0),
     _optional(whole(1, 100), "bounces", "how often it opens again meanwhile", 3),
@@ -129,8 +132,10 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(number(), "above", "on at and above this position"),
         _optional(number(), "position", "on around this position, with width"),
         _optional(_not_negative, "width", "how wide the zone around position is", 0.0),
+        _optional(_positive, "period", "the zone comes again after each; default a turn of a rotary axis in degree or rev"),
         _optional(_not_negative, "hysteresis", "how much further it stays on", 0.0),
         _CONTACT,
+        _JOIN,
         *_BOUNCE,
     ),
     "encoder": (
@@ -164,6 +169,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         Key("name", name_value, "how scripts name it"),
         Key("to", pin_name, "the input: MACHINE.PIN", attribute="target"),
         _CONTACT,
+        _JOIN,
         *_BOUNCE,
     ),
     "source": (

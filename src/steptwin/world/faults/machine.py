@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar, Protocol
 
 from steptwin.errors import Misuse
@@ -13,7 +13,7 @@ from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.answers import NEVER_SENT
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.table import Layer, Occasion
-from steptwin.world.kernel import Drive, DrivingMachine, Kernel
+from steptwin.world.kernel import Drive, DrivingMachine, Kernel, PinName
 from steptwin.world.trace import Record
 
 
@@ -71,10 +71,27 @@ class FaultyMachine(Stateful):
     Who sets an input by hand sets it here, so that a stuck switch stays stuck.
     """
 
-    __slots__ = ("_bounces", "_cut", "_faults", "_off_until", "_outer", "_released", "_stuck", "body", "changed", "inner", "name")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "body", "changed", "inner", "name"})
+    __slots__ = (
+        "_bounces",
+        "_cut",
+        "_faults",
+        "_off_until",
+        "_on_edge",
+        "_outer",
+        "_released",
+        "_stuck",
+        "body",
+        "changed",
+        "inner",
+        "name",
+    )
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_on_edge", "body", "changed", "inner", "name"})
 
-    def __init__(self, inner: DrivingMachine, name: str, faults: Faults, body: Body) -> None:
+    def __init__(
+        self, inner: DrivingMachine, name: str, faults: Faults, body: Body, on_edge: Callable[[str, Nanos, float], None]
+    ) -> None:
+        """``on_edge`` is told of the edges of inputs that faults make, which are recorded here."""
+        self._on_edge = on_edge
         self.inner = inner
         self.changed = inner.changed
         inner.changed = self._pass_on
@@ -239,8 +256,13 @@ class FaultyMachine(Stateful):
         return self.body.pin_name(str(fault.get("pin")))
 
     def _put(self, pin: str, level: float, now: Nanos) -> None:
+        """A fault gives an input a level; what that changes is recorded."""
+        before = self.inner.pins()[pin]
         self.inner.set_pin(pin, level, now)
-        self._faults.record(Record(now, self.name, "edge", pin, level))
+        after = self.inner.pins()[pin]
+        if after != before:
+            self._on_edge(pin, now, after)
+            self._faults.record(Record(now, self.name, "edge", pin, after))
 
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         """What lies before the faults changes; an input that is held takes it when it is let go."""
@@ -343,6 +365,10 @@ def rig(kernel: Kernel, name: str, faults: Faults, body: Body) -> FaultyMachine:
     """Let faults of physics and protocol happen to the machine ``name`` of a kernel."""
     there = faults.machines.get(name)
     if there is None:
-        there = faults.machines[name] = FaultyMachine(kernel.machines[name], name, faults, body)
+
+        def on_edge(pin: str, now: Nanos, level: float) -> None:
+            kernel.take_as_recorded(PinName(name, pin), now, level)
+
+        there = faults.machines[name] = FaultyMachine(kernel.machines[name], name, faults, body, on_edge)
         kernel.replace(name, there)
     return there
