@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -99,6 +101,62 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
     alone = chips.command("scan", str(controller.pty), "--kind", "m1486")
     assert (alone.returncode, alone.stderr) == (1, f"nobody answers on {controller.pty}\n")
     assert chips.command("scan", places[2], "--kind", "mic488", "--units", "1").returncode == 0
+
+
+def position_of(twin: Any, place: str, chip: int) -> float:
+    found = json.loads(twin.command("get", "POSITION", "-d", f"{place},chip={chip}", "--json").stdout)
+    return float(found["POSITION"]["value"] if isinstance(found["POSITION"], dict) else found["POSITION"])
+
+
+def test_a_terminal_moves_the_chip_it_was_told_whatever_stands_in_the_input_buffers(serve_m1486: Callable[..., Any]) -> None:
+    """The bytes of a Modbus master, the beginning of a command and another selection are in front of the first command."""
+    twin = serve_m1486("--variant", "B", "--chain", "0,7")
+    place = f"tcp://127.0.0.1:{twin.tcp_port}"
+    device = f"{place},chip=7"
+
+    def typed(script: str) -> tuple[int, str, str]:
+        run = subprocess.run(
+            [STEPTWIN, "terminal", "-d", device], input=script, capture_output=True, text=True, env=twin.environment, check=False
+        )
+        return run.returncode, run.stdout, run.stderr
+
+    for rubbish in (b"", bytes.fromhex("01 03 27 74 00 02 8e 67"), b"f999", b"r"):
+        with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
+            line.sendall(b"xg\rxg\rt41\rx0\r")
+            time.sleep(0.2)
+            line.sendall(rubbish)
+            time.sleep(0.2)
+        before = position_of(twin, place, 0)
+        stood = position_of(twin, place, 7)
+        with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
+            line.sendall(b"x0\r" + rubbish)
+            time.sleep(0.2)
+        assert typed("f640\nr\nwait\n") == (0, "42H  U20 type letter in ASCII: M1486B\n", "")
+        assert position_of(twin, place, 7) == stood + 10.0, rubbish
+        assert position_of(twin, place, 0) == before, rubbish
+
+
+def test_a_terminal_to_a_chip_that_is_not_there_types_only_k(serve_m1486: Callable[..., Any]) -> None:
+    twin = serve_m1486("--variant", "B", "--chain", "0,7")
+    place = f"tcp://127.0.0.1:{twin.tcp_port}"
+    command = [STEPTWIN, "terminal", "-d", f"{place},chip=5"]
+    for script, code in (("f640\nr\n", 1), ("k\n", 0)):
+        run = subprocess.run(command, input=script, capture_output=True, text=True, env=twin.environment, check=False)
+        assert (run.returncode, run.stdout) == (code, "")
+    assert position_of(twin, place, 0) == position_of(twin, place, 7) == 0.0
+
+
+def test_info_without_a_kind_leaves_nothing_in_front_of_the_next_command(serve_m1486: Callable[..., Any]) -> None:
+    twin = serve_m1486("--variant", "B")
+    place = f"tcp://127.0.0.1:{twin.tcp_port}"
+    for address in (place, f"rtu-{place}"):
+        run = twin.command("info", "-d", address)
+        assert run.returncode == 1
+        assert "If these are M1486 chips, put ',kind=m1486' behind the address" in run.stderr
+        with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
+            line.sendall(b"u20\r")
+            line.settimeout(5.0)
+            assert line.recv(1) == b"B"
 
 
 def test_a_terminal_on_a_pipe(serve_m1486: Callable[..., Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 
@@ -159,3 +160,20 @@ def test_no_answer_and_a_lost_line_are_told() -> None:
     with pytest.raises(LineLost):
         terminal.type("v200")
     terminal.close()
+
+
+def test_what_waits_for_an_eeprom_is_not_typed_after_a_suspension() -> None:
+    """R was typed, and half a second later, before its turn came, the program was suspended for an hour."""
+    wire = Wire()
+    away = [0.0]
+    terminal = ChipTerminal(wire, 4800, variant("E1"), str, clock=lambda: time.monotonic() + away[0])
+    for line in ("f640", "r", "x7"):
+        terminal.type(line)
+    away[0] = 3600.0
+    with pytest.raises(LineFailure, match=r"r: not typed; the program was suspended for 3600 s"):
+        terminal.settle(7200.0)
+    terminal.type("k")
+    terminal.settle(7200.0)
+    terminal.close()
+    assert b"r\r" not in wire.written
+    assert wire.written[-1] == b"k\r"

@@ -14,6 +14,7 @@ from steptwin.errors import LineFailure, Misuse, Refusal
 
 if TYPE_CHECKING:
     from steptwin.host import Mic488
+    from steptwin.host.m1486.identify import SearchLine
 
 Device = Annotated[
     str | None,
@@ -61,11 +62,37 @@ def opened(device: str | None, *, observe: bool = True, log_frames: bool = False
             ) from error
         raise
     except NoAnswer as error:
+        drop_rubbish(address.place, address.baud)
         raise LineFailure(f"{error}. If these are M1486 chips, put ',kind=m1486' behind the address") from error
     try:
         yield mic
     finally:
         mic.close()
+
+
+@contextlib.contextmanager
+def search_line(place: str, baud: int) -> Generator[SearchLine]:
+    """A line on which M1486 chips are looked for."""
+    from steptwin.host.blocking import finish
+    from steptwin.host.m1486.identify import SearchLine
+
+    line = SearchLine(place, baud=baud)
+    finish(line.open())
+    try:
+        yield line
+    finally:
+        finish(line.close())
+
+
+def drop_rubbish(place: str, baud: int) -> None:
+    """If those that did not answer Modbus are M1486 chips, its bytes stand in front of the next command: they are ended."""
+    from steptwin.host.address import CHIP_BAUD
+    from steptwin.host.blocking import finish
+    from steptwin.host.m1486.identify import end_line
+
+    for rate in (baud,) if "://" in place else (baud, CHIP_BAUD):
+        with contextlib.suppress(LineFailure, Misuse), search_line(place, rate) as line:
+            finish(end_line(line))
 
 
 def complain(text: str) -> None:

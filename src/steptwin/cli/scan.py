@@ -10,15 +10,12 @@ import enum
 import sys
 from collections.abc import Callable, Generator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from steptwin.cli.device import Json, complain, print_json, table
+from steptwin.cli.device import Json, complain, drop_rubbish, print_json, search_line, table
 from steptwin.errors import LineFailure, Misuse
-
-if TYPE_CHECKING:
-    from steptwin.host.m1486.identify import SearchLine
 
 BAUDS = (38400, 9600, 19200, 57600, 115200)
 """What a MIC488 is asked at; chips have rates of their own."""
@@ -105,7 +102,11 @@ def _found_at(place: str, kind: Kind, units: list[int], bauds: list[int] | None,
                 if not rows:
                     _let_chips_listen(place, chip_bauds)
         else:
-            rows = _controllers(place, _rates(place, bauds or list(BAUDS)), units, timeout)
+            rates = _rates(place, bauds or list(BAUDS))
+            rows = _controllers(place, rates, units, timeout)
+            if not rows:
+                for rate in rates:
+                    drop_rubbish(place, rate)
     except LineFailure as failure:
         complain(str(failure))
     return rows
@@ -129,7 +130,7 @@ def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]
     from steptwin.machine import SECOND
 
     for baud in bauds:
-        with _search_line(place, baud) as line, _progress(f"{_title(place, baud)} M1486 chip", 16, "X") as step:
+        with search_line(place, baud) as line, _progress(f"{_title(place, baud)} M1486 chip", 16, "X") as step:
             try:
                 found = finish(scan_chips(line, baud=baud, timeout_ns=round(timeout * SECOND), progress=step))
             except LineLost:
@@ -157,21 +158,8 @@ def _let_chips_listen(place: str, bauds: list[int]) -> None:
     from steptwin.host.m1486.identify import let_all_listen
 
     for baud in reversed(bauds):
-        with contextlib.suppress(LineFailure), _search_line(place, baud) as line:
+        with contextlib.suppress(LineFailure), search_line(place, baud) as line:
             finish(let_all_listen(line))
-
-
-@contextlib.contextmanager
-def _search_line(place: str, baud: int) -> Generator[SearchLine]:
-    from steptwin.host.blocking import finish
-    from steptwin.host.m1486.identify import SearchLine
-
-    line = SearchLine(place, baud=baud)
-    finish(line.open())
-    try:
-        yield line
-    finally:
-        finish(line.close())
 
 
 def _controllers(place: str, bauds: list[int], units: list[int], timeout: float) -> list[dict[str, Any]]:

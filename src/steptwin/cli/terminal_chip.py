@@ -5,17 +5,20 @@ From Python: `steptwin.runtime.m1486_terminal.ChipTerminal`.
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING
 
 import typer
 
 from steptwin.cli.device import complain, number_of
-from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 
 if TYPE_CHECKING:
     from steptwin.host.address import DeviceAddress
+    from steptwin.host.place import Channel
     from steptwin.m1486.variants import Variant
     from steptwin.runtime.m1486_terminal import ChipTerminal
 
@@ -30,12 +33,9 @@ WAIT_S = 60.0
 
 def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
     """Lines from the standard input to the chips. A script in a pipe ends with the first thing that goes wrong."""
-    from steptwin.host.m1486.lines import line_endpoint
     from steptwin.m1486.variants import variant
-    from steptwin.runtime.m1486_terminal import ChipTerminal
 
     kind = None if address.variant is None else variant(address.variant)
-    endpoint = line_endpoint(address.place, address.baud)
     interactive = sys.stdin.isatty()
     prompt = ""
 
@@ -49,14 +49,14 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
         sys.stdout.write(f"\r\x1b[K{text}\n{prompt}{readline.get_line_buffer()}")
         sys.stdout.flush()
 
-    terminal = ChipTerminal(endpoint.open(), address.baud, kind, tell)
+    connection = _Connection(address, kind, tell, log_frames=log_frames)
     try:
-        if address.chip is not None:
-            _type(terminal, f"x{address.chip:x}", log_frames=log_frames)
         if interactive:
-            complain(f"M1486 on {endpoint}; 'help' helps, k stops the motor, Ctrl-D ends")
+            with _told():
+                connection.verified()
+            complain(f"M1486 on {address.place}; 'help' helps, k stops the motor, Ctrl-D ends")
         while True:
-            prompt = f"{terminal.selected or 'all'}> " if interactive else ""
+            prompt = f"{connection.selected or 'all'}> " if interactive else ""
             try:
                 line = input(prompt).strip()
             except (EOFError, KeyboardInterrupt):
@@ -64,7 +64,7 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
             if line in ("quit", "exit"):
                 break
             try:
-                _answer(terminal, line, kind, log_frames=log_frames, waits=not interactive)
+                _answer(connection, line, kind, log_frames=log_frames, waits=not interactive)
             except KeyboardInterrupt:
                 complain("interrupted")
             except SteptwinError as error:
@@ -72,24 +72,100 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
                 if not interactive:
                     raise typer.Exit(2 if isinstance(error, Misuse) else 1) from None
     finally:
-        terminal.close()
+        connection.close()
 
 
-def _answer(terminal: ChipTerminal, line: str, kind: Variant | None, *, log_frames: bool, waits: bool) -> None:
+@contextlib.contextmanager
+def _told() -> Generator[None]:
+    try:
+        yield
+    except SteptwinError as error:
+        complain(str(error))
+
+
+class _Connection:
+    """The line to the chips. Before the first command the chip is selected and verified by its echo; only K does without."""
+
+    def __init__(self, address: DeviceAddress, kind: Variant | None, tell: Callable[[str], object], *, log_frames: bool) -> None:
+        from steptwin.host.m1486.lines import line_endpoint
+
+        self._address = address
+        self._kind = kind
+        self._tell = tell
+        self._log_frames = log_frames
+        self._endpoint = line_endpoint(address.place, address.baud)
+        self._terminal: ChipTerminal | None = None
+        self._is_verified = False
+
+    @property
+    def selected(self) -> str:
+        """The chip chosen last; nothing where all listen."""
+        if self._terminal is not None:
+            return self._terminal.selected
+        return "" if self._address.chip is None else f"{self._address.chip:X}"
+
+    def verified(self) -> ChipTerminal:
+        """The line, with the chip selected. Raises `LineFailure` where it does not echo."""
+        from steptwin.host.m1486.failures import NoEcho
+        from steptwin.host.m1486.wake import wake
+
+        if self._terminal is not None and self._is_verified:
+            return self._terminal
+        self.close()
+        channel = self._endpoint.open()
+        log = complain if self._log_frames else None
+        try:
+            wake(channel, str(self._endpoint), self._address.chip, self._address.baud, log)
+        except BaseException as error:
+            channel.close()
+            if isinstance(error, NoEcho):
+                raise LineFailure(f"{error}. Only k is typed as long as it does not echo") from error
+            raise
+        self._is_verified = True
+        return self._opened(channel)
+
+    def unverified(self) -> ChipTerminal:
+        """The line for K, which cannot wait. A selection of all chips ends what may stand in front of it."""
+        if self._terminal is None:
+            terminal = self._opened(self._endpoint.open())
+            chip = self._address.chip
+            # The first line may meet the rest of another one.
+            for line in ("k",) if chip is None else ("xg", "xg", f"x{chip:x}"):
+                _type(terminal, line, log_frames=self._log_frames)
+        return self._terminal or self.unverified()
+
+    def _opened(self, channel: Channel) -> ChipTerminal:
+        from steptwin.runtime.m1486_terminal import ChipTerminal
+
+        self._terminal = ChipTerminal(channel, self._address.baud, self._kind, self._tell)
+        self._terminal.selected = "" if self._address.chip is None else f"{self._address.chip:X}"
+        return self._terminal
+
+    def close(self) -> None:
+        if self._terminal is not None:
+            self._terminal.close()
+        self._terminal = None
+
+
+def _answer(connection: _Connection, line: str, kind: Variant | None, *, log_frames: bool, waits: bool) -> None:
     word, _, rest = line.partition(" ")
     if word == "help":
         typer.echo(HELP)
     elif word == "sleep":
         time.sleep(_seconds(rest, line))
     elif word == "wait":
+        seconds = _seconds(rest, line) if rest.strip() else WAIT_S
+        terminal = connection.verified()
         _type(terminal, "u20", log_frames=log_frames)
-        terminal.settle(_seconds(rest, line) if rest.strip() else WAIT_S)
+        terminal.settle(seconds)
     elif word == "raw":
-        _typed(terminal, rest, log_frames=log_frames, waits=waits)
+        _typed(connection.verified(), rest, log_frames=log_frames, waits=waits)
     elif line:
         from steptwin.runtime.m1486_terminal import command_of
 
-        if command_of(line, kind) is not None:
+        command = command_of(line, kind)
+        if command is not None:
+            terminal = connection.unverified() if command.key == "K" else connection.verified()
             _typed(terminal, line.partition(";")[0].strip(), log_frames=log_frames, waits=waits)
 
 

@@ -21,6 +21,8 @@ from steptwin.machine import SECOND
 from steptwin.wire.line import SerialLine
 
 LOOK_S = 0.02
+HELD_UP_S = 2.0
+"""Longer than any step of the thread takes by itself."""
 QUIET_S = 0.1
 """What a chip sends by itself comes at once, or through adapters that hold it back for 16 ms and more."""
 _ROOM = {
@@ -28,6 +30,8 @@ _ROOM = {
     EMPTY: "the input buffer is empty",
     THREE_FREE: "three places are free in the input buffer",
 }
+_IMMEDIATE = ("K", "X")
+"""Commands that act when received, and need no EEPROM."""
 _UPLOAD = re.compile(rb"\s*[Uu]\s*(\d+)\s*")
 _SELECT = re.compile(r"[Xx]\s*([0-9A-Fa-fGg])")
 
@@ -152,7 +156,16 @@ class ChipTerminal:
     ``variant``: an E type is given the time of its EEPROM for each command.
     """
 
-    def __init__(self, channel: Channel, baud: int, variant: Variant | None, tell: Callable[[str], object]) -> None:
+    def __init__(
+        self,
+        channel: Channel,
+        baud: int,
+        variant: Variant | None,
+        tell: Callable[[str], object],
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock = clock
         self._channel = channel
         self._serial = SerialLine(baud)
         self._quiet_s = QUIET_S + self._serial.duration(3) / SECOND
@@ -166,6 +179,7 @@ class ChipTerminal:
         self._heard = bytearray()
         self._quiet_at = self._ready_at = 0.0
         self._failure: LineFailure | None = None
+        self._dropped: LineFailure | None = None  # to be raised once
         self._ends = False
         self.selected = ""
         """The chip chosen by the last ``X``; nothing where all listen."""
@@ -191,13 +205,13 @@ class ChipTerminal:
 
         Returns how many characters have found no room so far. Raises `LineFailure` when an upload does not come in time.
         """
-        limit = time.monotonic() + timeout_s
+        limit = self._clock() + timeout_s
         with self._changed:
             while self._unsettled or self._words.is_awaiting:
                 self._check()
                 if not self._unsettled and self._words.refused:
                     break
-                if not self._changed.wait(max(limit - time.monotonic(), 0.0)) and time.monotonic() >= limit:
+                if not self._changed.wait(max(limit - self._clock(), 0.0)) and self._clock() >= limit:
                     raise LineFailure(
                         f"no answer to U within {timeout_s:g} s: the chip moves, waits, runs a program or is not there"
                     )
@@ -210,24 +224,43 @@ class ChipTerminal:
         self._channel.close()
 
     def _check(self) -> None:
+        dropped, self._dropped = self._dropped, None
+        if dropped is not None:
+            raise dropped
         if self._failure is not None:
             raise self._failure
 
     # ------------------------------------------------------------------ the thread
 
     def _run(self) -> None:
+        looked = self._clock()
         try:
             while not self._ends:
+                before, looked = looked, self._clock()
+                if looked - before > HELD_UP_S:
+                    self._drop_waiting(looked - before)
                 self._send()
                 data = self._channel.read(LOOK_S)
                 if data:
                     self._heard += data
-                    self._quiet_at = time.monotonic() + self._quiet_s
-                elif (self._heard or self._sent) and time.monotonic() >= self._quiet_at:
+                    self._quiet_at = self._clock() + self._quiet_s
+                elif (self._heard or self._sent) and self._clock() >= self._quiet_at:
                     self._put_into_words()
         except LineFailure as failure:
             with self._changed:
                 self._failure = failure
+                self._changed.notify_all()
+
+    def _drop_waiting(self, seconds: float) -> None:
+        """The program was suspended: nothing is to move any more by what was typed before."""
+        with self._changed:
+            dropped = [line for line in self._outgoing if line.strip()[:1].upper() not in _IMMEDIATE]
+            if dropped:
+                self._outgoing = deque(line for line in self._outgoing if line not in dropped)
+                self._unsettled -= len(dropped)
+                self._dropped = LineFailure(
+                    f"{', '.join(dropped)}: not typed, because the program was suspended for {seconds:.0f} s"
+                )
                 self._changed.notify_all()
 
     def _send(self) -> None:
@@ -239,9 +272,9 @@ class ChipTerminal:
         self._words.typed(text)
         self._channel.write(data)
         self._sent += 1
-        now = time.monotonic()
+        now = self._clock()
         self._quiet_at = now + self._serial.duration(len(data)) / SECOND + self._quiet_s
-        if text.strip().upper()[:1] not in ("K", "X"):
+        if text.strip().upper()[:1] not in _IMMEDIATE:
             self._ready_at = now + self._write_s
 
     def _next(self) -> str | None:
@@ -254,7 +287,7 @@ class ChipTerminal:
                 return line
             if kind == "X":
                 break
-        return waiting.popleft() if waiting and time.monotonic() >= self._ready_at else None
+        return waiting.popleft() if waiting and self._clock() >= self._ready_at else None
 
     def _put_into_words(self) -> None:
         told = self._words.heard(bytes(self._heard))

@@ -172,6 +172,11 @@ async def let_all_listen(line: Line[Question, bytes]) -> None:
     await _say(line, "\rxg\r", 0)
 
 
+async def end_line(line: Line[Question, bytes]) -> None:
+    """End what others have said on the line: chips that took it for characters drop it. Nobody is selected by it."""
+    await _say(line, "\r", 0)
+
+
 async def _asked(
     line: Line[Question, bytes], before: str, address: int, baud: int | None, patience_ns: Nanos
 ) -> FoundChip | None:
