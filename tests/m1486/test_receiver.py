@@ -243,10 +243,35 @@ def test_m_27_a_command_that_begins_like_clear_kill_is_refused_as_a_whole() -> N
     bench = stalled("A")
     bench.raw(b"w10\rw10\rw10\r")
     assert bench.raw(b"c7") == b""
-    assert bench.raw(b"6") == b"\x5e"
+    assert bench.raw(b"6") == b"\x5e\x5e\x5e"
     assert bench.raw(b"\r") == b"\x5e"
     bench.finish()
     assert bench.wrong == []
+
+
+@pytest.mark.parametrize("line", [b"u5", b"c1", b"c", b"c7", b"c7x", b"c751", b"u5 ; so"])
+def test_m_38_every_character_of_a_line_that_finds_no_room_is_answered_the_cr_too(line: bytes) -> None:
+    bench = stalled("A")
+    bench.raw(b"w10\rw10\rw10\r")
+    lost = len(line.split(b" ")[0]) + 1
+    assert b"".join(bench.raw(bytes((byte,))) for byte in line + b"\r") == b"\x5e" * lost
+    # The same again: nothing of the first one is left.
+    assert bench.raw(line + b"\r") == b"\x5e" * lost
+
+
+@pytest.mark.parametrize("line", [b"", b"; so", b"c75", b"k", b"xf"])
+def test_m_38_a_line_that_needs_no_room_is_not_answered(line: bytes) -> None:
+    bench = stalled("A")
+    bench.raw(b"w10\rw10\rw10\r")
+    assert bench.raw(line + b"\r") == b""
+
+
+def test_m_38_a_cr_that_finds_room_again_is_no_lost_one() -> None:
+    bench = stalled("A")
+    bench.raw(b"w10\rw10\rw10\r")
+    assert bench.raw(b"u5") == b"\x5e\x5e"
+    bench.finish()
+    assert bench.raw(b"\ru20\r") == b"\x41"
 
 
 def test_m_27_clear_kill_leaves_the_buffer_again() -> None:

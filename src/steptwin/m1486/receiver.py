@@ -46,12 +46,14 @@ class Receiver(Stateful):
         "_buffer",
         "_capacity",
         "_chip",
+        "_has_lost",
         "_in_comment",
         "_is_torn",
         "_lines",
         "_seen",
         "_seen_stored",
         "_skips_line",
+        "_unanswered",
         "busy_until",
         "is_deaf",
         "is_listening",
@@ -69,11 +71,14 @@ class Receiver(Stateful):
         #: Whole lines in the buffer.
         self._lines = 0
         # Of the line that is arriving: its first characters, in capitals; how many of it are in the buffer; whether a beginning
-        # that needed no room is missing there; whether it was longer than the buffer, so that its rest is no command.
+        # that needed no room is missing there, and how many characters of that have no answer yet; whether characters were
+        # lost; whether it was longer than the buffer, so that its rest is no command.
         self._seen = ""
         self._seen_stored = 0
         self._in_comment = False
         self._is_torn = False
+        self._unanswered = 0
+        self._has_lost = False
         self._skips_line = False
         self.is_listening = True
         #: Until when the EEPROM is being written or erased; nothing is compressed meanwhile.
@@ -147,8 +152,12 @@ class Receiver(Stateful):
         if byte != CR and _CLEAR_KILL.startswith(self._seen):
             # This may become C75, which needs no room. If it becomes something else, it has lost its beginning.
             self._is_torn = True
+            self._unanswered += 1
             return
-        self._chip.send(NO_ROOM)
+        for _ in range(self._unanswered + 1):
+            self._chip.send(NO_ROOM)
+        self._unanswered = 0
+        self._has_lost = True
         if not self._lines and not self._is_torn:
             # No command is as long as the buffer; waiting for its end would be for ever.
             self._buffer.clear()
@@ -172,6 +181,9 @@ class Receiver(Stateful):
         elif (self._buffer and self._buffer[-1] != CR) or self._is_torn:
             self._lines += self._store(CR)
             self._begin_line()
+        elif self._has_lost and self.free == 0:
+            self._chip.send(NO_ROOM)
+            self._begin_line()
         else:
             self._echo(CR)
             self._begin_line()
@@ -182,6 +194,8 @@ class Receiver(Stateful):
         self._seen_stored = 0
         self._in_comment = False
         self._is_torn = False
+        self._unanswered = 0
+        self._has_lost = False
         self._skips_line = False
 
     def _act(self, line: str) -> None:
