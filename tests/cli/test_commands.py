@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from steptwin.cli import main
+from steptwin.m1486.check import check
 
 Run = Callable[..., str]
 
@@ -40,13 +41,21 @@ def test_json_has_every_table(run: Run) -> None:
     data = json.loads(run("--format", "json"))
     assert {title: len(rows) for title, rows in data.items()} == {
         "Commands": 52, "Auxiliary functions": 24, "Flags": 2, "Registers": 10, "Bytes to upload": 20, "Microsteps": 7,
-        "I/O lines": 21, "Types": 5, "What the checker finds": 45,
+        "I/O lines": 21, "Types": 5, "What the checker finds": 47,
     }  # fmt: skip
     forward = next(row for row in data["Commands"] if row["command"] == "F")
     assert forward == {
         "command": "F", "name": "Forward", "number": "1 to 16 000 000 min. microsteps", "variable": "yes", "bits": "32",
         "acts": "in program order", "effect": "Sets distance and positive direction of the next move.", "section": "VII.2",
     }  # fmt: skip
+
+
+def test_m_45_commands_that_act_when_received_take_no_memory_as_the_checker_counts(run: Run) -> None:
+    shown = {(row["command"], row["name"]): row["bits"] for row in json.loads(run("--format", "json"))["Commands"]}
+    for text, name in (("K", "Kill"), ("XG", "indeX all"), ("C75", "Clear kill"), ("X7", "indeX"), ("C80", "Flag off")):
+        counted = sum(command.bits for command in check(f"[\n{text}\n]").memory[0].commands)
+        assert int(shown[text.rstrip("0123456789"), name]) == counted, text
+    assert shown["K", "Kill"] == shown["C", "Clear kill"] == "0"
 
 
 def test_markdown_tables_have_as_many_cells_as_columns(run: Run) -> None:

@@ -164,6 +164,11 @@ def test_a_trace_can_be_read_back(run: Run, tmp_path: Path) -> None:
         (["--input", "B22=0@1s"], "no input pin 'B22'"),
         (["--input", "B3=2@1s"], "B3 = 2: a digital input is 0 or 1"),
         (["--input", "7.B3=0@1s"], "--input 7.B3: no chip 7; there are F"),
+        (["--input", "B12=0@1s", "--interface", "two"], "--input B12: B12 is taken: the Two DACs interface has B8 to B17"),
+        (
+            ["--wire", "F.B1=F.B12", "--interface", "dual"],
+            "--wire F.B1=F.B12: B12 is taken: the Dual DAC interface has B10 to B17",
+        ),
         (["--trace", "t.xyz"], "t.xyz: formats are jsonl"),
         (["--firmware", "1.70"], "--firmware is not for M1486 programs"),
     ],
@@ -172,6 +177,12 @@ def test_wrong_use_is_said(run: Run, options: list[str], text: str) -> None:
     with pytest.raises(Misuse) as refusal:
         run("c1\n", *options)
     assert str(refusal.value).startswith(text)
+
+
+def test_an_e_type_that_is_typed_to_because_of_an_error_says_how_slowly(run: Run) -> None:
+    result = run("[\nf640\nv99999\n]\n", "--variant", "E1")
+    assert result.exit_code == 1
+    assert "the chip sees this, with 1 error in it, typed at 0.5 s a command:" in result.stderr
 
 
 def test_an_input_of_one_of_several_chips_is_named(run: Run) -> None:

@@ -136,6 +136,14 @@ def test_flags_are_off_and_can_be_asked() -> None:
     assert bench.wrong == []
 
 
+@pytest.mark.parametrize("letter", "TC")
+def test_m_44_the_carry_is_not_for_t_and_c(letter: str) -> None:
+    bench = Bench()
+    bench.send(f"{letter}87")
+    assert [text.partition(":")[2].partition(" is ")[0] for text in bench.wrong] == [f" {letter}87"]
+    assert not bench.chip.unit.carry
+
+
 def test_m_22_functions_are_told_lowest_number_first() -> None:
     bench = Bench()
     assert bench.do("u17", "u18", "u19") == b"\x00\xff\x00"

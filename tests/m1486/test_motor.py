@@ -11,6 +11,7 @@ from m1486_rig import Bench
 
 from steptwin.m1486.lines import DUAL_DAC, SEEK_ENDS_LOW, STEP_DIRECTION, TWO_DACS
 from steptwin.machine import SECOND
+from steptwin.motion.pulses import step_times
 
 STEP = 64
 
@@ -105,6 +106,44 @@ def test_m_6_the_speed_is_the_integral_of_its_acceleration(start: int, knee: int
     profile = bench.chip.drive.profile
     assert profile.velocity(now) / STEP / clock == pytest.approx(v, rel=5e-3, abs=1.0)
     assert (profile.position(now)) / STEP == pytest.approx(x, rel=5e-3, abs=1.0)
+
+
+def test_m_40_a_move_that_starts_above_p_begins_with_less_acceleration_than_a() -> None:
+    """S 500, P 100, V 2000: at v the acceleration is A √((V − v) / (V − P)), so √(1500 / 1900) of A at the start."""
+    bench = Bench()
+    bench.do("s500", "p100", "v2000", "a5000", "g+")
+    bench.send("r")
+    profile = bench.chip.drive.profile
+    begin, ms = bench.now, SECOND // 1000
+    assert profile.velocity(begin) / STEP == pytest.approx(500)
+    slope = (profile.velocity(begin + ms) - profile.velocity(begin)) / STEP * 1000
+    assert slope == pytest.approx(5000 * math.sqrt(1500 / 1900), rel=2e-3)
+
+
+def test_m_41_a_move_that_is_over_before_its_command_ends_with_the_time_of_the_command() -> None:
+    """One full step at 20 000 step/s takes 0.5 ms: U follows R by the 1 ms of a command."""
+    bench = Bench("B")
+    bench.file("v20000", "s1950", "f64", "r", "u20")
+    bench.finish()
+    assert [(event.time, event.code) for event in bench.chip.events][1:] == [
+        (3_000_000, "moves"),
+        (3_512_653, "stands"),
+        (4_000_000, "upload"),
+    ]
+
+
+def test_m_39_the_rest_of_a_distance_below_a_step_of_q_is_made_in_steps_of_m_at_start_stop_speed() -> None:
+    """6401 with M64 and Q2: 200 steps of 32, then one of 1 at 500 × 64 a second."""
+    bench = Bench("B", interface=DUAL_DAC)
+    bench.do("m64", "q2", "s500", "v2000", "a50000", "f6401")
+    begin = bench.now
+    bench.send("r")
+    bench.finish()
+    train = bench.trains[-1][1]
+    times = step_times(train, begin - 1, bench.now)
+    assert len(times) == 200 + 1
+    assert SECOND / (times[-1] - times[-2]) == pytest.approx(500 * 64, rel=0.01)
+    assert bench.true == 6401
 
 
 def test_p_above_v_switches_the_parabola_off() -> None:

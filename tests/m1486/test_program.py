@@ -188,6 +188,16 @@ def test_a_program_waits_for_lines() -> None:
     assert bench.run(ms=2) == b"\x00"
 
 
+@pytest.mark.parametrize(("low_after_ms", "sends_at_ms"), [(100.5, 100.5), (0.25, 1.0)])
+def test_m_42_waiting_for_a_line_takes_no_time_beyond_that_of_the_command(low_after_ms: float, sends_at_ms: float) -> None:
+    bench = Bench()
+    bench.file("z3", "u20")
+    bench.run(ms=low_after_ms)
+    bench.pin(B3=0)
+    bench.finish()
+    assert [event.time / MILLISECOND for event in bench.events("upload")] == [sends_at_ms]
+
+
 def test_a_line_that_has_the_level_already_is_not_waited_for() -> None:
     assert sends("o3", "u20") == b"\x42"
 

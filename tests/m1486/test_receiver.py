@@ -70,6 +70,13 @@ def test_characters_in_the_last_three_bytes_come_back_inverted_and_the_next_is_r
     assert bench.chip.receiver.waiting == size
 
 
+@pytest.mark.parametrize(("kind", "answer"), [("A", b"\xf2"), ("C", b"\xf2"), ("B", b""), ("E1", b"")])
+def test_m_43_the_tenth_character_of_a_line_is_answered_where_the_buffer_holds_twelve(kind: str, answer: bytes) -> None:
+    bench = Bench(kind)
+    assert bench.raw(b"w16000000") == b""
+    assert bench.raw(b"\r") == answer
+
+
 def test_a_refused_character_is_not_received() -> None:
     bench = stalled("A")
     bench.raw(b"u20\ru20\rw1\r")
@@ -280,6 +287,17 @@ def test_m_27_clear_kill_leaves_the_buffer_again() -> None:
     bench.raw(b"c75\r")
     assert bench.chip.receiver.waiting == 3
     assert bench.events("clear-kill")
+
+
+def test_kill_is_an_event() -> None:
+    """Whoever watches or records a chip sees K, whether or not there was a motion to stop."""
+    bench = Bench()
+    bench.send("k")
+    bench.run(ms=5)
+    bench.send("g+", "r")
+    bench.run(ms=50)
+    bench.send("K")
+    assert [event.text for event in bench.chip.events if event.code in ("kill", "stops")] == ["Kill", "Kill", "stops: Kill"]
 
 
 def test_m_27_index_needs_no_room() -> None:

@@ -22,7 +22,9 @@ import pytest
 
 import steptwin
 from steptwin.errors import Misuse
+from steptwin.m1486.chip import Event
 from steptwin.m1486.eeprom import image_of, unpack
+from steptwin.m1486.lines import DUAL_DAC, TWO_DACS, Interface
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import variant
 from steptwin.machine import SECOND
@@ -332,6 +334,41 @@ def test_all_pins_are_set_or_none(asked: Callable[..., list[Any]], request_: dic
         asked(served, {"do": "pin", **request_})
     assert str(refusal.value).startswith(text)
     assert served.chips[0].pins()["B1"] == 1.0
+
+
+def test_a_chip_is_chosen_by_the_address_that_its_pins_gave_it_last(asked: Callable[..., list[Any]]) -> None:
+    """ADDR3 (B21) makes an A of 2, when RST goes high; then 2 is nobody, and two chips can have the same address."""
+    served = M1486Line(ChainOptions(variant=variant("B"), addresses=(2, 7)))
+    moved = {"do": "pin", "unit": 2, "set": {"ADDR3": 1, "RST": 1}}
+    _, state = asked(served, moved, {"do": "state", "unit": "A"})
+    assert state["address"] == "A"
+    assert served.told(2, Event(0, "moves", "moves")) == "chip A: moves"
+    with pytest.raises(Misuse, match="no chip 2: served are A, 7"):
+        asked(served, {"do": "state", "unit": 2})
+    pins = {"ADDR0": 0, "ADDR1": 1, "ADDR2": 0, "ADDR3": 1, "RST": 1}
+    with pytest.raises(Misuse, match="several chips have address A: served are A, A"):
+        asked(served, {"do": "pin", "unit": 7, "set": pins}, {"do": "state", "unit": "A"})
+
+
+@pytest.mark.parametrize(
+    ("interface", "taken", "free", "lines"),
+    [(TWO_DACS, "B12", "B7", "B8 to B17"), (TWO_DACS, "B8", "B18", "B8 to B17"), (DUAL_DAC, "B10", "B9", "B10 to B17")],
+)
+def test_m_21_a_line_that_the_driver_interface_has_is_tied_to_nothing(
+    asked: Callable[..., list[Any]], interface: Interface, taken: str, free: str, lines: str
+) -> None:
+    def tied(*wires: str) -> M1486Line:
+        return M1486Line(
+            ChainOptions(variant=variant("B"), addresses=(0, 7), interface=interface, wires=[parse_wire(wire) for wire in wires])
+        )
+
+    tied(f"0.{free}=7.B3")
+    text = f"{taken} is taken: the {interface.title} interface has {lines}"
+    for wire in (f"0.{taken}=7.B3", f"0.B1=7.{taken}"):
+        with pytest.raises(Misuse, match=f"--wire {wire}: {text}"):
+            tied(wire)
+    with pytest.raises(Misuse, match=text):
+        asked(tied(), {"do": "pin", "unit": 0, "set": {free: 0, taken: 0}})
 
 
 def test_power_comes_to_all_chips_or_to_one(asked: Callable[..., list[Any]]) -> None:

@@ -144,3 +144,8 @@ def test_plans_and_waveforms_are_recorded() -> None:
     plans = list(ran.trace.plans())
     assert [(record.time, record.subject) for record in plans] == [(2 * MILLISECOND, "1")]
     assert [record.value for record in ran.trace.edges() if record.subject == "N"] == [3.0, 1.0]
+
+
+def test_kill_is_in_the_trace() -> None:
+    ran = Ran("k\n")
+    assert [(record.kind, record.subject, record.value) for record in ran.trace] == [("event", "kill", "Kill")]

@@ -96,7 +96,7 @@ def sections_of(variants: tuple[Variant, ...]) -> list[Section]:
 
 
 def _commands(variants: tuple[Variant, ...]) -> Section:
-    from steptwin.m1486.commands import TABLE, memory_bits, takes_variable
+    from steptwin.m1486.commands import TABLE, When, memory_bits, takes_variable
 
     rows = [
         (
@@ -104,7 +104,7 @@ def _commands(variants: tuple[Variant, ...]) -> Section:
             spec.name,
             _numbers(spec, variants),
             "yes" if takes_variable(spec.key) else "",
-            str(memory_bits(spec.key)),
+            str(0 if spec.when is When.RECEIVED else memory_bits(spec.key)),  # M-45
             spec.when.value,
             spec.effect,
             spec.section,

@@ -61,9 +61,21 @@ def _out_of_range(command: Command, number: int, variant: Variant) -> Diagnostic
         hint += f" on {variant.title}{_others_that_take(key, number, variant)}"
     elif key in "TC" and number == CARRY:
         hint = f"flag {CARRY}, the carry, is set and cleared by + and - only; {hint}"
+    elif kind is Kind.LINES:
+        hint = f"{_lines_reached(number)}; {hint}"
     elif number == 0 and key in _INSTEAD_OF_ZERO:
         fix = Fix(command.span, _INSTEAD_OF_ZERO[key])
     return findings.OUT_OF_RANGE(command.argument_span, f"{subject} is out of range", hint, fix)
+
+
+def _lines_reached(number: int) -> str:
+    """What a number that names no lines would name."""
+    first, count = divmod(number, 10)
+    if count == 0:
+        return f"no line: the count in {number} is 0"
+    if count == 1:
+        return f"{number} is line {first}"
+    return f"{number} is lines {first} to {first + count - 1}"
 
 
 def _others_that_take(key: str, number: int, variant: Variant) -> str:

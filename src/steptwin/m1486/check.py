@@ -8,6 +8,7 @@ from steptwin.diagnostics import Diagnostic, Severity, in_order
 from steptwin.m1486.argument_rules import argument_rules
 from steptwin.m1486.flow_rules import flow_rules
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
+from steptwin.m1486.position_rules import position_rules
 from steptwin.m1486.structure import Stream, stored_bits, streams
 from steptwin.m1486.structure_rules import structure_rules
 from steptwin.m1486.syntax import Command, Program, parse
@@ -61,6 +62,7 @@ def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIR
     for stream in chips:
         diagnostics += structure_rules(stream, variant)
         diagnostics += flow_rules(stream, variant, interface)
+        diagnostics += position_rules(stream, variant)
     # Commands that several chips receive are judged for each of them.
     return Checked(program, in_order(dict.fromkeys(diagnostics)), [memory_of(s, variant) for s in chips])
 

@@ -284,6 +284,8 @@ def range_text(spec: CommandSpec, variant: Variant, *, named: bool = False) -> s
         return "first line 1 to 21 and count 1 to 9 as one number, such as 14 for lines 1 to 4, up to line 21"
     if spec.kind is Kind.CONDITION:
         return f"line {LINES[0]} to {LINES[-1]} or flag {USER_FLAGS[0]} to {CARRY}, then H or L and a label"
+    if values == _PROFILE:
+        return f"{PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]} {spec.unit}, or a larger number above V for no parabolic part"
     text = f"{grouped(values[0])} to {grouped(values[-1])}" if isinstance(values, range) else ", ".join(map(str, values))
     if spec.unit:
         text += f" {spec.unit}"

@@ -78,6 +78,10 @@ BOTH_OPERANDS = _F("M217", "functions 46 and 58 both ON", "The manual says nothi
 NOT_IN_FILE = _F("M218", "not stored in the EEPROM", "Only what stands in [ ] runs again at power-up.")
 SECOND_FILE = _F("M219", "second file for the EEPROM", "The manual describes one file, stored into an erased EEPROM.")
 ACTS_AT_ONCE = _F("M220", "acts when received", "It is no part of the stored file: it acts while the file is being sent.")
+POSITION_PASSED = _F(
+    "M221", "position counter passed its end", "It has 24 bits without a sign; G and H count from what it shows."
+)
+ENDS_IN_FINE_STEPS = _F("M222", "ends in fine steps at high speed", "The rest of the distance is made in steps of M at S (M-39).")
 
 TABLE: tuple[Finding, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Finding))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import groupby
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
 from steptwin.m1486 import findings
@@ -43,7 +44,7 @@ def flow_rules(stream: Stream, variant: Variant, interface: Interface) -> Iterat
         if command.key in "CT!":
             yield from _runsign(command, states, variant)
     yield from _calls(stream, flow)
-    yield from _unused_labels(stream, flow)
+    yield from _labels(stream, flow)
     yield from _never_reached(stream, flow)
     yield from _shared_registers(stream, flow, variant)
 
@@ -110,6 +111,23 @@ def _too_fast(command: Command, state: Settings) -> _Fault | None:
     return findings.SPEED_ABOVE_Q, message, "Q1 goes as far as V"
 
 
+def _fine_end(command: Command, state: Settings) -> _Fault | None:
+    """M-39: what is left of a distance below one step of Q."""
+    m, q, distance = state.microstep, state.qualification, state.distance
+    if command.key != "R" or m is None or q is None or distance is None or state.start_stop is None or state.velocity is None:
+        return None
+    speed, limit = min(state.start_stop, state.velocity), low_range_limit(m)
+    fine, coarse = microstep_size(m), microstep_size(q)
+    if q not in PAIRS[m] or distance % fine or distance % coarse == 0 or speed <= limit:
+        return None
+    message = f"the distance {grouped(distance)} ends in steps of M{m} at {speed} step/s, above the {limit:g} step/s of M{m}"
+    return (
+        findings.ENDS_IN_FINE_STEPS,
+        message,
+        f"a multiple of {coarse} is made in steps of Q{q}; S up to {limit:g} step/s goes with any distance",
+    )
+
+
 def _profile(command: Command, state: Settings) -> _Fault | None:
     if command.key != "R" or state.profile is None or state.velocity is None:
         return None
@@ -131,7 +149,7 @@ def _acceleration(command: Command, state: Settings) -> _Fault | None:
     return findings.NO_ACCELERATION_TABLE, message, hint
 
 
-_RULES: tuple[_Rule, ...] = (_distance, _pair, _no_ramp, _too_fast, _profile, _acceleration)
+_RULES: tuple[_Rule, ...] = (_distance, _pair, _no_ramp, _too_fast, _fine_end, _profile, _acceleration)
 
 
 def _operand(command: Command, state: Settings, interface: Interface) -> _Fault | None:
@@ -215,16 +233,22 @@ def _calls(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
         yield findings.NEVER_RETURNS(command.span, f"{command} does not come back", "a subroutine ends with a dot")
 
 
-def _unused_labels(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+def _labels(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+    """Labels of a file, or of what comes between resets, that nothing jumps to, and those given twice: one finding for each."""
     used = set().union(*flow.targets.values())
     for index, command in enumerate(stream.commands):
         label = written_label(command)
         target = None if label is None else stream.resolve(index, label)
         used |= set() if target is None else {target}
     for label, places in stream.labels.items():
-        for at in places:
-            if at not in used:
-                yield findings.LABEL_UNUSED(stream.commands[at].span, f"nothing jumps to label {label}")
+        for _, group in groupby(places, lambda at: (stream.in_file[at], stream.resets[at])):
+            first, *others = group
+            if used.isdisjoint((first, *others)):
+                yield findings.LABEL_UNUSED(stream.commands[first].span, f"nothing jumps to label {label}")
+                continue
+            for later in others:
+                message = f"label {label} is given a second time"
+                yield findings.LABEL_TWICE(stream.commands[later].span, message, "the later one counts")
 
 
 def _never_reached(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:

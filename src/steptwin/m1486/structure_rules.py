@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.m1486 import findings
@@ -22,7 +21,6 @@ def structure_rules(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
     yield from _resets(stream, variant)
     yield from _immediate(stream)
     yield from _loops(stream, variant)
-    yield from _labels(stream)
     for index, command in enumerate(stream.commands):
         label = written_label(command)
         if label is not None and find("J", label, variant) is not None:
@@ -128,14 +126,6 @@ def _loops(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
             message = f"the loop begins {bits} bits back and has been overwritten"
             hint = f"the memory of {variant.title} holds {variant.memory_bits} bits"
             yield findings.LABEL_OVERWRITTEN(stream.commands[end].span, message, hint)
-
-
-def _labels(stream: Stream) -> Iterator[Diagnostic]:
-    for label, places in stream.labels.items():
-        for earlier, later in pairwise(places):
-            if stream.in_file[earlier] == stream.in_file[later] and stream.resets[earlier] == stream.resets[later]:
-                message = f"label {label} is given a second time"
-                yield findings.LABEL_TWICE(stream.commands[later].span, message, "the later one counts")
 
 
 def _crossing(stream: Stream, index: int, label: int) -> Iterator[Diagnostic]:

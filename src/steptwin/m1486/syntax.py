@@ -20,6 +20,7 @@ _NOWHERE = Span(0, 0)
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _DIGITS = frozenset("0123456789")
 _HEX = frozenset("0123456789ABCDEF")
+_WORD = re.compile(r"[A-Za-z]{2}")
 _BLANKS = frozenset(" \t")
 _LEVELS = frozenset("HL")
 #: More digits than any number of the language has; longer ones are no numbers.
@@ -228,6 +229,7 @@ def _command(reader: _Reader) -> Command:
         argument = int(reader.take(), 16)
     elif takes_number(key):
         argument = _number(reader)
+        _no_word(reader, key, argument)
         _no_other_notation(reader, key, argument_start)
         if argument is None and not takes_variable(key):
             hint = "the internal variable cannot stand for it"
@@ -250,6 +252,13 @@ def _number(reader: _Reader) -> int | None:
         message = f"blank inside a number, read as {digits}"
         reader.diagnostics.append(findings.BLANK_IN_NUMBER(span, message, None, Fix(span, digits)))
     return int(digits)
+
+
+def _no_word(reader: _Reader, key: str, number: int | None) -> None:
+    """Letters in the place of a number are no row of commands."""
+    if number is None and _WORD.match(reader.left):
+        hint = "a number, or the end of the line for the internal variable" if takes_variable(key) else "a number"
+        reader.give_up(findings.BAD_ARGUMENT, reader.rest_span(), f"{reader.left} is no number", hint)
 
 
 def _no_other_notation(reader: _Reader, key: str, start: int) -> None:

@@ -15,7 +15,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.chip import EVENTS_KEPT, M1486, OPEN_ADDRESS, Event
 from steptwin.m1486.line import LinePort, SerialChain
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.m1486.pins import known_pin
+from steptwin.m1486.pins import LINE_PINS, known_pin
 from steptwin.m1486.variants import DEFAULT, Store, Variant
 from steptwin.machine import Nanos
 from steptwin.runtime.cell import Cell
@@ -111,7 +111,7 @@ class M1486Line:
 
     def told(self, unit: int, event: Happening) -> str:
         """An event in words; the chip is named where there are several."""
-        return f"chip {unit:X}: {event.text}" if len(self.chips) > 1 else event.text
+        return f"chip {chip_name(self.chips[unit].address)}: {event.text}" if len(self.chips) > 1 else event.text
 
     # ------------------------------------------------------------------ what a hand at the machine does
 
@@ -142,7 +142,10 @@ class M1486Line:
         """All changes or none, then every pin. A hand reaches the pins before a switch that is stuck, not behind it."""
         chip = self._chosen(request)
         terminals = next(self.kernel.machines[chip_name(address)] for address, one in self.chips.items() if one is chip)
-        for pin, level in _pin_changes(request):
+        changes = _pin_changes(request)
+        for pin, _ in changes:
+            refuse_taken(pin, chip.interface)
+        for pin, level in changes:
             terminals.set_pin(pin, level, now)
         return dict(chip.pins())
 
@@ -151,24 +154,30 @@ class M1486Line:
             chip.power_cycle(now)
 
     def _chosen(self, request: Mapping[str, Any]) -> M1486:
+        """The chip that has the address now: address pins are read anew by RST and power-up."""
         unit = request.get("unit")
-        if unit is None and len(self.chips) == 1:
-            return next(iter(self.chips.values()))
-        served = ", ".join(map(chip_name, self.chips))
+        chips = list(self.chips.values())
+        if unit is None and len(chips) == 1:
+            return chips[0]
+        served = ", ".join(chip_name(chip.address) for chip in chips)
         if unit is None:
             raise Misuse(f"several chips are served: choose one with --unit: {served}")
         address: object = unit
         if isinstance(unit, str):
             with suppress(ValueError):
                 address = int(unit, 16)
-        if not isinstance(address, int) or isinstance(address, bool) or address not in self.chips:
-            raise Misuse(f"no chip {unit}: served are {served}")
-        return self.chips[address]
+        chosen = [chip for chip in chips if chip.address == address and not isinstance(address, bool)]
+        if len(chosen) != 1:
+            raise Misuse(f"{f'several chips have address {unit}' if chosen else f'no chip {unit}'}: served are {served}")
+        return chosen[0]
 
 
 def make_chips(options: ChainOptions, state: StateDirectory | None = None, image: bytes | None = None) -> dict[int, M1486]:
     """The chips of a line by address, each with its EEPROM."""
     variant = options.variant
+    for wire in options.wires:
+        for end in (wire.source, wire.target):
+            refuse_taken(end.pin, options.interface, f"--wire {wire.source}={wire.target}: ")
     if image is not None and len(options.addresses) > 1:
         raise Misuse(f"a program to switch on with is for a single chip: here are {len(options.addresses)}")
     chips: dict[int, M1486] = {}
@@ -237,6 +246,14 @@ def parse_wire(text: str) -> Wire:
     with suppress(Misuse):  # outputs that are no inputs are for the kernel to know
         source = known_pin(source)
     return Wire(PinName(match[1].upper(), source), PinName(match[3].upper(), known_pin(match[4])))
+
+
+def refuse_taken(pin: str, interface: Interface, place: str = "") -> None:
+    """`Misuse` for a line whose pin the driver interface has: it is no input and no output (M-21)."""
+    if LINE_PINS.get(pin) in interface.occupied:
+        taken = interface.occupied
+        lines = f"B{taken[0]} to B{taken[-1]}"
+        raise Misuse(f"{place}{pin} is taken: the {interface.title} interface has {lines}")
 
 
 class PinChange(NamedTuple):

@@ -19,11 +19,11 @@ from steptwin.errors import Misuse
 from steptwin.m1486.check import Checked, check
 from steptwin.m1486.chip import M1486, OPEN_ADDRESS
 from steptwin.m1486.eeprom import image_of
-from steptwin.m1486.lines import interface
+from steptwin.m1486.lines import Interface, interface
 from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.m1486.variants import DEFAULT, Store, variant
+from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.machine import SECOND, Nanos
-from steptwin.runtime.m1486 import ChainOptions, chip_name, make_chips, parse_wire, pin_change
+from steptwin.runtime.m1486 import ChainOptions, chip_name, make_chips, parse_wire, pin_change, refuse_taken
 from steptwin.runtime.m1486_bench import Bench, Ending, Happening, Input
 from steptwin.runtime.m1486_state import program_words, velocity
 from steptwin.runtime.m1486_trace import chip_views
@@ -69,9 +69,9 @@ def run(options: M1486Run, say: Say, warn: Say) -> bool:
     addresses = [chip.address for chip in checked.memory if chip.address is not None] or [OPEN_ADDRESS]
     chain = ChainOptions(variant=kind, addresses=addresses, interface=driver, wires=[parse_wire(w) for w in options.wires])
     names = [chip_name(address) for address in addresses]
-    inputs = [_input(change, names) for change in options.inputs]
+    inputs = [_input(change, names, driver) for change in options.inputs]
     text, image = _to_type(checked, chain, source.text)
-    _warn_of_errors(checked, source, warn)
+    _warn_of_errors(checked, source, kind, warn)
 
     trace = Trace(names) if options.trace is not None else None
     chips = dict(zip(names, make_chips(chain, image=image).values(), strict=True))
@@ -99,14 +99,15 @@ def _to_type(checked: Checked, chain: ChainOptions, text: str) -> tuple[str, byt
     return text, None
 
 
-def _warn_of_errors(checked: Checked, source: Source, warn: Say) -> None:
+def _warn_of_errors(checked: Checked, source: Source, kind: Variant, warn: Say) -> None:
     errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
     if errors:
+        typed = f", typed at {kind.write_ns / SECOND:g} s a command" if kind.store is Store.EEPROM else ""
         warn(render(source, errors))
-        warn(f"{source.name}: the chip sees this, with {len(errors)} error{'s' if len(errors) > 1 else ''} in it:")
+        warn(f"{source.name}: the chip sees this, with {len(errors)} error{'s' if len(errors) > 1 else ''} in it{typed}:")
 
 
-def _input(change: TimedInput, names: Sequence[str]) -> Input:
+def _input(change: TimedInput, names: Sequence[str], driver: Interface) -> Input:
     """``B3`` of the only chip, or ``7.B3``."""
     chip, dot, pin = change.pin.rpartition(".")
     if not dot:
@@ -116,6 +117,7 @@ def _input(change: TimedInput, names: Sequence[str]) -> Input:
     if chip not in names:
         raise Misuse(f"--input {change.pin}: no chip {chip}; there are {', '.join(names)}")
     name, level = pin_change(pin, change.value)
+    refuse_taken(name, driver, f"--input {change.pin}: ")
     return Input(change.time, chip, name, level)
 
 
