@@ -170,7 +170,7 @@ def test_what_waits_for_an_eeprom_is_not_typed_after_a_suspension() -> None:
     for line in ("f640", "r", "x7"):
         terminal.type(line)
     away[0] = 3600.0
-    with pytest.raises(LineFailure, match=r"r: not typed; the program was suspended for 3600 s"):
+    with pytest.raises(LineFailure, match=r"\br: not typed, because the program was suspended for 3600 s"):
         terminal.settle(7200.0)
     terminal.type("k")
     terminal.settle(7200.0)
