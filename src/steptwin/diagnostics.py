@@ -113,8 +113,14 @@ def render(source: Source, diagnostics: Sequence[Diagnostic]) -> str:
         if d.hint:
             parts.append(f"  {pad} = {d.hint}")
         if d.fix and f"did you mean {d.fix.text}?" not in f"{d.message} {d.hint}":
-            parts.append(f"  {pad} = suggestion: {d.fix.text.strip() or ('start a new line' if d.fix.text else 'remove it')}")
+            parts.append(f"  {pad} = suggestion: {d.fix.text.strip() or _blank_fix(d.fix.text)}")
     return "\n".join(parts)
+
+
+def _blank_fix(text: str) -> str:
+    if not text:
+        return "remove it"
+    return "start a new line" if "\n" in text else "a blank"
 
 
 def to_json(source: Source, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:

@@ -1,6 +1,7 @@
 """Messages are behaviour users rely on: every one of them stands in golden/, and a change of one deserves a review.
 
-Regenerate with ``python tests/wbc/test_check_golden.py`` and read the diff.
+`programs.txt` has the mistakes, `other_languages.txt` what people bring along from other languages. Regenerate both with
+``python tests/wbc/test_check_golden.py`` and read the diff.
 """
 
 from __future__ import annotations
@@ -10,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.diagnostics import Source, render
+from steptwin.diagnostics import Diagnostic, Source, render
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.findings import FINDINGS
 from steptwin.wbc.positions import parse_positions
 from steptwin.wbc.usage import Setup
 
-GOLDEN = Path(__file__).parent / "golden" / "programs.txt"
+GOLDEN = [Path(__file__).parent / "golden" / name for name in ("programs.txt", "other_languages.txt")]
 CASE, RESULT = "=== ", "---"
 NO_FINDING = "(no findings)"
 
@@ -38,6 +39,9 @@ class Case:
         return "".join(line for line in self.text.splitlines(keepends=True) if not line.startswith("@ "))
 
     def found(self) -> str:
+        return render(Source(self.name, self.program), self.check(self.program)) or NO_FINDING
+
+    def check(self, text: str) -> list[Diagnostic]:
         rows = self.settings("row")
         table = parse_positions("".join(row + "\n" for row in rows))[0] if rows else None
         dialect = dialect_for(*(self.settings("firmware") or ["1.70"]))
@@ -52,12 +56,11 @@ class Case:
                 homing_ends=tuple((numbers.get(f"kl{n}", 1) == 1, numbers.get(f"kr{n}", 1) == 1) for n in range(1, 5)),
                 most_speed_p=64_000,
             )
-        checked = check(self.program, table, setup, dialect)
-        return render(Source(self.name, self.program), checked.diagnostics) or NO_FINDING
+        return check(text, table, setup, dialect).diagnostics
 
 
-def read_cases() -> tuple[str, list[Case]]:
-    head, *parts = GOLDEN.read_text(encoding="utf-8").split(CASE)
+def read_cases(golden: Path) -> tuple[str, list[Case]]:
+    head, *parts = golden.read_text(encoding="utf-8").split(CASE)
     cases = []
     for part in parts:
         name, _, body = part.partition("\n")
@@ -66,12 +69,22 @@ def read_cases() -> tuple[str, list[Case]]:
     return head, cases
 
 
-HEAD, CASES = read_cases()
+CASES = [case for golden in GOLDEN for case in read_cases(golden)[1]]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_messages_are_the_reviewed_ones(case: Case) -> None:
     assert case.found() == case.expected
+
+
+@pytest.mark.parametrize("case", read_cases(GOLDEN[1])[1], ids=lambda case: case.name)
+def test_a_fix_mends_what_it_is_for(case: Case) -> None:
+    text = case.program
+    for _ in range(3):
+        fixes = [d.fix for d in case.check(text) if d.fix is not None and d.code.startswith("W1")]
+        for fix in sorted(fixes, key=lambda fix: -fix.span.start):
+            text = text[: fix.span.start] + fix.text + text[fix.span.end :]
+    assert [(d.message, d.fix) for d in case.check(text) if d.fix is not None and d.code.startswith("W1")] == [], text
 
 
 def test_every_message_about_a_program_has_a_case() -> None:
@@ -86,8 +99,10 @@ def test_there_are_wrong_programs_enough() -> None:
 
 
 def regenerate() -> None:
-    written = "\n".join(f"{CASE}{case.name}\n{case.text}{RESULT}\n{case.found()}\n" for case in CASES)
-    GOLDEN.write_text(HEAD + written, encoding="utf-8")
+    for golden in GOLDEN:
+        head, cases = read_cases(golden)
+        written = "\n".join(f"{CASE}{case.name}\n{case.text}{RESULT}\n{case.found()}\n" for case in cases)
+        golden.write_text(head + written, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -166,6 +166,27 @@ WORDS = st.sampled_from(
         *(*STATEMENTS, *(row.name for row in FUNCTIONS.values()), "SET", "x", "M1", "OUT9", "$I5", "$R3", "INT_IN1", "ON"),
         *("@p", "@", ":", "#", "//", "=", "==", "<", ">=", "<>", "+", "&&", "^", "(", ")", ",", ";"),
         *("1,5", "-", "5", "1.2.3", "ę", "\n", "\n", " "),
+        *("THEN", "NOT", "AND", "ELSEIF", "REM", "LET", "FOR", "DEFINE", "MOD", "SUB", "MAIN", "JUMP"),
+        *(
+            "0x1F",
+            "20mm",
+            "1e5",
+            "9e99",
+            "1.234,5",
+            "16#F",
+            "$FF",
+            "[1]",
+            "++",
+            "+=",
+            ":=",
+            "!=",
+            "'",
+            "/*",
+            "*/",
+            "–",
+            "\xa0",
+            "≥",
+        ),
     ]
 )
 SOUP = st.lists(WORDS, max_size=40).map(" ".join)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from steptwin.diagnostics import Diagnostic
 from steptwin.wbc import findings as f
 from steptwin.wbc.findings import Finding, Spanned
+from steptwin.wbc.foreign import IF_UNKNOWN
 
 
 @dataclass(slots=True)
@@ -29,12 +30,17 @@ _NOT_OPENED: dict[str, tuple[Finding, str]] = {
 }
 
 
+_OF_IF = frozenset(finding.code for finding in (f.IF_NOT_CLOSED, f.ELSE_WITHOUT_IF, f.ENDIF_WITHOUT_IF, f.SECOND_ELSE))
+
+
 class BlockMatcher:
     """Takes the block keywords in order. A forgotten end is reported once, at its beginning, and leaves outer blocks alone."""
 
     def __init__(self, diagnostics: list[Diagnostic]) -> None:
         self.blocks = Blocks()
-        self._diagnostics = diagnostics
+        self._reported = diagnostics
+        self._diagnostics: list[Diagnostic] = []
+        self._uncertain = False
         self._stack: list[tuple[str, int, Spanned]] = []
         self._open = {"IF": 0, "WHILE": 0}
 
@@ -44,10 +50,14 @@ class BlockMatcher:
             self._open[keyword] += 1
         elif keyword in _NOT_OPENED:
             self._continue(keyword, step, place)
+        elif keyword == IF_UNKNOWN:
+            self._uncertain = True
 
     def finish(self) -> Blocks:
         while self._stack:
             self._abandon()
+        # With an ELSE IF nobody knows how many ENDIFs were meant; it has been reported itself.
+        self._reported += [d for d in self._diagnostics if not (self._uncertain and d.code in _OF_IF)]
         return self.blocks
 
     def _continue(self, keyword: str, step: int, place: Spanned) -> None:

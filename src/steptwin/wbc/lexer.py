@@ -16,6 +16,10 @@ STRANGE = 7
 """A character that means nothing in WBC."""
 
 
+BLANKS = " \t\v\f"
+"""What separates words. Other white space, such as a no-break space, is a strange character."""
+
+
 class Token(NamedTuple):
     kind: int
     text: str
@@ -31,10 +35,10 @@ _TOKEN = re.compile(
       ( [0-9]+ (?: [.,][0-9]+ )? (?! [\w.] ) )
     | ( \.?[0-9] [\w.]* )
     | ( (?: \$ | [^\W\d] ) [\w.?!"'~\\`\[\]{};$]* (?<! ; ) )
-    | ( <= | >= | <> | != | == | =< | => | =(?!=) | <(?!<) | >(?!>) )
+    | ( <= | >= | <> | := | != | == | =< | => | =(?!=) | <(?!<) | >(?!>) )
     | ( && | \|\| | << | >> | [-+*/%&|^] )
     | ( [(),:@#] )
-    | ( \S )
+    | ( [^ \t\v\f] )
     """,
     re.VERBOSE,
 )

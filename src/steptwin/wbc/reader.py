@@ -10,6 +10,7 @@ import re
 from steptwin.diagnostics import Diagnostic
 from steptwin.wbc import findings as f
 from steptwin.wbc.findings import Finding
+from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD
 from steptwin.wbc.lexer import COMPARISON, NUMBER, OPERATOR, STRANGE, WORD, WRONG_NUMBER, Token, is_name
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.wbc.registers import parts
@@ -46,9 +47,18 @@ from steptwin.wbc.tree import (
 )
 
 _USER_REGISTER = re.compile(r"\$[IDR][0-9]+$", re.IGNORECASE | re.ASCII)
-_MEANT = {"==": "=", "=<": "<=", "=>": ">="}
+_MEANT = {"==": "=", ":=": "=", "=<": "<=", "=>": ">="}
+_EQUALS_ELSEWHERE = ("==", ":=")
 _FUNCTIONS_ELSEWHERE = {"TAN": "tg", "COT": "ctg", "ARCSIN": "asin", "ARCCOS": "acos", "SQR": "sqrt"}
-_STATEMENTS_ELSEWHERE = {"GOTO": "JUMP", "GOSUB": "JUMP", "CALL": "JUMP", "SLEEP": "DELAY", "PAUSE": "DELAY", "RET": "RETURN"}
+_STATEMENTS_ELSEWHERE = {
+    **dict.fromkeys(("GOTO", "GOSUB", "CALL", "JMP", "JP", "GO"), "JUMP"),
+    **dict.fromkeys(("SLEEP", "PAUSE"), "DELAY"),
+    **dict.fromkeys(("RET", "RETI", "IRET", "RETFIE"), "RETURN"),
+    **dict.fromkeys(("WEND", "ENDW", "END_WHILE", "ENDLOOP", "ENDDO"), "ENDWHILE"),
+    **dict.fromkeys(("END_IF", "FI"), "ENDIF"),
+    **dict.fromkeys(("WAITUNTIL", "WAIT_UNTIL", "AWAIT"), "WAIT"),
+    **dict.fromkeys(("RESTART", "REBOOT"), "PROGRESET"),
+}
 _BLOCK_WORDS = frozenset({"ELSE", "ENDIF", "ENDWHILE"})
 
 
@@ -144,7 +154,7 @@ class StatementReader:
             place = equals or self._end()
             raise Rejected(f.MISSING_EQUALS.at(place, f"= is missing after {target.text}", f"write {SET_USAGE}"))
         if equals.text != "=":
-            fix = "=" if equals.text == "==" else None
+            fix = "=" if equals.text in _EQUALS_ELSEWHERE else None
             raise Rejected(f.WRONG_OPERATOR.at(equals, f"an assignment is written with =, not {equals.text}", fix=fix))
         value = self._expression()
         if self._at < self._last:
@@ -214,7 +224,7 @@ class StatementReader:
             hint = "later firmware has it, but its syntax is not documented; use IF or JUMP"
             return Rejected(f.NOT_SUPPORTED.at(first, f"{key} is not supported", hint))
         if second is not None and second.kind == COMPARISON:
-            fix = "=" if second.text == "==" else None
+            fix = "=" if second.text in _EQUALS_ELSEWHERE else None
             return Rejected(f.WRONG_OPERATOR.at(second, f"an assignment is written with =, not {second.text}", fix=fix))
         if self._tokens[-1].text == ":":
             return Rejected(f.BAD_LABEL.at(self._place_of_all(), "a label is one word", "write it like MY_LABEL:"))
@@ -224,10 +234,14 @@ class StatementReader:
         if self._last > 2 and second is not None and second.kind == OPERATOR and self._tokens[2].text == "=":
             hint = f"write {first.text} = {first.text} {second.text} …"
             return Rejected(f.WRONG_OPERATOR.at(second, f"there is no {second.text}=", hint))
-        meant = _STATEMENTS_ELSEWHERE.get(key) or self._near.of(first.text, (SET, *STATEMENTS))
+        meant = _STATEMENTS_ELSEWHERE.get(key)
+        if meant is None and key not in INSTEAD and key not in ELSE_IF:
+            meant = self._near.of(first.text, (SET, *STATEMENTS))
         if meant is not None:
             self.keyword = meant
             return Rejected(f.UNKNOWN_STATEMENT.at(first, f"unknown statement {first.text}", f"did you mean {meant}?", fix=meant))
+        if key in INSTEAD or key in DECLARATIONS:
+            return Rejected(f.UNKNOWN_STATEMENT.at(first, f"WBC has no {key}", INSTEAD.get(key)))
         if self._last == 2 and second is not None and second.kind == NUMBER:
             hint = f"write {first.text} = {second.text}"
             return Rejected(f.MISSING_EQUALS.at(first, f"= is missing after {first.text}", hint, fix=f"{first.text} ="))

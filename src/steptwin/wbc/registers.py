@@ -185,3 +185,12 @@ PREDEFINED: dict[str, float] = {
     "M_POS_LIMR": 10,
 }
 """Names that stand for numbers everywhere."""
+
+VALUE_NAMES: dict[Domain, tuple[str, ...]] = {
+    BIT: ("ON", "OFF"),
+    ON_OFF: ("ON", "OFF"),
+    STATUS: tuple(name for name in PREDEFINED if name.startswith("M_") and name != "M_POS_HOMING"),
+    EDGE: ("INT_OFF", "RIS", "FALL", "RIS_FALL"),
+    SWITCH: ("INT_OFF", "INT_HIGH"),
+}
+"""The predefined names for the values of registers, by what they hold."""

@@ -10,6 +10,7 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.blocks import BlockMatcher, Blocks
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS, PREFIX, Event
+from steptwin.wbc.foreign import IF_UNKNOWN
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.wbc.paths import names_no_axis, row_problem
 from steptwin.wbc.positions import PositionTable
@@ -38,7 +39,7 @@ from steptwin.wbc.tree import (
 # WBC-7
 SHORTEST_DELAY_S = 0.01
 _ALONE = {"ENDIF": s.EndIf, "RETURN": s.Return, "END": s.End, "PROGRESET": s.ProgReset, "WAITPOS": s.WaitPos}
-_BRANCHING = frozenset({"IF", "ELSE", "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
+_BRANCHING = frozenset({"IF", "ELSE", IF_UNKNOWN, "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +104,9 @@ class _Resolver:
             elif isinstance(statement, Label):
                 self._define_label(statement, defined)
                 last = statement
+                continue
+            elif isinstance(statement, Broken) and statement.label is not None:
+                self._labels.setdefault(statement.label.key, len(lines))
                 continue
             elif isinstance(statement, Broken):
                 if statement.keyword is not None:
@@ -186,7 +190,8 @@ class _Resolver:
     def _assign(self, statement: Assign) -> s.Step | None:
         name = statement.target
         target = self._scope.target(name)
-        value = self._expression(statement.value)
+        node = statement.value
+        value = self._scope.value(node, name) if isinstance(node, Name | Number) else self._expression(node)
         if isinstance(target, s.Register) and isinstance(value, s.Literal):
             self._check_range(target, value.value, statement)
         if target is None or value is None:
@@ -231,7 +236,7 @@ class _Resolver:
     def _comparison(self, node: Operand) -> s.Comparison | None:
         if not isinstance(node, Condition):
             return None
-        left, right = self._scope.value(node.left), self._scope.value(node.right)
+        left, right = self._scope.value(node.left, node.right), self._scope.value(node.right, node.left)
         if left is None or right is None:
             return None
         return s.Comparison(left, node.comparison, right)
@@ -351,7 +356,7 @@ class _Resolver:
 
     def _row_motion(self, statement: Command) -> s.Step | None:
         operand = statement.operands[0]
-        row = self._position(operand) if isinstance(operand, Position) else self._value(operand)
+        row = self._position(operand) if isinstance(operand, Position) else self._value(operand, is_row=True)
         if row is None:
             return None
         if self._positions is None and not isinstance(operand, Position) and not (self._writes_row_0 and row == s.Literal(0.0)):
@@ -404,8 +409,8 @@ class _Resolver:
         elif names_no_axis(statement.keyword, values):
             self._say(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
 
-    def _value(self, operand: Operand) -> s.Source | None:
-        return self._scope.value(operand) if isinstance(operand, Name | Number) else None
+    def _value(self, operand: Operand, *, is_row: bool = False) -> s.Source | None:
+        return self._scope.value(operand, is_row=is_row) if isinstance(operand, Name | Number) else None
 
     def _say(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)

@@ -8,9 +8,10 @@ from steptwin.diagnostics import Diagnostic
 from steptwin.wbc import findings as f
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_LABEL
+from steptwin.wbc.foreign_words import VALUES
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, RegisterRow, parts
+from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, ROWS, VALUE_NAMES, RegisterRow, parts
 from steptwin.wbc.statements import FUNCTIONS, KEYWORDS, NOT_SUPPORTED
 from steptwin.wbc.steps import Literal, Register, Source, Target, Variable
 from steptwin.wbc.tree import Assign, Broken, Constant, Name, Number, Program, Value
@@ -104,15 +105,19 @@ class Scope:
 
     # -- using
 
-    def value(self, node: Value) -> Source | None:
-        """What a number or name stands for; None after saying why it stands for nothing."""
+    def value(self, node: Value, other: Value | None = None, *, is_row: bool = False) -> Source | None:
+        """What a number or name stands for; None after saying why it stands for nothing.
+
+        ``other`` is what it is compared with or given to: that tells which names were possible. ``is_row``: a row of the
+        position table is wanted.
+        """
         if isinstance(node, Number):
             if not -REAL_MAX <= node.value <= REAL_MAX:
                 self._say(f.OUT_OF_RANGE.at(node, f"{node.text} is out of range", f"REAL reaches ±{REAL_MAX:.3g}"))
                 return None
             return Literal(node.value)
         known = self.known.get(node.key)
-        return known if known is not None else self._look_up(node)
+        return known if known is not None else self._look_up(node, other, is_row=is_row)
 
     def target(self, name: Name) -> Target | None:
         """The variable or register an assignment goes to; None after saying why there is none."""
@@ -148,7 +153,7 @@ class Scope:
         family = parts(name.key)
         return family[0].key if family is not None else None
 
-    def _look_up(self, name: Name) -> Source | None:
+    def _look_up(self, name: Name, other: Value | None = None, *, is_row: bool = False) -> Source | None:
         """Registers and predefined names enter ``known`` when they are first used; anything else is a mistake."""
         key = name.key
         found = parts(key)
@@ -161,7 +166,7 @@ class Scope:
             self.known[key] = Literal(float(PREDEFINED[key]))
             return self.known[key]
         if key not in self._broken:
-            self._unknown(name)
+            self._unknown(name, other, is_row=is_row)
         return None
 
     def _register(self, name: Name, row: RegisterRow, number: int) -> Register | None:
@@ -186,19 +191,29 @@ class Scope:
             self._say(f.STATUS_IS_ZERO.at(name, f"STATUS is always 0 in firmware {dialect.firmware}", hint))
         return Register(row, number)
 
-    def _unknown(self, name: Name) -> None:
+    def _unknown(self, name: Name, other: Value | None, *, is_row: bool) -> None:
         key = name.key
         if self._positions is not None and self._positions.index(key) is not None:
             hint = f"write @{name.text} after a motion statement"
-            self._say(f.RESERVED.at(name, f"{name.text} is a position, not a value", hint))
+            self._say(
+                f.RESERVED.at(name, f"{name.text} is a position, not a value", hint, fix=f"@{name.text}" if is_row else None)
+            )
             return
         reason = self._reserved(key)
         if reason is not None:
             self._say(f.RESERVED.at(name, f"{name.text} is {reason}, not a value"))
             return
-        meant = self.nearest(name.text)
-        hint = f"did you mean {meant}?" if meant else "a variable comes into being when it is first set"
+        meant = VALUES.get(key) or self.nearest(name.text)
+        hint = f"did you mean {meant}?" if meant else self._names_for(other)
+        hint = hint or "a variable comes into being when it is first set"
         self._say(f.UNKNOWN_VARIABLE.at(name, f"unknown variable {name.text}", hint, fix=meant))
+
+    def _names_for(self, other: Value | None) -> str:
+        """The predefined names that make sense with a register; nothing where there are none."""
+        family = self.family(other) if isinstance(other, Name) else None
+        row = None if family is None else ROWS[family]
+        names = () if row is None else VALUE_NAMES.get(row.writes or row.reads) or VALUE_NAMES.get(row.reads) or ()
+        return f"with {row.name} go {', '.join(names)}" if row is not None and names else ""
 
     def nearest(self, text: str) -> str | None:
         return self._near.of(text, self._spellings())

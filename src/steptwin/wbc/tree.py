@@ -122,11 +122,12 @@ class PositionRecord(Node):
 @dataclass(frozen=True, slots=True)
 class Broken(Node):
     """A line with an error, as written. What could be understood keeps one mistake from causing others:
-    the keyword (a broken IF still opens a block) and the name it would have assigned."""
+    the keyword (a broken IF still opens a block), the name it would have assigned, the label it would have been."""
 
     text: str
     keyword: str | None = None
     target: Name | None = None
+    label: Name | None = None
 
 
 Statement: TypeAlias = Constant | Label | Assign | Command | Record | PositionRecord | Broken
