@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mic488_rig import EN, Rig, coil_pdu, controller, word_pdu
+from mic488_rig import EN, STOP, Rig, coil_pdu, controller, real_words, word_pdu
 
 from steptwin.machine import SECOND
 from steptwin.mic488.config import AxisConfig
@@ -66,6 +66,36 @@ def test_mic_8_motion_commands_while_off_are_answered_recorded_and_do_nothing() 
     rig.wait(1.0)
     assert rig.status() == 1
     assert rig.position() == 0.0
+
+
+def test_mic_8_an_axis_whose_en_is_not_wired_moves_without_it() -> None:
+    rig = Rig(controller(AxisConfig(en_wired=0), AxisConfig()))
+    assert (rig.status(), rig.pins()["M1_EN"]) == (0, 0.0)
+    rig.set("POS_ABS", 100.0)
+    assert rig.status() == 3
+    rig.until(1, 4)
+    assert (rig.position(), rig.pins()["M1_EN"]) == (100.0, 0.0)
+    assert rig.events("drive-off") == []
+    rig.jog(1, +1, True)
+    rig.enable(1)
+    assert (rig.status(), rig.pins()["M1_EN"]) == (2, 1.0)  # EN changes its output alone
+    rig.wait(1.0)
+    rig.jog(1, +1, False)
+    rig.until(1, 1)
+    rig.set("POS_ABS", 0.0, 2)
+    assert rig.status(2) == 0
+
+
+@pytest.mark.parametrize("enabled", [False, True])
+def test_mic_9_drives_off_stops_an_axis_whose_en_is_not_wired(enabled: bool) -> None:
+    rig = Rig(controller(AxisConfig(en_wired=0)))
+    if enabled:
+        rig.enable(1)
+    rig.set("VEL_ABS", 100.0)
+    rig.wait(1.0)
+    rig.coil(EN, False)
+    assert (rig.status(), rig.velocity(), rig.pins()["M1_EN"]) == (0, 0.0, 0.0)
+    assert [edge.value for edge in rig.edges if edge.pin == "M1_EN"] == ([1.0, 0.0] if enabled else [])
 
 
 def test_mic_9_en_off_during_motion_ends_pulses_at_once_and_keeps_the_position(rig: Rig) -> None:
@@ -372,6 +402,31 @@ def test_mic_16_a_trigger_consumes_values_of_its_axes_and_reads_back_its_mask(ri
     assert (rig.position(1), rig.position(2)) == (10.0, 20.0)
 
 
+def test_mic_16_a_trigger_without_a_new_value_is_told(rig: Rig) -> None:
+    rig.enable(1, 2)
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.set("POS_REL", 10.0, 1)
+    rig.word("AXIS_POS_REL_TRIG", 3)
+    assert [(event.axis, event.text) for event in rig.events("trigger-empty")] == [
+        (2, "trigger of M2 without a new value of POS_REL")
+    ]
+    rig.until(1, 4)
+    rig.word("AXIS_POS_REL_TRIG", 1)
+    assert (rig.status(), [event.axis for event in rig.events("trigger-empty")]) == (4, [2, 1])
+
+
+def test_mic_16_values_are_kept_where_it_is_configured() -> None:
+    rig = Rig(controller(trigger_keeps=1))
+    rig.enable(1)
+    rig.word("AXIS_CTR_MODE", 1)
+    rig.set("POS_REL", 10.0)
+    for position in (10.0, 20.0):
+        rig.word("AXIS_POS_REL_TRIG", 3)
+        rig.until(1, 4)
+        assert rig.position() == position
+    assert {event.axis for event in rig.events("trigger-empty")} == {2}
+
+
 def test_mic_16_each_kind_has_its_own_stored_value_and_the_last_one_counts(rig: Rig) -> None:
     rig.word("AXIS_CTR_MODE", 1)
     rig.set("VEL_ABS", 100.0)
@@ -562,3 +617,95 @@ def test_the_count_is_the_sum_of_the_pulses_of_replaced_profiles(steps: list[tup
     look()
     count = axis.profile.count(rig.now)
     assert count == given_p + pulses_of(profile, since, rig.now)
+
+
+# ---------------------------------------------------------------------- MIC-40 to MIC-42
+
+
+@pytest.mark.parametrize("key", ["ACC", "DEC", "VMAX", "JOG_SPEED"])
+@pytest.mark.parametrize("command", [("POS_ABS", 5000.0), ("VEL_ABS", 900.0), ("HOME", 900.0), ("JOG", 1.0)])
+def test_mic_40_parameters_written_during_a_motion_act_on_the_next_command(key: str, command: tuple[str, float]) -> None:
+    undisturbed, rig = Rig(), Rig()
+    for one in (undisturbed, rig):
+        one.enable(1)
+        one.jog(1, +1, True) if command[0] == "JOG" else one.set(*command)
+        one.wait(0.3)
+    if key == "JOG_SPEED":
+        rig.write_words(rig.base + 17, *real_words(123.0))
+    else:
+        rig.set(key, 123.0)
+    for one in (undisturbed, rig):
+        one.set("POSLIM_R", 100_000.0)  # far away: the motion is planned anew and goes on as it was
+    for _ in range(40):
+        for one in (undisturbed, rig):
+            one.wait(0.2)
+        assert (rig.position(), rig.velocity(), rig.status()) == (
+            undisturbed.position(),
+            undisturbed.velocity(),
+            undisturbed.status(),
+        )
+    rig.coil(STOP, True)
+    rig.set("POS_ACT", 0.0)
+    if key == "JOG_SPEED":
+        rig.jog(1, +1, True)
+        rig.wait(1.0)
+        assert rig.velocity() == 123.0
+    else:
+        rig.set("POS_ABS", 2000.0)
+        rig.wait(0.5)
+        assert rig.velocity() == {"ACC": 61.5, "DEC": 500.0, "VMAX": 123.0}[key]
+
+
+def test_mic_40_a_soft_limit_written_during_a_motion_acts_at_once(rig: Rig) -> None:
+    rig.set("POS_ABS", 5000.0)
+    rig.wait(0.3)
+    rig.set("POSLIM_R", 2000.0)
+    rig.until(1, 10)
+    assert rig.position() == 2000.0
+
+
+def test_mic_41_the_sign_of_the_jog_speed_is_ignored(rig: Rig) -> None:
+    rig.write_words(rig.base + 17, *real_words(-250.0))
+    for direction in (+1, -1):
+        rig.jog(1, direction, True)
+        rig.wait(2.0)
+        assert rig.velocity() == direction * 250.0
+
+
+def test_mic_42_a_relative_move_across_the_end_of_dint_wraps() -> None:
+    rig = Rig(controller(AxisConfig(acc=1e9, dec=1e9, vel=64_000.0)))
+    rig.use_dint()
+    rig.enable(1)
+    rig.set("POS_ACT", 2**31 - 11)
+    assert rig.exception(rig.set_pdu("POS_ABS", 2**31 - 1)) == 0
+    rig.until(1, 4)
+    rig.set("POS_REL", 20)
+    rig.until(1, 4)
+    assert rig.position() == -(2**31) + 19
+    rig.set("POS_REL", -20)
+    rig.until(1, 4)
+    assert rig.position() == 2**31 - 1
+
+
+@pytest.mark.parametrize("value", [0.25, 0.5, 1.4, 3.0])
+@pytest.mark.parametrize("key", ["ACC", "DEC", "VMAX"])
+def test_mic_42_what_is_read_in_dint_mode_can_be_written_back(rig: Rig, key: str, value: float) -> None:
+    rig.set(key, value)
+    rig.use_dint()
+    shown = rig.get(key)
+    assert shown == max(1, round(value))
+    assert rig.exception(rig.set_pdu(key, shown)) == 0
+
+
+# ---------------------------------------------------------------------- soft limits
+
+
+def test_no_overrun_from_standstill(rig: Rig) -> None:
+    """An axis at rest beyond a limit has nothing to brake."""
+    rig.set("POS_ACT", 1000.0)
+    rig.set("POSLIM_R", 500.0)
+    for key, value in (("VEL_ABS", 100.0), ("POS_ABS", 2000.0), ("POS_ABS", 0.0)):
+        rig.set(key, value)
+    rig.until(1, 4)
+    assert rig.events("overrun") == []
+    assert rig.position() == 0.0

@@ -133,6 +133,15 @@ def test_mic_19_encoder_tolerance_and_times_have_keys_of_our_own() -> None:
     assert [finding.code for finding in findings] == ["C008", "C008", "C007"]
 
 
+def test_mic_8_and_mic_16_have_keys_of_our_own() -> None:
+    config = read_config(parse("[Axis2]\nEnWired=0\n[TRIGGER]\nKeep=1"))
+    assert [axis.en_wired for axis in config.axes] == [1, 1, 0, 1]
+    assert config.trigger_keeps == 1
+    assert read_config(parse("[TRIGGER]\nKeep=0")).trigger_keeps == 0
+    _, findings = examine_config(parse("[Axis0]\nEnWired=2\n[TRIGGER]\nKeep=yes"))
+    assert [finding.code for finding in findings] == ["C008", "C006"]
+
+
 def test_input_numbers_of_encoder_channels() -> None:
     shown = [encoder_channel(number) for number in (0, 7, 8, 9, 10, 11, 19, 20)]
     assert shown == [None, None, (0, "C"), (0, "B"), (0, "A"), (1, "C"), (3, "A"), None]

@@ -473,14 +473,41 @@ def test_mic_26_a_program_error_is_cleared_by_the_next_stop() -> None:
     assert (rig.word("M_STATUS"), rig.pins()["ERR"]) == (0, 0.0)
 
 
-def test_mic_31_program_control_0_acts_like_end_drives_and_outputs_off() -> None:
+def test_mic_31_program_control_0_without_a_program_does_nothing() -> None:
+    """A master that zeroes the control registers when it starts switches no machine off."""
     rig = Rig()
     rig.enable(1, 3)
     rig.set("VEL_ABS", 100.0)
     rig.coil(OUT + 2, True)
+    rig.write_words(rig.base, 0, 0, 0, 0, 0)
     rig.word("PROGRAM_CTRL", 0)
-    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [0, 0, 0, 0]
-    assert rig.bits(1, OUT, 8) == [0] * 8
+    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [2, 0, 1, 0]
+    assert rig.bits(1, OUT, 8) == [0, 0, 1, 0, 0, 0, 0, 0]
+
+
+def test_an_unexpected_failure_of_a_request_is_answered_and_told() -> None:
+    rig = Rig()
+
+    def fail(memory: bytes) -> None:
+        raise ZeroDivisionError("of the store")
+
+    rig.device.store = fail
+    assert rig.ask(coil_pdu(USER_REG_SAVE, True)) == b"\x85\x04"
+    (event,) = rig.events("internal-error")
+    assert event.text.startswith("request 05 08 35 ff 00 failed, please report it: ZeroDivisionError: of the store (")
+    assert rig.exception(read_pdu(3, rig.base, 1)) == 0
+
+
+@pytest.mark.parametrize(("firmware", "status"), [("1.70", 3), ("1.40", 0)])
+def test_wbc_13_an_error_of_the_modbus_master_is_shown_after_all_others(firmware: str, status: int) -> None:
+    rig = Rig(firmware=firmware)
+    rig.device.master_error = True
+    assert rig.word("M_STATUS") == status
+    rig.word("PROGRAM_CTRL", 1)
+    assert rig.word("M_STATUS") == (2 if status else 0)
+    rig.word("PROGRAM_CTRL", 0)
+    rig.device.master_error = False
+    assert rig.word("M_STATUS") == 0
 
 
 def test_a_position_error_is_shown_before_a_program_error() -> None:

@@ -273,6 +273,23 @@ def test_mic_19_a_correction_without_progress_gives_up_after_err_time() -> None:
     assert rig.status() == ERROR
 
 
+@pytest.mark.parametrize("command", [("POS_ABS", 2000.0), ("POS_ABS", 100.0), ("VEL_ABS", 500.0), ("VEL_ABS", -500.0)])
+def test_mic_19_at_status_5_the_coordinate_becomes_the_encoders(command: tuple[str, float]) -> None:
+    """Whether it comes after a move, during one, or in velocity mode."""
+    rig = encoder_rig()
+    rig.set("POS_ABS", 800.0)
+    rig.until(1, REACHED)
+    couple(rig, Coupling.BLOCKED)
+    rig.set(*command)
+    rig.until(1, ERROR)
+    assert (rig.position(), rig.get("ENC_XPOS")) == (800.0, 800.0)
+    couple(rig, Coupling.DRIVE)
+    before = motor(rig)
+    rig.set("POS_REL", 80.0)
+    rig.until(1, REACHED)
+    assert (rig.position(), rig.get("ENC_XPOS"), motor(rig) - before) == (880.0, 880.0, 80)
+
+
 def test_mic_19_tolerance_settling_and_giving_up_are_configured() -> None:
     rig = encoder_rig(enc_tolerance=0, enc_settle_ms=700, err_time_ms=300)
     rig.set("POS_ABS", 800.0)

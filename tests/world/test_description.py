@@ -287,3 +287,18 @@ def test_the_configuration_of_a_controller_takes_words_and_numbers() -> None:
 )
 def test_a_firmware_is_a_text_or_a_number(written: str, firmware: str) -> None:
     assert read_world("w", f"{TABLE}firmware = {written}\n").mic488[0].firmware == firmware
+
+
+@pytest.mark.parametrize(("keys", "keeps"), [("", 0), ("trigger_keeps = true\n", 1), ("trigger_keeps = false\n", 0)])
+def test_mic_8_and_mic_16_in_a_description(keys: str, keeps: int) -> None:
+    world = World.from_toml(TABLE + keys + "[mic488.M2]\nen_wired = 0\n")
+    config = world.mic488["table"].device.config
+    assert [axis.en_wired for axis in config.axes] == [1, 0, 1, 1]
+    assert config.trigger_keeps == keeps
+
+
+def test_mic_15_strict_timing_is_for_modbus() -> None:
+    strict = '[[line]]\nname = "bus"\ntiming = "strict"\n'
+    World.from_toml(strict + TABLE + 'line = "bus"\n')
+    told = wrong(strict + 'kind = "m1486"\n' + CHIP + 'line = "bus"\n')
+    assert "timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters" in told

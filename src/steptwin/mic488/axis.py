@@ -68,7 +68,9 @@ class Axis(Stateful):
         "config",
         "control",
         "dec_p",
+        "enabled",
         "encoder",
+        "fall_p",
         "gear",
         "homing",
         "host",
@@ -83,6 +85,7 @@ class Axis(Stateful):
         "profile",
         "ramp_p",
         "revision",
+        "rise_p",
         "speed_p",
         "status",
         "target_p",
@@ -119,6 +122,7 @@ class Axis(Stateful):
         """Direction the JOG bits have started: +1, −1 or 0."""
         self.pending: dict[str, float] = {}
         """Values (pulses) stored in TRIGGER mode, by kind: VEL_ABS, VEL_REL, POS_ABS, POS_REL (MIC-16)."""
+        self._take_ramps()
         self.target_p = 0
         self.speed_p = self.vmax_p
         """Motor position a position move goes to, and its cruise speed."""
@@ -128,6 +132,8 @@ class Axis(Stateful):
         self.on_path = False
         """On a line, circle or arc, which it runs together with another axis."""
         self.on_arc = False
+        self.enabled = False
+        """Whether the EN output is on."""
         self._rest(now, Status.OFF)
         motor = self.profile.count(now)
         self.offset_p = -motor
@@ -142,8 +148,9 @@ class Axis(Stateful):
     # ------------------------------------------------------------------ what it shows
 
     @property
-    def enabled(self) -> bool:
-        return self.status is not Status.OFF
+    def can_move(self) -> bool:
+        """Whether motion commands move it: with EN on, or where EN is not wired (MIC-8)."""
+        return self.enabled or not self.config.en_wired
 
     def coordinate_p(self, now: Nanos) -> int:
         """Position register in pulses (MIC-14: the pulse count), a DINT that wraps."""
@@ -192,18 +199,21 @@ class Axis(Stateful):
     # ------------------------------------------------------------------ commands: drive and stop
 
     def enable(self, now: Nanos) -> None:
-        if self.status is not Status.OFF:
+        if self.enabled:
             return
-        self._rest(now, Status.ON)
-        self.control.reference(self, now)
+        self.enabled = True
+        if self.status is Status.OFF:
+            self._rest(now, Status.ON)
+            self.control.reference(self, now)
         self.host.drive_output(self.number, True)
 
     def disable(self, now: Nanos) -> None:
-        """EN off: pulses stop at once, the position is kept, status 0 (MIC-9)."""
-        if self.status is Status.OFF:
-            return
-        self._rest(now, Status.OFF)
-        self.host.drive_output(self.number, False)
+        """EN off: pulses stop at once, the position is kept, status 0 (MIC-9), also where EN is not wired."""
+        if self.status is not Status.OFF:
+            self._rest(now, Status.OFF)
+        if self.enabled:
+            self.enabled = False
+            self.host.drive_output(self.number, False)
 
     def stop(self, now: Nanos) -> None:
         """Immediate stop without ramp, status 1 (MIC-10). A position error stays until the axis is told to move (MIC-26)."""
@@ -215,6 +225,7 @@ class Axis(Stateful):
         self.jogging = 0
         if not self.profile.moving(now):
             return
+        self._take_ramps()
         self.ramp_p = self.down_p if self.status is Status.POSITION else self.up_p
         self.velocity_p = 0.0
         self._forget()
@@ -237,11 +248,13 @@ class Axis(Stateful):
         self.homing.leg = Homing.NONE
         self.control.stop()
 
-    def ready(self, what: str) -> bool:
-        """Whether motion commands are heard: with EN off they are accepted and do nothing (MIC-8)."""
-        if self.status is Status.OFF:
+    def ready(self, what: str, now: Nanos) -> bool:
+        """Whether motion commands are executed: with EN off they are accepted and do nothing (MIC-8)."""
+        if not self.can_move:
             self.host.axis_event(self.number, "drive-off", f"{what} ignored: M{self.number} is not enabled")
             return False
+        if self.status is Status.OFF:
+            self.control.reference(self, now)
         return True
 
     # ------------------------------------------------------------------ commands: motion
@@ -251,17 +264,18 @@ class Axis(Stateful):
         self.move_by(coordinate_p - self.coordinate_p(now), now)
 
     def move_by(self, distance_p: int, now: Nanos) -> None:
-        if not self.ready("position command"):
+        if not self.ready("position command", now):
             return
         self._forget()
         self.target_p = self.profile.count(now) + distance_p
         self.speed_p = self._clamped(self.vmax_p)
+        self._take_ramps()
         self._go(now)
         self.control.watch(self, now)
 
     def move_velocity(self, velocity_p: float, now: Nanos) -> None:
         """Velocity mode: ACC for speeding up and slowing down; ramped to 0 it ends with status 1 (MIC-11)."""
-        if not self.ready("velocity command"):
+        if not self.ready("velocity command", now):
             return
         self._forget()
         self.run(self._clamped(velocity_p), Status.VELOCITY, now)
@@ -274,22 +288,18 @@ class Axis(Stateful):
         """A JOG bit was written: motion while it is on, ramp down when it goes off; of both bits the last write wins (MIC-18)."""
         if on:
             self.move_velocity(direction * abs(speed_p), now)
-            self.jogging = direction if self.enabled else 0
+            self.jogging = direction if self.can_move else 0
         elif self.jogging == direction:
             self.brake(now)
 
     def home(self, velocity_p: float, now: Nanos) -> None:
         """Home at ``velocity_p``, the sign chooses the switch: − KL, + KR. Ends at position 0 with status 4.
 
-        A velocity of 0 chooses no switch: the drive comes to rest as in velocity mode.
+        A velocity of 0 chooses no switch and does nothing (MIC-41).
         """
-        if not self.ready("homing"):
-            return
-        self._forget()
         velocity_p = self._clamped(velocity_p)
-        if velocity_p == 0.0:
-            self.run(0.0, Status.VELOCITY, now)
-        else:
+        if velocity_p != 0.0 and self.ready("homing", now):
+            self._forget()
             self.homing.start(self, velocity_p, now)
 
     def follow_path(self, profile: Profile, arrival: Status, *, corrected: bool) -> None:
@@ -332,6 +342,7 @@ class Axis(Stateful):
     def run(self, velocity_p: float, status: Status, now: Nanos) -> None:
         """Run at ``velocity_p`` (already clamped) with ramps of ACC; towards a soft limit the motion is planned to stop on it."""
         self.velocity_p = velocity_p
+        self._take_ramps()
         self.ramp_p = self.up_p
         self._steer(status, now)
 
@@ -340,6 +351,7 @@ class Axis(Stateful):
         count = self.profile.count(now)
         self.target_p = count + min(max(target_p - count, -STRIDE_P), STRIDE_P)
         self.speed_p = self.cruise_p
+        self._take_ramps()
         self._go(now)
 
     def creep(self, distance_p: int, now: Nanos) -> None:
@@ -377,6 +389,10 @@ class Axis(Stateful):
         elif self.status in (Status.VELOCITY, Status.HOMING):
             self._steer(self.status, now)
 
+    def _take_ramps(self) -> None:
+        """A motion keeps the ramps with which it was commanded (MIC-40)."""
+        self.rise_p, self.fall_p = self.up_p, self.down_p
+
     def _steer(self, status: Status, now: Nanos) -> None:
         """Towards ``velocity_p``, slowing down with ``ramp_p``."""
         state = self.state(now)
@@ -385,7 +401,7 @@ class Axis(Stateful):
         direction = 1 if velocity_p > 0.0 else -1
         edge = None if velocity_p == 0.0 else self.edge(direction)
         if edge is None:
-            self._begin(plan_velocity(state, velocity_p, self.up_p, ramp_p), status, Status.ON)
+            self._begin(plan_velocity(state, velocity_p, self.rise_p, ramp_p), status, Status.ON)
         else:
             profile = self._to_edge(state, edge, direction, ramp_p, abs(velocity_p))
             self._begin(profile, status, LIMIT[direction])
@@ -393,7 +409,7 @@ class Axis(Stateful):
     def _go(self, now: Nanos) -> None:
         """Position mode to ``target_p``, at most to the soft limit on the way."""
         state = self.state(now)
-        dec_p = self._braking(state, self.down_p)
+        dec_p = self._braking(state, self.fall_p)
         target, velocity = self.target_p, state.velocity
         rest = _rest_p(state, dec_p)
         for direction in (-1, 1):
@@ -403,13 +419,13 @@ class Axis(Stateful):
                 profile = self._to_edge(state, edge, direction, dec_p, self.speed_p)
                 self._begin(profile, Status.POSITION, LIMIT[direction])
                 return
-        self._begin(plan_position(state, target, self.up_p, dec_p, self.speed_p), Status.POSITION, Status.REACHED)
+        self._begin(plan_position(state, target, self.rise_p, dec_p, self.speed_p), Status.POSITION, Status.REACHED)
 
     def _to_edge(self, state: MotionState, edge: int, direction: int, dec_p: float, speed_p: float) -> Profile:
         """To rest on the soft limit ``edge``; behind it already, or too late to brake before it, come to rest there."""
         if (_rest_p(state, dec_p) - edge) * direction > NEAR_P:
             return plan_stop(state, dec_p)
-        return plan_position(state, edge, self.up_p, dec_p, speed_p)
+        return plan_position(state, edge, self.rise_p, dec_p, speed_p)
 
     def _braking(self, state: MotionState, dec_p: float) -> float:
         """``dec_p`` when it brakes before the soft limit ahead; else the hardest ramp, and an overrun if that is too late too."""
@@ -420,7 +436,7 @@ class Axis(Stateful):
         edge = self.edge(direction)
         if edge is None or (_rest_p(state, dec_p) - edge) * direction <= NEAR_P:
             return dec_p
-        hardest = max(self.up_p, self.down_p)
+        hardest = max(self.rise_p, self.fall_p)
         if (_rest_p(state, hardest) - edge) * direction > NEAR_P:
             self.host.axis_event(self.number, "overrun", f"M{self.number} cannot brake before its soft limit")
         return hardest
@@ -508,8 +524,10 @@ class Axis(Stateful):
         self.host.axis_event(self.number, "homed", f"M{self.number} is at its home position")
 
     def position_lost(self, now: Nanos) -> None:
-        """Position control gave up: stop, status 5 (MIC-19)."""
+        """Position control gave up: stop, status 5, and the coordinate becomes the encoder's (MIC-19)."""
         self._rest(now, Status.ERROR)
+        self.offset_p += round(self.control.true_p(self, now)) - self.profile.count(now)
+        self.control.reference(self, now)
         self.host.position_error(self.number)
 
 

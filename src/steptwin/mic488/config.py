@@ -72,6 +72,9 @@ class AxisConfig:
     """How long after a move the correction begins."""
     err_time_ms: int = 2000
     """How long a drive may be blocked, or a correction make no progress."""
+    # MIC-8: nor for this.
+    en_wired: int = 1
+    """Whether EN controls the drive; 0: motion commands move the axis with EN off too."""
 
     @property
     def unit_name(self) -> str:
@@ -130,6 +133,9 @@ class ControllerConfig:
     analog: tuple[AnalogConfig, ...] = (AnalogConfig(),) * ANALOG_INPUTS
     ports: tuple[PortConfig, ...] = (PortConfig(),) * PORTS
     program: ProgramConfig = ProgramConfig()
+    # MIC-16: the vendor's tool has no key for it.
+    trigger_keeps: int = 0
+    """Whether values stored in TRIGGER mode are kept when they are triggered."""
 
     @property
     def address(self) -> int:
@@ -206,6 +212,7 @@ AXIS_KEYS = (
     Key("EncTolerance", "enc_tolerance", Range(0, DINT_MAX), note="a whole number ≥ 0 in encoder counts"),
     Key("EncSettle", "enc_settle_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
     Key("ErrTime", "err_time_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
+    _choice("EnWired", "en_wired", "not wired", "wired"),
 )
 INPUT_KEYS = (
     _choice("Filter", "filter", "10 ms", "50 ms", "100 ms", "250 ms", "500 ms"),
@@ -215,6 +222,9 @@ INPUT_KEYS = (
 ANALOG_KEYS = (_number("LoVal", "lo_val"), _number("HiVal", "hi_val"))
 BAUD_KEY = Key("Baud", "baud", Range(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
 ADDRESS_KEY = Key("ID", "address", Range(1, 247))
+
+
+TRIGGER_KEYS = (_choice("Keep", "trigger_keeps", "a trigger uses values up", "values are kept"),)
 
 
 def _program_keys(generation: Firmware) -> tuple[Key, ...]:
@@ -242,6 +252,7 @@ def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tupl
             PortConfig(**reader.values("AIN1", (BAUD_KEY,))),
         ),
         program=ProgramConfig(**reader.values("WBC_PROGRAM", _program_keys(firmware(firmware_name)))),
+        **reader.values("TRIGGER", TRIGGER_KEYS),
     )
     reader.ignore("AIN1", ADDRESS_KEY)
     if not reader.has_known_section() and not any(finding.severity is Severity.ERROR for finding in file.findings):

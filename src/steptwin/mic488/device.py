@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from array import array
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -25,6 +26,7 @@ from steptwin.mic488.vision import Record
 from steptwin.state import Plain, Stateful
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable
+from steptwin.wire.pdu import DEVICE_FAILURE, exception_pdu
 
 MAX_EVENTS_PER_INSTANT = 10_000
 """More than this at one moment is a runaway, not a motion."""
@@ -134,6 +136,7 @@ class Mic488(Stateful):
         "inputs",
         "jog_speed_u",
         "lenient",
+        "master_error",
         "memory",
         "now",
         "on_event",
@@ -182,6 +185,8 @@ class Mic488(Stateful):
         self.axes = tuple(Axis(n, config.axes[n - 1], self) for n in range(1, AXES + 1))
         self.program = ProgramControl(self, programs, positions, statement_time)
         self.error_led = False
+        self.master_error = False
+        """Whether a slave of the controller's own Modbus master does not answer, which only a fault brings about (WBC-13)."""
         self._power_on()
 
     def _power_on(self) -> None:
@@ -307,9 +312,19 @@ class Mic488(Stateful):
     # ------------------------------------------------------------------ the Modbus face
 
     def execute(self, pdu: bytes, now: Nanos) -> bytes:
-        """Apply a request at ``now`` and answer it; a request that cannot be served is answered with its exception."""
+        """Apply a request at ``now`` and answer it; a request that cannot be served is answered with its exception.
+
+        One that fails unexpectedly is answered with exception 04, device failure, and an event.
+        """
         self.advance(now)
-        return self.slave.answer(self, pdu)
+        try:
+            return self.slave.answer(self, pdu)
+        except Exception as error:  # noqa: BLE001 - a master waits for an answer
+            at = traceback.extract_tb(error.__traceback__)[-1]
+            what = f"{type(error).__name__}: {error} ({at.filename}:{at.lineno})"
+            self.event("internal-error", f"request {pdu.hex(' ')} failed, please report it: {what}")
+            self.touch()
+            return exception_pdu(pdu[0] if pdu else 0, DEVICE_FAILURE)
 
     # ------------------------------------------------------------------ pins
 
@@ -429,10 +444,12 @@ class Mic488(Stateful):
     # ------------------------------------------------------------------ state that registers show
 
     def status(self) -> ControllerStatus:
-        """M_STATUS. A position error is shown before a program error."""
+        """M_STATUS. A position error is shown before a program error, and that before an error of the Modbus master."""
         if any(axis.status is Status.ERROR for axis in self.axes):
             return ControllerStatus.POSITION_ERROR
-        return ControllerStatus.PROGRAM_ERROR if self.program.error else ControllerStatus.OK
+        if self.program.error:
+            return ControllerStatus.PROGRAM_ERROR
+        return ControllerStatus.MASTER_ERROR if self.master_error else ControllerStatus.OK
 
     # ------------------------------------------------------------------ non-volatile user registers
 

@@ -73,7 +73,7 @@ class PositionControl(Stateful):
         if axis.config.pos_ctrl_mode != self.ENCFOLLOW or axis.homing.leg == Homing.TO_STOP:
             if axis.status is not Status.CORRECTION:
                 self.watch(axis, now)
-        elif axis.enabled and (self._following or not axis.profile.moving(now)):
+        elif axis.can_move and (self._following or not axis.profile.moving(now)):
             # What is turned during a commanded motion is not followed; see `rested`.
             self._following = True
             if self.tick_ns is None:

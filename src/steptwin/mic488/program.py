@@ -228,8 +228,10 @@ class ProgramControl(Stateful):
                 self._resume(now)
         elif value == PAUSED:
             self._pause(now)
-        elif value == STOPPED:
+        elif self.state is not STOPPED:
             self._end(now)
+        else:
+            self.error = False  # MIC-26, MIC-31
 
     def _start(self, now: Nanos) -> None:
         program, table = self.programs.get(self.program_bank), self.positions.get(self.position_bank)

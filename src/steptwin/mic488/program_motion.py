@@ -82,7 +82,7 @@ def row_motion(control: ProgramControl, keyword: str, index: float, now: Nanos) 
             if value_u is not None:
                 move(axis, "PABS", value_u, now)
         return
-    if any(axis.status is Status.OFF for axis in device.axes[:2]):
+    if not all(axis.can_move for axis in device.axes[:2]):
         device.event("drive-off", f"{keyword} ignored: M1 and M2 must be enabled")
         return
     try:

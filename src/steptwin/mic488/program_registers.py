@@ -13,6 +13,7 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.axis import MAX_SPEED_P, Axis
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
+from steptwin.mic488.status import Status
 from steptwin.motion.paths import ArcProfile
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.state import Stateful
@@ -158,7 +159,7 @@ def _motion_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
 
 
 def _set_drive(axis: Axis, on: float, now: Nanos) -> bool:
-    if axis.enabled is bool(on):
+    if axis.enabled is bool(on) and (on or axis.status is Status.OFF):
         return False
     if on:
         axis.enable(now)

@@ -35,15 +35,14 @@ DEVICE = AXES
 
 
 def compile_read(registers: RegisterMap, request: Read, data_type: DataType, *, lenient: bool) -> Callable[[Mic488], bytes]:
-    """The plan for functions 01, 02, 03, or exception 02 (MIC-3, MIC-5)."""
+    """The plan for functions 01, 02, 03, or exception 02 (MIC-3). Registers may begin and end inside a value (MIC-5)."""
     space = FUNCTION_SPACES[request.function]
     pieces = list(registers.pieces(space, request.address, request.count))
     for piece in pieces:
         register = piece.register
-        if register is not None and request.function in register.reads and piece.whole:
+        if register is not None and request.function in register.reads:
             continue
-        half = register is not None and not piece.whole
-        if not lenient or half or request.address + request.count > LAST_ADDRESS + 1:
+        if not lenient or request.address + request.count > LAST_ADDRESS + 1:
             raise ModbusException(request.function, ILLEGAL_DATA_ADDRESS)
     if space is Space.HOLDING:
         return _registers_plan(request, pieces, data_type)
@@ -93,14 +92,18 @@ def _registers_plan(request: Read, pieces: list[Piece], data_type: DataType) -> 
         else:
             sources.append(_source(register, data_type))
             layout += register.type.layout(data_type)
-    return _packing_plan(head, struct.Struct(layout), sources)
+    register = pieces[0].register
+    inside = 0 if register is None or register.type is Type.MEMORY else pieces[0].address - register.address
+    return _packing_plan(head, struct.Struct(layout), sources, slice(2 * inside, 2 * (inside + request.count)))
 
 
-def _packing_plan(head: bytes, layout: struct.Struct, sources: list[Source]) -> Callable[[Mic488], bytes]:
+def _packing_plan(head: bytes, layout: struct.Struct, sources: list[Source], asked: slice) -> Callable[[Mic488], bytes]:
+    """``asked`` are the bytes of the values that the request covers: it may begin and end inside one (MIC-5)."""
     pack = layout.pack
     formats = layout.format[1:]
 
     of_axes_only = all(place < DEVICE for place, _ in sources)
+    all_asked = asked == slice(0, layout.size)
 
     def plan(device: Mic488) -> bytes:
         now = device.now
@@ -110,7 +113,7 @@ def _packing_plan(head: bytes, layout: struct.Struct, sources: list[Source]) -> 
             packed = pack(*values)
         except (struct.error, OverflowError):
             packed = pack(*map(_saturated, formats, values))
-        return head + swap_bytes(packed)
+        return head + (swap_bytes(packed) if all_asked else swap_bytes(packed)[asked])
 
     return plan
 
@@ -192,9 +195,10 @@ _IN_UNITS: dict[str, Getter] = {
 _IN_PULSES: dict[str, Getter] = {
     "POS_ACT": lambda axis, now: axis.coordinate_p(now),
     "VEL_ACT": lambda axis, now: round(axis.profile.velocity(now)),
-    "ACC": lambda axis, now: round(axis.acc_p),
-    "DEC": lambda axis, now: round(axis.dec_p),
-    "VMAX": lambda axis, now: round(axis.vmax_p),
+    # MIC-42: what is read can be written back, and 0 may not be written (MIC-7).
+    "ACC": lambda axis, now: max(1, round(axis.acc_p)),
+    "DEC": lambda axis, now: max(1, round(axis.dec_p)),
+    "VMAX": lambda axis, now: max(1, round(axis.vmax_p)),
     "ENC_XPOS": lambda axis, now: round(axis.encoder.pulses(axis.encoder_counts(now))),
     "POSLIM_L": lambda axis, now: axis.limit_l_p,
     "POSLIM_R": lambda axis, now: axis.limit_r_p,

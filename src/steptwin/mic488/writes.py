@@ -291,13 +291,15 @@ def _jog_speed(device: Mic488, value: float, now: Nanos) -> None:
 
 def _trigger(kind: str) -> Action:
     def trigger(device: Mic488, value: float, now: Nanos) -> None:
-        """MIC-16: starts the chosen axes that have a stored value, and consumes it."""
+        """MIC-16: starts the chosen axes that have a stored value, and uses it up, unless values are kept."""
         device.triggered[kind] = int(value)
         if not device.trigger_mode:
             return
         for axis in axes_chosen(device, value):
-            stored = axis.pending.pop(kind, None)
-            if stored is not None:
+            stored = axis.pending.get(kind) if device.config.trigger_keeps else axis.pending.pop(kind, None)
+            if stored is None:
+                device.axis_event(axis.number, "trigger-empty", f"trigger of M{axis.number} without a new value of {kind}")
+            else:
                 _MOTIONS[kind](axis, stored, now)
 
     return trigger

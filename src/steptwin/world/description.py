@@ -208,5 +208,6 @@ def config_of(spec: Mic488Spec, base: ControllerConfig) -> ControllerConfig:
 
     axes = tuple(replace(axis, **spec.axes.get(n, {})) for n, axis in enumerate(base.axes, start=1))
     inputs = tuple(replace(one, **spec.inputs.get(n, {})) for n, one in enumerate(base.inputs, start=1))
-    config = replace(base, axes=axes, inputs=inputs)
+    keeps = base.trigger_keeps if spec.trigger_keeps is None else int(spec.trigger_keeps)
+    config = replace(base, axes=axes, inputs=inputs, trigger_keeps=keeps)
     return replace(config, program=replace(config.program, activate=1)) if spec.start else config

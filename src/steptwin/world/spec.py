@@ -37,6 +37,7 @@ class Mic488Spec:
     start: bool
     statement_time: Nanos | None
     lenient: bool
+    trigger_keeps: bool | None
     axes: Mapping[int, Mapping[str, Any]]
     """Changed attributes of `AxisConfig`, by axis from 1."""
     inputs: Mapping[int, Mapping[str, Any]]

@@ -100,6 +100,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(flag, "start", "whether the program starts at power-on", False),
         _optional(time_value, "statement_time", "what a statement of the program takes"),
         _optional(flag, "lenient", "holes of the register map read 0", False),
+        _optional(flag, "trigger_keeps", "whether a trigger keeps the values it uses; default that of its configuration, no"),
     ),
     "m1486": (
         Key("name", name_value, "how the rest of the file names it"),

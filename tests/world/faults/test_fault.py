@@ -17,7 +17,7 @@ WANTED = {
     Layer.BYTES: {"flip", "drop", "insert", "gap", "split", "noise"},
     Layer.FRAMES: {"delay", "no-answer", "late", "wrong-unit", "crc", "echo"},
     Layer.PROTOCOL: {"exception", "busy"},
-    Layer.PHYSICS: {"stall", "lost-steps", "stuck", "bounce", "slip", "supply-drop", "power-cut", "wear"},
+    Layer.PHYSICS: {"stall", "lost-steps", "master-error", "stuck", "bounce", "slip", "supply-drop", "power-cut", "wear"},
 }
 
 

@@ -134,6 +134,41 @@ def test_stuck_keeps_an_input_whatever_drives_it(level: int) -> None:
     assert rig.levels("IN3") == [(SECOND, level), (3 * SECOND, 1 - level)]
 
 
+def test_master_error_is_shown_as_m_status_3_and_goes_with_the_fault() -> None:
+    def m_status(rig: FaultRig) -> int:
+        return rig.ask(bytes.fromhex("03 27 19 00 01"))[4]
+
+    rig = FaultRig("master-error from_s=1 until_s=3", "master-error from_s=2 name=other")
+    shown = []
+    for _ in range(4):
+        shown.append(m_status(rig))
+        rig.wait(1.0)
+    assert shown == [0, 3, 3, 3]
+    rig.kernel.advance(rig.now)
+    rig.faults.remove("other", rig.now)
+    assert m_status(rig) == 0
+    assert rig.told() == [
+        "master-error: a slave of its Modbus master does not answer",
+        "other: a slave of its Modbus master does not answer",
+        "master-error: the slave of its Modbus master answers again",
+    ]
+
+
+def test_master_error_stays_when_the_controller_is_switched_off_and_on() -> None:
+    rig = FaultRig("master-error")
+    rig.wait(0.1)
+    rig.device.power_cycle(rig.now)
+    assert rig.ask(bytes.fromhex("03 27 19 00 01"))[4] == 3
+
+
+def test_what_shows_no_master_error_says_so() -> None:
+    kernel, faults = Kernel(), Faults()
+    kernel.add("old", Mic488(ControllerConfig(), "1.40"))
+    rig(kernel, "old", faults, Mic488Body(kernel.machines["old"], 1))  # type: ignore[arg-type]
+    with pytest.raises(Misuse, match=r"fault master-error: 'old' has firmware 1\.40, which has no M_STATUS: 1\.70 has"):
+        faults.add(read("master-error"))
+
+
 def test_stuck_without_a_value_keeps_what_is_there() -> None:
     rig = FaultRig()
     rig.pin("AIN1", 4.5)

@@ -27,6 +27,13 @@ class M1486Body:
     def keeps_memory(self) -> bool:
         return self._chip.variant.store is Store.EEPROM
 
+    @property
+    def no_master(self) -> str | None:
+        return "is an M1486, which is no Modbus master"
+
+    def show_master_error(self, shown: bool, now: Nanos) -> None:
+        """There is none."""
+
     def watch(self, owner: FaultyMachine) -> None:
         chip = self._chip
         store = chip.store

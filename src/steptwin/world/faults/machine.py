@@ -49,6 +49,15 @@ class Body(Protocol):
         """Whether it has a memory that survives power-off."""
         ...
 
+    @property
+    def no_master(self) -> str | None:
+        """Why it cannot show that a slave of its own does not answer; None when it can."""
+        ...
+
+    def show_master_error(self, shown: bool, now: Nanos) -> None:
+        """A slave of its own Modbus master does not answer; it does again."""
+        ...
+
     def watch(self, owner: FaultyMachine) -> None:
         """Have ``owner`` asked before requests are served (`FaultyMachine.refusal`) and memory is kept (`FaultyMachine.kept`)."""
         ...
@@ -75,6 +84,7 @@ class FaultyMachine(Stateful):
         "_bounces",
         "_cut",
         "_faults",
+        "_mute",
         "_off_until",
         "_on_edge",
         "_outer",
@@ -104,6 +114,8 @@ class FaultyMachine(Stateful):
         """Levels to come."""
         self._stuck: dict[str, str] = {}
         """Which input which fault holds."""
+        self._mute: list[str] = []
+        """Faults because of which a slave of the machine does not answer."""
         self._released: list[tuple[Nanos, str, int]] = []
         """When which fault lets which axis go."""
         self._off_until: Nanos | None = None
@@ -165,7 +177,10 @@ class FaultyMachine(Stateful):
         """The moment of a fault that comes by itself."""
         fault = active.fault
         if fault.kind.occasion is Occasion.ALWAYS:
-            self._stick(active, now)
+            if fault.kind.name == "stuck":
+                self._stick(active, now)
+            else:
+                self._fail_master(active, now)
             return
         if active.strikes(now):
             axis = fault.whole("axis") or 1
@@ -216,6 +231,8 @@ class FaultyMachine(Stateful):
             raise Misuse(f"fault slip: {self.name!r} is an M1486, which reads no encoder")
         if fault.kind.occasion is Occasion.SAVE and not self.body.keeps_memory:
             raise Misuse(f"fault {fault.kind.name}: {self.name!r} saves nothing: it has no memory that survives power-off")
+        if fault.kind.name == "master-error" and self.body.no_master is not None:
+            raise Misuse(f"fault master-error: {self.name!r} {self.body.no_master}")
         if fault.kind.parameter("pin") is None:
             return
         pin = self._pin(fault)
@@ -248,6 +265,9 @@ class FaultyMachine(Stateful):
                 del self._outer[pin]
         for released in [r for r in self._released if r[1] == active.name]:
             self._let_go(released, now)
+        if active.name in self._mute:
+            self._mute.remove(active.name)
+            self.body.show_master_error(bool(self._mute), now)
         self.changed()
 
     # ------------------------------------------------------------------ inputs
@@ -308,6 +328,19 @@ class FaultyMachine(Stateful):
             del self._stuck[pin]
             self._put(pin, self._outer[pin], now)
             self._tell(active, now, f"{pin} is free")
+
+    def _fail_master(self, active: Active, now: Nanos) -> None:
+        """The first moment sets the error, the second clears it."""
+        if active.struck == 0:
+            self._mute.append(active.name)
+            active.struck = 1
+            active.due = active.end
+            self._tell(active, now, "a slave of its Modbus master does not answer")
+        else:
+            self._mute.remove(active.name)
+            active.due = None
+            self._tell(active, now, "the slave of its Modbus master answers again")
+        self.body.show_master_error(bool(self._mute), now)
 
     # ------------------------------------------------------------------ what the body asks
 

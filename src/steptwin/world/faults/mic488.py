@@ -48,6 +48,17 @@ class Mic488Body:
     def keeps_memory(self) -> bool:
         return True
 
+    @property
+    def no_master(self) -> str | None:
+        if any(register.key == "M_STATUS" for register in self._device.registers):
+            return None
+        return f"has firmware {self._device.firmware.name}, which has no M_STATUS: 1.70 has"
+
+    def show_master_error(self, shown: bool, now: Nanos) -> None:
+        self._device.advance(now)
+        self._device.master_error = shown
+        self._device.touch()
+
     def watch(self, owner: FaultyMachine) -> None:
         device = self._device
         device.slave = _Watched(device.slave, self._unit, self._line, owner)

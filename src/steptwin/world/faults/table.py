@@ -351,6 +351,12 @@ KINDS = _checked(
             (_PIN, _number("value", "The level; volts on analog inputs.", 0, 10, otherwise="the one it has")),
         ),
         Kind(
+            "master-error",
+            Layer.PHYSICS,
+            Occasion.ALWAYS,
+            "A slave of the controller's own Modbus master does not answer: M_STATUS is 3 (MIC488, firmware 1.70).",
+        ),
+        Kind(
             "bounce",
             Layer.PHYSICS,
             Occasion.CHANGE,
@@ -399,5 +405,7 @@ def shared() -> list[tuple[Parameter, str]]:
             found.setdefault(parameter, []).append(layer.value)
     for occasion, when in _WHEN.items():
         for parameter in when:
-            found.setdefault(parameter, []).append(f"each {occasion.value}" if occasion is not Occasion.ALWAYS else "stuck")
+            found.setdefault(parameter, []).append(
+                f"each {occasion.value}" if occasion is not Occasion.ALWAYS else "stuck, master-error"
+            )
     return [(parameter, ", ".join(of)) for parameter, of in found.items()]
