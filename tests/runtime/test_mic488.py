@@ -18,7 +18,7 @@ from steptwin.runtime.demo import demo_config
 from steptwin.runtime.links import Port
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.mic488 import LineOptions, Mic488Line
-from steptwin.runtime.rfc2217 import over_network
+from steptwin.runtime.rfc2217 import TwinLine, over_network
 from steptwin.wire.rtu import UART_GAP_NS
 
 Ask = Callable[..., Any]
@@ -59,7 +59,7 @@ BYTE_LINKS: dict[str, Callable[[Mic488Line], Port]] = {
     "pty": lambda line: line.rtu_port("pty"),
     "serial": lambda line: line.rtu_port("serial", UART_GAP_NS, baud=38400),
     "RTU over TCP": lambda line: line.rtu_client_port(),
-    "RFC 2217": lambda line: over_network(line.rtu_client_port()),
+    "RFC 2217": lambda line: over_network(line.rtu_client_port(), TwinLine()),
 }
 
 

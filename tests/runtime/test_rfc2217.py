@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.runtime.links import TalkingPort
-from steptwin.runtime.rfc2217 import MOST_HELD, Rfc2217Port, Telnet, escaped, over_network
+from steptwin.runtime.rfc2217 import MOST_HELD, Rfc2217Port, Telnet, TwinLine, escaped, over_network
 
 WILL_COM_PORT, DO_COM_PORT = bytes((255, 251, 44)), bytes((255, 253, 44))
 
@@ -51,7 +51,7 @@ def test_data_passes_however_it_is_cut(data: bytes, size: int) -> None:
 
 @given(st.binary(max_size=40))
 def test_what_comes_back_is_escaped(data: bytes) -> None:
-    port = Rfc2217Port(Echo())
+    port = Rfc2217Port(Echo(), TwinLine())
     assert port.exchange(escaped(data), 0) == escaped(data)
     assert port.to_send(3) == [(3, b"\xff\xff")]
     assert port.deadline() == 7
@@ -116,18 +116,87 @@ def test_what_was_set_is_remembered() -> None:
 
 
 def test_a_command_that_does_not_end_breaks_the_connection() -> None:
-    port = Rfc2217Port(Echo())
+    port = Rfc2217Port(Echo(), TwinLine())
     port.exchange(bytes((255, 250)) + bytes(MOST_HELD), 0)
     assert port.broken == "a telnet command does not end"
 
 
 def test_a_port_that_speaks_unasked_still_does() -> None:
     inner = Talker()
-    port = over_network(inner)
+    port = over_network(inner, TwinLine())
     assert isinstance(port, TalkingPort)
-    assert not isinstance(over_network(Echo()), TalkingPort)
+    assert not isinstance(over_network(Echo(), TwinLine()), TalkingPort)
     told: list[int] = []
     port.on_output = lambda: told.append(1)
     assert inner.on_output is port.on_output
     port.close()
     assert port.broken == "closed"
+
+
+# ---------------------------------------------------------------------- settings that do not fit the line
+
+FITTING = (b"", sub(1, 0, 0, 0x12, 0xC0), sub(1, 0, 0, 0x12, 0xC0) + sub(4, 2), sub(1, 0, 0, 0x12, 0x40), sub(2, 8) + sub(3, 1))
+WRONG = {
+    sub(1, 0, 0, 0x25, 0x80): "9600 bit/s 8N1",
+    sub(1, 0, 0, 0x12, 0x00): "4608 bit/s 8N1",
+    sub(3, 3): "4800 bit/s 8E1",
+    sub(2, 7) + sub(3, 2) + sub(4, 2): "4800 bit/s 7O2",
+    sub(3, 4) + sub(4, 3): "4800 bit/s 8M1.5",
+    sub(3, 77): "4800 bit/s 8?1",
+}
+
+
+class Set:
+    """A network port at a line of 4800 bit/s, and its events."""
+
+    def __init__(self, settings: bytes, *, is_timed: bool, baud: int = 4800) -> None:
+        self.told: list[str] = []
+        self.baud = baud
+        self.port = over_network(Echo(), TwinLine(lambda: self.baud, is_timed, self.told.append))
+        self.port.exchange(settings, 0)
+
+
+@pytest.mark.parametrize("is_timed", [False, True])
+@pytest.mark.parametrize("settings", FITTING)
+def test_settings_that_fit_are_no_event(settings: bytes, is_timed: bool) -> None:
+    """Those of the line by default, rates within 3 %, and more stop bits than one."""
+    one = Set(settings, is_timed=is_timed)
+    assert one.port.exchange(b"u20\r", 0) == b"u20\r"
+    assert one.port.to_send(1) == [(1, b"\xff\xff")]
+    assert one.told == []
+
+
+@pytest.mark.parametrize(("settings", "words"), WRONG.items(), ids=WRONG.values())
+def test_wrong_settings_are_mute_where_line_timing_is_real(settings: bytes, words: str) -> None:
+    one = Set(settings, is_timed=True)
+    assert one.told == []  # rate and parity are set one after the other
+    assert one.port.exchange(b"u20\r", 0) == b""
+    assert one.port.to_send(1) == []
+    assert one.told == [f"network port: {words} is set by its client, the line has 4800 bit/s 8N1: no character gets through"]
+
+
+@pytest.mark.parametrize(("settings", "words"), WRONG.items(), ids=WRONG.values())
+def test_wrong_settings_are_an_event_where_line_timing_is_off(settings: bytes, words: str) -> None:
+    one = Set(settings, is_timed=False)
+    assert one.port.exchange(b"u20\r" + sub(1, 0, 0, 0, 0), 0).endswith(b"u20\r")
+    assert one.port.to_send(1) == [(1, b"\xff\xff")]
+    (told,) = one.told
+    assert told.startswith(f"network port: {words} is set by its client, the line has 4800 bit/s 8N1: served all the same")
+
+
+def test_settings_made_right_again_get_through() -> None:
+    one = Set(sub(3, 3), is_timed=True)
+    assert one.port.exchange(b"a", 0) == b""
+    assert one.port.exchange(sub(3, 1) + b"b", 0).endswith(b"b")
+    assert one.port.exchange(sub(3, 3) + b"c", 0).endswith(sub(103, 3))
+    assert len(one.told) == 2
+
+
+def test_a_line_that_changes_its_rate_leaves_its_clients_behind() -> None:
+    """The M1486 reads its BR pins anew with RST."""
+    one = Set(b"", is_timed=True)
+    one.baud = 300
+    assert one.port.exchange(b"a", 0) == b""
+    assert one.told == [
+        "network port: 4800 bit/s 8N1 is set by its client, the line has 300 bit/s 8N1: no character gets through"
+    ]

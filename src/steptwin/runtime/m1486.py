@@ -70,7 +70,7 @@ class M1486Line:
         self.faults = FaultDesk(self.kernel, {chip_name(a): partial(M1486Body, chip) for a, chip in self.chips.items()})
         self.faults.lines = {Line.CHARACTERS}
         self.chain = SerialChain(self.chips.values())
-        self.baud = next(iter(self.chips.values())).uart.baud
+        self.baud = self.present_baud()
         names = ", ".join(map(chip_name, self.chips))
         addresses = f"addresses {names}" if len(self.chips) > 1 else f"address {names}"
         self.title = f"{variant.title}, {options.interface.title}, {addresses}, {self.baud} bit/s"
@@ -86,6 +86,10 @@ class M1486Line:
     def client_port(self) -> Port:
         """A place on the line for one more client of raw TCP."""
         return self.port(f"tcp-{next(self._connections)}")
+
+    def present_baud(self) -> int:
+        """That of the first chip, bit/s: RST and power-up read the pins anew."""
+        return next(iter(self.chips.values())).uart.baud
 
     def log_characters(self, cell: Cell) -> Feed:
         """From now on what the chips send goes into the log of characters, until the feed is closed."""

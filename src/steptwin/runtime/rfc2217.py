@@ -1,12 +1,13 @@
 """A serial port over the network, the server's side (RFC 2217 over telnet, RFC 854). No I/O.
 
-`over_network` puts it around the port of a twin: whoever connects sees a serial port whose settings he may change. The twin
-hears every baud rate alike; what was set is remembered and told.
+`over_network` puts it around the port of a twin: the client sees a serial port whose settings it may change. Settings that do not
+fit the line of the twin (`TwinLine`) are an event; where line timing is real nothing gets through then, in either direction.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from steptwin.machine import Nanos
 from steptwin.runtime.links import Port, TalkingPort
@@ -39,17 +40,52 @@ _CONTROL_GROUPS = {
 }
 
 
-class Telnet:
-    """Takes a client's stream apart: data for the device, and what is to be answered about the port."""
+BAUD_TOLERANCE = 0.03
+"""Rates that differ by less than this are read without errors: a receiver samples the last bit of ten in its middle half."""
+_PARITIES = {1: "N", 2: "O", 3: "E", 4: "M", 5: "S"}
+_STOP_BITS = {1: "1", 2: "2", 3: "1.5"}
 
-    def __init__(self) -> None:
+
+def _unnoticed(text: str) -> None:
+    """For ports that are made without anybody to tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class TwinLine:
+    """The serial line of a twin, 8N1. ``baud`` gives its present rate in bit/s; ``notice`` is called with events for people."""
+
+    baud: Callable[[], int] = lambda: 38400
+    is_timed: bool = False
+    notice: Callable[[str], None] = _unnoticed
+
+
+class Telnet:
+    """Takes a client's stream apart: data for the device, and what is to be answered about the port.
+
+    ``baud``, ``data_bits``, ``parity`` (1 none, 2 odd, 3 even, 4 mark, 5 space) and ``stop_bits`` (1, 2, 3 for 1.5) are what the
+    client has set; before that those of the line.
+    """
+
+    def __init__(self, baud: int = 38400) -> None:
         self.broken: str | None = None
-        self.baud = 38400
+        self.baud = baud
         self._sizes = {DATA_SIZE: 8, PARITY: 1, STOP_SIZE: 1}
         self._control = {0: 1, 4: 6, 7: 8, 10: 11, 13: 14}
         self._ours: set[int] = set()
         self._theirs: set[int] = set()
         self._command = b""  # the beginning of a command, from its IAC on
+
+    @property
+    def settings(self) -> str:
+        """What the client has set, such as ``9600 bit/s 8E1``."""
+        sizes = self._sizes
+        parity, stop = sizes[PARITY], sizes[STOP_SIZE]
+        return f"{self.baud} bit/s {sizes[DATA_SIZE]}{_PARITIES.get(parity, '?')}{_STOP_BITS.get(stop, '?')}"
+
+    def fits(self, baud: int) -> bool:
+        """Whether characters of the client are read as they are by a line with 8N1 at ``baud``. Further stop bits are a pause."""
+        sizes = self._sizes
+        return abs(self.baud - baud) <= BAUD_TOLERANCE * baud and (sizes[DATA_SIZE], sizes[PARITY]) == (8, 1)
 
     def receive(self, data: bytes) -> tuple[bytes, bytes]:
         """The data in it, and the answer to the rest."""
@@ -150,9 +186,12 @@ def escaped(data: bytes) -> bytes:
 class Rfc2217Port:
     """The port of a twin behind a network serial port."""
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self, port: Port, line: TwinLine) -> None:
         self._port = port
-        self._telnet = Telnet()
+        self._line = line
+        self._telnet = Telnet(line.baud())
+        self._told = ""
+        """The settings of the last event."""
 
     @property
     def broken(self) -> str | None:
@@ -160,10 +199,25 @@ class Rfc2217Port:
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         plain, answers = self._telnet.receive(data)
-        return answers + escaped(self._port.exchange(plain, now)) if plain else answers
+        return answers + escaped(self._port.exchange(plain, now)) if plain and self._passes() else answers
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        return [(at, escaped(data)) for at, data in self._port.to_send(now)]
+        sent = self._port.to_send(now)
+        return [(at, escaped(data)) for at, data in sent] if sent and self._passes() else []
+
+    def _passes(self) -> bool:
+        """Whether characters get through with the present settings; an event when they do not fit."""
+        line, telnet = self._line, self._telnet
+        baud = line.baud()
+        if telnet.fits(baud):
+            self._told = ""
+            return True
+        told = f"{telnet.settings} is set by its client, the line has {baud} bit/s 8N1"
+        if told != self._told:
+            self._told = told
+            effect = "no character gets through" if line.is_timed else "served all the same, as line timing is off"
+            line.notice(f"network port: {told}: {effect}")
+        return not line.is_timed
 
     def deadline(self) -> Nanos | None:
         return self._port.deadline()
@@ -172,8 +226,8 @@ class Rfc2217Port:
 class TalkingRfc2217Port(Rfc2217Port):
     """The same of a port that speaks unasked."""
 
-    def __init__(self, port: TalkingPort) -> None:
-        super().__init__(port)
+    def __init__(self, port: TalkingPort, line: TwinLine) -> None:
+        super().__init__(port, line)
         self._talking = port
 
     @property
@@ -188,6 +242,6 @@ class TalkingRfc2217Port(Rfc2217Port):
         self._talking.close()
 
 
-def over_network(port: Port) -> Port:
-    """``port`` as a network serial port."""
-    return TalkingRfc2217Port(port) if isinstance(port, TalkingPort) else Rfc2217Port(port)
+def over_network(port: Port, line: TwinLine) -> Port:
+    """``port``, which is on ``line``, as a network serial port."""
+    return TalkingRfc2217Port(port, line) if isinstance(port, TalkingPort) else Rfc2217Port(port, line)

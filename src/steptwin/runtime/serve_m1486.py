@@ -21,7 +21,7 @@ from steptwin.runtime.lines import Face, Lines
 from steptwin.runtime.m1486 import ChainOptions, M1486Line, parse_addresses, parse_wire
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.output import Output
-from steptwin.runtime.rfc2217 import over_network
+from steptwin.runtime.rfc2217 import TwinLine, over_network
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, shows_live_view
 from steptwin.runtime.tcp import check_addresses, parse_address
@@ -128,7 +128,8 @@ async def _open(server: Server, line: M1486Line, options: M1486Options) -> None:
         await server.open_tcp("tcp", parse_address(options.tcp, listen_any=options.listen_any), CHARACTERS, line.client_port)
     if options.rfc2217 is not None:
         address = parse_address(options.rfc2217, listen_any=options.listen_any)
-        await server.open_tcp("rfc2217", address, CHARACTERS, lambda: over_network(line.client_port()))
+        wire = TwinLine(line.present_baud, options.line_timing == "real", server.notice)
+        await server.open_tcp("rfc2217", address, CHARACTERS, lambda: over_network(line.client_port(), wire))
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file, options.name)
 

@@ -22,7 +22,7 @@ from steptwin.runtime.lines import Face, Lines
 from steptwin.runtime.mic488 import LineOptions, Mic488Line, open_state
 from steptwin.runtime.output import Output
 from steptwin.runtime.programbanks import Banks, Findings, ProgramErrors, parse_banks, read_banks
-from steptwin.runtime.rfc2217 import over_network
+from steptwin.runtime.rfc2217 import TwinLine, over_network
 from steptwin.runtime.server import Server, clear_ready_file
 from steptwin.runtime.serving import check_line_timing, check_name, shows_live_view
 from steptwin.runtime.tcp import check_addresses, parse_address
@@ -199,7 +199,8 @@ async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: 
         await server.open_tcp("rtu-tcp", address, RTU_TCP, lambda: line.rtu_client_port(bursty))
     if options.rfc2217 is not None:
         address = parse_address(options.rfc2217, listen_any=options.listen_any)
-        await server.open_tcp("rfc2217", address, RFC2217, lambda: over_network(line.rtu_client_port(bursty)))
+        wire = TwinLine(lambda: baud, line.options.timing, server.notice)
+        await server.open_tcp("rfc2217", address, RFC2217, lambda: over_network(line.rtu_client_port(bursty), wire))
     if options.vision is not None:
         address = parse_address(options.vision, listen_any=options.listen_any)
         await server.open_tcp("vision", address, VISION, line.vision_port)
