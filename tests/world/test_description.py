@@ -302,3 +302,99 @@ def test_mic_15_strict_timing_is_for_modbus() -> None:
     World.from_toml(strict + TABLE + 'line = "bus"\n')
     told = wrong(strict + 'kind = "m1486"\n' + CHIP + 'line = "bus"\n')
     assert "timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters" in told
+
+
+MANY = """
+[[mic488]]
+name = "table"
+line = "bus"
+firmware = "9"
+unit = 300
+
+[[mic488]]
+name = "good"
+line = "buss"
+
+[[line]]
+name = "bus"
+
+[[axis]]
+name = "x"
+drive = "table.M1"
+start = "left"
+travel = [0, 5]
+switch = [{ to = "good.IN1", below = "low" }]
+
+[[axis]]
+name = "y"
+drive = "nobody.M1"
+
+[[button]]
+name = "go"
+to = "good.IN99"
+
+[[button]]
+name = "stop"
+to = "table.IN3"
+bounce = "soon"
+
+[[wire]]
+from = "good.OUT1"
+to = "table.IN1"
+
+[[source]]
+to = "good.AIN1"
+kind = "sinus"
+amplitude = 1
+
+[[fault]]
+kind = "crc"
+nth = 0
+
+[[fault]]
+kind = "stall"
+machine = "other"
+axis = 9
+
+[[fault]]
+kind = "stall"
+machine = "table"
+axis = 1
+
+[[event]]
+when = 5
+steps = [
+  { wait = "soon" },
+  { press = "go" },
+  { press = "stop" },
+  { write = { "table.M1_EN" = 1, "good.M1_ENN" = 1, "good.M2_ENN" = 1 } },
+  { until = "x.position > 1" },
+  { until = "good.M1.stat == 1" },
+  { clear_fault = "whatever" },
+]
+
+[[mic488]]
+name = "other"
+"""
+
+
+def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None:
+    lines = [line.removeprefix("w.toml:") for line in wrong(MANY).splitlines() if line.startswith("w.toml")]
+    assert [(line.split(":")[0], line.partition(": error ")[2][:60]) for line in lines] == [
+        ("5", "D003: [mic488]: firmware: '9': permitted are 1.23, 1.40, 1.7"),
+        ("6", "D003: [mic488]: unit: 300: permitted are whole numbers from "),
+        ("10", "D009: nothing is called 'buss'; did you mean 'bus'?"),
+        ("18", "D003: [axis]: start: 'left': expected a number"),
+        ("20", "D003: [axis.switch]: below: 'low': expected a number"),
+        ("24", "D009: nothing is called 'nobody'"),
+        ("26", "D009: good.IN99 is no digital input: digital inputs of 'good"),
+        ("33", "D003: [button]: bounce: 'soon' is no time: expected a number"),
+        ("41", "D003: [source]: kind: 'sinus': permitted are constant, ramp,"),
+        ("46", "D003: [[fault]] (crc): nth = 0: permitted are whole numbers "),
+        ("48", "D009: fault stall: axis = 9: permitted are 1 to 4"),
+        ("59", "D003: [event]: when: 5: expected a text"),
+        ("61", "D003: [event.steps]: wait: 'soon' is no time: expected a num"),
+        ("64", "D009: step 4: firmware 1.70 has no register named 'M1_ENN'; "),
+        ("64", "D009: step 4: firmware 1.70 has no register named 'M2_ENN'; "),
+        ("66", "D009: step 6: no signal 'good.M1.stat'; there are status, en"),
+    ]

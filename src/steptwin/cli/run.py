@@ -44,6 +44,7 @@ class Options:
     session: Path | None = None
     seed: int | None = None
     moment: Nanos | None = None
+    allow_outside: bool | None = None
 
     @property
     def until_idle(self) -> bool:
@@ -105,6 +106,9 @@ def run(
         str | None,
         typer.Option("--from", metavar="TIME", help="Session: go on from this moment, such as 2.5s. Default: its end."),
     ] = None,
+    allow_outside: Annotated[
+        bool, typer.Option("--allow-outside", help="World: permit files that do not lie beside its file or below.")
+    ] = False,
 ) -> None:
     """Run a program or a world in virtual time: its moves, waits, outputs and uploads with their times. A session goes on."""
     from steptwin.runtime.timedinputs import parse_duration, parse_inputs
@@ -143,12 +147,13 @@ def run(
         session=session,
         seed=seed,
         moment=None if begin is None else parse_duration(begin, "--from"),
+        allow_outside=allow_outside or None,
     )
     if not runner(file, options):
         raise typer.Exit(1)
 
 
-_WORLDS = ("fault", "session", "seed", "moment")
+_WORLDS = ("fault", "session", "seed", "moment", "allow_outside")
 """Options for worlds alone."""
 
 
@@ -212,6 +217,7 @@ def _run_world(file: Path, options: Options) -> bool:
         faults=tuple(options.fault or ()),
         trace=options.trace,
         session=options.session,
+        allow_outside=bool(options.allow_outside),
         as_json=options.as_json,
     )
     return run_world(wanted, typer.echo, lambda text: typer.echo(text, err=True))

@@ -41,6 +41,9 @@ def up(
     ] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    allow_outside: Annotated[
+        bool, typer.Option("--allow-outside", help="Permit files that do not lie beside the description or below.")
+    ] = False,
     keys: Annotated[bool, typer.Option("--keys", help="Show what a description may say.")] = False,
     form: Annotated[Format, typer.Option("--format", help="How to print the keys.")] = Format.TEXT,
 ) -> None:
@@ -68,6 +71,7 @@ def up(
         faults=tuple(fault or ()),
         ready_file=ready_file,
         listen_any=listen_any,
+        allow_outside=allow_outside,
     )
     if not run_up(options):
         raise typer.Exit(1)

@@ -36,6 +36,7 @@ def begin_world(
     seed: int | None = None,
     keep_trace: bool = True,
     keep_inputs: bool = True,
+    allow_outside: bool = False,
 ) -> World:
     """The world that a file describes; that of a session at its end, or at a ``moment`` with all that had come by then.
 
@@ -44,7 +45,7 @@ def begin_world(
     if not is_session(path):
         if moment is not None:
             raise Misuse(f"--from: {path} is no session; a description begins at 0 s")
-        world = World.load(path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        world = World.load(path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs, allow_outside=allow_outside)
         for warning in world.plan.warnings:
             warn(warning)
         return world

@@ -51,6 +51,8 @@ class WorldRun:
     faults: Sequence[str] = ()
     trace: Path | None = None
     session: Path | None = None
+    allow_outside: bool = False
+    """Files of the description may lie anywhere."""
     as_json: bool = False
 
 
@@ -60,7 +62,14 @@ def run(options: WorldRun, say: Say, warn: Say) -> bool:
     Raises `Misuse` for what cannot be run, and `KeyboardInterrupt` after one that Ctrl-C has ended, when everything is written.
     """
     keep_trace = options.trace is not None or not options.as_json
-    world = begin_world(options.world, warn, moment=options.moment, seed=options.seed, keep_trace=keep_trace)
+    world = begin_world(
+        options.world,
+        warn,
+        moment=options.moment,
+        seed=options.seed,
+        keep_trace=keep_trace,
+        allow_outside=options.allow_outside,
+    )
     began = world.now
     known = Counter(record.machine for record in filter(is_told, world.trace))
     _arrange(world, options)

@@ -48,6 +48,8 @@ class UpOptions:
     faults: Sequence[str] = ()
     ready_file: Path | None = None
     listen_any: bool = False
+    allow_outside: bool = False
+    """Files of the description may lie anywhere."""
 
 
 MOST_INPUTS = 200_000
@@ -185,6 +187,7 @@ def up(options: UpOptions) -> bool:
         seed=options.seed,
         keep_trace=options.trace is not None,
         keep_inputs=options.session is not None,
+        allow_outside=options.allow_outside,
     )
     _send_away(world)
     set_faults(world, options.faults)

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Self, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.files import read_bytes
+from steptwin.files import read_bytes, shown
 from steptwin.host.mic488.values import encoded, named
 from steptwin.m1486.chip import M1486
 from steptwin.machine import SECOND, Nanos
@@ -24,7 +24,7 @@ from steptwin.runtime.export.progress import Progress, silent
 from steptwin.runtime.textfiles import read_text
 from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegisters, encode_request
 from steptwin.world import script as do
-from steptwin.world.description import read_world
+from steptwin.world.description import describe, read_world
 from steptwin.world.durations import duration
 from steptwin.world.plant import Plant, PlantSnapshot, Values
 from steptwin.world.running import Script
@@ -76,15 +76,29 @@ class World(Plant):
     # ------------------------------------------------------------------ making one
 
     @classmethod
-    def load(cls, path: str | Path, *, seed: int | None = None, keep_trace: bool = True, keep_inputs: bool = True) -> Self:
-        """The world described by a TOML file; other files are looked for beside it. Raises `WorldError` (a `Misuse`).
+    def load(
+        cls,
+        path: str | Path,
+        *,
+        seed: int | None = None,
+        keep_trace: bool = True,
+        keep_inputs: bool = True,
+        allow_outside: bool = False,
+    ) -> Self:
+        """The world described by a TOML file. Raises `WorldError` (a `Misuse`).
 
         ``seed`` replaces that of the description. Without ``keep_trace`` and ``keep_inputs`` the memory of a long run does not
-        grow with what happens; it then has no trace and no session.
+        grow with what happens; it then has no trace and no session. Files the description names are read from its folder and
+        those below, with ``allow_outside`` from anywhere: their content becomes part of sessions.
         """
         place = Path(path)
         spec = _described(str(path), read_text(place).source.text, seed)
-        files = {name: read_bytes(place.parent / name) for name in spec.files()}
+        files: dict[str, bytes] = {}
+        for name, key in spec.files():
+            try:
+                files[name] = read_bytes(_beside(place.parent, name, allow_outside=allow_outside))
+            except Misuse as error:
+                spec.text.wrong(key, "D009", str(error))
         return cls(spec, files, keep_trace=keep_trace, keep_inputs=keep_inputs)
 
     @classmethod
@@ -194,8 +208,8 @@ class World(Plant):
 
 
 def _described(name: str, text: str, seed: int | None = None) -> WorldSpec:
-    """What a text describes. Raises `WorldError`, also for addresses that are none."""
-    spec = read_world(name, text, seed)
+    """What a text describes; what is wrong with it, addresses included, is in its ``text``."""
+    spec = describe(name, text, seed)
     addresses = [
         (line, key, given) for line in spec.lines for key in ("tcp", "rtu_tcp") if (given := getattr(line, key)) is not None
     ]
@@ -207,8 +221,20 @@ def _described(name: str, text: str, seed: int | None = None) -> WorldSpec:
                 parse_address(given, listen_any=True)
             except Misuse as error:
                 spec.text.wrong((*line.path, key), "D003", f"[line]: {key}: {error}")
-        spec.text.check()
     return spec
+
+
+def _beside(folder: Path, name: str, *, allow_outside: bool) -> Path:
+    """The path of a file named in a description in this folder. Raises `Misuse` for one elsewhere."""
+    path = folder / name
+    try:
+        if not allow_outside and not path.resolve().is_relative_to(folder.resolve()):
+            raise Misuse(f"{shown(Path(name))} does not lie beside the description or below: --allow-outside permits it")
+    except (OSError, RuntimeError) as error:  # links in a circle
+        raise Misuse(f"{shown(Path(name))}: {error}") from None
+    except ValueError as error:
+        raise error if isinstance(error, Misuse) else Misuse(f"{shown(Path(name))}: {error}") from None
+    return path
 
 
 def _steps(reaction: Reaction) -> tuple[do.Step, ...]:

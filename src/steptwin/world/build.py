@@ -33,12 +33,13 @@ from steptwin.world.faults import Faults
 from steptwin.world.kernel import Kernel, PinName, Wire
 from steptwin.world.lines import ChipLine, Line, ModbusLine, timing_of
 from steptwin.world.mechanics import EncoderBuild, Mechanism, RotorMark
-from steptwin.world.reader import Path
+from steptwin.world.names import Unknown
 from steptwin.world.scale import Scale, motor_of, scale_of
 from steptwin.world.sources import Constant, Sine, Table, Waveform
 from steptwin.world.sources import Source as AnalogSource
 from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, SourceSpec, SwitchSpec, WorldSpec
 from steptwin.world.terminals import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, check_terminal
+from steptwin.world.tomlplaces import Path
 from steptwin.world.trace import Record, Recorder
 
 DEFAULT_BAUD = 38400
@@ -97,9 +98,7 @@ class _Builder:
         self._circuits: dict[PinName, tuple[Circuit, str | None]] = {}
         """The contacts of inputs, and how they are said to be joined."""
         self._make_machines()
-        spec.text.check()
         self._make_kernels()
-        spec.text.check()
         self._make_lines()
         for axis in spec.axes:
             self._told(axis.path, partial(self._fit, axis))
@@ -111,16 +110,18 @@ class _Builder:
             self._told(button.path, partial(self._button, button))
         for source in spec.sources:
             self._told(source.path, partial(self._source, source))
-        spec.text.check()
-        for circuit, _ in self._circuits.values():
-            circuit.close()
+        if not spec.text.findings:
+            for circuit, _ in self._circuits.values():
+                circuit.close()
 
     def _told(self, path: Path, action: Callable[[], None]) -> None:
-        """Do something for the table at ``path``; what is wrong with it is told there."""
+        """Do something for the table at ``path``, unless something is wrong with it already; what is wrong is told there."""
+        if self.spec.text.is_wrong(path):
+            return
         try:
             action()
         except Misuse as error:
-            self.spec.text.wrong(path, "D009", str(error))
+            self.spec.text.wrong_reference(path, error)
 
     # ------------------------------------------------------------------ machines
 
@@ -210,11 +211,13 @@ class _Builder:
 
         order = {name: i for i, name in enumerate(joined)}
         for one, other, path in self._joints():
-            unknown = [name for name in (one, other) if name not in joined]
+            unknown = [name for name in dict.fromkeys((one, other)) if name not in joined]
+            for name in unknown:
+                if not self.spec.text.may_be_broken(name):
+                    near = self.spec.text.near(name, joined)
+                    there = ", ".join(joined) or "none"
+                    self.spec.text.wrong(path, "D009", f"nothing is called {name!r}{near}", f"there are {there}")
             if unknown:
-                near = self.spec.text.near(unknown[0], joined)
-                there = ", ".join(joined) or "none"
-                self.spec.text.wrong(path, "D009", f"nothing is called {unknown[0]!r}{near}", f"there are {there}")
                 continue
             first, second = sorted((root(one), root(other)), key=order.__getitem__)
             joined[second] = first
@@ -253,12 +256,12 @@ class _Builder:
             self._told(spec.path, partial(self._line, spec.name, spec.kind, spec.baud, spec.timing))
 
     def _line(self, name: str, kind: str, baud: int | None, timed: str) -> None:
-        plan, kernel = self.plan, self.plan.kernel_of[name]
+        plan, kernel = self.plan, self._kernel(name)
         chips: list[M1486] = []
         devices: dict[int, Mic488] = {}
         names: dict[int, str] = {}
         for spec in (*self.spec.mic488, *self.spec.m1486):
-            if spec.line != name:
+            if spec.line != name or spec.name not in plan.machines:
                 continue
             machine = plan.machines[spec.name]
             if isinstance(machine, M1486) is not (kind == "m1486"):
@@ -272,6 +275,9 @@ class _Builder:
                 raise Misuse(f"unit {unit} is both {names[unit]!r} and {spec.name!r}")
             devices[unit] = machine
             names[unit] = spec.name
+        if not names and self.spec.text.is_any_wrong("mic488", "m1486"):
+            self.spec.text.leave_out(name)
+            return
         if not names:
             raise Misuse("nothing is on this line")
         if kind == "modbus" and baud is not None and baud not in BAUDS:
@@ -301,7 +307,7 @@ class _Builder:
         taken = [axis.spec.name for axis in plan.axes.values() if axis.spec.drive == spec.drive]
         if taken:
             raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
-        kernel = plan.kernel_of[machine]
+        kernel = self._kernel(machine)
         scale = scale_of(spec, plan.machines[machine], number)
         pulses = scale.nearest
         build = Build(
@@ -365,7 +371,7 @@ class _Builder:
         if encoder.follows is not None:
             other = plan.axes.get(encoder.follows)
             if other is None:
-                raise Misuse(f"encoder: follows = {encoder.follows!r}: axes are {', '.join(plan.axes)}")
+                raise Unknown(encoder.follows, f"encoder: follows = {encoder.follows!r}: axes are {', '.join(plan.axes)}")
             turned = other
         counts: Fraction | None = None
         if encoder.counts_per_unit is not None:
@@ -393,8 +399,16 @@ class _Builder:
     def _machine(self, name: str) -> Mic488 | M1486:
         """What has pins and axes: no line."""
         found = self.plan.machines.get(name)
+        if found is None and name not in self.plan.kernel_of:
+            raise Unknown(name, f"nothing is called {name!r}")
         if found is None:
             raise Misuse(f"{name!r} is a line; machines are {', '.join(self.plan.machines)}")
+        return found
+
+    def _kernel(self, name: str) -> Kernel:
+        found = self.plan.kernel_of.get(name)
+        if found is None:
+            raise Unknown(name, f"nothing is called {name!r}")
         return found
 
     def _input(self, name: tuple[str, str], path: Path, kind: str = DIGITAL_INPUT) -> PinName:
@@ -429,12 +443,12 @@ class _Builder:
         return Chance(self.spec.seed, f"bounce {circuit.target}{number}")
 
     def _wire(self, source: tuple[str, str], target: tuple[str, str], path: Path, inverted: bool, delay: Nanos) -> None:
-        kernel = self.plan.kernel_of[source[0]]
+        kernel = self._kernel(source[0])
         check_terminal(self._machine(source[0]), PinName(*source), OUTPUT)
         kernel.connect(Wire(PinName(*source), self._input(target, path), inverted, delay))
 
     def _button(self, spec: ButtonSpec) -> None:
-        kernel = self.plan.kernel_of[spec.target[0]]
+        kernel = self._kernel(spec.target[0])
         circuit = self._circuit(kernel, spec.target, spec.path, spec.join)
         button = Button(
             circuit,
@@ -449,7 +463,7 @@ class _Builder:
         self.plan.buttons[spec.name] = button, kernel
 
     def _source(self, spec: SourceSpec) -> None:
-        kernel = self.plan.kernel_of[spec.target[0]]
+        kernel = self._kernel(spec.target[0])
         target = self._input(spec.target, spec.path, ANALOG_INPUT)
         kernel.add_part(AnalogSource(kernel, target, _waveform(spec), spec.period))
 

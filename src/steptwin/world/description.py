@@ -38,6 +38,14 @@ def read_world(name: str, text: str, seed: int | None = None) -> WorldSpec:
 
     ``seed`` takes the place of the text's; `Misuse` where it is no seed.
     """
+    spec = describe(name, text, seed)
+    spec.text.check()
+    return spec
+
+
+def describe(name: str, text: str, seed: int | None = None) -> WorldSpec:
+    """As `read_world`, but raises `WorldError` only for what is no TOML. What is wrong is in ``text`` of the result, for more may
+    be found when the world is built."""
     toml = Text(name, text)
     data = toml.data
     known = [key for key in KEYS if key not in ("switch", "encoder", "motor")]
@@ -60,7 +68,6 @@ def read_world(name: str, text: str, seed: int | None = None) -> WorldSpec:
         text=toml,
     )
     check_names(spec)
-    toml.check()
     return spec if seed is None else replace(spec, seed=_seed(seed))
 
 
@@ -144,7 +151,7 @@ def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec
         if "target" in values:
             check_sense(toml, place, "switch", switch)
             spec = SwitchSpec(**values, path=place)
-            if sum(x is not None for x in (spec.below, spec.above, spec.position)) != 1:
+            if sum(key in switch for key in ("below", "above", "position")) != 1:
                 toml.wrong(place, "D007", "a switch needs one of below, above and position")
             switches.append(spec)
     encoder = motor = None
@@ -158,20 +165,20 @@ def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec
             check_sense(toml, motor.path, "motor", table["motor"], table.get("kind", "linear"))
             if motor.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in motor.torque):
                 toml.wrong((*path, "motor", "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
-    if row["travel"] is not None and not row["travel"][0] <= row["start"] <= row["travel"][1]:
+    is_known = row["travel"] is not None and not toml.is_wrong((*path, "start"))
+    if is_known and not row["travel"][0] <= row["start"] <= row["travel"][1]:
         toml.wrong((*path, "start"), "D007", f"start = {row['start']:g} is outside travel = {list(row['travel'])}")
     return AxisSpec(**row, switches=tuple(switches), encoder=encoder, motor=motor)
 
 
 def _events(toml: Text) -> list[ScriptSpec]:
     found: list[ScriptSpec] = []
-    for row in _rows(toml, "event"):
+    for row, table in _tables(toml, "event"):
         path = row["path"]
-        if sum(row[key] is not None for key in ("at", "every", "when")) != 1:
-            toml.wrong(path, "D007", "an event needs one of at, every and when")
-            continue
         name = row.pop("name") or f"event-{path[1] + 1}"
         steps = read_steps(toml, (*path, STEPS.name), row.pop(STEPS.name))
+        if sum(key in table for key in ("at", "every", "when")) != 1:
+            toml.wrong(path, "D007", "an event needs one of at, every and when")
         found.append(ScriptSpec(name=name, repeat=1, steps=steps, **row))
     return found
 
@@ -184,8 +191,9 @@ def _scripts(toml: Text) -> list[ScriptSpec]:
     return found
 
 
-def _faults(toml: Text) -> list[Fault]:
-    found: list[Fault] = []
+def _faults(toml: Text) -> list[Fault | None]:
+    """One for each table; None for one that is wrong."""
+    found: list[Fault | None] = []
     tables = toml.data.get("fault", [])
     if not isinstance(tables, list):
         toml.wrong(("fault",), "D002", "[fault] stands once", "expected [[fault]], for there may be several")
@@ -193,12 +201,14 @@ def _faults(toml: Text) -> list[Fault]:
     for n, table in enumerate(tables):
         if not isinstance(table, Mapping):
             toml.wrong(("fault", n), "D002", f"[[fault]] is {table!r}", "expected a table")
+            found.append(None)
             continue
         try:
             found.append(parse(table, "[[fault]]"))
         except Misuse as error:
             key = re.search(r"(\w+) = ", str(error))
             toml.wrong(("fault", n, key[1] if key else ""), "D003", str(error))
+            found.append(None)
     return found
 
 

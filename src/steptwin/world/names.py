@@ -4,8 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from steptwin.errors import Misuse
+
 if TYPE_CHECKING:
     from steptwin.world.spec import WorldSpec
+
+
+class Unknown(Misuse):
+    """Nothing is called ``name``."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name = name
+        super().__init__(text)
+
 
 RESERVED = {
     "time": "a signal",

@@ -26,7 +26,8 @@ from steptwin.world.expression import Condition
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import Line
-from steptwin.world.references import check_scripts, check_step
+from steptwin.world.names import Unknown
+from steptwin.world.references import check_faults, check_scripts, check_step
 from steptwin.world.reports import Reports, ReportsState
 from steptwin.world.rigging import Rigging
 from steptwin.world.running import Script
@@ -106,12 +107,9 @@ class Plant:
         self._later: dict[str, Script] = {}
         """What is done later, and may be called off, by name."""
         self.rigging = Rigging(self.plan)
-        for n, fault in enumerate(spec.faults):
-            try:
-                self.put_fault(fault)
-            except Misuse as error:
-                spec.text.wrong(("fault", n), "D009", str(error))
+        check_faults(self, spec.faults)
         check_scripts(self, spec.scripts)
+        spec.text.check()
         for line in spec.scripts:
             self._begin(line)
 
@@ -147,10 +145,10 @@ class Plant:
         return kernel
 
     @staticmethod
-    def unknown(what: str, name: str, known: Iterable[str]) -> Misuse:
+    def unknown(what: str, name: str, known: Iterable[str]) -> Unknown:
         near = NearMiss().of(name, known)
         hint = "" if near is None else f" (did you mean {near!r}?)"
-        return Misuse(f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
+        return Unknown(name, f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
 
     def condition(self, text: str) -> Condition:
         """Raises `Misuse` for what is no condition, and for unknown signals."""

@@ -13,9 +13,12 @@ from steptwin.diagnostics import Diagnostic, Severity, Source, Span, in_order, r
 from steptwin.errors import Misuse
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.world.durations import duration
+from steptwin.world.names import Unknown
 from steptwin.world.tomlplaces import Path, TooMuch, find_places
 
 _MISSING: Any = object()
+NAMED = ("line", "mic488", "m1486", "axis", "button")
+"""Tables with names that others refer to."""
 MOST_FINDINGS = 100
 """After so many nobody reads on."""
 _LONGEST_MESSAGE = 400
@@ -40,6 +43,9 @@ class Text:
         self.findings: list[Diagnostic] = []
         self._near = NearMiss()
         self._spans: dict[Path, Span] = {}
+        self._wrong: set[Path] = set()
+        """What is wrong, as it was told; tables of these are not looked at further."""
+        self._left_out: set[str] = set()
         try:
             self._spans = find_places(text)
             self.data: dict[str, Any] = tomllib.loads(text)
@@ -82,11 +88,41 @@ class Text:
 
     def wrong(self, path: Path, code: str, message: str, hint: str | None = None) -> None:
         """Something is wrong with the value at ``path``, or with what holds it."""
+        self._wrong.add(path)
         if (*path, 0) in self._spans and path not in self._spans:
             path = *path, 0
         while path and path not in self._spans:
             path = path[:-1]
         self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint)
+
+    def wrong_reference(self, path: Path, error: Misuse, place: str = "") -> None:
+        """What is at ``path`` does not fit the rest. Not told where it only follows from something else that is wrong."""
+        if not (isinstance(error, Unknown) and self.may_be_broken(error.name)):
+            self.wrong(path, "D009", f"{place}{error}")
+
+    def is_wrong(self, path: Path) -> bool:
+        """Whether something is wrong with the value at ``path`` or in it."""
+        return any(wrong[: len(path)] == path for wrong in self._wrong)
+
+    def is_any_wrong(self, *kinds: str) -> bool:
+        """Whether something is wrong with tables of these kinds."""
+        return any(wrong[0] in kinds for wrong in self._wrong if wrong)
+
+    def leave_out(self, name: str) -> None:
+        """What has this name is not built because of what is wrong elsewhere."""
+        self._left_out.add(name)
+
+    def may_be_broken(self, name: str) -> bool:
+        """Whether this is the name of a table with something wrong in it, or may be, because such a table has none."""
+        if name in self._left_out:
+            return True
+        for kind, number in {(wrong[0], wrong[1]) for wrong in self._wrong if len(wrong) > 1}:
+            tables = self.data.get(str(kind))
+            table = tables[number] if isinstance(tables, list) and isinstance(number, int) else None
+            found = table.get("name") if isinstance(table, dict) else None
+            if found == name or (kind in NAMED and not isinstance(found, str)):
+                return True
+        return False
 
     def line(self, path: Path) -> int:
         """The line (from 1) of a value, or of what holds it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from steptwin.errors import Misuse
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
-    """Raises `WorldError` with every step that cannot be taken."""
+    """Tell the description's text every step that cannot be taken."""
     text = plant.spec.text
     set_somewhere = [step.fault for script in scripts for step in _all(script.steps) if isinstance(step, do.SetFault)]
     for script in scripts:
@@ -28,9 +29,25 @@ def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
             try:
                 plant.condition(script.when)
             except Misuse as error:
-                text.wrong((*script.path, "when"), "D009", str(error))
+                text.wrong_reference((*script.path, "when"), error)
         _check(plant, script.steps, (*script.path, STEPS.name), set_somewhere)
-    text.check()
+
+
+def check_faults(plant: Plant, faults: Sequence[Fault | None]) -> None:
+    """Set the faults of the description; tell its text those that cannot happen."""
+    for n, fault in enumerate(faults):
+        if fault is not None and not _is_on_something_broken(plant, fault):
+            try:
+                plant.put_fault(fault)
+            except Misuse as error:
+                plant.spec.text.wrong_reference(("fault", n), error)
+
+
+def _is_on_something_broken(plant: Plant, fault: Fault) -> bool:
+    """Whether a fault is, or may be, on a machine or line with something wrong in its own table."""
+    text = plant.spec.text
+    named = [str(name) for key in ("machine", "line") if (name := fault.get(key)) is not None]
+    return any(map(text.may_be_broken, named)) if named else text.is_any_wrong("mic488", "m1486", "line", "axis")
 
 
 def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
@@ -42,16 +59,31 @@ def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
 
 
 def _check(plant: Plant, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
+    text = plant.spec.text
     for n, step in enumerate(steps):
         if isinstance(step, do.Repeat):
             _check(plant, step.steps, (*path, n, STEPS.name), set_somewhere)
-        elif isinstance(step, do.ClearFault) and any(_may_be_called(fault, step.name) for fault in set_somewhere):
-            pass
-        else:
+            continue
+        if isinstance(step, do.ClearFault) and (
+            any(_may_be_called(fault, step.name) for fault in set_somewhere) or text.is_any_wrong("fault", "event", "script")
+        ):
+            continue
+        if isinstance(step, do.SetFault) and _is_on_something_broken(plant, step.fault):
+            continue
+        for part in _parts(step):
             try:
-                check_step(plant, step)
+                check_step(plant, part)
             except Misuse as error:
-                plant.spec.text.wrong((*path, n), "D009", f"step {n + 1}: {error}")
+                text.wrong_reference((*path, n), error, f"step {n + 1}: ")
+
+
+def _parts(step: do.Step) -> Sequence[do.Step]:
+    """A step in parts that can each be wrong."""
+    if isinstance(step, do.Set):
+        return [replace(step, levels=(level,)) for level in step.levels]
+    if isinstance(step, do.Write):
+        return [replace(step, values=(value,)) for value in step.values]
+    return [step]
 
 
 def _may_be_called(fault: Fault, name: str) -> bool:

@@ -67,7 +67,9 @@ class Rigging:
 def _wires(plan: Plan) -> Iterator[Wire]:
     """What requests come along: links of lines to the outside, described or there now; their scripts; without a line nothing."""
     for spec in plan.spec.lines:
-        line = plan.lines[spec.name]
+        line = plan.lines.get(spec.name)
+        if line is None:
+            continue  # something is wrong with it
         serial, network = line.fault_kinds[line.kinds[0]], line.fault_kinds[line.kinds[-1]]
         name = f"line {spec.name!r} carries"
         outside = [

@@ -401,6 +401,10 @@ STEPS = Key("steps", _list, "a list of steps, such as [{ press = 'start' }, { wa
 """Of events, scripts and ``repeat``; `read_steps` reads it."""
 
 
+_UNREAD = Note("")
+"""In the place of a step that is wrong, so that those after it keep theirs; such a script never runs."""
+
+
 def read_steps(text: Text, path: Path, value: object) -> tuple[Step, ...]:
     """Steps from a list of tables; what is wrong is told to ``text``."""
     if not isinstance(value, list):
@@ -409,8 +413,7 @@ def read_steps(text: Text, path: Path, value: object) -> tuple[Step, ...]:
     steps: list[Step] = []
     for n, table in enumerate(value):
         step = _step(text, (*path, n), n + 1, table)
-        if step is not None:
-            steps.append(step)
+        steps.append(_UNREAD if step is None else step)
     return tuple(steps)
 
 

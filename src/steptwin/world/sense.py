@@ -48,7 +48,10 @@ def check_sense(text: Text, path: Path, name: str, table: object, kind: object =
     for one, other in _EXCLUDE.get(name, ()):
         if one in table and other in table:
             text.wrong((*path, other), "D007", f"{one} and {other} exclude each other")
+    owner = path if kind is None else path[:-1]
     kind = table.get("kind", _USUAL.get(name)) if kind is None else kind
+    if text.is_wrong((*owner, "kind")):
+        return
     for key, kinds in _ONLY.get(name, {}).items():
         if key in table and kind not in kinds:
             text.wrong((*path, key), "D007", f"{key} means nothing for kind = {kind!r}", f"it is for {' and '.join(kinds)}")

@@ -18,6 +18,7 @@ from steptwin.world.build import Fitted, Plan
 from steptwin.world.course import profile_of
 from steptwin.world.kernel import Kernel
 from steptwin.world.lines import Line
+from steptwin.world.names import Unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ def find_signal(plan: Plan, name: str) -> SignalOf | Idle:
         known = [*plan.machines, *plan.axes, *plan.buttons, "time", "idle"]
         near = NearMiss().of(owner, known)
         hint = f" (did you mean {near!r}?)" if near else ""
-        raise Misuse(f"no signal {name!r}: nothing is called {owner!r}{hint}; there are {', '.join(known)}")
+        raise Unknown(owner, f"no signal {name!r}: nothing is called {owner!r}{hint}; there are {', '.join(known)}")
     kernel = plan.kernel_of[owner]
     pins = machine.pins()
     if rest.upper() in pins:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -191,11 +191,17 @@ class WorldSpec:
     buttons: tuple[ButtonSpec, ...]
     sources: tuple[SourceSpec, ...]
     scripts: tuple[ScriptSpec, ...]
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault | None, ...]
+    """None for one that is wrong, as ``text`` says."""
     text: Text
 
-    def files(self) -> list[str]:
-        """Names of the files the description refers to."""
-        named = [name for spec in self.mic488 for name in (spec.config, spec.program, spec.positions)]
-        named += [spec.program for spec in self.m1486]
-        return sorted({name for name in named if name is not None})
+    def files(self) -> Iterator[tuple[str, Path]]:
+        """Names of the files the description refers to, and the keys that do."""
+        for spec in self.mic488:
+            for key in ("config", "program", "positions"):
+                name = getattr(spec, key)
+                if name is not None:
+                    yield name, (*spec.path, key)
+        for chip in self.m1486:
+            if chip.program is not None:
+                yield chip.program, (*chip.path, "program")
