@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from textual.events import Key
@@ -281,3 +282,52 @@ def test_the_help_names_every_key_and_opens_and_closes(mic488: Mic488Rig) -> Non
         await screen.until(lambda: not shown.has_class("open"), "it is closed")
 
     run(mic488, scenario)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (100, 30)])
+def test_every_column_is_on_the_screen(mic488: Mic488Rig, size: tuple[int, int]) -> None:
+    async def main() -> None:
+        app = Monitor(session_at(mic488.device_address, 5.0))
+        app.animation_level = "none"
+        async with app.run_test(size=size) as pilot:
+            screen = Screen(app, pilot)
+            await screen.until(lambda: screen.cell("registers", "M1_ACC", "value") == "50", "registers are read")
+            for name in ("axes", "registers"):
+                table = app.query_one(f"#{name}", DataTable)
+                assert table.virtual_size.width <= table.scrollable_content_region.width, name
+                assert table.size.height >= 3, name
+
+    asyncio.run(main())
+
+
+def test_the_error_of_the_controller_is_shown(mic488: Mic488Rig) -> None:
+    async def scenario(screen: Screen) -> None:
+        assert "ERR" not in screen.text("head")
+        mic488.driver.set("PROGRAM_CTRL", 1)  # of an empty bank
+        await screen.until(lambda: "ERR: program error" in screen.text("head"), "the error is shown")
+
+    run(mic488, scenario)
+
+
+@pytest.mark.parametrize(("first", "then"), [("1.70", "1.23"), ("1.23", "1.70")])
+def test_a_controller_that_comes_back_with_another_firmware_is_shown_with_its_map(
+    serve: Callable[..., Any], first: str, then: str
+) -> None:
+    old = serve("--firmware", first)
+    address, position = {"1.23": "1020 0x03FC", "1.70": "10020 0x2724"}, "M1_POS_ACT"
+
+    async def main() -> None:
+        app = Monitor(session_at(f"tcp://127.0.0.1:{old.tcp_port}", 10.0))
+        app.animation_level = "none"
+        async with app.run_test(size=(110, 40)) as pilot:
+            screen = Screen(app, pilot)
+            await screen.until(lambda: f"firmware {first}" in screen.text("head"), "the first controller is found")
+            await screen.until(lambda: screen.cell("registers", position, "address") == address[first], "its map is shown")
+            await asyncio.to_thread(old.end)
+            await screen.until(lambda: "NOT CONNECTED" in screen.text("head"), "its end is told")
+            await asyncio.to_thread(serve, "--firmware", then, "--tcp", f"127.0.0.1:{old.tcp_port}")
+            await screen.until(lambda: f"firmware {then}" in screen.text("head"), "the other one is found")
+            await screen.until(lambda: screen.cell("registers", position, "address") == address[then], "its map is shown")
+            await screen.until(lambda: screen.cell("registers", position, "value") == "0", "and its registers")
+
+    asyncio.run(main())

@@ -17,7 +17,7 @@ from steptwin.host.mic488.frames import Heard
 from steptwin.host.mic488.values import value_of
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.registermap import DataType, Register, Type
-from steptwin.mic488.registers import AXIS_STATUS_TEXTS
+from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
 from steptwin.monitor.groups import USER, USER_SHOWN, groups_of, permitted, shown
 from steptwin.monitor.session import Picture, Session
 from steptwin.wire.slave import Direction
@@ -126,7 +126,7 @@ class Monitor(App[None]):
         for number in range(1, 5):
             axes.add_row(f"M{number}", NOTHING, NOTHING, "", "", "", key=str(number))
         registers = self.query_one("#registers", DataTable)
-        for column, width in (("register", 24), ("value", 26), ("unit", 8), ("address", 16), ("writing it", 24)):
+        for column, width in (("register", 19), ("value", 22), ("unit", 9), ("address", 12), ("write", 6)):
             registers.add_column(column, key=column, width=width)
         self._fill_groups()
         axes.focus()
@@ -159,8 +159,10 @@ class Monitor(App[None]):
             head.update(f"NOT CONNECTED, trying again: {picture.trouble}")
         elif picture.status is not None:
             program = PROGRAM_STATES[picture.status.program] if picture.status.program < 3 else "?"
+            error = CONTROLLER_STATUS_TEXTS.get(picture.status.controller or 0, "unknown")
             head.update(
                 f"{self.session.place}   firmware {self._firmware}   program {program}   jog ← → {self._jog_velocity:g} u/s"
+                + (f"   ERR: {error}" if picture.status.controller else "")
             )
         self._show_axes(picture)
         self._show_io(picture)
@@ -223,7 +225,7 @@ class Monitor(App[None]):
         rows = self._rows()
         for name, register in rows:
             address = register.address + (int(name[name.index("[") + 1 : -1]) if register.type is Type.MEMORY else 0)
-            writing = register.effect.value if register.accepts else "read only"
+            writing = register.effect.value if register.accepts else NOTHING
             table.add_row(name, NOTHING, "", f"{address} 0x{address:04X}", writing, key=name)
         self.session.watch([name for name, register in rows if register.reads])
 
@@ -344,15 +346,16 @@ class Monitor(App[None]):
     def action_ask_motion(self, kind: str) -> None:
         axis = self.session.mic.axis(self._axis)
         number = self._axis
-        begin, title = {
-            "move": (axis.move_to, f"M{number}: move to position, {axis.unit}"),
-            "by": (axis.move_by, f"M{number}: move by distance, {axis.unit}"),
-            "home": (axis.home, f"M{number}: home at velocity, {axis.unit}/s, negative towards KL, positive towards KR"),
+        unit = axis.unit if kind != "home" else f"{axis.unit}/s"
+        begin, title, doing = {
+            "move": (axis.move_to, f"M{number}: move to position, {unit}", "moving to"),
+            "by": (axis.move_by, f"M{number}: move by distance, {unit}", "moving by"),
+            "home": (axis.home, f"M{number}: home at velocity, {unit}, negative towards KL, positive towards KR", "homing at"),
         }[kind]
 
         async def move(typed: str) -> None:
             await begin(_number(typed))
-            self._say(f"M{number} has been told")
+            self._say(f"M{number}: {doing} {typed.strip()} {unit}")
 
         self._ask(title, move)
 

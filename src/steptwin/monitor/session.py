@@ -91,6 +91,8 @@ class Session:
             if not self._is_open:
                 await self.mic.open()
                 self._is_open = True
+            elif not self.is_connected:
+                await self.mic.find_firmware()
             status = await self.mic.status()
             values = await self.mic.get_shown(*self.watched) if self.watched else {}
         except SteptwinError as error:

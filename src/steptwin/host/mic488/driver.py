@@ -123,8 +123,7 @@ class AsyncMic488:
         """Open the line, find out the firmware, see to DATA_TYPE. Raises `LineFailure` or `NoMic488`."""
         await self.line.open()
         try:
-            if self._firmware is None:
-                self._unit.use(register_map(await identify.firmware_of(self.line, self.unit, self._unit.timeout_ns)))
+            await self.find_firmware()
             control = await self._unit.control()
             if control.data_type is not DataType.REAL and not self._observe:
                 _log.warning("%s: unit %d: DATA_TYPE was DINT and is set to REAL", self.line.place, self.unit)
@@ -133,6 +132,14 @@ class AsyncMic488:
         except BaseException:
             await self.close()
             raise
+
+    async def find_firmware(self) -> None:
+        """Find out the firmware again, unless it was given: another controller may have taken the place of the one before.
+
+        Raises `LineFailure` or `NoMic488`.
+        """
+        if self._firmware is None:
+            self._unit.use(register_map(await identify.firmware_of(self.line, self.unit, self._unit.timeout_ns)))
 
     async def close(self) -> None:
         """Close the line, unless it is shared. Axes are not stopped by it."""
