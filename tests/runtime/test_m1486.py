@@ -492,7 +492,7 @@ def test_each_chip_has_its_own_eeprom(tmp_path: Path) -> None:
         served = M1486Line(ChainOptions(variant=variant("E2"), addresses=[1, 10]), state=state)
         type_to(served, "xA", *FILE)
         later(served, 5)
-    assert {path.name for path in tmp_path.iterdir()} - {"owner.lock"} == {"m1486-A-eeprom.0"}
+    assert {path.name for path in tmp_path.iterdir()} - {"owner.lock"} == {"m1486-A-eeprom.image"}
 
 
 def test_what_another_type_has_stored_is_said(tmp_path: Path) -> None:

@@ -86,71 +86,79 @@ def test_another_process_owns_it_until_it_is_killed(tmp_path: Path) -> None:
             assert state.load("unit1") is not None
 
 
+def test_nothing_but_images_stays_when_the_owner_ends(tmp_path: Path) -> None:
+    with StateDirectory(tmp_path) as state:
+        assert (tmp_path / "owner.lock").exists()
+        state.save("unit1", image(1))
+        state.save("unit1", image(2))
+    assert {path.name for path in tmp_path.iterdir()} == {"unit1.image"}
+
+
 # ---------------------------------------------------------------------- damage
 
 
-def _slots(path: Path, name: str = "unit1") -> list[Path]:
-    return [path / f"{name}.0", path / f"{name}.1"]
-
-
-def _saved_twice(path: Path) -> Path:
-    """The slot that holds the newer of two generations."""
+def _saved(path: Path) -> Path:
+    """The file of an image."""
     with StateDirectory(path) as state:
         state.save("unit1", image(1))
-        before = {slot: slot.stat().st_ino for slot in _slots(path) if slot.exists()}
         state.save("unit1", image(2))
-    (newer,) = [slot for slot in _slots(path) if slot not in before]
-    return newer
+    return path / "unit1.image"
 
 
-def test_a_slot_torn_at_any_length_gives_the_generation_before(tmp_path: Path) -> None:
-    newer = _saved_twice(tmp_path)
-    whole = newer.read_bytes()
+def test_an_image_of_another_length_is_damaged(tmp_path: Path) -> None:
+    file = _saved(tmp_path)
+    whole = file.read_bytes()
     with StateDirectory(tmp_path) as state:
         for length in [*range(40), *range(40, len(whole), 97), len(whole) - 1]:
-            newer.write_bytes(whole[:length])
-            assert state.load("unit1") == image(1), length
-        newer.write_bytes(whole + b"\0")
-        assert state.load("unit1") == image(1)
-        newer.write_bytes(whole)
+            file.write_bytes(whole[:length])
+            with pytest.raises(StateFailure, match=r"unit1\.image is damaged; remove it to start anew"):
+                state.load("unit1")
+        file.write_bytes(whole + b"\0")
+        with pytest.raises(StateFailure, match="is damaged"):
+            state.load("unit1")
+        file.write_bytes(whole)
         assert state.load("unit1") == image(2)
 
 
-def test_any_flipped_bit_gives_the_generation_before(tmp_path: Path) -> None:
-    newer = _saved_twice(tmp_path)
-    whole = newer.read_bytes()
+def test_any_flipped_bit_is_found(tmp_path: Path) -> None:
+    file = _saved(tmp_path)
+    whole = file.read_bytes()
     with StateDirectory(tmp_path) as state:
         for place in [*range(24), *range(24, len(whole), 61)]:
-            newer.write_bytes(whole[:place] + bytes([whole[place] ^ 0x10]) + whole[place + 1 :])
-            assert state.load("unit1") == image(1), place
+            file.write_bytes(whole[:place] + bytes([whole[place] ^ 0x10]) + whole[place + 1 :])
+            with pytest.raises(StateFailure, match=r"is damaged|has format"):
+                state.load("unit1")
 
 
-def test_a_save_after_damage_does_not_touch_the_good_generation(tmp_path: Path) -> None:
-    newer = _saved_twice(tmp_path)
-    (older,) = [slot for slot in _slots(tmp_path) if slot != newer]
-    newer.write_bytes(b"torn")
-    kept = older.read_bytes()
+def test_a_damaged_image_can_be_saved_anew(tmp_path: Path) -> None:
+    _saved(tmp_path).write_bytes(b"torn")
     with StateDirectory(tmp_path) as state:
         state.save("unit1", image(3))
         assert state.load("unit1") == image(3)
-    assert older.read_bytes() == kept
 
 
-def test_a_first_save_that_was_torn_is_no_save(tmp_path: Path) -> None:
-    (tmp_path / "unit1.0").write_bytes(b"STW1")
+def test_an_image_of_a_newer_format_is_refused_and_left_alone(tmp_path: Path) -> None:
+    file = _saved(tmp_path)
+    newer = b"STW3" + file.read_bytes()[4:]
+    file.write_bytes(newer)
     with StateDirectory(tmp_path) as state:
-        assert state.load("unit1") is None
+        for act in (lambda: state.load("unit1"), lambda: state.save("unit1", image(3))):
+            with pytest.raises(StateFailure, match="has format STW3, this version of steptwin reads and writes STW2"):
+                act()
+    assert file.read_bytes() == newer
 
 
-def test_two_damaged_generations_are_said_and_can_be_overwritten(tmp_path: Path) -> None:
-    _saved_twice(tmp_path)
-    for slot in _slots(tmp_path):
-        slot.write_bytes(b"x" * 30)
-    with StateDirectory(tmp_path) as state:
-        with pytest.raises(StateFailure, match=r"both generations of unit1 .* \(unit1\.0 is damaged, unit1\.1 is damaged\)"):
-            state.load("unit1")
-        state.save("unit1", image(9))
-        assert state.load("unit1") == image(9)
+@pytest.mark.parametrize("slot", [0, 1])
+def test_an_image_of_the_earlier_format_is_not_passed_over(tmp_path: Path, slot: int) -> None:
+    (tmp_path / f"unit1.{slot}").write_bytes(b"STW1" + bytes(100))
+    with StateDirectory(tmp_path) as state, pytest.raises(StateFailure, match=rf"earlier format \(unit1\.{slot}\)"):
+        state.load("unit1")
+
+
+def test_what_is_no_file_cannot_be_read(tmp_path: Path) -> None:
+    (tmp_path / "unit1.image").mkdir()
+    with StateDirectory(tmp_path) as state, pytest.raises(StateFailure, match=r"unit1\.image"):
+        state.load("unit1")
 
 
 # ---------------------------------------------------------------------- power loss: the calls that reach the disk fail one by one
@@ -215,8 +223,7 @@ def test_the_file_reaches_the_disk_before_its_name_and_the_name_before_save_retu
         state.save("unit1", b"1")
         state.save("unit1", b"2")
         state.save("unit1", b"3")
-    one = ["fsync unit1.tmp", "rename unit1.tmp unit1.0", "fsync state"]
-    assert order == [*one, *[step.replace("unit1.0", "unit1.1") for step in one], *one]
+    assert order == 3 * ["fsync unit1.tmp", "rename unit1.tmp unit1.image", "fsync state"]
 
 
 def test_a_full_disk_is_said_and_keeps_the_old_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,14 +31,12 @@ def test_the_second_is_told_who_the_first_is(tmp_path: Path) -> None:
     Ownership(path).release()
 
 
-def test_release_removes_the_file_unless_told_not_to(tmp_path: Path) -> None:
+def test_release_removes_the_file(tmp_path: Path) -> None:
     path = tmp_path / "lock"
     owned = Ownership(path)
-    owned.release(remove=False)
     owned.release()
-    assert path.exists()
-    Ownership(path).release()
     assert not path.exists()
+    owned.release()
 
 
 def test_a_killed_owner_has_left_it_behind(tmp_path: Path) -> None:

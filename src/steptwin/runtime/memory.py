@@ -1,11 +1,10 @@
-"""A directory that keeps what survives power-off: non-volatile images, each in two generations, with one owner at a time.
+"""A directory that keeps what survives power-off: non-volatile images, with one owner at a time.
 
-An image is saved into the slot that does not hold its newest good generation: temporary file, fsync, rename onto the slot,
-fsync of the directory. The newest generation stays untouched meanwhile, so at any moment — ``kill -9``, power loss, full disk —
-the old or the new content is there. A header with generation, length and CRC-32 tells a torn slot from a good one.
+An image is one file. A save writes a temporary file, syncs it, renames it onto the image and syncs the directory: at any moment —
+``kill -9``, power loss, full disk — the old or the new content is there whole. A header with format, length and CRC-32 tells
+damage, which is an error and never older content passed off as the newest.
 
-Layout: ``<name>.0``, ``<name>.1`` (slots), ``<name>.tmp`` (a save in progress), ``owner.lock``. POSIX only (flock, fsync of
-directories).
+Layout: ``<name>.image``, ``<name>.tmp`` (a save in progress), ``owner.lock``. POSIX only (flock, fsync of directories).
 """
 
 from __future__ import annotations
@@ -17,15 +16,17 @@ import struct
 import zlib
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Self
 
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import read_bytes
 from steptwin.runtime.ownership import InUse, Ownership
 
-_MAGIC = b"STW1"
-_HEADER = struct.Struct("<4sQII")
-"""Magic, generation, length of the data, CRC-32 of generation, length and data."""
+_FAMILY = b"STW"
+_MAGIC = _FAMILY + b"2"
+"""Family and number of the format."""
+_HEADER = struct.Struct("<4sII")
+"""Magic, length of the data, CRC-32 of length and data."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 _LOCK = "owner.lock"
 
@@ -35,13 +36,7 @@ class StateInUse(Misuse):
 
 
 class StateFailure(SteptwinError, OSError):
-    """The state directory cannot be read or written, or both generations of an image are damaged."""
-
-
-class _Generation(NamedTuple):
-    slot: int
-    number: int
-    data: bytes
+    """The state directory cannot be read or written, or an image in it is damaged or of another format."""
 
 
 class StateDirectory:
@@ -70,7 +65,7 @@ class StateDirectory:
     def close(self) -> None:
         """Give the directory free. Closing twice does nothing."""
         if self._lock is not None:
-            self._lock.release(remove=False)
+            self._lock.release()
             self._lock = None
 
     def _make(self) -> None:
@@ -82,65 +77,72 @@ class StateDirectory:
             _sync(path.parent)
 
     def load(self, name: str) -> bytes | None:
-        """The newest good content of an image, None when it was never saved.
+        """The content last saved of an image, None when it was never saved.
 
-        Raises `StateFailure` when it was saved and both generations are damaged, `Misuse` for a name outside
-        letters, digits, ``-`` and ``_``.
+        Raises `StateFailure` when it is damaged or of another format, `Misuse` for a name outside letters, digits, ``-``, ``_``.
         """
-        newest = self._newest(name)
-        return None if newest is None else newest.data
+        path = self._path(name)
+        content = self._content(path)
+        if content is None:
+            earlier = [f"{name}.{slot}" for slot in (0, 1) if (self.path / f"{name}.{slot}").exists()]
+            if earlier:
+                raise StateFailure(
+                    f"{name} in {self.path} was saved in an earlier format ({', '.join(earlier)}), which is not read; remove that"
+                    " to start anew"
+                )
+            return None
+        self._check_format(path, content)
+        data = content[_HEADER.size :]
+        if content[: _HEADER.size] != _header(data):
+            raise StateFailure(f"{path} is damaged; remove it to start anew")
+        return data
 
     def save(self, name: str, data: bytes) -> None:
         """Make ``data`` the content of an image; when this returns it survives power loss.
 
-        Raises `StateFailure` when that is not possible; a later `load` then gives the old content or this one.
+        Raises `StateFailure` when that is not possible, or what is there is of another format; a later `load` then gives the old
+        content or this one.
         """
-        newest = self._newest(name, strict=False)
-        slot, number = (0, 1) if newest is None else (1 - newest.slot, newest.number + 1)
-        body = struct.pack("<QI", number, len(data)) + data
+        path = self._path(name)
+        self._check_format(path, self._content(path) or b"")
         temporary = self.path / f"{name}.tmp"
         try:
-            _write(temporary, _HEADER.pack(_MAGIC, number, len(data), zlib.crc32(body)) + data)
-            temporary.replace(self._slot(name, slot))
+            _write(temporary, _header(data) + data)
+            temporary.replace(path)
             _sync(self.path)
         except OSError as error:
             raise StateFailure(f"{name} cannot be saved in {self.path}: {error.strerror}") from error
 
-    def _newest(self, name: str, *, strict: bool = True) -> _Generation | None:
+    def _path(self, name: str) -> Path:
         if self._lock is None:
             raise Misuse(f"the state directory {self.path} is not open")
         if not _NAME.match(name):
             raise Misuse(f"{name!r} is no image name: permitted are up to 64 letters, digits, '-' and '_'")
-        slots = [self._read(name, slot) for slot in (0, 1)]
-        good = [slot for slot in slots if isinstance(slot, _Generation)]
-        if good:
-            return max(good, key=lambda generation: generation.number)
-        # A single damaged slot is a first save that was torn: what was there before is nothing.
-        if strict and None not in slots:
-            raise StateFailure(
-                f"both generations of {name} in {self.path} are unusable ({name}.0 is {slots[0]}, {name}.1 is {slots[1]});"
-                " remove both to start anew"
-            )
-        return None
+        return self.path / f"{name}.image"
 
-    def _slot(self, name: str, slot: int) -> Path:
-        return self.path / f"{name}.{slot}"
-
-    def _read(self, name: str, slot: int) -> _Generation | str | None:
-        """A good generation; what a bad one is; None for a slot never used."""
+    def _content(self, path: Path) -> bytes | None:
+        """What the file holds; None where there is none."""
         try:
-            content = read_bytes(self._slot(name, slot))
+            return read_bytes(path)
         except Misuse as error:
             if isinstance(error.__cause__, FileNotFoundError):
                 return None
             raise StateFailure(str(error)) from error
-        if len(content) < _HEADER.size:
-            return "too short"
-        magic, number, length, check = _HEADER.unpack_from(content)
-        data = content[_HEADER.size :]
-        if magic != _MAGIC or length != len(data) or zlib.crc32(content[4:16] + data) != check:
-            return "damaged"
-        return _Generation(slot, number, data)
+
+    def _check_format(self, path: Path, content: bytes) -> None:
+        magic = content[: len(_MAGIC)]
+        if magic.startswith(_FAMILY) and len(magic) == len(_MAGIC) and magic != _MAGIC:
+            raise StateFailure(
+                f"{path} has format {_shown(magic)}, this version of steptwin reads and writes {_shown(_MAGIC)}; it is left alone"
+            )
+
+
+def _header(data: bytes) -> bytes:
+    return _HEADER.pack(_MAGIC, len(data), zlib.crc32(len(data).to_bytes(4, "little") + data))
+
+
+def _shown(magic: bytes) -> str:
+    return magic.decode("ascii", "backslashreplace")
 
 
 def _write(path: Path, content: bytes) -> None:

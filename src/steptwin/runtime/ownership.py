@@ -66,11 +66,11 @@ class Ownership:
         except FileNotFoundError:
             return False
 
-    def release(self, *, remove: bool = True) -> None:
-        """Give it free. ``remove`` takes the file away too."""
+    def release(self) -> None:
+        """Give it free and take the file away."""
         if self._file < 0:
             return
-        if remove and self._is_at_path():
+        if self._is_at_path():
             self.path.unlink()
         os.close(self._file)
         self._file = -1
