@@ -52,9 +52,9 @@ binary_input = st.one_of(st.integers(1, 20).map(lambda n: f"IN{n}"), output, st.
 
 
 @st.composite
-def conditions(draw: DrawFn) -> Tokens:
-    """A condition that can become true and false."""
-    kind = draw(st.integers(0, 3))
+def conditions(draw: DrawFn, *, waits: bool = False) -> Tokens:
+    """A condition that can become true and false; with ``waits`` by itself."""
+    kind = draw(st.integers(0, 2 if waits else 3))
     if kind == 0:
         return [draw(binary_input), "=", draw(st.sampled_from(("ON", "OFF", "1", "0", "OPEN", "CLOSE")))]
     if kind == 1:
@@ -94,7 +94,7 @@ def simple_statements(draw: DrawFn, subroutines: tuple[str, ...]) -> Tokens:
     if kind <= 3:
         return draw(assignments())
     if kind == 4:
-        return ["WAIT", *draw(conditions())]
+        return ["WAIT", *draw(conditions(waits=True))]
     if kind == 5:
         return ["DELAY", draw(st.sampled_from(("0.01", "0,5", "1", "count", "PosM1")))]
     if kind == 6:

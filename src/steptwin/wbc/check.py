@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from steptwin.diagnostics import Diagnostic, Severity, in_order
-from steptwin.wbc import flow, usage
+from steptwin.wbc import flow, mistaken, usage
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.resolve import resolve
@@ -49,12 +49,14 @@ def check(text: str, positions: PositionTable | None = None, setup: Setup | None
         diagnostics += flow.unreached(paths, executable)
         diagnostics += flow.stray_returns(paths)
     if not wrong:
-        diagnostics += usage.unused_variables(executable, resolution.scope)
+        diagnostics += mistaken.unused_variables(executable, resolution.scope, dialect)
+        diagnostics += mistaken.waits_for_variables(executable, dialect)
         diagnostics += usage.axes_never_enabled(executable, positions)
         diagnostics += usage.interrupts(executable, setup)
         if setup is not None:
             diagnostics += usage.unequal_axes(executable, setup)
             diagnostics += usage.homing_without_end(executable, setup)
+            diagnostics += usage.too_fast(executable, setup)
     wrong_somewhere = any(d.severity is Severity.ERROR for d in diagnostics)
     runs = resolution.complete and not wrong_somewhere
     return Checked(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics))

@@ -38,6 +38,8 @@ from steptwin.wbc.tree import (
 
 # WBC-7
 SHORTEST_DELAY_S = 0.01
+_LOOKS_LIKE_MS = 100
+"""Seconds from which on a time is doubted."""
 _ALONE = {"ENDIF": s.EndIf, "RETURN": s.Return, "END": s.End, "PROGRESET": s.ProgReset, "WAITPOS": s.WaitPos}
 _BRANCHING = frozenset({"IF", "ELSE", IF_UNKNOWN, "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
 
@@ -142,6 +144,10 @@ class _Resolver:
                 known = f"INT_IN1…INT_IN{INPUT_LABELS}, INT_MODBUS, INT_TICK"
                 hint = f"{known}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
                 self._say(f.RESERVED_LABEL.at(name, f"{name.text} is no interrupt label, but begins like one", hint))
+            elif key in self._scope.constants or key in self._scope.variables:
+                kind = "a constant" if key in self._scope.constants else "a variable"
+                message = f"{name.text} cannot be a label: it is {kind}"
+                self._say(f.RESERVED_LABEL.at(name, message, "give one of them another name"))
             elif reason is not None:
                 self._say(f.RESERVED_LABEL.at(name, f"{name.text} cannot be a label: it is {reason}", "take another name"))
             self._labels[key] = len(self._lines)
@@ -299,7 +305,19 @@ class _Resolver:
         if isinstance(seconds, s.Literal) and seconds.value < SHORTEST_DELAY_S:
             message = f"DELAY {seconds.value:g} waits {SHORTEST_DELAY_S:g} s"
             self._say(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {SHORTEST_DELAY_S:g} s"))
+        self._check_time("DELAY", statement.operands[0], seconds)
         return None if seconds is None else s.Delay(statement.start, statement.end, seconds)
+
+    def _check_time(self, keyword: str, operand: Operand, seconds: s.Source | None) -> None:
+        """Hundreds of seconds are meant as milliseconds, unless they are whole minutes."""
+        if not isinstance(seconds, s.Literal) or seconds.value < _LOOKS_LIKE_MS or seconds.value % 60 == 0:
+            return
+        whole, rest = divmod(seconds.value, 60)
+        message = f"{keyword} {seconds.value:.10g} is {whole:.0f} min {rest:.10g} s"
+        milliseconds = f"{seconds.value / 1000:.10g}"
+        fix = milliseconds if isinstance(operand, Number) else None
+        hint = f"the time is in seconds: {seconds.value:.10g} ms are {milliseconds}"
+        self._say(f.LONG_TIME.at(operand, message, hint, fix=fix))
 
     def _jump(self, statement: Command) -> s.Step | None:
         name = statement.operands[0]
@@ -350,6 +368,7 @@ class _Resolver:
             return None
         if isinstance(seconds, s.Literal) and seconds.value <= 0:
             self._say(f.OUT_OF_RANGE.at(operand, f"PULSE cannot last {seconds.value:g} s", "permitted: greater than 0"))
+        self._check_time("PULSE", operand, seconds)
         return None if seconds is None else s.Pulse(statement.start, statement.end, register.number, seconds)
 
     # -- rows of the position table

@@ -29,6 +29,7 @@ class Scope:
         self._positions = positions
         self._diagnostics = diagnostics
         self._near = NearMiss()
+        self._near_registers = NearMiss()
         self._broken: set[str] = set()
         self._status_told = False
         self.known: dict[str, Source] = {}
@@ -215,6 +216,9 @@ class Scope:
         names = () if row is None else VALUE_NAMES.get(row.writes or row.reads) or VALUE_NAMES.get(row.reads) or ()
         return f"with {row.name} go {', '.join(names)}" if row is not None and names else ""
 
+    def nearest_register(self, text: str) -> str | None:
+        return self._near_registers.of(text, _register_spellings(self._dialect))
+
     def nearest(self, text: str) -> str | None:
         return self._near.of(text, self._spellings())
 
@@ -223,13 +227,17 @@ class Scope:
             for name in names.values():
                 yield name.text
         yield from PREDEFINED
-        for row in REGISTERS:
-            numbers = row.numbers(self._dialect)[:20]
-            if numbers:
-                for number in numbers:
-                    yield f"{row.name}{number}"
-            else:
-                yield row.name
+        yield from _register_spellings(self._dialect)
 
     def _say(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)
+
+
+def _register_spellings(dialect: Dialect) -> Iterator[str]:
+    for row in REGISTERS:
+        numbers = row.numbers(dialect)[:20]
+        if numbers:
+            for number in numbers:
+                yield f"{row.name}{number}"
+        else:
+            yield row.name

@@ -12,7 +12,7 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
 from steptwin.wbc.events import BY_REGISTER, INPUTS, Event
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.scope import Scope
+from steptwin.wbc.real import real_text
 from steptwin.wbc.statements import CIRCLES, LINES
 
 _RAMPS = frozenset({"ACCM", "DECM"})
@@ -56,16 +56,6 @@ def sources(step: s.Step) -> Iterator[s.Source]:
             yield seconds
         case s.RowMotion(row=row):
             yield row
-
-
-def unused_variables(executable: s.Executable, scope: Scope) -> list[Diagnostic]:
-    read = {source.index for step in executable.steps for source in sources(step) if isinstance(source, s.Variable)}
-    hint = "remove it, or did you mean a register?"
-    return [
-        f.NEVER_USED.at(name, f"{name.text} is set but never used", hint)
-        for index, name in enumerate(scope.variables.values())
-        if index not in read
-    ]
 
 
 def endless_waits(executable: s.Executable) -> list[Diagnostic]:
@@ -160,6 +150,27 @@ def homing_without_end(executable: s.Executable, setup: Setup) -> list[Diagnosti
         if other:
             hint += f", or home to {names[1]} with a {'negative' if 1 in signs else 'positive'} velocity"
         found.append(f.HOME_WITHOUT_SWITCH.at(step, message, hint))
+    return found
+
+
+def too_fast(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
+    """Velocities, known before, that are more than the pulse outputs give."""
+    found: list[Diagnostic] = []
+    for step in executable.steps:
+        if isinstance(step, s.Motion) and step.keyword in ("VABS", "HOME"):
+            axis, value = step.axis, step.value
+        elif isinstance(step, s.Set) and isinstance(step.target, s.Register) and step.target.row.key == "VMAXM":
+            axis, value = step.target.number, step.value
+        else:
+            continue
+        if not isinstance(value, s.Literal):
+            continue
+        gear = setup.gears[axis - 1]
+        speed_p = abs(value.value) * gear
+        if speed_p > setup.most_speed_p:
+            message = f"{real_text(value.value)} u/s at GEAR {gear:g} of M{axis} are {speed_p:.10g} pulses/s"
+            hint = f"the outputs give {setup.most_speed_p:g} pulses/s, {setup.most_speed_p / gear:.6g} u/s"
+            found.append(f.TOO_FAST.at(step, message, hint))
     return found
 
 

@@ -1,0 +1,89 @@
+"""Variables that were meant as registers: a name with a mistake in it is a new variable to WBC, and the mistake passes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+
+from steptwin.diagnostics import Diagnostic
+from steptwin.wbc import findings as f
+from steptwin.wbc import steps as s
+from steptwin.wbc.dialect import Dialect
+from steptwin.wbc.registers import ROWS
+from steptwin.wbc.scope import Scope
+from steptwin.wbc.usage import sources
+
+_FAMILIES: Mapping[str, str] = {
+    **dict.fromkeys(("OUTPUT", "OUTP", "DO", "DOUT", "Q"), "OUT"),
+    **dict.fromkeys(("INPUT", "INP", "DI", "DIN"), "IN"),
+    **dict.fromkeys(("AI", "ADC", "ANALOG", "AINPUT"), "AIN"),
+    **dict.fromkeys(("VMAX", "VEL", "VELM", "SPEED", "SPEEDM", "VELOCITYM", "VMX"), "VMAXM"),
+    **dict.fromkeys(("STATUS", "STATUSM", "STAT"), "STATM"),
+    **dict.fromkeys(("LIML", "LIMITL", "LIMITLM"), "LIMLM"),
+    **dict.fromkeys(("LIMR", "LIMITR", "LIMITRM"), "LIMRM"),
+    **dict.fromkeys(("ACC", "ACCEL", "ACCELM"), "ACCM"),
+    **dict.fromkeys(("DEC", "DECEL", "DECELM"), "DECM"),
+    **dict.fromkeys(("POS", "POSITIONM"), "POSM"),
+    **dict.fromkeys(("MOTOR", "DRIVE", "AXIS"), "M"),
+    **dict.fromkeys(("ENCODER", "ENCM"), "ENC"),
+    **dict.fromkeys(("TIMER", "TIM", "TMR"), "TIMA"),
+    **dict.fromkeys(("CFGINT", "INT_IN", "CFG_IN"), "CFGINT_IN"),
+    "VACT": "VACTM",
+    "PTP": "PTPM",
+    "I": "$I",
+    "D": "$D",
+    "R": "$R",
+}
+_CERTAIN = frozenset(
+    {"OUTPUT", "DOUT", "DO", "INPUT", "DIN", "DI", "AINPUT", "VELM", "SPEEDM", "VELOCITYM", "STATUSM", "LIMITLM", "LIMITRM"}
+    | {"ACCELM", "DECELM", "POSITIONM", "ENCM"}
+)
+"""Names that nobody gives a variable. The others are only told of where the variable is of no use."""
+_NAME = re.compile(r"([A-Z_]+?)([0-9]{1,4})$")
+
+
+def register_meant(key: str, dialect: Dialect, families: Iterable[str] = _FAMILIES) -> str | None:
+    """The register that a name in upper case was probably meant for."""
+    match = _NAME.match(key)
+    if match is None or match[1] not in families or match[1] not in _FAMILIES:
+        return None
+    row = ROWS[_FAMILIES[match[1]]]
+    return f"{row.name}{int(match[2])}" if int(match[2]) in row.numbers(dialect) else None
+
+
+def unused_variables(executable: s.Executable, scope: Scope, dialect: Dialect) -> list[Diagnostic]:
+    """Variables that are set and never read, and those whose names leave no doubt that a register was meant."""
+    read = {source.index for step in executable.steps for source in sources(step) if isinstance(source, s.Variable)}
+    found: list[Diagnostic] = []
+    for index, name in enumerate(scope.variables.values()):
+        if index not in read:
+            meant = register_meant(name.key, dialect) or scope.nearest_register(name.text)
+            hint = f"remove it, or did you mean {meant or 'a register'}?"
+            found.append(f.NEVER_USED.at(name, f"{name.text} is set but never used", hint, fix=meant))
+        elif (meant := register_meant(name.key, dialect, _CERTAIN)) is not None:
+            message = f"{name.text} is a variable: it has nothing to do with {meant}"
+            found.append(f.LIKE_A_REGISTER.at(name, message, f"did you mean {meant}?", fix=meant))
+    return found
+
+
+def waits_for_variables(executable: s.Executable, dialect: Dialect) -> list[Diagnostic]:
+    """WAITs whose condition nothing can change: it has variables only, and there is no interrupt that could set one."""
+    if executable.entries:
+        return []
+    found: list[Diagnostic] = []
+    for step in executable.steps:
+        names = list(_variables(step)) if isinstance(step, s.Wait) else []
+        if not names:
+            continue
+        meant = next((meant for name in names if (meant := register_meant(name.upper(), dialect))), None)
+        hint = f"did you mean {meant}?" if meant else "a WAIT looks at registers, or at what an interrupt sets"
+        message = f"nothing changes {' and '.join(names)} while the program waits here"
+        found.append(f.WAITS_FOR_VARIABLE.at(step, message, hint))
+    return found
+
+
+def _variables(step: s.Wait) -> Iterator[str]:
+    """The variables of a condition; none where it has a register too."""
+    sides = step.condition.left, step.condition.right
+    if not any(isinstance(side, s.Register) for side in sides):
+        yield from dict.fromkeys(side.name for side in sides if isinstance(side, s.Variable))
