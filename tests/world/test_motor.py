@@ -31,7 +31,7 @@ def motor(
     load: float = 0.0,
     start: float | None = None,
 ) -> Motor:
-    return Motor(curve, inertia, friction, load, start, 64)
+    return Motor(curve, inertia, friction, load, start)
 
 
 def final(build: Build, plan: Profile) -> Standing:
@@ -48,7 +48,7 @@ def accelerated(rate: float, speed: float = 30_000.0) -> Profile:
 def test_the_acceleration_from_which_steps_are_lost_is_that_of_the_torque() -> None:
     """From rest to v: J a = T(v) at the end of the ramp. With T(v) = 1 − 0.8 v / 32000 and v = 16000, T = 0.6 N·m."""
     limit = 0.6 / INERTIA
-    build = Build(motor=motor())
+    build = Build(period_p=64, motor=motor())
     below, above = accelerated(limit * 0.9999, 16_000.0), accelerated(limit * 1.0001, 16_000.0)
     assert final(build, below) == Standing(200_000, 200_000)
     assert final(build, above).rotor < 200_000
@@ -60,14 +60,14 @@ def test_the_speed_at_which_steps_are_lost_is_where_the_curve_meets_the_need() -
     plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 30_000.0, rate, rate)
     lost = motor().loses(plan.segments[0], 0.0, plan.segments[0].end_s, 1)
     assert lost == pytest.approx(20_000.0 / rate, rel=1e-12)
-    course = Course(Build(motor=motor()), plan, 0, Standing(0, 0))
+    course = Course(Build(period_p=64, motor=motor()), plan, 0, Standing(0, 0))
     moment = round(20_000.0 / rate * SECOND)
     assert not course.at(moment - 10).stalled
     assert course.at(moment + 10).stalled
 
 
 def test_friction_is_needed_at_speed_and_helps_to_brake() -> None:
-    build = Build(motor=motor(((0.0, 0.5), (32_000.0, 0.5)), friction=0.2))
+    build = Build(period_p=64, motor=motor(((0.0, 0.5), (32_000.0, 0.5)), friction=0.2))
     up = 0.3 / INERTIA
     down = 0.7 / INERTIA
     fine = plan_position(MotionState(0, 0, 0.0, 0.0), 50_000, up * 0.999, down * 0.999, 20_000.0)
@@ -79,33 +79,33 @@ def test_friction_is_needed_at_speed_and_helps_to_brake() -> None:
 
 
 def test_a_load_that_pulls_down_makes_the_way_up_harder() -> None:
-    build = Build(motor=motor(((0.0, 0.5), (32_000.0, 0.5)), load=0.3))
+    build = Build(period_p=64, motor=motor(((0.0, 0.5), (32_000.0, 0.5)), load=0.3))
     rate = 0.4 / INERTIA
     up = plan_position(MotionState(0, 0, 0.0, 0.0), 5000, rate, rate * 0.1, 20_000.0)
     down = plan_position(MotionState(0, 0, 0.0, 0.0), -5000, rate, rate * 0.1, 20_000.0)
     assert final(build, up).rotor < 5000
     assert final(build, down).rotor == -5000
-    assert final(Build(sign=-1, motor=build.motor), up).rotor == -5000
+    assert final(Build(sign=-1, period_p=64, motor=build.motor), up).rotor == -5000
 
 
 def test_a_start_above_the_start_speed_is_not_followed() -> None:
     """The M1486 begins at its start/stop speed at once."""
     plan = plan_endless(0, 0, 1, SpeedCurve(500.0, 1000.0, 2000.0, 2000.0))
     for start, follows in ((499.0, False), (500.0, True), (None, True)):
-        build = Build(motor=motor(inertia=0.0, start=start))
+        build = Build(period_p=64, motor=motor(inertia=0.0, start=start))
         course = Course(build, plan, 0, Standing(0, 0), jump=500.0)
         assert (course.at(SECOND).rotor > 0) is follows
 
 
 def test_what_is_lost_is_a_whole_number_of_electrical_periods() -> None:
-    standing = final(Build(motor=motor()), accelerated(0.9 / INERTIA))
+    standing = final(Build(period_p=64, motor=motor()), accelerated(0.9 / INERTIA))
     assert 200_000 - standing.rotor > 0
     assert (200_000 - standing.rotor) % 64 == 0
     assert not standing.stalled
 
 
 def test_a_stalled_rotor_is_caught_below_the_start_speed() -> None:
-    slow, fast = Build(motor=motor(start=2000.0)), Build(motor=motor())
+    slow, fast = Build(period_p=64, motor=motor(start=2000.0)), Build(period_p=64, motor=motor())
     plan = accelerated(0.9 / INERTIA)
     assert final(slow, plan).rotor > final(fast, plan).rotor
     course = Course(slow, plan, 0, Standing(0, 0))
@@ -115,8 +115,64 @@ def test_a_stalled_rotor_is_caught_below_the_start_speed() -> None:
     assert not course.at(caught + 1000).stalled
 
 
+def test_a_rotor_is_caught_when_speed_and_torque_both_allow_it() -> None:
+    """1 N·m at standstill, 0.2 from 300 rev/min on; lost at 600 rev/min when braking with 300 000 pulses/s² begins.
+
+    Braking needs 8.8e-4 · 589 = 0.518 N·m, which there is below 180.6 rev/min, 155 pulses before rest: 1552 pulses are lost until
+    then, of which 24 periods stay. By its speed alone, below 280 rev/min, it would be 21 periods; at rest 27.
+    """
+    per_rpm = PER_REV / 60
+    curve = ((0.0, 1.0), (300 * per_rpm, 0.2), (1200 * per_rpm, 0.2))
+    build = Build(period_p=64, motor=motor(curve, inertia=8.8e-4 * 2 * pi / PER_REV, start=280 * per_rpm))
+    plan = plan_position(MotionState(0, 0, 0.0, 0.0), 20_000, 50_000.0, 300_000.0, 600 * per_rpm)
+    course = Course(build, plan, 0, Standing(0, 0))
+    assert 20_000 - course.at(1000 * SECOND).rotor == 24 * 64
+    speed = next(n for n in range(28_000, 0, -1) if at_speed(curve, n / 100 * per_rpm) >= 300_000 * build.motor.inertia) / 100  # type: ignore[union-attr]
+    assert speed == pytest.approx(180.6, abs=0.1)
+    caught = (plan.end or 0) - round(speed * per_rpm / 300_000 * SECOND)
+    assert course.at(caught - 100_000).stalled
+    assert not course.at(caught + 100_000).stalled
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    torques=st.lists(st.floats(0.05, 1.5), min_size=2, max_size=5),
+    rate=st.floats(2000.0, 400_000.0),
+    speed=st.floats(500.0, 25_000.0),
+    friction=st.floats(0.0, 0.3),
+    load=st.floats(-0.3, 0.3),
+    start=st.floats(100.0, 25_000.0),
+    braking=st.booleans(),
+    sign=st.sampled_from([1, -1]),
+)
+def test_the_moment_of_being_caught_is_the_first_that_a_walk_finds(  # noqa: PLR0917
+    torques: list[float], rate: float, speed: float, friction: float, load: float, start: float, braking: bool, sign: int
+) -> None:
+    """Every 1/2000 of a ramp: is it slow enough, and is there the torque?"""
+    curve = tuple((7000.0 * n, torque) for n, torque in enumerate(torques))
+    plan = plan_position(MotionState(0, 0, 0.0, 0.0), 200_000, rate, rate, speed)
+    s = plan.segments[-1 if braking else 0]
+    begin = plan.segments[-2].end_s if braking else 0.0
+    drive = motor(curve, friction=friction, load=load, start=start)
+    found = drive.catches(s, begin, s.end_s, sign)
+    step = (s.end_s - begin) / 2000
+    need = abs(INERTIA * sign * 2 * s.c2 + sign * friction + load)
+
+    def spare(t: float) -> float:
+        speed = abs(s.velocity(t))
+        return min(at_speed(curve, speed) - need, (start - speed) * 1e-4)
+
+    walked = next((t for n in range(2000) if spare(t := begin + n * step) >= 0), None)
+    if walked is None:
+        assert found is None or max(spare(found), spare(found - step), spare(found + step)) > -1e-3
+    else:
+        assert found is not None, f"never caught, a walk finds {walked}"
+        assert found <= walked + 1e-9 or spare(walked) < 1e-6
+        assert walked - found <= step * 1.001 or spare(found) >= -1e-9
+
+
 def test_a_motor_too_weak_for_its_load_never_catches_it() -> None:
-    build = Build(motor=motor(load=2.0))
+    build = Build(period_p=64, motor=motor(load=2.0))
     standing = final(build, accelerated(1000.0))
     assert standing.stalled
     assert standing.rotor == 0

@@ -134,10 +134,12 @@ def test_a_scale_that_is_not_known_or_cannot_be_is_told(text: str, message: str)
 )
 def test_torques_and_the_electrical_period_go_by_the_pulses_of_a_revolution(text: str, per_rev: int) -> None:
     """600 rev/min are ten revolutions a second; four of 200 full steps are a fiftieth of one."""
-    motor = motor_of(world_of(text))
+    world = world_of(text)
+    motor = motor_of(world)
     assert motor.curve == ((0.0, 1.0), (10.0 * per_rev, 0.5))
+    (axis,) = world.axes.values()
+    assert axis.mechanism.build.period_p == per_rev // 50
     assert motor.start_p == per_rev
-    assert motor.period_p == per_rev // 50
 
 
 def test_an_m1486_that_stalls_loses_a_multiple_of_four_full_steps() -> None:

@@ -316,6 +316,7 @@ class _Builder:
             low=None if spec.travel is None else pulses(spec.travel[0]),
             high=None if spec.travel is None else pulses(spec.travel[1]),
             play=pulses(spec.backlash),
+            period_p=scale.period_p,
             motor=None if spec.motor is None else motor_of(spec.motor, spec.kind, scale),
         )
         mechanism = Mechanism(kernel, machine, number, build, spec.name)

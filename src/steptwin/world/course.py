@@ -5,6 +5,10 @@ All positions are whole pulses in the frame of the mechanics, which has its zero
 where a stop or a lack of torque holds it. The *load* is moved by the rotor through backlash of ``play`` pulses: it is at the
 rotor after a way up, and ``play`` above it after a way down.
 
+A rotor that was held is drawn to the nearest place with the electrical angle of the field as soon as that stands or turns: what
+is lost is a whole number of electrical periods (four full steps). That place may be up to two full steps before a stop, and the
+rotor springs back there; or as far beyond it, and the rotor leaves the stop when the field has come back so far.
+
 Between two turns of the field both are what they were, or the field and a constant: a course is a list of such pieces.
 """
 
@@ -47,6 +51,8 @@ class Build:
     high: int | None = None
     """Hard stops of the load."""
     play: int = 0
+    period_p: int = 1
+    """An electrical period of the motor, four full steps: a rotor that was held is caught at a multiple of it."""
     motor: Motor | None = None
 
     @property
@@ -62,6 +68,8 @@ class Standing(NamedTuple):
     load: int
     stalled: bool = False
     """The rotor has lost the field."""
+    behind: int = 0
+    """How far behind the field the place is to which it draws the rotor. The rotor is there, unless something holds it."""
 
 
 class Piece(NamedTuple):
@@ -74,6 +82,7 @@ class Piece(NamedTuple):
     load_follows: bool
     load: int
     stalled: bool
+    behind: int
 
 
 class Carried(NamedTuple):
@@ -137,7 +146,7 @@ class Course:
         field = self.field(now) if piece.rotor_follows or piece.load_follows else 0
         rotor = piece.rotor + field if piece.rotor_follows else piece.rotor
         load = piece.load + field if piece.load_follows else piece.load
-        return Standing(rotor, load, piece.stalled)
+        return Standing(rotor, load, piece.stalled, piece.behind)
 
     def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
         """First moment > ``after`` at which the load (or the rotor) has come to ``position`` in ``direction``, or beyond."""
@@ -197,7 +206,7 @@ class Course:
         if profile.end is not None:
             rest = max(profile.end, begin)
             motor = self.build.motor
-            if self._now.stalled and not self.blocked and (motor is None or motor.holds()):
+            if not self.blocked and (not self._now.stalled or motor is None or motor.holds()):
                 self._catch(rest)
             self._stand(rest, 1)
 
@@ -212,34 +221,48 @@ class Course:
             self._follow(begin, end, direction)
             return
         end_s = inf if end is None else (end - start) / SECOND
-        now = begin
+        now, caught = begin, None
         while True:
-            now_s = (now - start) / SECOND
+            before, now_s = now, (now - start) / SECOND
             if self._now.stalled:
                 found = motor.catches(s, now_s, end_s, self.build.sign)
                 if found is None:
                     self._stand(now, direction)
                     return
-                now = max(now, start + ceil(found * SECOND))
+                now = caught = max(now, start + ceil(found * SECOND))
+                if now > before:
+                    self._stand(before, direction)
                 self._catch(now)
             else:
                 found = motor.loses(s, now_s, end_s, self.build.sign)
                 if found is None:
                     self._follow(now, end, direction)
                     return
-                lost = max(now, start + ceil(found * SECOND))
-                self._follow(now, lost, direction)
-                self._now = self._now._replace(stalled=True)
-                now = lost
-                if motor.catches(s, (now - start) / SECOND, end_s, self.build.sign) is not None:
+                now = max(now, start + ceil(found * SECOND))
+                if now == caught:
                     # It would be caught and lost for ever in one moment.
+                    self._now = self._now._replace(stalled=True)
                     self._stand(now, direction)
                     return
+                self._follow(before, now, direction)
+                self._now = self._now._replace(stalled=True)
 
     def _follow(self, begin: Nanos, end: Nanos | None, direction: int) -> None:
         """The rotor goes with the field until a stop holds it, the load when its play is used up."""
-        build, (rotor, load, _) = self.build, self._now
-        offset = rotor - self.field(begin)
+        build = self.build
+        if self._is_pushed(begin, direction):
+            self._stand(begin, direction)
+            return
+        self._catch(begin)
+        rotor, load, _, behind = self._now
+        if self.field(begin) - behind != rotor:
+            # Drawn against a stop from which the field comes back.
+            left = self._time(rotor + behind, begin)
+            self._stand(begin, direction)
+            if left is None or (end is not None and left >= end):
+                return
+            begin, rotor = left, self.field(left) - behind
+        offset = -behind
         slack = 0 if direction > 0 else build.play
         stop = build.high if direction > 0 else None if build.low is None else build.low - build.play
         held = (
@@ -247,37 +270,47 @@ class Course:
         )
         if held is not None and end is not None and held >= end:
             held = None
-        touching = rotor + slack == load
-        met = begin if touching else self._time(load - slack + direction - offset, begin)
+        touches = (rotor + slack - load) * direction >= 0
+        met = begin if touches else self._time(load - slack + direction - offset, begin)
         if met is not None and ((end is not None and met >= end) or (held is not None and met >= held)):
             met = None
         if held != begin:
             if met != begin:
-                self._laid.append(Piece(begin, direction, True, offset, False, load, False))
+                self._laid.append(Piece(begin, direction, True, offset, False, load, False, behind))
             if met is not None:
-                self._laid.append(Piece(met, direction, True, offset, True, offset + slack, False))
+                self._laid.append(Piece(met, direction, True, offset, True, offset + slack, False, behind))
         if held is not None and stop is not None:
-            self._laid.append(Piece(held, direction, False, stop, False, stop + slack, False))
+            self._laid.append(Piece(held, direction, False, stop, False, stop + slack, False, behind))
         if end is not None:
             rotor = offset + self.field(end)
             if stop is not None and (rotor - stop) * direction > 0:
                 rotor = stop
             carried = rotor + slack
-            self._now = Standing(rotor, carried if (carried - load) * direction > 0 else load)
+            self._now = Standing(rotor, carried if (carried - load) * direction > 0 else load, False, behind)
+
+    def _is_pushed(self, now: Nanos, direction: int) -> bool:
+        """Whether the field goes on against the stop at which the rotor stands."""
+        build, rotor = self.build, self._now.rotor
+        drawn = self.field(now) - self._now.behind - rotor
+        if direction > 0:
+            return build.high is not None and rotor >= build.high and drawn > 0
+        return build.low is not None and rotor <= build.low - build.play and drawn < 0
 
     def _stand(self, now: Nanos, direction: int) -> None:
-        rotor, load, stalled = self._now
-        self._laid.append(Piece(now, direction, False, rotor, False, load, stalled))
+        rotor, load, stalled, behind = self._now
+        self._laid.append(Piece(now, direction, False, rotor, False, load, stalled, behind))
 
     def _catch(self, now: Nanos) -> None:
-        """The rotor takes the place nearest to it that has the electrical angle of the field."""
-        build, (rotor, load, _) = self.build, self._now
-        period = 1 if build.motor is None else build.motor.period_p
-        behind = self.field(now) - rotor
-        rotor = self.field(now) - (2 * behind + period) // (2 * period) * period
-        low = None if build.low is None else build.low - build.play
-        if low is not None and rotor < low:
-            rotor += -(-(low - rotor) // period) * period
-        if build.high is not None and rotor > build.high:
-            rotor -= -(-(rotor - build.high) // period) * period
-        self._now = Standing(rotor, min(max(load, rotor), rotor + build.play))
+        """The rotor goes to the nearest place that has the electrical angle of the field, or towards it as far as a stop."""
+        build, (rotor, load, _, behind) = self.build, self._now
+        drawn = self.field(now) - behind
+        if drawn != rotor:
+            periods = (2 * (drawn - rotor) + build.period_p) // (2 * build.period_p)
+            behind += periods * build.period_p
+            rotor = drawn - periods * build.period_p
+            if build.low is not None:
+                rotor = max(rotor, build.low - build.play)
+            if build.high is not None:
+                rotor = min(rotor, build.high)
+            load = min(max(load, rotor), rotor + build.play)
+        self._now = Standing(rotor, load, False, behind)

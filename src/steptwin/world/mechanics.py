@@ -180,9 +180,12 @@ class Mechanism(Stateful):
         if standing is None:
             if self._simple:
                 here = self.build.sign * plan.count(now) + self.build.zero - self._lost
-                standing = Standing(here, here)
+                standing = Standing(here, here, behind=self._lost)
             else:
                 standing = before.at(now)
+                # A controller that is switched off counts from 0 again.
+                counted_anew = self.build.sign * (plan.count(now) - before.plan.count(now))
+                standing = standing._replace(behind=standing.behind + counted_anew)
         jump = profile_of(plan).velocity(now) - profile_of(before.plan).velocity(now)
         self._revision = drive.revision
         self._course = Course(self.build, plan, now, standing, blocked=self._blocked, jump=jump)
@@ -233,7 +236,7 @@ class Mechanism(Stateful):
 
     def lose(self, pulses: int, now: Nanos) -> None:
         """The rotor falls ``pulses`` behind the field (negative: ahead), as far as stops permit."""
-        build, (rotor, load, stalled) = self.build, self.at(now)
+        build, (rotor, load, stalled, _) = self.build, self.at(now)
         rotor -= pulses
         if build.low is not None:
             rotor = max(rotor, build.low - build.play)
@@ -241,7 +244,8 @@ class Mechanism(Stateful):
             rotor = min(rotor, build.high)
         self._lost += pulses
         self._simple = False
-        self._renew(self._drive, now, Standing(rotor, min(max(load, rotor), rotor + build.play), stalled))
+        behind = self.course(now).field(now) - rotor
+        self._renew(self._drive, now, Standing(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
         self._kernel.mark()
 
     def slip(self, counts: int, now: Nanos) -> None:

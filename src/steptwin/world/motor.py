@@ -5,17 +5,18 @@ Torques in N·m, speeds in pulses/s. While the torque that a motion needs,
     inertia · acceleration + friction · direction + load,
 
 is not above what the curve gives at its speed, the rotor follows the field. Where it is above, the rotor stands still at once and
-pulses are lost until the field is slow enough to be caught again; then the rotor takes the nearest place that has the same
-electrical angle, so that what is lost is a whole number of electrical periods (four full steps). Velocity within a segment is
-a polynomial, so both moments come in closed form. What a rotor does beyond its stop in a jump of the field is not modelled.
+pulses are lost until the field is slow enough for the rotor to be caught, and there is the torque that the motion needs at that
+moment. Velocity within a segment is a polynomial, so both moments come in closed form. What a rotor does beyond its stop in a
+jump of the field is not modelled.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, sqrt
-from typing import Any
+from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.motion import Segment
@@ -23,6 +24,8 @@ from steptwin.motion import Segment
 LOOK_S = 0.001
 """Motions along arcs have no such polynomial: they are looked at this often."""
 _NEAR_S = 1e-5
+Quadratic: TypeAlias = tuple[float, float, float]
+"""q0 + q1·u + q2·u²."""
 _SLACK = 1e-12
 """Relative: what is needed and what is there may be the same number but for rounding."""
 
@@ -41,8 +44,6 @@ class Motor:
     start_p: float | None
     """Highest speed (pulses/s) that the field may take at once, and at which a standing rotor is caught. None: it may take any,
     and the rotor is caught where the field stands or turns."""
-    period_p: int
-    """Pulses of an electrical period."""
 
     def __post_init__(self) -> None:
         speeds = [speed for speed, _ in self.curve]
@@ -88,75 +89,121 @@ class Motor:
         """
         if not isinstance(s, Segment):
             return self._loses_looking(s, begin_s, end_s, sign)
-        d = s.direction
-        speed = (d * s.c1, d * 2.0 * s.c2, d * 3.0 * s.c3)
-        need = (self.needs(sign * 2.0 * s.c2, sign * d), self.inertia * sign * 6.0 * s.c3)
         if end_s == inf:
-            return begin_s if self._lacks(abs(s.velocity(begin_s)), need[0]) else None
+            need = self.needs(sign * 2.0 * s.c2, sign * s.direction)
+            return begin_s if self._lacks(abs(s.velocity(begin_s)), need) else None
         begins = [begin_s, *self._corners(s, begin_s, end_s)]
         for t0, t1 in zip(begins, [*begins[1:], end_s], strict=True):
-            constant, slope = self._line(abs(s.velocity(0.5 * (t0 + t1))))
-            for way in (1.0, -1.0):
-                spare = (
-                    constant + slope * speed[0] - way * need[0],
-                    slope * speed[1] - way * need[1],
-                    slope * speed[2],
-                )
-                lost = _first_below_0(spare, t0 - s.anchor_s, t1 - s.anchor_s, _SLACK * (abs(constant) + abs(need[0])))
+            spares, slack = self._spares(s, t0, t1, sign)
+            for spare in spares:
+                lost = _first_below_0(spare, t0 - s.anchor_s, t1 - s.anchor_s, slack)
                 if lost is not None:
                     return lost + s.anchor_s
         return None
+
+    def _spares(self, s: Segment, t0: float, t1: float, sign: int) -> tuple[list[Quadratic], float]:
+        """What torque is left for what is needed in each direction, from ``t0`` to ``t1``, and what of it is rounding.
+
+        By seconds since the segment's anchor; between the two moments the speed passes no corner of the curve.
+        """
+        d = s.direction
+        speed = (d * s.c1, d * 2.0 * s.c2, d * 3.0 * s.c3)
+        need = (self.needs(sign * 2.0 * s.c2, sign * d), self.inertia * sign * 6.0 * s.c3)
+        constant, slope = self._line(abs(s.velocity(0.5 * (t0 + t1))))
+        spares = [
+            (constant + slope * speed[0] - way * need[0], slope * speed[1] - way * need[1], slope * speed[2])
+            for way in (1.0, -1.0)
+        ]
+        return spares, _SLACK * (abs(constant) + abs(need[0]))
 
     def _lacks(self, speed: float, need: float) -> bool:
         torque = self.torque(speed)
         return abs(need) > torque + _SLACK * (abs(torque) + abs(need))
 
-    def _corners(self, s: Segment, begin_s: float, end_s: float) -> list[float]:
-        """Moments at which the speed passes a corner of the curve."""
+    def _corners(self, s: Segment, begin_s: float, end_s: float, *others: float) -> list[float]:
+        """Moments at which the speed passes a corner of the curve, or one of ``others``."""
         if s.c2 == 0.0:
             return []
         v0, v1 = abs(s.velocity(begin_s)), abs(s.velocity(end_s))
-        inside = [speed for speed, _ in self.curve if min(v0, v1) < speed < max(v0, v1)]
+        inside = {speed for speed in (*(speed for speed, _ in self.curve), *others) if min(v0, v1) < speed < max(v0, v1)}
         return sorted(min(max(s.when_speed(speed), begin_s), end_s) for speed in inside)
 
     def _loses_looking(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
+        return next((t for t, speed, need in self._looks(s, begin_s, end_s, sign) if self._lacks(speed, need)), None)
+
+    def _looks(self, s: Any, begin_s: float, end_s: float, sign: int) -> Iterator[tuple[float, float, float]]:
+        """(moment, speed, torque needed), every `LOOK_S`."""
         looks = 0 if end_s == inf else int((end_s - begin_s) / LOOK_S)
         for n in range(looks + 1):
             t = begin_s + n * LOOK_S
             acceleration = (s.velocity(t + _NEAR_S) - s.velocity(t - _NEAR_S)) / (2.0 * _NEAR_S)
-            if self._lacks(abs(s.velocity(t)), self.needs(sign * acceleration, sign * s.direction)):
-                return t
-        return None
+            yield t, abs(s.velocity(t)), self.needs(sign * acceleration, sign * s.direction)
 
     def catches(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
-        """First moment from ``begin_s`` on and before ``end_s`` at which a standing rotor follows the field again."""
-        t = begin_s
-        if abs(s.velocity(t)) > self.catch_p:
-            slows = isinstance(s, Segment) and s.c2 * s.direction < 0.0
-            if not slows or abs(s.velocity(end_s)) >= self.catch_p:
-                return None
-            t = min(max(s.when_speed(self.catch_p), begin_s), end_s)
-        acceleration = (2.0 * s.c2 + 6.0 * s.c3 * (t - s.anchor_s)) if isinstance(s, Segment) else 0.0
-        need = self.needs(sign * acceleration, sign * s.direction)
-        return None if self._lacks(abs(s.velocity(t)), need) or t >= end_s else t
+        """First moment from ``begin_s`` on and before ``end_s`` at which a standing rotor follows the field again.
+
+        The field is no faster than ``start_p`` then, and there is torque for what the motion needs.
+        """
+        if not isinstance(s, Segment):
+            return self._catches_looking(s, begin_s, end_s, sign)
+        if end_s == inf:
+            speed, need = abs(s.velocity(begin_s)), self.needs(sign * 2.0 * s.c2, sign * s.direction)
+            return begin_s if speed <= self.catch_p and not self._lacks(speed, need) else None
+        begins = [begin_s, *self._corners(s, begin_s, end_s, self.catch_p)]
+        for t0, t1 in zip(begins, [*begins[1:], end_s], strict=True):
+            is_slow = abs(s.velocity(0.5 * (t0 + t1))) <= self.catch_p
+            if not is_slow and abs(s.velocity(t0)) > self.catch_p:
+                continue
+            spares, slack = self._spares(s, t0, t1, sign)
+            caught = _first_not_below_0(spares, t0 - s.anchor_s, t1 - s.anchor_s if is_slow else t0 - s.anchor_s, slack)
+            if caught is not None:
+                return caught + s.anchor_s
+        return None
+
+    def _catches_looking(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
+        return next(
+            (
+                t
+                for t, speed, need in self._looks(s, begin_s, end_s, sign)
+                if speed <= self.catch_p and not self._lacks(speed, need)
+            ),
+            None,
+        )
 
 
-def _first_below_0(q: tuple[float, float, float], begin: float, end: float, slack: float) -> float | None:
+def _first_below_0(q: Quadratic, begin: float, end: float, slack: float) -> float | None:
     """First u in begin…end at which q0 + q1·u + q2·u² goes below 0 (by more than ``slack`` at the ends)."""
     q0, q1, q2 = q
     if q0 + begin * (q1 + begin * q2) < -slack:
         return begin
-    roots: list[float] = []
-    if q2 == 0.0:
-        if q1 < 0.0:
-            roots = [-q0 / q1]
-    else:
-        inside = q1 * q1 - 4.0 * q2 * q0
-        if inside > 0.0:
-            half = -0.5 * (q1 + (sqrt(inside) if q1 >= 0.0 else -sqrt(inside)))
-            roots = [half / q2] + ([q0 / half] if half != 0.0 else [])
-            roots = [u for u in roots if q1 + 2.0 * q2 * u < 0.0]
-    for u in sorted(roots):
+    for u in sorted(u for u in _roots(q) if _slope(q, u) < 0.0):
         if begin < u <= end:
             return u if q0 + end * (q1 + end * q2) < -slack or u < end else None
     return end if q0 + end * (q1 + end * q2) < -slack else None
+
+
+def _first_not_below_0(all_q: list[Quadratic], begin: float, end: float, slack: float) -> float | None:
+    """First u from begin on and before end (or at begin) at which no q is below 0; 0 itself counts where q does not fall."""
+
+    def is_up(q: Quadratic, u: float) -> bool:
+        value = q[0] + u * (q[1] + u * q[2])
+        return value > slack or (value >= -slack and _slope(q, u) >= 0.0)
+
+    rising = sorted(u for q in all_q for u in _roots(q) if begin < u < end and _slope(q, u) > 0.0)
+    return next((u for u in (begin, *rising) if all(is_up(q, u) for q in all_q)), None)
+
+
+def _slope(q: Quadratic, u: float) -> float:
+    return q[1] + 2.0 * q[2] * u
+
+
+def _roots(q: Quadratic) -> list[float]:
+    """Where q passes through 0."""
+    q0, q1, q2 = q
+    if q2 == 0.0:
+        return [] if q1 == 0.0 else [-q0 / q1]
+    inside = q1 * q1 - 4.0 * q2 * q0
+    if inside <= 0.0:
+        return []
+    half = -0.5 * (q1 + (sqrt(inside) if q1 >= 0.0 else -sqrt(inside)))
+    return [half / q2] + ([q0 / half] if half != 0.0 else [])

@@ -45,6 +45,11 @@ class Scale:
         return Fraction(str(units)) * self.pulses_per_unit
 
     @property
+    def period_p(self) -> int:
+        """Pulses of an electrical period: four full steps."""
+        return max(1, round(4 * self.pulses_per_rev / self.full_steps))
+
+    @property
     def turn(self) -> Fraction | None:
         """Pulses in a turn of the axis itself, where its unit says what that is."""
         revs = TURNS.get(self.unit)
@@ -122,5 +127,4 @@ def motor_of(motor: MotorSpec, kind: str, scale: Scale) -> Motor:
         friction=motor.friction + motor.friction_force * arm,
         load=motor.load + motor.force * arm,
         start_p=None if motor.start_speed is None else motor.start_speed / 60.0 * per_rev,
-        period_p=max(1, round(4 * per_rev / scale.full_steps)),
     )
