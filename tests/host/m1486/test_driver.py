@@ -324,6 +324,30 @@ def test_plain_commands_are_typed_as_the_buffer_takes_them() -> None:
     assert "wrong-data" not in wire.codes()
 
 
+@pytest.mark.parametrize(
+    ("program", "steps"),
+    [
+        ("l3\n[\nf640\nr\ne\n]", 30),
+        ("f640\nr\nl3\n[\nf640\nr\n]\nb64\nr\ne", 40 - 3),
+        ("l2\nf640\nr\nm1\nl2\n[\nb64\nr\ne\n]\nt6\ne", 20 - 4),
+        ("@3\n[\nf640\nr\nt80\n]\nb64\nr\ni2l3", 9),
+    ],
+)
+def test_nothing_is_asked_where_a_loop_or_a_jump_comes_by_again(program: str, steps: int) -> None:
+    """A question typed there would be part of it: every turn would upload a byte, and take a place in the memory."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.configure(**KNOWN)  # type: ignore[arg-type]
+    wire.sent.clear()
+    chip.download(program)
+    lines = program.split("\n")
+    begin = next(n for n, line in enumerate(lines) if line[0] in "l@")
+    assert " ".join(lines[begin:]) in typed(wire)
+    assert chip.wait().ok
+    assert wire.true() == steps * 64
+    assert "wrong-data" not in wire.codes()
+
+
 def test_example_6_of_the_manual_needs_both_its_chips() -> None:
     text = "x0\n:0\n[\nl3\nc1\nt1\n+64\nf\nr\ne\n]\nx7\n[\nf640\nr\n]\n"
     wire = ChipWire("B", (0, 7))

@@ -14,7 +14,7 @@ from steptwin.host.m1486.talk import WHO
 from steptwin.host.m1486.unit import Unit
 from steptwin.host.permission import Permission
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.m1486.syntax import Command, Program
+from steptwin.m1486.syntax import Command, Condition, Program
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
 
@@ -26,7 +26,8 @@ MOST_TOLD = 10
 ERASE_MARGIN_S = 0.1
 FULL_PAUSE_NS = 50 * MILLISECOND
 """The input buffer is given this long to empty when characters come back inverted."""
-_MOVES = frozenset("r)(jk'[")
+_MOVES = frozenset("r)(jk'[ie")
+"""What moves, or leads to commands typed before."""
 
 
 def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> Program:
@@ -52,6 +53,30 @@ def parts(program: Program) -> list[tuple[int | None, list[Command]]]:
         else:
             found[-1][1].append(command)
     return [(address, commands) for address, commands in found if commands]
+
+
+def probes(commands: Sequence[Command]) -> list[bool]:
+    """Whether a question may be typed before each command: not where the program comes by again, in a loop or behind a label that
+    is jumped back to, because it would be part of it: every turn would upload a byte.
+    """
+    allowed = [True] * len(commands)
+    loops: list[int] = []
+    labels: dict[int | None, int] = {}
+    for index, command in enumerate(commands):
+        begin = index
+        if command.key == "L":
+            loops.append(index)
+        elif command.key == "@":
+            labels.setdefault(command.number, index)
+        elif command.key == "E" and loops:
+            begin = loops.pop()
+        elif command.key in ("J", "'", "I"):
+            condition = command.argument
+            label = condition.label if isinstance(condition, Condition) else command.number
+            begin = min(labels.values(), default=index) if label is None else labels.get(label, index)
+        for inside in range(begin + 1, index + 1):
+            allowed[inside] = False
+    return allowed
 
 
 async def send_program(
@@ -99,14 +124,19 @@ class _Typist:
         self._permission = unit.permission()
         self._capacity = unit.variant.input_bits // 8
         self._typed = 0  # characters that may lie in the input buffer
+        self._may_ask = True  # see `probes`
 
     async def type(self, commands: Sequence[Command]) -> bytes:
         unit = self._unit
         uploaded = b""
         index = 0
+        allowed = probes(commands)
         async with unit.turn(self._permission):
             await unit.rest()
             while index < len(commands):
+                self._may_ask = allowed[index]
+                if self._may_ask and self._typed and not all(allowed[index + 1 : index + 2]):
+                    await self._empty()  # the last chance
                 if commands[index].key == "[":
                     closes = next(n for n in range(index, len(commands)) if commands[n].key == "]")
                     await self._file(commands[index : closes + 1], index)
@@ -154,8 +184,14 @@ class _Typist:
         return b""
 
     async def _empty(self) -> None:
-        """Until the chip has done all it was told: its buffer is empty then. Raises `Busy` after a minute."""
+        """Until the chip has done all it was told: its buffer is empty then. Raises `Busy` after a minute.
+
+        Where nothing may be asked only a moment: a chip that does not move empties it meanwhile, one that does answers 5EH.
+        """
         unit = self._unit
+        if not self._may_ask:
+            await unit.line.sleep(FULL_PAUSE_NS / SECOND)
+            return
         if await unit.asks_who(round(UNKNOWN_S * SECOND), self._permission) is None:
             raise Busy(f"{unit.place}: {unit.name} takes no more: it {unit.why_busy()}")
         self._typed = 0
