@@ -57,7 +57,9 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
 
     program = tmp_path / "toandfro.m1486"
     program.write_text(PROGRAM)
-    assert run("send", str(program)) == f"{program} is in the M1486B\n"
+    assert run("send", str(program)) == (
+        f"{program} is in the M1486B and has been started by its ]: the motor may move; 'steptwin stop --program' ends it\n"
+    )
     assert "does not answer yet" in run("info", code=1)
     run("stop", "--program")
     assert run("get", "counter").startswith("COUNTER")
@@ -75,7 +77,11 @@ def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: 
         done = twin.command("send", str(program), "-d", f"{twin.pty},{address}")
         return done.returncode, done.stdout or done.stderr
 
-    assert sent("x0\n[\nf640\nr\n]\nx7\n[\nb64\nr\n]\n", "kind=m1486") == (0, f"{program} is in chips 0, 7 (M1486B)\n")
+    started = " and has been started by its ]: the motor may move; 'steptwin stop --program' ends it"
+    assert sent("x0\n[\nf640\nr\n]\nx7\n[\nb64\nr\n]\n", "kind=m1486") == (
+        0,
+        f"{program} is in chips 0, 7 (M1486B){started}\n",
+    )
     assert sent("f64\nr\nx0\nr\n", "chip=7")[0] == 0
     code, told = sent("f64\nr\nx0\nr\n", "kind=m1486")
     assert (code, "what stands before its first X is for which chip?" in told) == (2, True)

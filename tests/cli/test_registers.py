@@ -29,9 +29,9 @@ def test_piped_it_is_plain_text_of_one_line_per_register() -> None:
     lines = printed("--firmware", "1.23").splitlines()
     assert lines[0].split() == ["address", "name", "type", "read", "write", "unit", "permitted", "meaning"]
     assert len(lines) == 1 + len(register_map("1.23"))
-    assert "1036     M1_ACC             REAL/DINT       03    16      u/s²  > 0" in "\n".join(lines)
+    assert "1036     M1_ACC             REAL/DINT       3 (03h)  16 (10h)           u/s²  > 0" in "\n".join(lines)
     (jog,) = [line for line in lines if " JOG_SPEED " in line]
-    assert jog.split()[:6] == ["1017", "JOG_SPEED", "REAL", "06,", "16", "u/s"]
+    assert jog.split()[:8] == ["1017", "JOG_SPEED", "REAL", "6", "(06h),", "16", "(10h)", "u/s"]
 
 
 def test_the_default_is_the_default_firmware() -> None:
@@ -84,19 +84,19 @@ def test_golden_lines_of_the_page() -> None:
         "| address | name | type | read | write | unit | permitted | meaning |",
     ]
     # What stands between the address and the meaning of a coil.
-    coil = "BIT |  | 05 |  | ON, OFF"
+    coil = "BIT |  | 5 (05h) |  | ON, OFF"
     assert [line for line in page if "_EN`" in line or "`USER_REG_ZERO`" in line or "`Mx_JOG_MINUS`" in line] == [
         f"| 2000…2003 | `Mx_EN` | {coil} | Enable output of axis Mx: ON switches the drive on, OFF switches it off. |",
         f"| 2009, 2011, 2013, 2015 | `Mx_JOG_MINUS` | {coil} | While ON, axis Mx moves in the negative direction at JOG_SPEED. |",
         f"| 2102 | `USER_REG_ZERO` (also `USER_REG_RESET`) | {coil} | Writing ON sets user registers 1000–1999 to 0. |",
     ]
-    assert "| 10001 | `PROG_BANK_SEL` | WORD | 03 | 06, 16 |  | 0…5 | Program bank the next start runs. |" in page
+    assert "| 10001 | `PROG_BANK_SEL` | WORD | 3 (03h) | 6 (06h), 16 (10h) |  | 0…5 | Program bank the next start runs. |" in page
     assert (
-        "| 10044, 10046, 10048, 10050 | `Mx_DEC` | REAL/DINT | 03 | 16 | u/s² | > 0 | Deceleration of axis Mx in position mode. |"
-        in page
+        "| 10044, 10046, 10048, 10050 | `Mx_DEC` | REAL/DINT | 3 (03h) | 16 (10h) | u/s² | > 0 |"
+        " Deceleration of axis Mx in position mode. |" in page
     )
     assert (
-        "| 10009 | `M_STATUS` | WORD | 03 |  |  |  | Status of the controller:"
+        "| 10009 | `M_STATUS` | WORD | 3 (03h) |  |  |  | Status of the controller:"
         " 0 ok, 1 drive position error, 2 program error, 3 Modbus master communication error. |" in page
     )
 

@@ -66,9 +66,9 @@ REQUESTS = [
     ("10 2734 0002 04" + real(1000), "write M1_ACC = 1000 mm/s²"),
     ("10 2713 0002 04 0001 0001", "write PROGRAM_CTRL = START (1); AXIS_CTR_MODE = TRIGGER (1)"),
     ("10 2774 0002 04 FFFF FFFF", "write ENC1_IMP = -1 imp"),
-    ("2B 0E01", "function 2B: not implemented by the device"),
-    ("03 2724 0000", "function 03: quantity 0 is outside 1 to 125"),
-    ("05 07D0 1234", "function 05: coil value 1234 is neither FF00 nor 0000"),
+    ("2B 0E01", "function 43 (2Bh): not implemented by the device"),
+    ("03 2724 0000", "function 3 (03h): quantity 0 is outside 1 to 125"),
+    ("05 07D0 1234", "function 5 (05h): coil value 1234 is neither FF00 nor 0000"),
     ("", "empty request"),
 ]
 
@@ -105,7 +105,7 @@ RESPONSES = [
     ("10 2754 0002 04" + real(2.5), "10 2754 0002", "wrote M1_VEL_ABS"),
     ("03 2775 0001", "83 02", "exception 02 illegal data address (10101)"),
     ("06 2710 0007", "86 03", "exception 03 illegal data value (10000)"),
-    ("2B 0E01", "AB 01", "exception 01 illegal function (function 2B)"),
+    ("2B 0E01", "AB 01", "exception 01 illegal function (function 43 (2Bh))"),
     ("03 2724 0002", "83 63", "exception 99 unknown exception (10020)"),
     # Not what was asked for: nothing is invented.
     ("03 2724 0002", "03 02 0007", "read registers 7"),
@@ -122,7 +122,7 @@ def test_responses(asked: str, frame: str, text: str) -> None:
 def test_a_response_without_its_request_shows_what_can_be_known() -> None:
     assert wording().response(pdu("03 04 0001 0002")) == "read registers 1, 2"
     assert wording().response(pdu("01 01 0F")) == "read bits 0f"
-    assert wording().response(pdu("83 02")) == "exception 02 illegal data address (function 03)"
+    assert wording().response(pdu("83 02")) == "exception 02 illegal data address (function 3 (03h))"
 
 
 def test_dint_shows_pulses_and_units() -> None:

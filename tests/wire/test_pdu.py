@@ -211,7 +211,7 @@ def test_any_pdu_is_a_response_or_a_bad_one(pdu: bytes) -> None:
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (Read(4, 0, 1), "function 4 does not read: permitted are 1, 2 and 3"),
+        (Read(4, 0, 1), "function 4 (04h) does not read: permitted are 1, 2 and 3"),
         (Read(3, 0, 0), "number of registers 0 is outside 1 to 125"),
         (Read(3, 0, 126), "number of registers 126 is outside 1 to 125"),
         (Read(1, 0, 2001), "number of bits 2001 is outside 1 to 2000"),
@@ -234,7 +234,7 @@ def test_what_cannot_be_asked(request_: Request, message: str) -> None:
 @pytest.mark.parametrize(
     ("response", "message"),
     [
-        (Bits(3, b"\0"), "function 3 does not answer with bits: permitted are 1 and 2"),
+        (Bits(3, b"\0"), "function 3 (03h) does not answer with bits: permitted are 1 and 2"),
         (Bits(1, bytes(251)), "number of bytes 251 is outside 1 to 250"),
         (Registers(()), "number of registers 0 is outside 1 to 125"),
         (Refused(0x83, 2), "function 131 is outside 1 to 127"),
@@ -252,12 +252,12 @@ def test_what_cannot_be_answered(response: Response, message: str) -> None:
     [
         ("", "a response of 0 bytes is too short"),
         ("03", "a response of 1 bytes is too short"),
-        ("83 02 00", "response 83 has 3 bytes instead of 2"),
-        ("03 04 00 00", "response 03 has 4 bytes instead of 6"),
-        ("03 03 00 00 00", "response to function 03 has an odd byte count: 3"),
-        ("05 00 00 00 01", "response to function 05 repeats the coil value 0001, neither FF00 nor 0000"),
-        ("06 00 00", "response 06 has 3 bytes instead of 5"),
-        ("04 02 00 00", "response to function 04, which is none of 01, 02, 03, 05, 06, 10"),
+        ("83 02 00", "response to function 3 (03h) has 3 bytes instead of 2"),
+        ("03 04 00 00", "response to function 3 (03h) has 4 bytes instead of 6"),
+        ("03 03 00 00 00", "response to function 3 (03h) has an odd byte count: 3"),
+        ("05 00 00 00 01", "response to function 5 (05h) repeats the coil value 0001, neither FF00 nor 0000"),
+        ("06 00 00", "response to function 6 (06h) has 3 bytes instead of 5"),
+        ("04 02 00 00", "response to function 4 (04h), which is none of 1, 2, 3, 5, 6 and 16 (10h)"),
     ],
 )
 def test_responses_without_form(text: str, message: str) -> None:
@@ -295,11 +295,14 @@ def test_a_refusal_is_raised_as_one(request_: Request) -> None:
         answer(request_, bytes((request_.function | 0x80, 2)))
     assert isinstance(refusal.value, Refusal)
     assert (refusal.value.function, refusal.value.code) == (request_.function, 2)
-    assert str(refusal.value) == f"function {request_.function:02X} refused with exception 02 (illegal data address)"
+    assert (
+        str(refusal.value)
+        == f"function {request_.function} ({request_.function:02X}h) refused with exception 02 (illegal data address)"
+    )
 
 
 def test_an_exception_code_nobody_knows_is_shown() -> None:
-    assert str(ModbusException(3, 0x55)) == "function 03 refused with exception 55 (unknown code)"
+    assert str(ModbusException(3, 0x55)) == "function 3 (03h) refused with exception 55 (unknown code)"
 
 
 def test_values_of_different_kinds_differ() -> None:

@@ -236,7 +236,17 @@ def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
             uploaded = download_to(chips.values(), text, first=chips.get(address.chip), progress=tell, name=str(file))
     title = next(iter(chips.values())).variant.title
     where = f"the {title}" if len(addresses) == 1 else f"chips {', '.join(f'{a:X}' for a in addresses)} ({title})"
-    typer.echo(f"{file} is in {where}" + (f"; it uploaded {uploaded.hex(' ')}" if uploaded else ""))
+    typer.echo(f"{file} is in {where}{_started(text)}" + (f"; it uploaded {uploaded.hex(' ')}" if uploaded else ""))
+
+
+def _started(text: str) -> str:
+    """What a sent program does already."""
+    from steptwin.m1486.syntax import parse
+
+    keys = {command.key for command in parse(text).program.commands}
+    if "]" in keys:
+        return " and has been started by its ]: the motor may move; 'steptwin stop --program' ends it"
+    return " and was carried out as it was sent: the motor may move" if keys & {"R", "(", ")", "J"} else ""
 
 
 def _addressed(text: str, chip: int | None, file: Path) -> list[int | None]:

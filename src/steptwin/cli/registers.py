@@ -106,7 +106,9 @@ def as_csv(register_map: RegisterMap) -> str:
 
 
 def _functions(codes: Iterable[int]) -> str:
-    return ", ".join(f"{code:02d}" for code in codes)
+    from steptwin.wire.pdu import function_number
+
+    return ", ".join(map(function_number, codes))
 
 
 def _permitted(register: Register) -> str:

@@ -19,7 +19,7 @@ from steptwin.errors import Refusal
 def send(
     file: Annotated[Path, typer.Argument(help="The program.")], device: Device = None, log_frames: LogFrames = False
 ) -> None:
-    """Download a program into an M1486. A file in [ ] runs from its end on; an E type is erased before, and keeps it.
+    """Download a program into an M1486. A file in [ ] is started by its ]: the motor may move. An E type is erased before.
 
     A program that names its chips with X goes into all of them: --device ADDRESS,kind=m1486 is their line.
     """

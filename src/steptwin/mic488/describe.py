@@ -47,7 +47,7 @@ class Wording:
         except modbus.ModbusException as refusal:
             if not pdu:
                 return "empty request"
-            return f"function {pdu[0]:02X}: {refusal.detail or 'not implemented by the device'}"
+            return f"function {modbus.function_number(pdu[0])}: {refusal.detail or 'not implemented by the device'}"
         match request:
             case modbus.Read(function, address, count):
                 return f"read {self._names(_SPACES[function], address, count)}"
@@ -68,7 +68,7 @@ class Wording:
         match response:
             case modbus.Refused(function, code):
                 name = modbus.EXCEPTION_NAMES.get(code, "unknown exception")
-                where = f"function {function:02X}" if asked is None else str(asked.address)
+                where = f"function {modbus.function_number(function)}" if asked is None else str(asked.address)
                 return f"exception {code:02d} {name} ({where})"
             case modbus.Bits(function, packed):
                 if isinstance(asked, modbus.Read) and asked.function == function and len(packed) == (asked.count + 7) // 8:

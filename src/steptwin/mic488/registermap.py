@@ -421,10 +421,10 @@ def _check_row(row: Row, firmware: Firmware) -> None:
     where = f"firmware {firmware.name}: {row.name}"
     for function in row.reads + row.writes:
         if FUNCTION_SPACES.get(function) is not row.space:
-            raise RegisterMapError(f"{where} is a {row.space.value}, function {function:02d} does not reach it")
+            raise RegisterMapError(f"{where} is a {row.space.value}, function {pdu.function_number(function)} does not reach it")
     wrong = [f for f in row.reads if f not in pdu.READS] + [f for f in row.writes if f in pdu.READS]
     if wrong:
-        raise RegisterMapError(f"{where} lists function {wrong[0]:02d} on the wrong side of read and write")
+        raise RegisterMapError(f"{where} lists function {pdu.function_number(wrong[0])} on the wrong side of read and write")
     if bool(row.writes) is (row.effect is Effect.NONE):
         raise RegisterMapError(f"{where} has the effect '{row.effect.value}' but write functions {row.writes}")
     if (row.type is Type.BIT) is (row.space is Space.HOLDING):

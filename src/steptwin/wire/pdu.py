@@ -58,6 +58,11 @@ _THREE_FIELDS = struct.Struct(">BHH")
 _WRITE_HEAD = struct.Struct(">BHHB")
 
 
+def function_number(code: int) -> str:
+    """A function code for people, decimal with its hexadecimal form: ``22 (16h)``."""
+    return f"{code} ({code:02X}h)"
+
+
 class ModbusException(Refusal):
     """The peer answered with an exception; inside a slave: the request has to be answered with one (`pdu`)."""
 
@@ -65,7 +70,8 @@ class ModbusException(Refusal):
         self.function = function
         self.code = code
         self.detail = detail
-        text = f"function {function:02X} refused with exception {code:02X} ({EXCEPTION_NAMES.get(code, 'unknown code')})"
+        name = EXCEPTION_NAMES.get(code, "unknown code")
+        text = f"function {function_number(function)} refused with exception {code:02X} ({name})"
         super().__init__(f"{text}: {detail}" if detail else text)
 
     @property
@@ -196,7 +202,7 @@ def encode_request(request: Request) -> bytes:
     match request:
         case Read(function, address, count):
             if function not in READS:
-                raise Misuse(f"function {function} does not read: permitted are 1, 2 and 3")
+                raise Misuse(f"function {function_number(function)} does not read: permitted are 1, 2 and 3")
             bits = function in BIT_READS
             _check_span(address, count, MAX_BITS if bits else MAX_REGISTERS, "bits" if bits else "registers")
             return _THREE_FIELDS.pack(function, address, count)
@@ -259,7 +265,7 @@ def encode_response(response: Response) -> bytes:
     match response:
         case Bits(function, packed):
             if function not in BIT_READS:
-                raise Misuse(f"function {function} does not answer with bits: permitted are 1 and 2")
+                raise Misuse(f"function {function_number(function)} does not answer with bits: permitted are 1 and 2")
             return bytes((function, _within("number of bytes", len(packed), 1, MAX_BITS // 8))) + packed
         case Registers(values):
             count = _within("number of registers", len(values), 1, MAX_REGISTERS)
@@ -295,10 +301,10 @@ def decode_response(pdu: bytes) -> Response:
         if function in BIT_READS:
             return Bits(function, pdu[2:])
         if pdu[1] % 2:
-            raise BadResponse(f"response to function 03 has an odd byte count: {pdu[1]}")
+            raise BadResponse(f"response to function 3 (03h) has an odd byte count: {pdu[1]}")
         return Registers(struct.unpack_from(f">{pdu[1] // 2}H", pdu, 2))
     if function not in WRITES:
-        raise BadResponse(f"response to function {function:02X}, which is none of 01, 02, 03, 05, 06, 10")
+        raise BadResponse(f"response to function {function_number(function)}, which is none of 1, 2, 3, 5, 6 and 16 (10h)")
     if len(pdu) != 5:
         raise _bad_response(pdu, 5)
     _, address, value = _THREE_FIELDS.unpack(pdu)
@@ -307,12 +313,12 @@ def decode_response(pdu: bytes) -> Response:
     if function == WRITE_SINGLE_REGISTER:
         return WriteRegister(address, value)
     if value not in (COIL_ON, COIL_OFF):
-        raise BadResponse(f"response to function 05 repeats the coil value {value:04X}, neither FF00 nor 0000")
+        raise BadResponse(f"response to function 5 (05h) repeats the coil value {value:04X}, neither FF00 nor 0000")
     return WriteCoil(address, value == COIL_ON)
 
 
 def _bad_response(pdu: bytes, wanted: int) -> BadResponse:
-    return BadResponse(f"response {pdu[0]:02X} has {len(pdu)} bytes instead of {wanted}")
+    return BadResponse(f"response to function {function_number(pdu[0] & ~REFUSED)} has {len(pdu)} bytes instead of {wanted}")
 
 
 def answer(request: Request, pdu: bytes) -> Response:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 from chip_rig import ChipWire, chip_driver, chip_line
 
-from steptwin.host.m1486 import M1486, WrongType
+from steptwin.host.m1486 import M1486, NoEcho, WrongType
+from steptwin.host.m1486.lines import TALK
+from steptwin.host.m1486.talk import SPOILER
 from steptwin.m1486.lines import DUAL_DAC
 
 
@@ -62,3 +64,48 @@ def test_switches() -> None:
     assert chip.variable() == 77
     chip.command("T6")
     assert wire.chip.pins()["B6"] == 1
+
+
+WAKING = {
+    # Chip, address asked for: what is typed until it is known whether it echoes, with "|" for CR.
+    "alone": ("B", 15, None, "t41|t41|t41|"),
+    "addressed": ("B", 7, 7, "xg|xg|t41|x7|t41|t41|t41|"),
+    "an E type, which is given its time": ("E1", 7, 7, "xg|xg|t41|x7|xg|xg|t41|x7|t41|t41|t41|"),
+    "another chip echoes, this one is not there": (
+        "B", 7, 5, "xg|xg|t41|x5|t41|t41|t41|xg|xg|t41|x5|t41|t41|t41|xg|xg|",
+    ),
+    "nobody is there": ("B", None, 7, "xg|xg|t41|x7|xg|xg|t41|x7|xg|xg|"),
+    "nobody is there, without address": ("B", None, None, "t41|t41|t41|t41|t41|t41|"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WAKING)
+def test_what_is_typed_to_wake_a_chip(case: str) -> None:
+    """Lines that get no echo are given their CR later, so that nothing stands in front of what comes next."""
+    kind, there, asked, expected = WAKING[case]
+    wire = ChipWire(kind, (15 if there is None else there,))
+    wire.severed = there is None
+    chip = M1486(chip_line(wire), asked)
+    if there is not None and asked in (None, there):
+        chip.open()
+    else:
+        with pytest.raises(NoEcho):
+            chip.open()
+    assert b"".join(data for _, data in wire.sent).decode().replace("\r", "|").partition("u20")[0] == expected
+
+
+def test_after_an_ordinary_session_no_letter_is_expected_and_a_stray_one_counts() -> None:
+    """It may be the echo of something that stands in front of the next command now: that is spoilt first."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(microstep=1)
+    chip.move_by(10.0)
+    assert chip.wait().ok
+    chip.status()
+    talk = chip._driver.line.notes[TALK]
+    assert (talk.surplus, talk.owed, talk.dirty) == (0, {}, False)
+    wire.inject(b"B")
+    wire.sleep(0.1)
+    wire.sent.clear()
+    assert chip.counter() == 640
+    assert wire.sent[0][1] == SPOILER

@@ -417,6 +417,22 @@ def test_a_chip_that_was_switched_off_is_not_moved_with_what_it_was_set_to(call:
         chip.position()
 
 
+def test_after_a_restart_a_busy_chip_is_not_held_by_an_earlier_kill() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.set_function(51, False)
+    chip.run(1)
+    chip.stop()
+    wire.sleep(1.0)
+    wire.chip.power_cycle(wire.now)
+    with pytest.raises(Restarted):
+        chip.variable()
+    chip.set_function(51, False)
+    chip.run(1)
+    with pytest.raises(Busy, match="chip 7 is not done with a run without end: wait for its end or stop it"):
+        chip.variable()
+
+
 def test_a_chip_that_is_switched_off_between_the_distance_and_the_run_does_not_move() -> None:
     wire = ChipWire("B", (7,))
     chip = chip_driver(wire, 7)

@@ -73,7 +73,6 @@ class Notes:
         self.motion = None
         self.uploads = None
         self.is_position_valid = False
-        self.is_killed = False
 
     def function(self, number: int) -> bool | None:
         return None if self.functions is None else bool(self.functions >> (number - FUNCTIONS.start) & 1)
