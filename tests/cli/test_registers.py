@@ -123,3 +123,40 @@ def test_the_reference_page_prints_every_firmware() -> None:
         ["registers", "mic488", "--firmware", name, "--format", "md"] for name in reversed(list(FIRMWARES))
     ]
     assert "|" not in page
+
+
+def test_tags_for_panels_have_the_address_in_every_way_of_counting() -> None:
+    tags = {tag["tag"]: tag for tag in csv.DictReader(io.StringIO(printed("--format", "tags")))}
+    assert len(tags) == len(register_map("1.70"))
+    assert tags["M1_POS_ACT"] == {
+        "tag": "M1_POS_ACT",
+        "data_type": "REAL",
+        "access": "RW",
+        "area": "4x holding register",
+        "address_0": "10020",
+        "address_1": "10021",
+        "reference": "410021",
+        "registers": "2",
+        "word_order": "low word first",
+        "unit": "u",
+        "minimum": "",
+        "maximum": "",
+        "comment": tags["M1_POS_ACT"]["comment"],
+    }
+    expected = {
+        "M1_EN": ("002001", "BOOL", "W"),
+        "IN1": ("105001", "BOOL", "R"),
+        "OUT1": ("006001", "BOOL", "RW"),
+        "M1_STATUS": ("410011", "WORD", "R"),
+    }
+    assert {name: (tags[name]["reference"], tags[name]["data_type"], tags[name]["access"]) for name in expected} == expected
+    assert {tag["word_order"] for tag in tags.values() if tag["registers"] == "2"} == {"low word first"}
+    assert {tag["word_order"] for tag in tags.values() if tag["registers"] == "1"} == {""}
+
+
+def test_the_addresses_on_the_page_for_panels_are_those_of_the_tags() -> None:
+    page = (PAGE.parents[1] / "hmi.md").read_text()
+    tags = {tag["tag"]: tag for tag in csv.DictReader(io.StringIO(printed("--format", "tags")))}
+    for column, line in (("address_0", "address from 0"), ("address_1", "address from 1"), ("reference", "reference with area")):
+        (row,) = [row for row in page.splitlines() if row.startswith(f"| {line}")]
+        assert [cell.strip() for cell in row.split("|")[2:-1]] == [tags[name][column] for name in ("M1_POS_ACT", "M1_EN", "IN1")]

@@ -172,8 +172,9 @@ class Reader:
         ready = self._directory / f"{name}.json"
         options = ["--ready-file", str(ready)]
         if name != "up" and not {"--tcp", "--pty", "--serial", "--rtu-tcp", "--rfc2217"} & set(words):
-            options += ["--pty", str(self._directory / "run" / name), "--tcp", "127.0.0.1:0"]
-            options += ["--rtu-tcp", "127.0.0.1:0"] if name == "mic488" else []
+            anywhere = "0.0.0.0:0" if "--listen-any" in words else "127.0.0.1:0"
+            options += ["--pty", str(self._directory / "run" / name), "--tcp", anywhere]
+            options += ["--rtu-tcp", anywhere] if name == "mic488" else []
         process = subprocess.Popen(
             [str(BIN / "steptwin"), *words[1:], *options],
             cwd=self._cwd,

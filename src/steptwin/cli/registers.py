@@ -28,12 +28,13 @@ class Format(enum.StrEnum):
     CSV = "csv"
     JSON = "json"
     MD = "md"
+    TAGS = "tags"
 
 
 def registers(
     device: Annotated[str, typer.Argument(metavar="mic488", help="Controller.")],
     firmware: Annotated[str, typer.Option(help="Firmware generation: 1.23, 1.40 or 1.70.")] = "1.70",
-    form: Annotated[Format, typer.Option("--format", help="How to print it.")] = Format.TABLE,
+    form: Annotated[Format, typer.Option("--format", help="How to print it; tags: a list for panels and SCADA.")] = Format.TABLE,
 ) -> None:
     """Show the coils, inputs and holding registers of a controller."""
     from steptwin.mic488.registers import register_map
@@ -47,6 +48,8 @@ def registers(
         typer.echo(as_csv(chosen), nl=False)
     elif form is Format.JSON:
         typer.echo(json.dumps(as_data(chosen), ensure_ascii=False, indent=2))
+    elif form is Format.TAGS:
+        typer.echo(as_tags(chosen), nl=False)
     elif form is Format.MD:
         typer.echo(as_markdown(chosen), nl=False)
     elif sys.stdout.isatty():
@@ -99,6 +102,44 @@ def as_csv(register_map: RegisterMap) -> str:
     for record in records:
         flat = {name: " ".join(map(str, value)) if isinstance(value, list) else value for name, value in record.items()}
         writer.writerow(flat | {"values": "; ".join(f"{value}={meaning}" for value, meaning in record["values"].items())})
+    return text.getvalue()
+
+
+_TAG_COLUMNS = ("tag", "data_type", "access", "area", "address_0", "address_1", "reference", "registers", "word_order", "unit")
+_LIMITS = ("minimum", "maximum", "comment")
+_AREAS = {"coil": ("0x coil", 0), "input": ("1x discrete input", 1), "holding register": ("4x holding register", 4)}
+
+
+def as_tags(register_map: RegisterMap) -> str:
+    """CSV to import into panels and SCADA systems: one tag for each register, its address counted in all three ways.
+
+    ``reference`` has six digits: the area, then the address counted from 1. Registers of type REAL/DINT are REAL.
+    """
+    from steptwin.mic488.registermap import Type
+
+    types = {Type.BIT: "BOOL", Type.DINT: "DINT", Type.REAL: "REAL", Type.VALUE: "REAL"}
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=[*_TAG_COLUMNS, *_LIMITS], lineterminator="\n")
+    writer.writeheader()
+    for register in register_map:
+        area, digit = _AREAS[register.space.value]
+        writer.writerow(
+            {
+                "tag": register.name,
+                "data_type": types.get(register.type, "WORD"),
+                "access": ("R" if register.reads else "") + ("W" if register.accepts else ""),
+                "area": area,
+                "address_0": register.address,
+                "address_1": register.address + 1,
+                "reference": f"{digit}{register.address + 1:05d}",
+                "registers": register.span,
+                "word_order": "low word first" if register.type.size == 2 else "",
+                "unit": register.unit(),
+                "minimum": "" if register.permitted.low is None else register.permitted.low,
+                "maximum": "" if register.permitted.high is None else register.permitted.high,
+                "comment": _meaning(register.meaning, register.values),
+            }
+        )
     return text.getvalue()
 
 
