@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -24,6 +24,7 @@ from steptwin.world.actions import ACTIONS, Outside
 from steptwin.world.description import read_world
 from steptwin.world.durations import LONGEST_NS
 from steptwin.world.faults import Fault, parse
+from steptwin.world.overrides import Overrides
 from steptwin.world.plant import Given
 
 FORMAT = 1
@@ -45,11 +46,18 @@ class Session:
     inputs: tuple[Given, ...]
     until: Nanos
     digest: str
+    overrides: Overrides = field(default_factory=dict)
+    """Values that replace those of the text."""
     version: str = __version__
 
     def world(self, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
-        world = World(read_world(self.name, self.text, self.seed), self.files, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        world = World(
+            read_world(self.name, self.text, self.seed, self.overrides),
+            self.files,
+            keep_trace=keep_trace,
+            keep_inputs=keep_inputs,
+        )
         ran = {name: view.device.firmware.name for name, view in world.mic488.items()}
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
@@ -112,6 +120,7 @@ def session_of(world: World) -> Session:
         tuple(world.inputs),
         world.now,
         world.trace.digest(),
+        spec.overrides,
     )
 
 
@@ -122,6 +131,7 @@ def save(session: Session, path: Path | str) -> None:
         "version": session.version,
         "name": session.name,
         "seed": session.seed,
+        "overrides": dict(session.overrides),
         "firmware": dict(session.firmware),
         "until_ns": session.until,
         "digest": session.digest,
@@ -184,6 +194,7 @@ def _session(data: Mapping[str, Any]) -> Session:
         inputs,
         until,
         fitting("digest", data["digest"], str),
+        fitting("overrides", data.get("overrides", {}), dict),
         fitting("version", data["version"], str),
     )
 

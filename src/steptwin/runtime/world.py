@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.files import read_bytes, shown
@@ -26,6 +26,9 @@ from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegisters, en
 from steptwin.world import script as do
 from steptwin.world.description import describe, read_world
 from steptwin.world.durations import duration
+from steptwin.world.faults import Fault
+from steptwin.world.faults import read as read_fault
+from steptwin.world.overrides import NO_OVERRIDES, Overrides
 from steptwin.world.plant import Plant, PlantSnapshot, Values
 from steptwin.world.running import Script
 from steptwin.world.spec import WorldSpec
@@ -81,18 +84,20 @@ class World(Plant):
         path: str | Path,
         *,
         seed: int | None = None,
+        overrides: Overrides = NO_OVERRIDES,
         keep_trace: bool = True,
         keep_inputs: bool = True,
         allow_outside: bool = False,
     ) -> Self:
         """The world described by a TOML file. Raises `WorldError` (a `Misuse`).
 
-        ``seed`` replaces that of the description. Without ``keep_trace`` and ``keep_inputs`` the memory of a long run does not
-        grow with what happens; it then has no trace and no session. Files the description names are read from its folder and
-        those below, with ``allow_outside`` from anywhere: their content becomes part of sessions.
+        ``seed`` replaces that of the description, ``overrides`` other values in it: ``{"axis.x.pitch": 4.0}``. Without
+        ``keep_trace`` and ``keep_inputs`` the memory of a long run does not grow with what happens; it then has no trace and no
+        session. Files the description names are read from its folder and those below, with ``allow_outside`` from anywhere: their
+        content becomes part of sessions.
         """
         place = Path(path)
-        spec = _described(str(path), read_text(place).source.text, seed)
+        spec = _described(str(path), read_text(place).source.text, seed, overrides)
         files: dict[str, bytes] = {}
         for name, key in spec.files():
             try:
@@ -109,11 +114,12 @@ class World(Plant):
         *,
         name: str = "world.toml",
         seed: int | None = None,
+        overrides: Overrides = NO_OVERRIDES,
         keep_trace: bool = True,
         keep_inputs: bool = True,
     ) -> Self:
         """The world described by a text. ``files`` are the contents of the files it names; the rest is as in `load`."""
-        return cls(_described(name, text, seed), files, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        return cls(_described(name, text, seed, overrides), files, keep_trace=keep_trace, keep_inputs=keep_inputs)
 
     def __enter__(self) -> Self:
         return self
@@ -174,12 +180,12 @@ class World(Plant):
         moment = duration(time)
         if moment < self.now:
             raise Misuse(f"at {moment / SECOND:g} s: this world is at {self.time:g} s already")
-        return self.start(name, lambda: do.run_through((do.At(moment), *_steps(reaction))), is_outside=True)
+        return self.start(name, partial(do.run_through, (do.At(moment), *_steps(reaction))), is_outside=True)
 
     def when(self, condition: str, reaction: Reaction, *, once: bool = False, name: str = "when") -> Script:
         """Do something whenever a condition comes true, or only the first time. Raises `Misuse`."""
         self.condition(condition)
-        return self.start(name, lambda: do.run_when(_steps(reaction), condition, once=once), is_outside=True)
+        return self.start(name, partial(do.run_when, _steps(reaction), condition, once=once), is_outside=True)
 
     def script(self, operator: Callable[[], do.Steps], name: str | None = None) -> Script:
         """Let an operator work from now on: a function that yields steps (`steptwin.world.script`) and is sent what they give.
@@ -195,6 +201,18 @@ class World(Plant):
     def release(self, button: str) -> None:
         self.outside(do.Release(button))
 
+    def fault(self, fault: str | Fault) -> str:
+        """Set a fault from now on, such as ``"crc unit=1 nth=3"`` (`steptwin fault --kinds`); gives its name.
+
+        Raises `Misuse` for one that cannot happen here.
+        """
+        self.outside(do.SetFault(read_fault(fault) if isinstance(fault, str) else fault))
+        return self.plan.faults.active[-1].name
+
+    def clear_fault(self, name: str) -> None:
+        """Remove a fault. Raises `Misuse` with the names there are."""
+        self.outside(do.ClearFault(name))
+
     # ------------------------------------------------------------------ branches
 
     def branch(self, snapshot: PlantSnapshot | None = None) -> Self:
@@ -202,14 +220,26 @@ class World(Plant):
 
         Scripts go along. Functions given to `at` and `when` do what they did: those that name this world act on this one.
         """
-        other = type(self)(read_world(self.spec.text.source.name, self.spec.text.source.text, self.spec.seed), self.files)
+        other = type(self)(self.spec, self.files, keep_trace=self.trace.is_kept, keep_inputs=self.keeps_inputs)
         other.restore(self.snapshot() if snapshot is None else snapshot)
         return other
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle and copy: the description and a snapshot. Functions given to `at`, `when` and `script` must be such as
+        pickle can find by name; a world that keeps no trace cannot be pickled (`Misuse`)."""
+        return _revived, (type(self), self.spec.text.source.name, self.snapshot(), self.keeps_inputs)
 
-def _described(name: str, text: str, seed: int | None = None) -> WorldSpec:
+
+def _revived(kind: type[World], name: str, snapshot: PlantSnapshot, keep_inputs: bool) -> World:
+    text, seed, overrides, files = snapshot.description
+    world = kind(read_world(name, text, seed, overrides), files, keep_inputs=keep_inputs)
+    world.restore(snapshot)
+    return world
+
+
+def _described(name: str, text: str, seed: int | None, overrides: Overrides) -> WorldSpec:
     """What a text describes; what is wrong with it, addresses included, is in its ``text``."""
-    spec = describe(name, text, seed)
+    spec = describe(name, text, seed, overrides)
     addresses = [
         (line, key, given) for line in spec.lines for key in ("tcp", "rtu_tcp") if (given := getattr(line, key)) is not None
     ]

@@ -13,6 +13,7 @@ from steptwin.mic488.config import Key as ConfigKey
 from steptwin.mic488.registers import AXES
 from steptwin.world.faults import Fault, parse
 from steptwin.world.names import check_names
+from steptwin.world.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.world.reader import Key, Path, Text, read_table
 from steptwin.world.script import STEPS, read_steps
 from steptwin.world.sense import check_sense
@@ -33,21 +34,22 @@ from steptwin.world.spec import (
 from steptwin.world.tables import KEYS, SEED
 
 
-def read_world(name: str, text: str, seed: int | None = None) -> WorldSpec:
+def read_world(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
     """The world that a TOML text called ``name`` describes. Raises `WorldError` with everything that is wrong with it.
 
-    ``seed`` takes the place of the text's; `Misuse` where it is no seed.
+    ``seed`` and ``overrides`` replace values of the text; `Misuse` for what is no seed, or is not there to be replaced.
     """
-    spec = describe(name, text, seed)
+    spec = describe(name, text, seed, overrides)
     spec.text.check()
     return spec
 
 
-def describe(name: str, text: str, seed: int | None = None) -> WorldSpec:
+def describe(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
     """As `read_world`, but raises `WorldError` only for what is no TOML. What is wrong is in ``text`` of the result, for more may
     be found when the world is built."""
     toml = Text(name, text)
     data = toml.data
+    override(data, overrides)
     known = [key for key in KEYS if key not in ("switch", "encoder", "motor")]
     for key in data:
         if key not in known and key != "fault":
@@ -66,6 +68,7 @@ def describe(name: str, text: str, seed: int | None = None) -> WorldSpec:
         scripts=(*_events(toml), *_scripts(toml)),
         faults=tuple(_faults(toml)),
         text=toml,
+        overrides=dict(overrides),
     )
     check_names(spec)
     return spec if seed is None else replace(spec, seed=_seed(seed))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, NamedTuple, TypeAlias
@@ -27,6 +28,7 @@ from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
+from steptwin.world.overrides import Overrides
 from steptwin.world.references import check_faults, check_scripts, check_step
 from steptwin.world.reports import Reports, ReportsState
 from steptwin.world.rigging import Rigging
@@ -59,7 +61,7 @@ class Given(NamedTuple):
 class PlantSnapshot:
     """All state of a world at a moment."""
 
-    description: tuple[str, int, Files]
+    description: tuple[str, int, Overrides, Files]
     now: Nanos
     kernels: tuple[KernelState, ...]
     faults: tuple[tuple[Fault, str, Nanos], ...]
@@ -178,13 +180,13 @@ class Plant:
     def _begin(self, spec: ScriptSpec) -> None:
         if spec.when is not None:
             text, once = spec.when, spec.once
-            self.start(spec.name, lambda: do.run_when(spec.steps, text, once=once))
+            self.start(spec.name, partial(do.run_when, spec.steps, text, once=once))
         elif spec.every is not None:
             period = spec.every
-            self.start(spec.name, lambda: do.run_every(spec.steps, period, 0))
+            self.start(spec.name, partial(do.run_every, spec.steps, period, 0))
         else:
             steps = (do.At(spec.at or 0), *spec.steps)
-            self.start(spec.name, lambda: do.run_through(steps, spec.repeat))
+            self.start(spec.name, partial(do.run_through, steps, spec.repeat))
 
     def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool = False) -> Script:
         """Let a script run from now on. ``make`` makes its steps, again whenever a snapshot is restored."""
@@ -315,7 +317,7 @@ class Plant:
         watch = None
         if until is not None:
             steps = (do.Until(until), do.Stop(until))
-            watch = self.start("until", lambda: do.run_through(steps))
+            watch = self.start("until", partial(do.run_through, steps))
         self.advance(end)
         if watch is not None:
             self._scripts.end(watch)
@@ -325,7 +327,7 @@ class Plant:
     def do_later(self, name: str, steps: tuple[do.Step, ...]) -> None:
         """Steps that are taken as those of the description, instead of others begun under the same name."""
         self.call_off(name)
-        self._later[name] = self.start(name, lambda: do.run_through(steps))
+        self._later[name] = self.start(name, partial(do.run_through, steps))
 
     def call_off(self, name: str) -> None:
         """What was to be done later under a name is not done."""
@@ -357,8 +359,8 @@ class Plant:
             frozenset(self._later),
         )
 
-    def _description(self) -> tuple[str, int, Files]:
-        return self.spec.text.source.text, self.spec.seed, self.files
+    def _description(self) -> tuple[str, int, Overrides, Files]:
+        return self.spec.text.source.text, self.spec.seed, self.spec.overrides, self.files
 
     def restore(self, snapshot: PlantSnapshot) -> None:
         """Go on where a snapshot of this world, or of one with the same description, was taken.

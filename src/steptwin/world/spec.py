@@ -8,6 +8,7 @@ from typing import Any
 
 from steptwin.machine import Nanos
 from steptwin.world.faults import Fault
+from steptwin.world.overrides import Overrides
 from steptwin.world.reader import Path, Text
 from steptwin.world.script import Step
 
@@ -194,6 +195,8 @@ class WorldSpec:
     faults: tuple[Fault | None, ...]
     """None for one that is wrong, as ``text`` says."""
     text: Text
+    overrides: Overrides
+    """Values that replace those of the text."""
 
     def files(self) -> Iterator[tuple[str, Path]]:
         """Names of the files the description refers to, and the keys that do."""

@@ -20,7 +20,7 @@ from hashlib import blake2b
 from heapq import merge
 from itertools import islice
 from operator import itemgetter
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -53,7 +53,7 @@ class Trace:
     """
 
     def __init__(self, machines: Iterable[str] = (), *, keep: bool = True) -> None:
-        self._keep = keep
+        self.is_kept = keep
         self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
         self.watchers: list[Recorder] = []
         """Told of every record as it is taken."""
@@ -74,7 +74,7 @@ class Trace:
             raise Misuse(f"{record.machine}: a record of {record.time} ns after one of {stream.latest} ns")
         stream.latest = record.time
         stream.count += 1
-        if self._keep:
+        if self.is_kept:
             stream.records.append(record)
         else:
             stream.hash.update(encode(record))
@@ -156,6 +156,16 @@ class StreamMark(NamedTuple):
     hash: blake2b
     hashed: int
     records: tuple[Record, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: a hash in progress cannot be saved, but made again from records that were kept."""
+        if self.count != len(self.records):
+            raise Misuse("a world that keeps no trace cannot be pickled")
+        return _mark_of, (self.latest, self.records)
+
+
+def _mark_of(latest: Nanos, records: tuple[Record, ...]) -> StreamMark:
+    return StreamMark(len(records), latest, blake2b(digest_size=DIGEST_BYTES), 0, records)
 
 
 class Mark(NamedTuple):
