@@ -700,11 +700,12 @@ def test_mic_42_what_is_read_in_dint_mode_can_be_written_back(rig: Rig, key: str
 # ---------------------------------------------------------------------- soft limits
 
 
-def test_no_overrun_from_standstill(rig: Rig) -> None:
+@pytest.mark.parametrize("side", [-1, 1])
+def test_no_overrun_from_standstill(rig: Rig, side: int) -> None:
     """An axis at rest beyond a limit has nothing to brake."""
-    rig.set("POS_ACT", 1000.0)
-    rig.set("POSLIM_R", 500.0)
-    for key, value in (("VEL_ABS", 100.0), ("POS_ABS", 2000.0), ("POS_ABS", 0.0)):
+    rig.set("POS_ACT", side * 1000.0)
+    rig.set("POSLIM_R" if side > 0 else "POSLIM_L", side * 500.0)
+    for key, value in (("VEL_ABS", side * 100.0), ("POS_ABS", side * 2000.0), ("POS_ABS", 0.0)):
         rig.set(key, value)
     rig.until(1, 4)
     assert rig.events("overrun") == []

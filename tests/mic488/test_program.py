@@ -6,12 +6,12 @@ import pickle
 from dataclasses import replace
 
 import pytest
-from mic488_rig import Rig
+from mic488_rig import Rig, controller
 from wbc_rig import PAUSED, RUNNING, STOPPED, ProgramRig, loaded
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Edge
-from steptwin.mic488.config import ControllerConfig, ProgramConfig
+from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.program import load
 from steptwin.wbc.check import check
@@ -307,3 +307,49 @@ def test_a_program_without_any_wait_does_not_hang_and_lets_others_work() -> None
             rig.i(7, step)
             assert rig.i(7) == step
         assert rig.r(0) > 300
+
+
+# ---------------------------------------------------------------------- a program at rest and masters
+
+
+@pytest.mark.parametrize(
+    ("name", "key"), [("VmaxM1", "VMAX"), ("AccM1", "ACC"), ("DecM1", "DEC"), ("LimLM1", "POSLIM_L"), ("PosM1", "POS_ACT")]
+)
+def test_a_waiting_program_notices_what_a_master_writes(name: str, key: str) -> None:
+    """It waits without looking all the time; a write of the register lets it look."""
+    rig = ProgramRig(f"WAIT {name} = 5\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig.start()
+    rig.wait(3.0)
+    assert not rig.out(1)
+    rig.set(key, 5.0)
+    rig.wait(0.1)
+    assert rig.out(1)
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_mic_31_program_control_0_ends_a_program_with_drives_and_outputs_off(paused: bool) -> None:
+    rig = ProgramRig("M1 = ON\nVABS M1 100\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig.start()
+    rig.wait(0.1)
+    if paused:
+        rig.pause()
+    assert (rig.status(), rig.out(1)) == (2, True)
+    rig.halt()
+    assert (rig.status(), rig.out(1), rig.word("PROGRAM_CTRL")) == (0, False, 0)
+
+
+def test_mic_8_a_program_stops_and_moves_an_axis_whose_en_is_not_wired() -> None:
+    rig = ProgramRig(
+        "VABS M1 100\nDELAY 1\nM1 = OFF\nWAIT IN1 = ON\nM2 = ON\nLinX = 5\nLinY = 5\nLinVel = 50\nMOVELIN 0\nWAITPOS\nOUT1 = ON\n"
+        "WAIT 1 = 2\n",
+        "",
+        controller(AxisConfig(en_wired=0)),
+    )
+    rig.start()
+    rig.wait(0.9)
+    assert rig.status() == 2
+    rig.wait(0.3)
+    assert (rig.status(), rig.velocity()) == (0, 0.0)
+    rig.pin("IN1", 1)
+    rig.wait(5.0)
+    assert (rig.out(1), rig.position(1), rig.position(2)) == (True, 5.0, 5.0)

@@ -84,7 +84,7 @@ def test_mic_15_a_request_in_pieces_is_answered_on_every_byte_transport(link: st
     assert in_pieces(served, port, pause_ms, REQUEST[:3], REQUEST[3:6], REQUEST[6:]) == ANSWER
     (event,) = served.devices[1].events
     assert event.code == "frame-pause"
-    assert event.text.startswith(f"a request had a pause of {pause_ms if link != 'serial' else pause_ms - 0.521:.3g} ms inside")
+    assert event.text.startswith(f"a request had a pause of {pause_ms if link != 'serial' else pause_ms - 0.521:.1f} ms inside")
 
 
 def test_mic_15_a_broadcast_with_a_pause_is_an_event_of_every_unit() -> None:

@@ -89,7 +89,7 @@ def pause_observer(devices: Mapping[int, Mic488]) -> Callable[[int, Nanos], None
     """For ports that serve ``devices``: an event for a request with a pause inside (unit, 0 for all; pause in ns), see MIC-15."""
 
     def observe(unit: int, pause: Nanos) -> None:
-        text = f"a request had a pause of {pause / MILLISECOND:.3g} ms inside: the controller drops a frame at 0.75 ms (MIC-15)"
+        text = f"a request had a pause of {pause / MILLISECOND:.1f} ms inside: the controller drops a frame at 0.75 ms (MIC-15)"
         for device in devices.values() if unit == 0 else (devices[unit],):
             device.event("frame-pause", text)
 
