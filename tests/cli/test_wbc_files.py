@@ -205,6 +205,23 @@ def test_build_and_decompile_come_back_to_the_same_bytes(run: Run, file: File, t
     assert again.read_bytes() == image.read_bytes()
 
 
+def test_wbc_40_build_and_decompile_say_what_is_inferred(run: Run, file: File, tmp_path: Path) -> None:
+    program = file("a.prg", "M1 = ON\nPABS M1 5\nWAITPOS\n")
+    code, out, err = run("build", program)
+    assert (code, out) == (1, "")
+    assert "error W160: PABS has no documented form in the image" in err
+    assert "--inferred writes it in a form that was never seen" in err
+    image, source = tmp_path / "a.wbc", tmp_path / "b.prg"
+    assert run("build", program, "--inferred") == (0, f"{image}: 3 commands, 0 positions\n", "")
+    summary = "1 statement marked as inferred: build takes them with --inferred"
+    assert run("decompile", image, "-o", source) == (0, f"{source}: {summary}\n", "")
+    assert source.read_text().splitlines()[1:] == ["SET M1 = 1", "PABS M1 5  // inferred", "WAITPOS"]
+    code, out, err = run("run", image, "--until", "idle")
+    assert code == 0
+    assert "warning W260: 1 statement is inferred" in err
+    assert "M1 goes to 5 imp" in out
+
+
 def test_decompile_overwrites_no_table_it_was_not_told_of(run: Run, file: File, tmp_path: Path) -> None:
     image = tmp_path / "a.wbc"
     run("build", file("a.prg", PROGRAM), "--positions", file("a.csv", TABLE), "-o", image)

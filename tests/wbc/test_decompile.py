@@ -21,7 +21,7 @@ def again(decompiled: Decompiled) -> bytes | None:
     assert wrong == []
     checked = check(decompiled.text, positions)
     assert checked.executable is not None, checked.errors
-    return build(checked.executable, positions)[0]
+    return build(checked.executable, positions, inferred=True)[0]
 
 
 def image(records: str, rows: str = "") -> bytes:
@@ -77,6 +77,23 @@ def test_known_records_become_statements() -> None:
     assert again(found) == image(KNOWN, KNOWN_ROWS)
 
 
+def test_wbc_40_inferred_statements_are_marked() -> None:
+    records = (
+        "01 06 01 00 00 FE 00 00 80 3F F9 F9\n11 06 01 FE 00 00 20 41\n15\n07 09 01 00 00 00 3E FE 00 00 80 3F\n13 06 01\n1C\n"
+    )
+    found = decompile(image(records))
+    assert found.text.splitlines()[1:] == [
+        "SET M1 = 1",
+        "PABS M1 10  // inferred",
+        "WAITPOS",
+        "WAIT PosM1 > 1  // inferred",
+        "BRAKE M1  // inferred",
+        "PROGRESET  // inferred",
+    ]
+    assert (found.unknown, found.inferred) == (0, 4)
+    assert again(found) == image(records)
+
+
 def unknown(records: str, rows: str = "") -> list[str]:
     """The lines that stay data; the round trip is checked on the way."""
     found = decompile(image(records, rows))
@@ -87,10 +104,16 @@ def unknown(records: str, rows: str = "") -> list[str]:
 @pytest.mark.parametrize(
     "record",
     [
-        "12 01 02 03",  # unknown operation
+        "0C 01 02 03",  # unknown operation
+        "1D",
+        "13 06 05",  # M5
+        "13 06 01 01",  # BRAKE with something behind it
+        "17 FE 00 00 80 3F",  # a row that does not exist
+        "01 01 03 00 00 FE 00 00 80 3F F9 F9",  # OUTPUTS has no number
         "0A 00 00 01",  # RETURN with something behind it
         "15 00 00 00 00 00 00 00 00 00 00 00 00 00 00 01",
-        "01 03 01 00 00 FE 00 00 80 3F F9 F9",  # unknown register class
+        "01 11 01 00 00 FE 00 00 80 3F F9 F9",  # unknown register class
+        "01 03 00 00 00 FE 00 00 80 3F F9 F9",  # INPUTS as destination
         "01 00 09 00 00 FE 00 00 80 3F F9 F9",  # OUT9
         "01 02 01 00 00 FE 00 00 80 3F F9 F9",  # an input as destination
         "01 00 01 00 00 FE 00 00 00 3F F9 F9",  # a fraction marked as whole
@@ -165,7 +188,7 @@ reals = st.one_of(
     st.integers(-300, 300).map(lambda n: b"\xfe" + struct.pack("<f", n)),
     st.floats(width=32).map(lambda x: b"\xff" + struct.pack("<f", x)),
 )
-registers = st.tuples(st.sampled_from((0, 2, 6, 7, 8, 10, 12, 15, 16, 20, 3)), st.integers(0, 9)).map(bytes)
+registers = st.tuples(st.sampled_from((*range(17), 20)), st.integers(0, 9)).map(bytes)
 values = st.one_of(reals, registers.map(lambda pair: pair + b"\0\0\0"))
 signs = st.sampled_from((b"=", b"<", b">", b"!"))
 conditions = st.tuples(values, signs, values).map(b"".join)
@@ -188,6 +211,12 @@ def images(draw: DrawFn) -> bytes:
         slots.map(lambda slot: b"\x09" + slot),
         st.tuples(st.just(b"\x0b"), st.binary(min_size=1, max_size=1), slots).map(b"".join),
         st.tuples(st.just(b"\x0e\x06"), st.binary(min_size=1, max_size=1), values).map(b"".join),
+        st.tuples(
+            st.integers(0x0F, 0x14).map(lambda op: bytes((op, 6))), st.integers(0, 5).map(lambda n: bytes((n,))), values
+        ).map(b"".join),
+        st.tuples(st.integers(0x13, 0x14), st.just(6), st.integers(0, 5)).map(bytes),
+        st.tuples(st.integers(0x16, 0x1D).map(lambda op: bytes((op,))), values).map(b"".join),
+        st.just(b"\x1c"),
     )
     records = draw(st.lists(record, min_size=count, max_size=count))
     row = st.one_of(

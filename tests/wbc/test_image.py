@@ -175,6 +175,56 @@ def test_what_is_not_documented_is_refused_by_name(line: str, name: str) -> None
     assert refused(f"M1 = ON\n{line}\n", "P;1;2;3;1\n") == [(name, line)]
 
 
+# WBC-40: op, then the operands of HOME and MOVEPTP; classes in the order of the registers.
+INFERRED = """\
+0F 06 01 FE 00 00 20 41  VABS M1 10
+10 06 02 FE 00 00 A0 C0  VREL M2 -5
+11 06 03 FF 00 00 20 40  PABS M3 2,5
+12 06 04 07 01 00 00 00  PREL M4 AccM1
+13 06 01                 BRAKE M1
+14 06 04                 STOP M4
+17 FE 00 00 00 00        MOVELIN @P
+18 FE 00 00 00 00        MOVELIN_REL @P
+19 FE 00 00 00 00        MOVETOCIRC @P
+1A FE 00 00 00 00        DOCIRC @P
+1B FE 00 00 00 00        DOARC @P
+1C                       PROGRESET
+01 01 00 00 00 FE 00 00 80 3F F9 F9  OUTPUTS = 1
+01 07 02 00 00 03 00 00 00 00 F9 F9  AccM2 = INPUTS
+01 07 02 00 00 04 02 00 00 00 F9 F9  AccM2 = AIN2
+07 05 00 00 00 00 3D FE 00 00 00 00  WAIT STATUS = 0
+01 09 03 00 00 FE 00 00 00 00 F9 F9  PosM3 = 0
+07 0B 01 00 00 00 3E FE 00 00 00 00  WAIT VactM1 > 0
+01 0D 04 00 00 FE 00 00 00 00 F9 F9  ENC4 = 0
+07 0E 01 00 00 00 3C FE 00 00 00 00  WAIT XENC1 < 0
+"""
+
+
+@pytest.mark.parametrize("row", INFERRED.splitlines())
+def test_wbc_40_inferred_forms_are_written_only_on_request(row: str) -> None:
+    record, line = row.split("  ", 1)
+    text = f"M1 = ON\nM2 = ON\nM3 = ON\nM4 = ON\n{line.strip()}\n"
+    positions, _ = parse_positions("P;1;2;3;1\n")
+    executable = check(text, positions).executable
+    assert executable is not None
+    data, diagnostics = build(executable, positions)
+    assert data is None
+    assert [(d.code, d.hint) for d in diagnostics] == [("W160", "--inferred writes it in a form that was never seen (WBC-40)")]
+    data, diagnostics = build(executable, positions, inferred=True)
+    assert diagnostics == []
+    assert data is not None
+    assert data[64:80].hex(" ") == bytes.fromhex(record).ljust(16, b"\0").hex(" ")
+
+
+@pytest.mark.parametrize("line", ["END", "PULSE(OUT1, 2)", "OUT1 = IN1 + IN2", "$I5 = 1", "WAIT StatM1 >= 3"])
+def test_wbc_40_what_cannot_be_inferred_stays_refused(line: str) -> None:
+    executable = check(f"M1 = ON\n{line}\n").executable
+    assert executable is not None
+    data, diagnostics = build(executable, parse_positions("")[0], inferred=True)
+    assert data is None
+    assert [(d.code, d.hint) for d in diagnostics] == [("W160", None)]
+
+
 def test_variables_and_other_interrupts_are_refused() -> None:
     assert refused("x = IN1\nOUT1 = x\n") == [("the variable x", "x = IN1"), ("the variable x", "OUT1 = x")]
     text = "CFGINT_IN1 = RIS\nWAIT IN1 = 1\nJUMP A\nA:\nWAIT IN2 = 1\nJUMP A\nHARDINT_IN1:\nRETURN\nINT_TICK:\nRETURN\n"

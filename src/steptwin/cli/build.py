@@ -19,9 +19,16 @@ def build(
         Path | None, typer.Option(help="Position table; default: the .csv of the same name, else an empty one.")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Image to write; default: FILE.wbc.")] = None,
+    inferred: Annotated[
+        bool, typer.Option("--inferred", help="Also write what has a form that is inferred, but was never seen in an image.")
+    ] = False,
     firmware: Annotated[str, typer.Option(help="Firmware the program is checked for.")] = "1.70",
 ) -> None:
-    """Compile a WBC program to the image of firmware 1.25. Exit code 1 if it has errors or something without a known form."""
+    """Compile a WBC program to the image of firmware 1.25. Exit code 1 if it has errors or something without a known form.
+
+    Few statements have a known form: IF, ELSE, WHILE, WAIT, DELAY, JUMP, RETURN, HOME, MOVEPTP, WAITPOS, SET without calculation,
+    labels INT_INn; with --inferred also the other motions and PROGRESET. Variables, END, $I, $D and $R have none.
+    """
     from steptwin.diagnostics import Severity, render
     from steptwin.runtime.programfiles import IMAGE, Companions, read_program
     from steptwin.runtime.textfiles import write_bytes
@@ -42,7 +49,7 @@ def build(
     if executable is None:
         raise Misuse(f"{file} names positions: give the table with --positions")
     table = read.positions or PositionTable()
-    data, refused = build_image(executable, table)
+    data, refused = build_image(executable, table, inferred=inferred)
     if data is None:
         typer.echo(render(read.findings[0][0], refused), err=True)
         raise typer.Exit(1)

@@ -6,11 +6,14 @@ From Python: `steptwin.wbc.decompile.decompile`.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from steptwin.errors import Misuse
+
+if TYPE_CHECKING:
+    from steptwin.wbc.decompile import Decompiled
 
 
 def decompile(
@@ -34,8 +37,20 @@ def decompile(
         typer.echo(found.text, nl=False)
     else:
         write_bytes(output, found.text.encode("utf-8"))
-        typer.echo(f"{output}: {found.unknown} unknown records" if found.unknown else f"{output}: everything known")
+        typer.echo(f"{output}: {_summary(found)}")
     if table is not None:
         write_bytes(table, found.positions.text.encode("utf-8"))
     elif rows:
         typer.echo(f"{file} has {rows} positions: write them with --positions", err=True)
+
+
+def _summary(found: Decompiled) -> str:
+    if not found.unknown and not found.inferred:
+        return "everything known"
+    parts = []
+    if found.unknown:
+        parts.append("1 unknown record" if found.unknown == 1 else f"{found.unknown} unknown records")
+    if found.inferred:
+        statements = "1 statement" if found.inferred == 1 else f"{found.inferred} statements"
+        parts.append(f"{statements} marked as inferred: build takes them with --inferred")
+    return ", ".join(parts)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from steptwin.diagnostics import Diagnostic, Severity, Source
+from steptwin.diagnostics import Diagnostic, Severity, Source, Span
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import read_bytes
 from steptwin.mic488.config import ControllerConfig
@@ -15,8 +15,9 @@ from steptwin.mic488.program import LoadedProgram, load, setup_of
 from steptwin.runtime.programfiles import IMAGE
 from steptwin.runtime.textfiles import read_text
 from steptwin.wbc.check import Checked, check
-from steptwin.wbc.decompile import ImageError, decompile
+from steptwin.wbc.decompile import MARK, ImageError, decompile
 from steptwin.wbc.dialect import DEFAULT, Dialect
+from steptwin.wbc.findings import INFERRED
 from steptwin.wbc.positions import PositionTable, parse_positions
 
 Findings: TypeAlias = tuple[tuple[Source, list[Diagnostic]], ...]
@@ -32,8 +33,11 @@ class Banks:
     findings: Findings = ()
 
 
-def read_image(path: Path) -> tuple[Source, PositionTable]:
-    """Source and position table of a compiled image. Raises `Misuse` for what is none, or has statements that are not known."""
+def read_image(path: Path) -> tuple[Source, PositionTable, list[Diagnostic]]:
+    """Source and position table of a compiled image, and what is doubtful in it.
+
+    Raises `Misuse` for what is no image, or has statements that are not known.
+    """
     try:
         found = decompile(read_bytes(path))
     except ImageError as error:
@@ -41,7 +45,14 @@ def read_image(path: Path) -> tuple[Source, PositionTable]:
     if found.unknown:
         records = "1 of its records is" if found.unknown == 1 else f"{found.unknown} of its records are"
         raise Misuse(f"cannot run {path}: {records} not known; 'steptwin decompile' shows the others")
-    return Source(str(path), found.text), found.positions
+    doubts: list[Diagnostic] = []
+    if found.inferred:
+        place = found.text.index(MARK)
+        statements = "1 statement is" if found.inferred == 1 else f"{found.inferred} statements are"
+        message = f"{statements} inferred from the order of the vendor's keywords (WBC-40)"
+        hint = f"they are marked '{MARK}' by steptwin decompile; whether the device does the same is not known"
+        doubts.append(INFERRED.at(Span(place, place + len(MARK)), message, hint))
+    return Source(str(path), found.text), found.positions, doubts
 
 
 class ProgramErrors(SteptwinError):
@@ -90,7 +101,8 @@ def read_banks(
     sources: dict[int, Source] = {}
     for bank, path in programs.items():
         if path.suffix.lower() == IMAGE:
-            sources[bank], table = read_image(path)
+            sources[bank], table, doubts = read_image(path)
+            findings.append((sources[bank], doubts))
             if table.rows and bank not in positions:
                 tables[bank] = table
         else:

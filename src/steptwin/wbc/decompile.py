@@ -1,6 +1,7 @@
 """From a compiled image back to source. Labels and names of positions are invented: the image has none.
 
-Building what comes out gives the same bytes again. What is not known, or known but written in a form the builder would not
+Building what comes out gives the same bytes again; statements whose form is inferred (WBC-40) are marked by a comment, and are
+built only where that is asked for. What is not known, or known but written in a form the builder would not
 write, becomes a ``//!record`` line (a comment to the vendor's tool, raw data to the builder); a row no position table can
 express becomes a ``//!position`` line.
 """
@@ -26,8 +27,18 @@ from steptwin.wire.crc import crc16
 
 _REAL = struct.Struct("<f")
 _TITLE = "// Decompiled from a compiled image: labels and names of positions are invented."
-_CLASSES = {code: ROWS[key] for key, code in im.REGISTER_CLASSES.items()}
-_ALONE = {im.RETURN: "RETURN", im.WAITPOS: "WAITPOS"}
+MARK = "// inferred"
+"""The comment of a statement whose form was never seen in an image (WBC-40)."""
+_CLASSES = {code: ROWS[key] for key, code in (im.REGISTER_CLASSES | im.INFERRED_CLASSES).items()}
+_INFERRED_CLASSES = frozenset(im.INFERRED_CLASSES.values())
+_ALONE = {im.RETURN: "RETURN", im.WAITPOS: "WAITPOS", im.INFERRED_PROGRESET: "PROGRESET"}
+_MOTIONS = {im.HOME: "HOME"} | {code: keyword for keyword, code in im.INFERRED_MOTIONS.items()}
+_HALTS = {code: keyword for keyword, code in im.INFERRED_HALTS.items()}
+_ROW_MOTIONS = {im.MOVEPTP: "MOVEPTP"} | {code: keyword for keyword, code in im.INFERRED_ROW_MOTIONS.items()}
+_INFERRED_OPS = (frozenset(_MOTIONS) | frozenset(_HALTS) | frozenset(_ROW_MOTIONS) | {im.INFERRED_PROGRESET}) - {
+    im.HOME,
+    im.MOVEPTP,
+}
 
 
 class ImageError(Misuse):
@@ -44,11 +55,12 @@ class Image:
 
 @dataclass(frozen=True, slots=True)
 class Decompiled:
-    """``unknown`` counts the records that stayed raw data."""
+    """``unknown`` counts the records that stayed raw data, ``inferred`` those whose form was never seen in an image (WBC-40)."""
 
     text: str
     positions: PositionTable
     unknown: int
+    inferred: int = 0
 
 
 def read_image(data: bytes) -> Image:
@@ -84,7 +96,8 @@ def decompile(data: bytes) -> Decompiled:
         text = attempt.text()
         wrong = _differing(text, attempt, table, image)
         if not wrong:
-            return Decompiled(text, table, len(attempt.raw))
+            inferred = sum(line.endswith(MARK) for line in text.splitlines())
+            return Decompiled(text, table, len(attempt.raw), inferred)
         if wrong <= attempt.raw:
             raise ImageError(f"slots {sorted(wrong)} of this image cannot be written as source")
         raw = attempt.raw | wrong
@@ -96,7 +109,7 @@ def _differing(text: str, attempt: _Attempt, table: PositionTable, image: Image)
     if checked.executable is None:
         lines = Source("", text)
         return {attempt.slot_of_line(lines.position(d.span.start)[0]) for d in checked.errors}
-    built, refused = im.build(checked.executable, table)
+    built, refused = im.build(checked.executable, table, inferred=True)
     if built is None:
         raise ImageError(f"the source of this image cannot be built: {refused[0].message}")
     records = read_image(built).records
@@ -135,6 +148,7 @@ class _Attempt:
         self._raw_rows = raw_rows
         self._labels: dict[int, str] = {}
         self._line_slots: list[int] = []
+        self._inferred = False
 
     def text(self) -> str:
         records = self._records
@@ -154,7 +168,10 @@ class _Attempt:
             if slot in self._labels and slot not in entries:
                 lines.append(f"{self._labels[slot]}:")
                 self._line_slots.append(slot)
+            self._inferred = record[0] in _INFERRED_OPS
             statement = None if slot in self.raw else self._statement(record)
+            if statement is not None and self._inferred:
+                statement = f"{statement}  {MARK}"
             if statement is None:
                 self.raw.add(slot)
                 statement = f"{RECORD_MARK} {record.hex()}"
@@ -169,7 +186,7 @@ class _Attempt:
     def _statement(self, record: bytes) -> str | None:
         op = record[0]
         if op == im.SET:
-            target, value = _register(record[1], record[2]), self._value(record[5:10])
+            target, value = self._register(record[1], record[2]), self._value(record[5:10])
             return None if target is None or value is None else f"SET {target} = {value}"
         if op in (im.IF, im.WHILE, im.WAIT):
             condition = self._condition(record)
@@ -185,12 +202,14 @@ class _Attempt:
             return f"JUMP {self._labels[target]}" if target < len(self._records) else None
         if op == im.ENTRY:
             return f"INT_IN{record[1] + 1}:" if record[1] < INPUT_LABELS else None
-        if op == im.HOME:
-            velocity = self._value(record[3:8])
-            return None if velocity is None else f"HOME M{record[2]} {velocity}"
-        if op == im.MOVEPTP:
+        if op in _MOTIONS:
+            value = self._value(record[3:8])
+            return None if value is None else f"{_MOTIONS[op]} M{record[2]} {value}"
+        if op in _HALTS:
+            return f"{_HALTS[op]} M{record[2]}"
+        if op in _ROW_MOTIONS:
             row = self._value(record[1:6])
-            return None if row is None else f"MOVEPTP {self._row(row)}"
+            return None if row is None else f"{_ROW_MOTIONS[op]} {self._row(row)}"
         return _ALONE.get(op)
 
     def _row(self, index: str) -> str:
@@ -204,16 +223,18 @@ class _Attempt:
         if data[0] in (im.WHOLE, im.FRACTION):
             (value,) = _REAL.unpack(data[1:])
             return number_text(shortest(value)) if math.isfinite(value) else None
-        return _register(data[0], data[1])
+        return self._register(data[0], data[1])
+
+    def _register(self, code: int, number: int) -> str | None:
+        row = _CLASSES.get(code)
+        if row is None or (number and not row.last):
+            return None
+        self._inferred = self._inferred or code in _INFERRED_CLASSES
+        return f"{row.name}{number}" if row.last else row.name
 
 
 _BLOCK_ENDS = {im.ENDIF: "ENDIF", im.ELSE: "ELSE", im.ENDWHILE: "ENDWHILE"}
 _BLOCKS = frozenset({im.IF, im.WHILE, *_BLOCK_ENDS})
-
-
-def _register(code: int, number: int) -> str | None:
-    row = _CLASSES.get(code)
-    return None if row is None else f"{row.name}{number}"
 
 
 def _stray_blocks(records: tuple[bytes, ...], raw: set[int]) -> set[int]:

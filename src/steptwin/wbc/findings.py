@@ -126,3 +126,4 @@ WAITS_FOR_VARIABLE = _row("W221", "a WAIT for variables that nothing changes mea
 LONG_TIME = _row("W222", "a time in seconds that looks like milliseconds")
 TOO_FAST = _row("W223", "a velocity above what the pulse outputs give")
 TABLE_NAME = _row("W250", "a name of the position table cannot be written after @")
+INFERRED = _row("W260", "statements of an image whose form was inferred")

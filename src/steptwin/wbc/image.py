@@ -26,6 +26,11 @@ SIZE = POSITIONS_AT + 4
 
 SET, IF, ENDIF, ELSE, WHILE, ENDWHILE, WAIT, DELAY, JUMP, RETURN, ENTRY = range(1, 12)
 HOME, WAITPOS, MOVEPTP = 0x0E, 0x15, 0x16
+# WBC-40: by the order of the keywords in the vendor's tool, which fits every operation that was seen in an image.
+INFERRED_MOTIONS = {"VABS": 0x0F, "VREL": 0x10, "PABS": 0x11, "PREL": 0x12}
+INFERRED_HALTS = {"BRAKE": 0x13, "STOP": 0x14}
+INFERRED_ROW_MOTIONS = {"MOVELIN": 0x17, "MOVELIN_REL": 0x18, "MOVETOCIRC": 0x19, "DOCIRC": 0x1A, "DOARC": 0x1B}
+INFERRED_PROGRESET = 0x1C
 
 WHOLE, FRACTION = 0xFE, 0xFF
 NO_OPERATOR = b"\xf9\xf9"
@@ -42,6 +47,17 @@ REGISTER_CLASSES = {
     "LIMRM": 0x10,
     "CFGINT_IN": 0x14,
 }
+# WBC-40
+INFERRED_CLASSES = {
+    "OUTPUTS": 0x01,
+    "INPUTS": 0x03,
+    "AIN": 0x04,
+    "STATUS": 0x05,
+    "POSM": 0x09,
+    "VACTM": 0x0B,
+    "ENC": 0x0D,
+    "XENC": 0x0E,
+}
 CONDITION_SIGNS = "=<>"
 """Conditions are one character: there is no room for <= and >=."""
 
@@ -53,8 +69,11 @@ class _NotEncodable(Exception):
     """The text says what has no documented form."""
 
 
-def build(executable: s.Executable, positions: PositionTable) -> tuple[bytes | None, list[Diagnostic]]:
-    """The image of a program without errors and of its table; None and every reason when something has no documented form."""
+def build(executable: s.Executable, positions: PositionTable, *, inferred: bool = False) -> tuple[bytes | None, list[Diagnostic]]:
+    """The image of a program without errors and of its table; None and every reason when something has no documented form.
+
+    ``inferred``: forms that follow from the order of the keywords, but were never seen in an image (WBC-40), are taken too.
+    """
     diagnostics: list[Diagnostic] = []
     records: list[bytes] = []
     for number, step in enumerate(executable.steps):
@@ -62,9 +81,15 @@ def build(executable: s.Executable, positions: PositionTable) -> tuple[bytes | N
             diagnostics.append(f.IMAGE_FULL.at(step, f"{len(executable.steps)} commands", f"the image holds {SLOTS}"))
             break
         try:
-            records.append(_record(number, step).ljust(SLOT_BYTES, b"\0"))
+            record = _Record(number)
+            records.append(record.of(step).ljust(SLOT_BYTES, b"\0"))
         except _NotEncodable as reason:
             diagnostics.append(f.NOT_ENCODABLE.at(step, f"{reason} has no documented form in the image"))
+        else:
+            if record.inferred and not inferred:
+                message = f"{record.inferred[0]} has no documented form in the image"
+                hint = "--inferred writes it in a form that was never seen (WBC-40)"
+                diagnostics.append(f.NOT_ENCODABLE.at(step, message, hint))
     if diagnostics:
         return None, diagnostics
     rows: list[bytes] = []
@@ -98,78 +123,92 @@ def row_bytes(row: PositionRow, before: bytes | None) -> bytes:
 _ALONE: dict[type[s.Step], int] = {s.EndIf: ENDIF, s.Return: RETURN, s.WaitPos: WAITPOS}
 
 
-def _record(number: int, step: s.Step) -> bytes:
-    if type(step) in _ALONE:
-        return bytes((_ALONE[type(step)],))
-    match step:
-        case s.Set():
-            return _set(step)
-        case s.If(condition=condition, middle=middle, close=close):
-            return bytes((IF,)) + _condition(condition) + _slot(close) + _slot(middle or 0)
-        case s.Else(close=close):
-            return bytes((ELSE,)).ljust(12, b"\0") + _slot(close)
-        case s.While(condition=condition, close=close):
-            return bytes((WHILE,)) + _condition(condition) + _slot(close)
-        case s.EndWhile(condition=condition, open=opened):
-            return bytes((ENDWHILE,)) + _condition(condition) + _slot(opened)
-        case s.Wait(condition=condition):
-            return bytes((WAIT,)) + _condition(condition)
-        case s.Delay(seconds=seconds):
-            return bytes((DELAY,)) + _value(seconds)
-        case s.Jump(target=target):
-            return bytes((JUMP,)) + _slot(target)
-        case s.Entry(event=event, hard=hard):
-            if hard or not event.input:
-                raise _NotEncodable(f"the label {'HARDINT' if hard else 'INT'}_{event.name}")
-            return bytes((ENTRY, event.input - 1)) + _slot(number)
-        case s.Motion(keyword="HOME", axis=axis, value=value):
-            return bytes((HOME, DRIVE, axis)) + _value(value)
-        case s.RowMotion(keyword="MOVEPTP", row=row):
-            return bytes((MOVEPTP,)) + _value(row)
-        case s.Illegal(data=data):
-            return data
-        case _:
-            raise _NotEncodable(_statement_name(step))
+class _Record:
+    """The record of the step with this number. ``inferred`` names what of it follows from the order of the keywords only."""
 
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self.inferred: list[str] = []
 
-def _statement_name(step: s.Step) -> str:
-    match step:
-        case s.Motion(keyword=keyword) | s.Halt(keyword=keyword) | s.RowMotion(keyword=keyword):
-            return keyword
-        case _:
-            name = type(step).__name__.upper()
-            return name if name in STATEMENTS else f"the step {name}"
+    def of(self, step: s.Step) -> bytes:
+        if type(step) in _ALONE:
+            return bytes((_ALONE[type(step)],))
+        match step:
+            case s.Set():
+                return self._set(step)
+            case s.If(condition=condition, middle=middle, close=close):
+                return bytes((IF,)) + self._condition(condition) + _slot(close) + _slot(middle or 0)
+            case s.Else(close=close):
+                return bytes((ELSE,)).ljust(12, b"\0") + _slot(close)
+            case s.While(condition=condition, close=close):
+                return bytes((WHILE,)) + self._condition(condition) + _slot(close)
+            case s.EndWhile(condition=condition, open=opened):
+                return bytes((ENDWHILE,)) + self._condition(condition) + _slot(opened)
+            case s.Wait(condition=condition):
+                return bytes((WAIT,)) + self._condition(condition)
+            case s.Delay(seconds=seconds):
+                return bytes((DELAY,)) + self._value(seconds)
+            case s.Jump(target=target):
+                return bytes((JUMP,)) + _slot(target)
+            case s.Entry(event=event, hard=hard):
+                if hard or not event.input:
+                    raise _NotEncodable(f"the label {'HARDINT' if hard else 'INT'}_{event.name}")
+                return bytes((ENTRY, event.input - 1)) + _slot(self._number)
+            case s.Illegal(data=data):
+                return data
+            case _:
+                return self._motion(step)
 
+    def _motion(self, step: s.Step) -> bytes:
+        match step:
+            case s.Motion(keyword="HOME", axis=axis, value=value):
+                return bytes((HOME, DRIVE, axis)) + self._value(value)
+            case s.Motion(keyword=keyword, axis=axis, value=value):
+                return bytes((self._infer(keyword, INFERRED_MOTIONS[keyword]), DRIVE, axis)) + self._value(value)
+            case s.Halt(keyword=keyword, axis=axis):
+                return bytes((self._infer(keyword, INFERRED_HALTS[keyword]), DRIVE, axis))
+            case s.RowMotion(keyword="MOVEPTP", row=row):
+                return bytes((MOVEPTP,)) + self._value(row)
+            case s.RowMotion(keyword=keyword, row=row):
+                return bytes((self._infer(keyword, INFERRED_ROW_MOTIONS[keyword]),)) + self._value(row)
+            case s.ProgReset():
+                return bytes((self._infer("PROGRESET", INFERRED_PROGRESET),))
+            case _:
+                name = type(step).__name__.upper()
+                raise _NotEncodable(name if name in STATEMENTS else f"the step {name}")
 
-def _set(step: s.Set) -> bytes:
-    value = step.value
-    if isinstance(value, s.Operation):
-        raise _NotEncodable(f"the operator {value.operator}")
-    if isinstance(value, s.Function):
-        raise _NotEncodable(f"the function {value.name}")
-    return bytes((SET, *_class_and_number(step.target), 0, 0)) + _value(value) + NO_OPERATOR
+    def _infer(self, name: str, code: int) -> int:
+        self.inferred.append(name)
+        return code
 
+    def _set(self, step: s.Set) -> bytes:
+        value = step.value
+        if isinstance(value, s.Operation):
+            raise _NotEncodable(f"the operator {value.operator}")
+        if isinstance(value, s.Function):
+            raise _NotEncodable(f"the function {value.name}")
+        return bytes((SET, *self._class_and_number(step.target), 0, 0)) + self._value(value) + NO_OPERATOR
 
-def _condition(condition: s.Comparison) -> bytes:
-    if condition.sign not in CONDITION_SIGNS:
-        raise _NotEncodable(f"the comparison {condition.sign}")
-    return _value(condition.left) + condition.sign.encode("ascii") + _value(condition.right)
+    def _condition(self, condition: s.Comparison) -> bytes:
+        if condition.sign not in CONDITION_SIGNS:
+            raise _NotEncodable(f"the comparison {condition.sign}")
+        return self._value(condition.left) + condition.sign.encode("ascii") + self._value(condition.right)
 
+    def _value(self, source: s.Source) -> bytes:
+        if isinstance(source, s.Literal):
+            whole = source.value == int(source.value)
+            return bytes((WHOLE if whole else FRACTION,)) + _REAL.pack(source.value)
+        return bytes((*self._class_and_number(source), 0, 0, 0))
 
-def _value(source: s.Source) -> bytes:
-    if isinstance(source, s.Literal):
-        whole = source.value == int(source.value)
-        return bytes((WHOLE if whole else FRACTION,)) + _REAL.pack(source.value)
-    return bytes((*_class_and_number(source), 0, 0, 0))
-
-
-def _class_and_number(source: s.Register | s.Variable) -> tuple[int, int]:
-    if isinstance(source, s.Variable):
-        raise _NotEncodable(f"the variable {source.name}")
-    code = REGISTER_CLASSES.get(source.row.key)
-    if code is None:
-        raise _NotEncodable(f"the register {source.name}")
-    return code, source.number
+    def _class_and_number(self, source: s.Register | s.Variable) -> tuple[int, int]:
+        if isinstance(source, s.Variable):
+            raise _NotEncodable(f"the variable {source.name}")
+        key = source.row.key
+        if key in INFERRED_CLASSES:
+            return self._infer(f"the register {source.name}", INFERRED_CLASSES[key]), source.number
+        if key not in REGISTER_CLASSES:
+            raise _NotEncodable(f"the register {source.name}")
+        return REGISTER_CLASSES[key], source.number
 
 
 def _slot(number: int) -> bytes:
