@@ -326,6 +326,21 @@ def test_bytes_of_chips_are_spared_by_a_fault_of_a_modbus_line() -> None:
     assert (first.machine, first.value) == ("chips", "python, towards the twin, byte 1 of 9: 66 is lost")
 
 
+@pytest.mark.parametrize(
+    ("fault", "heard"), [("drop nth=2", b"\0"), ("flip nth=2 bit=1", b"\0\2"), ("insert nth=2 value=66", b"\0B\0")]
+)
+def test_bytes_that_nobody_hears_are_no_occasions(fault: str, heard: bytes) -> None:
+    """One program is connected; the scripts of the world send, but read nothing."""
+    world = World.from_toml('[[line]]\nname = "chips"\nkind = "m1486"\n[[m1486]]\nname = "a"\naddress = 3\nline = "chips"\n')
+    world.put_fault(read(f"{fault} direction=out"))
+    world.line["chips"].send(b"x3\rU1\r")
+    world.run(for_=0.5)
+    world.line["chips"].send(b"U1\r")
+    world.run(for_=0.5)
+    assert world.line["chips"].received() == heard
+    assert [str(record.value).split(",")[0] for record in world.trace.faults()] == ["python"]
+
+
 def test_the_link_of_a_fault_is_kept_on_a_line_that_takes_its_time() -> None:
     world = World.from_toml(TWO_LINES.format(timing='timing = "real"'))
     world.put_fault(read("busy link=script line=a"))

@@ -176,3 +176,35 @@ def test_faults_that_are_set_and_cleared_after_a_snapshot_are_undone_by_it() -> 
     world.restore(after)
     world.run(for_=3)
     assert (world.trace.digest(), world.axis["x"].position, world.mic488["m"].pins["IN7"]) == stalled
+
+
+def test_an_encoder_that_slips_on_its_shaft_shows_it_and_the_load_does_not() -> None:
+    """40 counts of 4000 a revolution of 5 mm are 0.05 mm; again by a fault of the running world."""
+    world = world_of("", '[[fault]]\nkind = "slip"\nmachine = "m"\ncounts = 40\nat_s = 1.0\n')
+    axis = world.mic488["m"].axis[1]
+    axis.move_to(10.0)
+    world.run(until=0.999)
+    moved = axis.encoder - round(axis.position / 5.0 * 4000)
+    assert abs(moved) <= 1
+    world.run(until="idle and time > 2")
+    assert (axis.encoder, axis.position, world.axis["x"].position, world.axis["x"].lost) == (8040, 10.0, 30.0, 0)
+    world.put_fault(read("slip machine=m counts=-100"))
+    world.run(for_=1)
+    assert (axis.encoder, axis.position, world.axis["x"].position) == (7940, 10.0, 30.0)
+    axis.move_to(0.0)
+    world.run(until="idle")
+    assert axis.encoder == -60
+    assert [record.value for record in world.trace.faults("m")] == [
+        "the encoder of M1 slips by 40 counts",
+        "the encoder of M1 slips by -100 counts",
+    ]
+
+
+def test_a_correction_follows_an_encoder_that_has_slipped() -> None:
+    """The controller believes its encoder: the load is off by what that has slipped, 1 mm."""
+    world = world_of('pos_ctrl_mode = "ENCODER"', '[[fault]]\nkind = "slip"\nmachine = "m"\ncounts = 800\nat_s = 0.5\n')
+    axis = world.mic488["m"].axis[1]
+    axis.move_to(50.0)
+    world.run(until="m.M1.status == 4", for_=20)
+    assert axis.position == pytest.approx(50.0, abs=0.01)
+    assert world.axis["x"].position == pytest.approx(69.0, abs=0.02)

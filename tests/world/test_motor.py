@@ -14,7 +14,7 @@ from steptwin.machine import SECOND
 from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
 from steptwin.motion.ramps import SpeedCurve, plan_endless
 from steptwin.world.course import Build, Course, Standing
-from steptwin.world.motor import Motor
+from steptwin.world.motor import Motor, _first_below_0, _first_not_below_0
 
 PER_REV = 3200
 INERTIA = 1e-4 * 2 * pi / PER_REV
@@ -255,3 +255,58 @@ def test_at_standstill_the_first_torque_holds() -> None:
     assert motor(load=1.0).holds()
     assert not motor(load=1.0001).holds()
     assert motor().torque(32_001.0) < 0.0
+
+
+# ---------------------------------------------------------------------- when a quadratic goes below 0
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    q2=st.floats(-50.0, 50.0).filter(lambda q: abs(q) > 1e-3),
+    middle=st.floats(-2.0, 2.0),
+    spread=st.sampled_from([0.0, 1e-9, 1e-7, 1e-5, 1e-3, 0.1, 1.0, -1e-9, -1e-6, -1e-3, -1.0]),
+    begin=st.floats(-2.0, 1.9),
+)
+@example(q2=1.0, middle=0.5, spread=1e-7, begin=0.0)
+@example(q2=-1.0, middle=0.5, spread=1e-3, begin=0.499)
+def test_the_first_moment_below_0_is_that_of_a_dense_scan(q2: float, middle: float, spread: float, begin: float) -> None:
+    """Roots far apart, nearly double, double and not there (``spread`` < 0: as far above or below 0)."""
+    end, slack = 2.0, 1e-12
+    q0, q1 = q2 * (middle * middle - spread * abs(spread)), -2.0 * q2 * middle
+
+    def value(u: float) -> float:
+        return q0 + u * (q1 + u * q2)
+
+    found = _first_below_0((q0, q1, q2), begin, end, slack)
+    scan = [begin + (end - begin) * n / 20_000 for n in range(20_001)]
+    # Between the roots of a parabola that opens upwards a scan may find nothing: they are looked for there, too.
+    moments = sorted({*scan, *(u for u in (middle, middle - spread / 2, middle + spread / 2) if begin <= u <= end)})
+    below = next((u for u in moments if value(u) < -1e-9), None)
+    if below is None:
+        assert found is None or min(value(u) for u in moments) < 1e-9, f"found {found}, where there is nothing below 0"
+        return
+    assert found is not None, f"below 0 at {below}"
+    assert found <= below
+    assert found == begin or abs(value(found)) < 1e-9
+    assert all(value(u) > -1e-9 for u in moments if u < found)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    parabolas=st.lists(st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)), min_size=1, max_size=2),
+    begin=st.floats(-1.0, 0.9),
+)
+def test_the_first_moment_at_which_nothing_is_below_0_is_that_of_a_dense_scan(parabolas: list, begin: float) -> None:
+    def least(u: float) -> float:
+        return min(q0 + u * (q1 + u * q2) for q0, q1, q2 in parabolas)
+
+    found = _first_not_below_0(parabolas, begin, 1.0, 1e-12)
+    scan = [begin + (1.0 - begin) * n / 5000 for n in range(5000)]
+    up = next((u for u in scan if least(u) > 1e-6), None)
+    if up is None:
+        assert found is None or least(found) > -1e-6
+    else:
+        assert found is not None, f"nothing is below 0 at {up}"
+        assert found <= up
+        assert least(found) > -1e-6
+        assert all(least(u) <= 1e-6 for u in scan if u < found)

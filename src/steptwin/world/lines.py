@@ -100,7 +100,9 @@ class Line(Stateful):
             raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
         port = self._port(place, kind)
         if hasattr(port, "on_output"):
-            faulty: FaultyPort = FaultyTalkingPort(port, place, self._faults, self.fault_kinds[kind], line_name=self.name)
+            faulty: FaultyPort = FaultyTalkingPort(
+                port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_heard=place != SCRIPTS
+            )
             port.on_output = self._kernel.mark
         else:
             faulty = FaultyPort(

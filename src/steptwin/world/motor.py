@@ -172,25 +172,37 @@ class Motor:
 
 
 def _first_below_0(q: Quadratic, begin: float, end: float, slack: float) -> float | None:
-    """First u in begin…end at which q0 + q1·u + q2·u² goes below 0 (by more than ``slack`` at the ends)."""
-    q0, q1, q2 = q
-    if q0 + begin * (q1 + begin * q2) < -slack:
+    """First u in begin…end at which q goes below 0 (by more than ``slack`` at the ends)."""
+    at_begin, at_end = _at(q, begin), _at(q, end)
+    if at_begin < -slack:
         return begin
+    if at_begin <= slack and _slope(q, begin) < 0.0:
+        # The root is where it begins, give or take its rounding: only how far it falls from there tells.
+        lowest = end if q[2] <= 0.0 else min(end, -q[1] / (2.0 * q[2]))
+        if _at(q, lowest) < -slack:
+            return begin
     for u in sorted(u for u in _roots(q) if _slope(q, u) < 0.0):
         if begin < u <= end:
-            return u if q0 + end * (q1 + end * q2) < -slack or u < end else None
-    return end if q0 + end * (q1 + end * q2) < -slack else None
+            return u if at_end < -slack or u < end else None
+    if at_end >= -slack:
+        return None
+    # A parabola that touches 0 where it begins has no root to fall through; else the root is the end, give or take its rounding.
+    return begin if at_begin <= slack else end
 
 
 def _first_not_below_0(all_q: list[Quadratic], begin: float, end: float, slack: float) -> float | None:
     """First u from begin on and before end (or at begin) at which no q is below 0; 0 itself counts where q does not fall."""
 
     def is_up(q: Quadratic, u: float) -> bool:
-        value = q[0] + u * (q[1] + u * q[2])
+        value = _at(q, u)
         return value > slack or (value >= -slack and _slope(q, u) >= 0.0)
 
     rising = sorted(u for q in all_q for u in _roots(q) if begin < u < end and _slope(q, u) > 0.0)
     return next((u for u in (begin, *rising) if all(is_up(q, u) for q in all_q)), None)
+
+
+def _at(q: Quadratic, u: float) -> float:
+    return q[0] + u * (q[1] + u * q[2])
 
 
 def _slope(q: Quadratic, u: float) -> float:

@@ -288,14 +288,23 @@ class FaultyPort(Stateful):
 
 
 class FaultyTalkingPort(FaultyPort):
-    """Before a port that has something to send without having been asked."""
+    """Before a port that has something to send without having been asked.
 
-    __slots__ = ("_talking",)
-    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_talking"}
+    ``is_heard``: a program there reads it; else nothing can go wrong with it.
+    """
 
-    def __init__(self, port: InnerTalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "") -> None:
-        super().__init__(port, link, faults, line, line_name=line_name)
+    __slots__ = ("_is_heard", "_talking")
+    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_heard", "_talking"}
+
+    def __init__(
+        self, port: InnerTalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "", is_heard: bool = True
+    ) -> None:
+        self._is_heard = is_heard
         self._talking = port
+        super().__init__(port, link, faults, line, line_name=line_name)
+
+    def _bytewise(self, direction: str) -> list[Active]:
+        return super()._bytewise(direction) if self._is_heard or direction != "out" else []
 
     @property
     def on_output(self) -> Callable[[], None] | None:
