@@ -149,6 +149,9 @@ def test_what_was_waited_for_in_vain_is_a_warning(tmp_path: Path) -> None:
     steps = '[{ until = "a.M1.position > 3", within = "500 ms" }]'
     world.write_text(f'[[mic488]]\nname = "a"\n[[script]]\nname = "hand"\nsteps = {steps}\n')
     assert "warning: at 0.5 s hand waited in vain for a.M1.position > 3\n" in invoke("run", str(world), "--for", "2s")
+    assert "hand waited in vain" in invoke("run", str(world), "--for", "2s", "--strict", code=1)
+    assert "did not come true" in invoke("run", str(world), "--for", "400ms", "--until", "a.M1.position > 3", "--strict", code=1)
+    invoke("run", str(world), "--for", "400ms", "--strict")
     told = json.loads(invoke("run", str(world), "--for", "2s", "--json"))
     assert told["overdue"] == [{"time_s": 0.5, "what": "hand waited in vain for a.M1.position > 3"}]
 

@@ -38,6 +38,9 @@ def export(
         ),
     ] = None,
     machine: Annotated[list[str] | None, typer.Option(help="Only this machine; may be given more than once.")] = None,
+    texts: Annotated[
+        bool, typer.Option("--texts/--no-texts", help="Signals of type string (vcd): GTKWave shows them, sigrok refuses them.")
+    ] = True,
     period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
 ) -> None:
     """Write a recorded trace as a timeline (html), a picture (png, svg), signals (vcd) or samples (csv, parquet)."""
@@ -65,6 +68,7 @@ def export(
             until=until_ns,
             machines=machine or None,
             period=period_ns,
+            texts=texts,
             watch=bar,
         )
         for path in written:

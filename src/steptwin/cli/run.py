@@ -45,6 +45,7 @@ class Options:
     seed: int | None = None
     moment: Nanos | None = None
     allow_outside: bool | None = None
+    strict: bool | None = None
 
     @property
     def until_idle(self) -> bool:
@@ -106,6 +107,7 @@ def run(
         str | None,
         typer.Option("--from", metavar="TIME", help="Session: go on from this moment, such as 2.5s. Default: its end."),
     ] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="World: exit code 1 also for what was waited for in vain.")] = False,
     allow_outside: Annotated[
         bool, typer.Option("--allow-outside", help="World: permit files that do not lie beside its file or below.")
     ] = False,
@@ -148,12 +150,13 @@ def run(
         seed=seed,
         moment=None if begin is None else parse_duration(begin, "--from"),
         allow_outside=allow_outside or None,
+        strict=strict or None,
     )
     if not runner(file, options):
         raise typer.Exit(1)
 
 
-_WORLDS = ("fault", "session", "seed", "moment", "allow_outside")
+_WORLDS = ("fault", "session", "seed", "moment", "allow_outside", "strict")
 """Options for worlds alone."""
 
 
@@ -218,6 +221,7 @@ def _run_world(file: Path, options: Options) -> bool:
         trace=options.trace,
         session=options.session,
         allow_outside=bool(options.allow_outside),
+        strict=bool(options.strict),
         as_json=options.as_json,
     )
     return run_world(wanted, typer.echo, lambda text: typer.echo(text, err=True))

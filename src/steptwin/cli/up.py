@@ -41,6 +41,7 @@ def up(
     ] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 also for what was waited for in vain.")] = False,
     allow_outside: Annotated[
         bool, typer.Option("--allow-outside", help="Permit files that do not lie beside the description or below.")
     ] = False,
@@ -71,6 +72,7 @@ def up(
         faults=tuple(fault or ()),
         ready_file=ready_file,
         listen_any=listen_any,
+        strict=strict,
         allow_outside=allow_outside,
     )
     if not run_up(options):

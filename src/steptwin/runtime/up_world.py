@@ -47,6 +47,8 @@ class UpOptions:
     trace: Path | None = None
     faults: Sequence[str] = ()
     ready_file: Path | None = None
+    strict: bool = False
+    """Whether what was waited for in vain counts as a failure."""
     listen_any: bool = False
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
@@ -202,7 +204,7 @@ def up(options: UpOptions) -> bool:
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
     asyncio.run(_serve(options, world, speed, name, has_clients=bool(outside)))
-    return not world.failures
+    return not world.failures and not (options.strict and world.overdue)
 
 
 def _send_away(world: World) -> None:

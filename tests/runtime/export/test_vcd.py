@@ -231,3 +231,16 @@ def test_text_made_of_many_changes_is_that_made_of_each(changes: list[tuple[int,
     times = np.array([time for time, _ in changes], dtype=np.int64)
     chosen = np.array([token for _, token in changes], dtype=np.intp)
     assert b"".join(changes_text(times, chosen, lines)) == expected
+
+
+def test_without_texts_there_are_no_signals_of_type_string() -> None:
+    trace = Trace()
+    trace.add(Record(1, "a", "edge", "OUT1", 1.0))
+    trace.add(Record(2, "a", "event", "note", "a text"))
+    trace.add(Record(3, "a", "statement", "program", 7))
+    recording = sort_out(trace, {})
+    file = io.BytesIO()
+    vcd.write_vcd(recording, file, silent, texts=False)
+    assert b"$var string" in dumped(recording)
+    assert b"$var string" not in file.getvalue()
+    assert b"$var integer" in file.getvalue()

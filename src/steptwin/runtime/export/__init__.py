@@ -40,6 +40,8 @@ class _Options(NamedTuple):
     progress: Progress
     window: bool
     """Whether it was asked for to show everything up to the end."""
+    texts: bool
+    """Whether signals may be texts."""
 
 
 class Format(NamedTuple):
@@ -67,7 +69,7 @@ def _vcd(recording: Recording, path: Path, options: _Options) -> None:
     from steptwin.runtime.export.vcd import write_vcd
 
     with path.open("wb") as file:
-        write_vcd(recording, file, options.progress)
+        write_vcd(recording, file, options.progress, texts=options.texts)
 
 
 def _csv(recording: Recording, path: Path, options: _Options) -> None:
@@ -120,6 +122,7 @@ def write_trace(
     until: Nanos | None = None,
     machines: Collection[str] | None = None,
     period: Nanos = MILLISECOND,
+    texts: bool = True,
     watch: Watch = unwatched,
 ) -> list[Path]:
     """Write ``trace`` to a file, whose suffix says its format, or into a directory, as ``trace.jsonl`` and so on; what was
@@ -129,7 +132,8 @@ def write_trace(
     ``ended`` (ns) when that ended; by default when all came to rest. ``formats`` by default: for a directory `USUAL`; what a
     file is to be where its suffix does not tell. A window of time (``begin`` to ``until``, ns) and ``machines`` limit what is
     shown; JSON lines always have everything. Without ``until`` everything goes on to the end, but pictures end shortly after
-    the last change. ``period`` (ns) is that of samples. ``watch=bar`` shows on a terminal how far each file is.
+    the last change. ``period`` (ns) is that of samples. Without ``texts`` a VCD has no signals of type
+    string (events, frames, faults), which sigrok does not read. ``watch=bar`` shows on a terminal how far each file is.
 
     Raises `Misuse` for what is not permitted, for libraries that are missing, and where a file cannot be written; a file is
     there as a whole or, after an error, as it was before.
@@ -153,7 +157,7 @@ def write_trace(
                         with unfinished.open("w", encoding="utf-8") as file:
                             write_records(trace, views, file, progress, title=title, until=ended)
                     else:
-                        write(recording, unfinished, _Options(period, progress, until is not None))
+                        write(recording, unfinished, _Options(period, progress, until is not None, texts))
                 unfinished.replace(path)
             finally:
                 unfinished.unlink(missing_ok=True)

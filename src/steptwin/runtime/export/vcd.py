@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
+from dataclasses import replace
 from operator import itemgetter
 from typing import IO, NamedTuple, TypeAlias
 
@@ -36,8 +37,9 @@ _Quiet: TypeAlias = list[tuple[Nanos, bytes]]
 """Single changes: moments and tokens."""
 
 
-def write_vcd(recording: Recording, file: IO[bytes], progress: Progress) -> None:
-    dump = _Dump(recording)
+def write_vcd(recording: Recording, file: IO[bytes], progress: Progress, *, texts: bool = True) -> None:
+    """Without ``texts`` there are no signals of type string, an extension of GTKWave that sigrok does not read."""
+    dump = _Dump(recording if texts else replace(recording, marks=recording.of("statement")))
     file.write(dump.header())
     for after, until in _windows(recording):
         file.writelines(dump.changes(after, until))
