@@ -1,10 +1,10 @@
-"""One axis: what it is told, what it does about it, and what happens to it.
+"""One axis: its commands, motion and events.
 
 Suffixes: ``_p`` pulses (and pulses/s, pulses/s²), ``_u`` configured units, ``_ns`` moments and durations.
 
 Three positions: the *motor* count is pulses since power-on and never jumps; profiles live in it. The *coordinate* is what
-registers show: motor count plus ``offset_p`` (writing POS_ACT only moves the offset, MIC-13). The *true* position is where
-the encoder says the shaft is.
+registers show: motor count plus ``offset_p`` (writing POS_ACT only moves the offset, MIC-13). The *true* position is that of
+the shaft according to the encoder.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class AxisHost(Protocol):
         ...
 
     def axis_event(self, axis: int, code: str, detail: str) -> None:
-        """Something worth telling happened to ``axis`` (from 1)."""
+        """Record an event of ``axis`` (from 1)."""
         ...
 
     def drive_output(self, axis: int, on: bool) -> None:
@@ -111,7 +111,7 @@ class Axis(Stateful):
     def power_on(self, now: Nanos) -> None:
         """Registers as configured (MIC-27), drive off, position 0; the motor stays where it is."""
         config, gear = self.config, self.gear
-        # Stored in pulses whatever DATA_TYPE says (MIC-17).
+        # Stored in pulses, whatever DATA_TYPE is (MIC-17).
         self.acc_p = min(max(config.acc * gear, LEAST), MOST)
         self.dec_p = min(max(config.dec * gear, LEAST), MOST)
         self.vmax_p = min(max(config.vel * gear, LEAST), MOST)
@@ -216,7 +216,7 @@ class Axis(Stateful):
             self.host.drive_output(self.number, False)
 
     def stop(self, now: Nanos) -> None:
-        """Immediate stop without ramp, status 1 (MIC-10). A position error stays until the axis is told to move (MIC-26)."""
+        """Immediate stop without ramp, status 1 (MIC-10). A position error stays until the next motion command (MIC-26)."""
         if self.status not in (Status.OFF, Status.ERROR):
             self._rest(now, Status.ON)
 

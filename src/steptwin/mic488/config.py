@@ -1,7 +1,7 @@
-"""The configuration of a MIC488, and how the vendor's ``.cfg`` file says it.
+"""The configuration of a MIC488, and the vendor's ``.cfg`` file.
 
 The file itself is an `IniFile`, which loses nothing; here its values get types, ranges and meaning. Missing keys have their
-defaults (MIC-27); names that are not known mean nothing and are told. Numbers take a decimal point or a decimal comma.
+defaults (MIC-27); unknown names have no effect and give a warning. Numbers take a decimal point or a decimal comma.
 
 Diagnostics: C001–C004 form of the file; C005 name that is not known; C006 no number; C007 no whole number; C008 not
 permitted; C009 limit switch on an encoder input of an axis that uses its encoder; C010 limit switch on a channel of an encoder
@@ -154,7 +154,7 @@ class ConfigError(Misuse):
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key of the file: the attribute it sets, what it may be, and how people are told."""
+    """A key of the file: the attribute it sets, its permitted values, and their description."""
 
     name: str
     attribute: str
@@ -248,7 +248,7 @@ def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tupl
         analog=tuple(AnalogConfig(**reader.values(f"AIN{n}", ANALOG_KEYS)) for n in range(ANALOG_INPUTS)),
         ports=(
             PortConfig(**reader.values("AIN0", (BAUD_KEY, ADDRESS_KEY))),
-            # The slave address is that of COM1; whatever COM2's says is not even checked.
+            # The slave address is that of COM1; that of COM2 is not even checked.
             PortConfig(**reader.values("AIN1", (BAUD_KEY,))),
         ),
         program=ProgramConfig(**reader.values("WBC_PROGRAM", _program_keys(firmware(firmware_name)))),
@@ -315,7 +315,7 @@ class _Reader:
         return any(header.section.lower() in known for header in self._file.headers)
 
     def unknown(self) -> Iterator[Diagnostic]:
-        """Sections and keys nobody asked for; with a repair where one looks like one that is missing."""
+        """Unknown sections and keys; with a fix where one looks like one that is missing."""
         file, known = self._file, self._known
         by_lower = {section.lower(): section for section in known}
         present = {header.section.lower() for header in file.headers}

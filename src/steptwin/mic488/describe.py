@@ -1,6 +1,6 @@
 """Modbus PDUs of a MIC488 in words: ``read M1_POS_ACT … M4_POS_ACT = 12.5, 0, 0, 0 mm``. For logs and live views.
 
-Never raises on what comes from the line: a PDU that says nothing sensible is described as such.
+Never raises on what comes from the line: a PDU that makes no sense is described as such.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Scale(NamedTuple):
 class Wording:
     """What one needs to know to put the frames of one controller into words.
 
-    ``scales`` are those of axes 1–4; without them units are shown as ``u``. ``data_type`` is what DATA_TYPE says at the time.
+    ``scales`` are those of axes 1–4; without them units are shown as ``u``. ``data_type`` is DATA_TYPE at the time.
     """
 
     __slots__ = ("data_type", "register_map", "scales")

@@ -38,7 +38,7 @@ _ERROR = Status.ERROR
 
 
 class Event(NamedTuple):
-    """Something worth telling that no register shows."""
+    """Something that happened and that no register shows."""
 
     time: Nanos
     axis: int | None
@@ -255,7 +255,7 @@ class Mic488(Stateful):
         raise Runaway(f"more than {MAX_EVENTS_PER_INSTANT} events of one MIC488 at {at} ns")
 
     def _run_others(self, at: Nanos) -> None:
-        """Inputs, then axes; then the program is told, before its statement of this moment."""
+        """Inputs, then axes; then the program is notified, before its statement of this moment."""
         changed: list[int] = []
         due = self.inputs.deadline()
         if due is not None and due <= at:
@@ -272,7 +272,7 @@ class Mic488(Stateful):
         return self._due
 
     def touch(self) -> None:
-        """State was changed from outside: tell the program, find the next deadline and the ERR lamp anew."""
+        """State was changed from outside: notify the program, find the next deadline and the ERR lamp anew."""
         self.program.disturbed(self.now, inside=False)
         self._plan_ahead(self._due_without_program(), lamp=True)
 

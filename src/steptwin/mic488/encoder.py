@@ -34,7 +34,7 @@ class Motion(Protocol):
 
 
 class Encoder(Stateful):
-    """``enc_resol`` counts per ``mot_resol`` pulses of the drive, as the controller is told; unless `gear` says otherwise, that
+    """``enc_resol`` counts per ``mot_resol`` pulses of the drive, as configured; unless `gear` changes it, that
     is how the encoder is built.
     """
 
@@ -69,7 +69,7 @@ class Encoder(Stateful):
 
     @property
     def agrees(self) -> bool:
-        """Whether the counts cannot but tell what the drive does."""
+        """Whether the counts always follow the drive."""
         counts, pulses = self._built
         as_told = counts * self.mot_resol == pulses * self.enc_resol
         return self.coupling is Coupling.DRIVE and self._motion is None and as_told

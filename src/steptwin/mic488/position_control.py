@@ -50,7 +50,7 @@ class PositionControl(Stateful):
         self._ref_shaft = axis.shaft(now)
 
     def true_p(self, axis: Axis, now: Nanos) -> float:
-        """Where the encoder says the drive is, as motor position."""
+        """Where the drive is according to the encoder, as motor position."""
         shaft = axis.shaft(now)
         return self._ref_motor + axis.encoder.pulses(shaft - self._ref_shaft)
 

@@ -181,7 +181,7 @@ def _position_u(axis: Axis, now: Nanos) -> float:
     return coordinate / axis.gear
 
 
-# MIC-17: stored in pulses, shown as DATA_TYPE says.
+# MIC-17: stored in pulses, shown according to DATA_TYPE.
 _IN_UNITS: dict[str, Getter] = {
     "POS_ACT": _position_u,
     "VEL_ACT": lambda axis, now: axis.profile.velocity(now) / axis.gear,

@@ -58,7 +58,7 @@ class Type(enum.Enum):
     DINT = "DINT"
     REAL = "REAL"
     VALUE = "REAL/DINT"
-    """REAL in configured units or DINT in pulses, as DATA_TYPE says."""
+    """REAL in configured units or DINT in pulses, depending on DATA_TYPE."""
     MEMORY = "WORD/DINT/REAL"
     """Plain 16-bit memory; the master may keep DINT or REAL in two neighbours from an even address."""
 
@@ -164,7 +164,7 @@ class Row:
     step: int = 1
     """Distance of the copies in addresses."""
     cells: int | str = 1
-    """Values behind one name: a number, or the name of the `Firmware` field that says it (ranged rows)."""
+    """Values behind one name: a number, or the name of the `Firmware` field with it (ranged rows)."""
     permitted: Range | Mapping[str, Range] | None = None
     """Permitted written values; by firmware name where they differ; None: whatever the type holds."""
     values: Mapping[int, str] = field(default_factory=dict)

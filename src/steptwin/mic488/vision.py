@@ -77,7 +77,7 @@ class Com1Port(Stateful):
 
     def receive(self, data: bytes, now: Nanos) -> None:
         if self.modbus is not None:
-            # With line timing frames of earlier pieces are told of while nothing comes.
+            # With line timing frames of earlier pieces are observed while nothing arrives.
             self._frames.clear()
             self.modbus.receive(data, now)
             for frame in self._frames:

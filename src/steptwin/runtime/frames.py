@@ -90,7 +90,7 @@ class RtuPort(Protocol):
 
 
 class WatchedRtuPort:
-    """An RTU port that tells of rubbish too: a wrong CRC, another protocol, another baud rate look like that."""
+    """An RTU port that reports rubbish too: a wrong CRC, another protocol, another baud rate look like that."""
 
     broken = None
 

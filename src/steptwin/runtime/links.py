@@ -54,7 +54,7 @@ class Feed:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.Handle | None = None
         self.is_read = True
-        """Whether the other end takes what is written. What is said unasked is lost otherwise, as on a wire."""
+        """Whether the other end takes what is written. Unasked output is lost otherwise, as on a wire."""
         self._talks: TalkingPort | None = None
         if isinstance(port, TalkingPort):
             self._talks = port
@@ -77,7 +77,7 @@ class Feed:
         self._timer = self._loop.call_later(self._cell.clock.wait_s(due), self._wake)
 
     def _fetch_soon(self) -> None:
-        # The port says so while machines are being advanced.
+        # The port calls this while machines are being advanced.
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self._loop.call_soon(self._wake)
@@ -85,9 +85,9 @@ class Feed:
     def _wake(self) -> None:
         self._timer = None
         now = self._cell.enter()
-        heard = self.is_read or self._talks is None
+        is_taken = self.is_read or self._talks is None
         for _, data in self._port.to_send(now):
-            if heard:
+            if is_taken:
                 self._writer.write(data)
         self._cell.leave()
         due = self._port.deadline()

@@ -1,8 +1,8 @@
 """A directory that keeps what survives power-off: non-volatile images, with one owner at a time.
 
 An image is one file. A save writes a temporary file, syncs it, renames it onto the image and syncs the directory: at any moment —
-``kill -9``, power loss, full disk — the old or the new content is there whole. A header with format, length and CRC-32 tells
-damage, which is an error and never older content passed off as the newest.
+``kill -9``, power loss, full disk — the old or the new content is there whole. Damage is found by a header with format,
+length and CRC-32; it is an error, never older content passed off as the newest.
 
 Layout: ``<name>.image``, ``<name>.tmp`` (a save in progress), ``owner.lock``. POSIX only (flock, fsync of directories).
 """
@@ -42,7 +42,7 @@ class StateFailure(SteptwinError, OSError):
 class StateDirectory:
     """A locked state directory; a context manager. It is made when it does not exist.
 
-    Entering raises `StateInUse` when somebody owns it and `StateFailure` when it cannot be used.
+    Entering raises `StateInUse` when another process owns it and `StateFailure` when it cannot be used.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:

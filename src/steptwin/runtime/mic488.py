@@ -101,7 +101,7 @@ class Mic488Line:
             timing = LineTiming(SerialLine(self.options.baud), strict=self.options.strict)
             self._gateway = Gateway(TimedUnits(self.devices, timing))
         self._connections = count(1)
-        # WBC-15; nobody else pays for it.
+        # WBC-15; without vision registers in a program it costs nothing.
         self._hears_records = len(units) == 1 and any(map(uses_vision, banks.programs.values()))
 
     # ------------------------------------------------------------------ ports
@@ -214,7 +214,7 @@ def _pin(device: Mic488, terminals: PinMachine, request: Mapping[str, Any], now:
 
 
 def _encoder(device: Mic488, request: Mapping[str, Any], now: Nanos) -> object:
-    """Turn or couple shafts, then all of them. A whole number turns by counts, a word says what turns the shaft."""
+    """Turn or couple shafts, then all of them. A whole number turns by counts, a word chooses what turns the shaft."""
     wanted: list[tuple[int, int | Coupling]] = []
     for name, change in changes(request).items():
         axis = axis_number(name)

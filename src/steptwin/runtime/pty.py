@@ -22,7 +22,7 @@ class PtyLink:
     """A pty whose far end is reached through the symbolic link ``path``.
 
     A program that opens it meets a new port: what one that went away had begun or had not read is not there for the next. (Where
-    the next is there before the hang-up has been noticed, within a fraction of a millisecond, nothing tells them apart.)
+    the next is there before the hang-up has been noticed, within a fraction of a millisecond, they cannot be told apart.)
     """
 
     def __init__(self, cell: Cell, path: Path, make_port: Callable[[], Port]) -> None:
@@ -67,13 +67,13 @@ class PtyLink:
         self._owned = Ownership(self.path.with_name(f".{self.path.name}.lock"))
         if self.path.is_symlink():
             target = os.readlink(self.path)
-            # A number under /dev/pts is given to somebody else as soon as its owner ends: only the lock tells whose link it is.
+            # A number under /dev/pts is given to another process as soon as its owner ends: only the lock shows whose link it is.
             if not target.startswith(PTS) or (self.path.exists() and not self._owned.left_behind):
                 self._owned.release()
                 raise Misuse(f"{self.path} is somebody's link to {target}: choose another --pty")
 
     def write(self, data: bytes) -> None:
-        """Send; what finds no room or nobody there is lost, as on a serial line whose other end does not listen."""
+        """Send; what finds no room or no program there is lost, as on a serial line whose other end does not listen."""
         if self._quiet and _is_hung_up(self._master):
             return
         try:
@@ -81,8 +81,8 @@ class PtyLink:
         except OSError:
             return
 
-    # While nobody has the line open the master reports a hang-up, so the loop would never rest on it. An edge-triggered epoll
-    # reports that once, and then again when there is something to read or somebody has come and gone.
+    # While no program has the line open the master reports a hang-up, so the loop would never rest on it. An edge-triggered epoll
+    # reports that once, and then again when there is something to read or a program has come and gone.
 
     def _left(self) -> None:
         """The last program closed the line: raw again, emptied of what it had not read, and a new port for the next one."""

@@ -19,7 +19,7 @@ RETRY_S = 1.0
 class SerialLink:
     """A serial port that a port answers on.
 
-    When the device disappears (a USB adapter is pulled out) it is looked for until it is back; ``notice`` is told of both.
+    When the device disappears (a USB adapter is pulled out) it is looked for until it is back; ``notice`` is called for both.
     """
 
     def __init__(self, cell: Cell, device: str, baud: int, make_port: Callable[[], Port], notice: Callable[[str], None]) -> None:
@@ -71,7 +71,7 @@ class SerialLink:
 
 
 class _Line(asyncio.Protocol):
-    """While nobody takes what is sent nothing is read either."""
+    """While the other end does not take what is sent, nothing is read either."""
 
     def __init__(self, cell: Cell, port: Port, lost: Callable[[Exception | None], None]) -> None:
         self._cell = cell

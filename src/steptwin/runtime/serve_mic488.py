@@ -185,7 +185,7 @@ async def _open(server: Server, line: Mic488Line, options: Mic488Options, baud: 
     line.faults.start(options.faults, options.seed)
     gap: Nanos | None = None if options.gap_ms is None else round(options.gap_ms * MILLISECOND)
     bursty = BURSTY_GAP_NS if gap is None else gap
-    # First, for it tells who else has this name, and with it the pty of that name.
+    # First: it finds another server of this name, and with it the pty of that name.
     await server.open_control(options.name, line.handlers(server.cell))
     if options.pty is not None:
         await server.open_pty(options.pty, RTU, lambda: line.rtu_port("pty", bursty))
@@ -228,7 +228,7 @@ def _empty_banks(config: ControllerConfig, banks: Banks) -> list[str]:
 
 
 def remarks(options: Mic488Options, config: ControllerConfig, banks: Banks) -> list[str]:
-    """What the person who started this should know."""
+    """Remarks for the person who started this."""
     remarks = _empty_banks(config, banks)
     if options.listen_any:
         remarks.append("Modbus has no authentication: whoever reaches these addresses moves the axes")

@@ -44,7 +44,7 @@ class EndPoint:
 class Server:
     """Opens links one after the other and closes all of them, whatever happened.
 
-    ``tell`` is told what a person watching should know.
+    ``tell`` is called with texts for the person watching.
     """
 
     def __init__(self, cell: Cell, tell: Callable[[str], None]) -> None:
@@ -94,7 +94,7 @@ class Server:
         self.end_points.append(EndPoint(kind, str(listening), protocol, details))
 
     async def open_control(self, name: str, handlers: Mapping[str, Handler]) -> None:
-        """Listen for a hand at the machine. Every server tells its ``end-points``, besides what ``handlers`` do."""
+        """Open the control endpoint: what ``handlers`` do, and the ``end-points`` of the server."""
         endpoint = ControlEndpoint(name, {**handlers, END_POINTS: lambda _: self._where()})
         await endpoint.open()
         self._links.append(endpoint)
@@ -135,7 +135,7 @@ class Server:
         self.notice(f"this process was held up for {by / SECOND:.1f} s; the time of the twin was held up as long")
 
     def _trouble(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """What no caller could be told: the end where machines cannot go on, else a notice."""
+        """Errors without a caller: the end where machines cannot go on, else a notice."""
         error = context.get("exception")
         if isinstance(error, SteptwinError):
             self.fail(str(error))
@@ -167,7 +167,7 @@ class Server:
 
 
 def clear_ready_file(path: Path) -> None:
-    """Remove what a server that is gone left behind, so that nobody waiting takes it for the new one's.
+    """Remove what a server that is gone left behind, so that a waiting program does not take it for the new one's.
 
     Raises `Misuse` where the path is taken by another kind of file.
     """

@@ -21,7 +21,7 @@ BACKLOG = 1024
 AT_ONCE = 64
 """Clients that are accepted before those that are there are served."""
 RETRY_S = 1.0
-"""How long nobody is accepted when the system has no room for one more."""
+"""How long no client is accepted when the system has no room for one more."""
 
 
 class Address(NamedTuple):
@@ -67,14 +67,14 @@ def _is_loopback(host: str) -> bool:
 
 
 def _unnoticed(text: str) -> None:
-    """For shells that nobody watches."""
+    """For shells without an observer."""
 
 
 @dataclass(slots=True)
 class Clients:
     """All TCP clients of a process. Every one is an open file, so there is a limit: ``most``.
 
-    ``notice`` is told of clients that were turned away or made no sense.
+    ``notice`` is called for clients that were turned away or made no sense.
     """
 
     most: int = 65536

@@ -1,8 +1,8 @@
 """A gateway in front of a line with timing (MIC-32).
 
 All its ports share one line, on which the gateway is the only master: requests wait for their turn in the order in which they
-came, and each takes the time of its characters, of the controller and of the response. What finds the queue full is refused with
-exception 06.
+came, and each takes the time of its characters, of the controller and of the response. A request that finds the queue full is
+refused with exception 06.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ class TcpGatewayPort(GatewayPort):
 class ScriptPort(GatewayPort):
     """RTU frames of the scripts of a world: their requests wait for those of Modbus TCP clients instead of getting lost.
 
-    A request is observed when it is executed; one that nobody serves is not.
+    A request is observed when it is executed; one for a unit that is not served is not.
     """
 
     broken = None

@@ -286,7 +286,7 @@ def encode_response(response: Response) -> bytes:
 def decode_response(pdu: bytes) -> Response:
     """The response in a PDU by its own form alone; `BadResponse` when it has none of the six functions.
 
-    Whether it answers a given request says `answer`.
+    Use `answer` to check that it answers a given request.
     """
     if len(pdu) < 2:
         raise BadResponse(f"a response of {len(pdu)} bytes is too short")

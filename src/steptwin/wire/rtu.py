@@ -1,13 +1,13 @@
 """Modbus RTU frames in a stream of bytes.
 
-A frame is cut where its function says that it ends and its CRC is right; silence does not cut frames, because pseudo
+A frame is cut where its function makes it end and its CRC is right; silence does not cut frames, because pseudo
 terminals, USB adapters and networks deliver in bursts (MIC-15). The gap only brings the framer back in step after rubbish.
 
 A line with several slaves carries requests and responses, and both have to be cut so that nothing inside them is taken for
 a frame. At the front of the held bytes the framer tries the length that the function has as a request and the one it has
 as a response. When neither can match any more, one byte is given up and the rest looked at again, so that a good frame behind
 rubbish is found at once. When the gap has passed, nothing is waited for: complete frames are taken wherever they are, and
-a rest with a right CRC is a frame even where the function tells no length.
+a rest with a right CRC is a frame even where the length of its function is not known.
 """
 
 from __future__ import annotations
@@ -62,14 +62,14 @@ _REQUESTS = tuple(_REQUEST_LENGTHS.get(function) for function in range(256))
 _RESPONSES = tuple(_RESPONSE_LENGTHS.get(function) for function in range(256))
 _IMPOSSIBLE = -1
 _UNKNOWN_YET = MAX_FRAME + 1
-"""Longer than anything held: the byte that tells the length has not arrived."""
+"""Longer than anything held: the byte with the length has not arrived."""
 
 _KNOWN = re.escape(bytes(sorted(_REQUEST_LENGTHS | _RESPONSE_LENGTHS)))
 _FRAME_START = re.compile(rb"[\x00-\xf7](?:[" + _KNOWN + rb"]|\Z)", re.DOTALL)
 
 
 class Role(enum.Enum):
-    """What a frame is. A response that repeats its request (05, 06) is told apart only when the request was seen before."""
+    """What a frame is. A response that repeats its request (05, 06) is recognised only when the request was seen before."""
 
     REQUEST = "request"
     RESPONSE = "response"
@@ -234,7 +234,7 @@ class RtuFramer(Stateful):
         return frames
 
     def _is_one_unknown(self) -> bool:
-        """Whether all that came since the last cut or gap is one frame whose function does not tell its length."""
+        """Whether all that came since the last cut or gap is one frame of a function whose length is not known."""
         rest = self.held[self._burst :]
         return MIN_FRAME <= len(rest) <= MAX_FRAME and crc16(rest) == 0 and self._look(self._burst, waiting=False)[0] <= 0
 
@@ -315,7 +315,7 @@ class RtuFramer(Stateful):
         if not mine and have > 1 and self._asked == (unit, held[start + 1]):
             first, first_role, second, second_role = response, Role.RESPONSE, request, Role.REQUEST
         if first > have:
-            # A short response can be the beginning of a longer request by chance; the next bytes or the gap tell.
+            # A short response can be the beginning of a longer request by chance; the next bytes or the gap decide.
             if waiting and first <= 8:
                 return 0, Role.UNKNOWN
         elif first > 0 and crc16(held[start : start + first]) == 0:

@@ -120,7 +120,7 @@ class PauseReports(Stateful):
 class RtuSlavePort(Stateful):
     """One RTU line without the time a wire takes (`steptwin.wire.timed` has it).
 
-    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15). ``line`` tells how long the
+    ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15). ``line`` gives the time that the
     characters of a delivery took; without it a delivery takes no time.
     """
 
@@ -205,8 +205,8 @@ class TcpSlavePort(Stateful):
     """One Modbus TCP connection. ``devices`` is read once.
 
     MIC-23: a single device is addressed by 0 and 255 too. With several, 0 is a broadcast, which is not answered (MIC-2). Any
-    other unit is answered with exception 0B at once, as gateways do. When `broken` says why, the shell sends what it has and
-    closes the connection.
+    other unit is answered with exception 0B at once, as gateways do. When `broken` has a reason, the shell sends what it has
+    and closes the connection.
     """
 
     __slots__ = ("_devices", "_framer", "_out", "on_frame")
