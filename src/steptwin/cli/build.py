@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 
@@ -22,7 +23,9 @@ def build(
     inferred: Annotated[
         bool, typer.Option("--inferred", help="Also write what has a form that is inferred, but was never seen in an image.")
     ] = False,
-    firmware: Annotated[str, typer.Option(help="Firmware the program is checked for.")] = "1.70",
+    firmware: Annotated[
+        str, typer.Option(help="Firmware the program is checked for.", autocompletion=completion.firmwares)
+    ] = "1.70",
 ) -> None:
     """Compile a WBC program to the image of firmware 1.25. Exit code 1 if it has errors or something without a known form.
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -57,14 +58,19 @@ class Report:
 
 def check(
     file: Annotated[Path, typer.Argument(help="Program to check.")],
-    variant: Annotated[str | None, typer.Option(help="Type of M1486: A, B, C, E1, E2, or A2x and so on. Default A.")] = None,
+    variant: Annotated[
+        str | None,
+        typer.Option(help="Type of M1486: A, B, C, E1, E2, or A2x and so on. Default A.", autocompletion=completion.variants),
+    ] = None,
     interface: Annotated[str | None, typer.Option(help="Driver interface of the M1486: sd, dual or two. Default sd.")] = None,
     memory: Annotated[bool, typer.Option("--memory", help="Show the command memory each M1486 command takes.")] = False,
     positions: Annotated[
         Path | None, typer.Option(help="Position table of a WBC program. Default: the .csv of the same name.")
     ] = None,
     config: Annotated[Path | None, typer.Option(help="Configuration of its MIC488. Default: the .cfg of the same name.")] = None,
-    firmware: Annotated[str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.")] = None,
+    firmware: Annotated[
+        str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.", autocompletion=completion.firmwares)
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Check a program and report everything wrong or doubtful in it: WBC in .prg files, M1486 in all others."""

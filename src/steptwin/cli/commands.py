@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -40,8 +41,13 @@ class Section:
 
 def commands(
     device: Annotated[Device, typer.Argument(help="Controller.")],
-    variant: Annotated[str | None, typer.Option(help="Type of M1486: A, B, C, E1, E2, or A2x and so on. Default: all.")] = None,
-    firmware: Annotated[str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.")] = None,
+    variant: Annotated[
+        str | None,
+        typer.Option(help="Type of M1486: A, B, C, E1, E2, or A2x and so on. Default: all.", autocompletion=completion.variants),
+    ] = None,
+    firmware: Annotated[
+        str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.", autocompletion=completion.firmwares)
+    ] = None,
     form: Annotated[Format, typer.Option("--format", help="How to print it.")] = Format.TEXT,
 ) -> None:
     """Show the commands of a controller, their arguments and effect, and what the checker can say."""

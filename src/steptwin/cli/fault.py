@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.cli.commands import Format, Section, show
 from steptwin.cli.twin import Json, Twin
 from steptwin.errors import Misuse
@@ -20,7 +21,11 @@ if TYPE_CHECKING:
 def fault(
     words: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[KIND [NAME=VALUE ...]]", help="crc nth=3; without any, those that are set are shown."),
+        typer.Argument(
+            metavar="[KIND [NAME=VALUE ...]]",
+            help="crc nth=3; without any, those that are set are shown.",
+            autocompletion=completion.faults,
+        ),
     ] = None,
     clear: Annotated[list[str] | None, typer.Option(help="Remove the fault of this name; repeatable.")] = None,
     clear_all: Annotated[bool, typer.Option("--clear-all", help="Remove all faults.")] = False,

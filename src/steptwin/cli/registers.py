@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -33,7 +34,9 @@ class Format(enum.StrEnum):
 
 def registers(
     device: Annotated[str, typer.Argument(metavar="mic488", help="Controller.")],
-    firmware: Annotated[str, typer.Option(help="Firmware generation: 1.23, 1.40 or 1.70.")] = "1.70",
+    firmware: Annotated[
+        str, typer.Option(help="Firmware generation: 1.23, 1.40 or 1.70.", autocompletion=completion.firmwares)
+    ] = "1.70",
     form: Annotated[Format, typer.Option("--format", help="How to print it; tags: a list for panels and SCADA.")] = Format.TABLE,
 ) -> None:
     """Show the coils, inputs and holding registers of a controller."""

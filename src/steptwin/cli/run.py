@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -79,14 +80,19 @@ def run(
         Path | None, typer.Option(help="Write what happened to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    variant: Annotated[str | None, typer.Option(help="M1486: type A, B, C, E1, E2, or A2x and so on. Default A.")] = None,
+    variant: Annotated[
+        str | None,
+        typer.Option(help="M1486: type A, B, C, E1, E2, or A2x and so on. Default A.", autocompletion=completion.variants),
+    ] = None,
     interface: Annotated[str | None, typer.Option(help="M1486: driver interface sd, dual or two. Default sd.")] = None,
     wire: Annotated[
         list[str] | None, typer.Option(help="M1486: from a pin of one chip to an input of another, 0.B1=7.B3. Again for more.")
     ] = None,
     positions: Annotated[Path | None, typer.Option(help="MIC488: position table. Default: the .csv of the same name.")] = None,
     config: Annotated[Path | None, typer.Option(help="MIC488: configuration. Default: the .cfg of the same name.")] = None,
-    firmware: Annotated[str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70, which is the default.")] = None,
+    firmware: Annotated[
+        str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70, which is the default.", autocompletion=completion.firmwares)
+    ] = None,
     travel: Annotated[
         list[str] | None,
         typer.Option(

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli import completion
+
 app = typer.Typer(help="Serve a twin until Ctrl-C.", no_args_is_help=True)
 
 MODBUS_TCP_PORT = 5020
@@ -30,7 +32,9 @@ def _default_host(listen_any: bool) -> str:
 
 @app.command()
 def mic488(
-    firmware: Annotated[str, typer.Option(help="Register map: 1.23, 1.40 or 1.70.")] = "1.70",
+    firmware: Annotated[
+        str, typer.Option(help="Register map: 1.23, 1.40 or 1.70.", autocompletion=completion.firmwares)
+    ] = "1.70",
     units: Annotated[
         str | None, typer.Option(help="Slave addresses, such as 1,2,5. Default: that of the configuration, or 1.")
     ] = None,
@@ -126,7 +130,9 @@ def mic488(
 
 @app.command()
 def m1486(
-    variant: Annotated[str, typer.Option(help="Type: A, B, C, E1, E2, or A2x and so on (24 MHz).")] = "A",
+    variant: Annotated[
+        str, typer.Option(help="Type: A, B, C, E1, E2, or A2x and so on (24 MHz).", autocompletion=completion.variants)
+    ] = "A",
     chain: Annotated[str, typer.Option(help="Addresses of the chips on the line, such as 0,7; hexadecimal digits.")] = "F",
     interface: Annotated[str, typer.Option(help="Driver interface: sd, dual or two.")] = "sd",
     wire: Annotated[

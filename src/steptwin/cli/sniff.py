@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.cli.device import complain
 
 if TYPE_CHECKING:
@@ -29,8 +30,8 @@ def sniff(
     pty: Annotated[Path | None, typer.Option(help="Stand in the line: programs open the pseudo terminal PATH instead.")] = None,
     language: Annotated[Language, typer.Option(help="What is spoken.")] = Language.MODBUS,
     baud: Annotated[int, typer.Option(help="Baud rate of a serial port.")] = 38400,
-    firmware: Annotated[str, typer.Option(help="Register map of the MIC488.")] = "1.70",
-    variant: Annotated[str, typer.Option(help="Type of the M1486.")] = "A",
+    firmware: Annotated[str, typer.Option(help="Register map of the MIC488.", autocompletion=completion.firmwares)] = "1.70",
+    variant: Annotated[str, typer.Option(help="Type of the M1486.", autocompletion=completion.variants)] = "A",
     json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each frame.")] = False,
 ) -> None:
     """Put a line between two others into words.

@@ -7,18 +7,24 @@ from typing import Annotated, Any
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 _LONGEST_UNIT = 10
 """Digits; a longer number is nobody's unit."""
 
-Twin = Annotated[str | None, typer.Option(help="Name of the twin; default: the only one running.")]
+Twin = Annotated[
+    str | None, typer.Option(help="Name of the twin; default: the only one running.", autocompletion=completion.twins)
+]
 Unit = Annotated[str | None, typer.Option(help="Unit, where the twin serves several: slave address, or address of a chip.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def pin(
-    changes: Annotated[list[str] | None, typer.Argument(help="IN3=1 AIN1=4.2 ...; without any, all pins are shown.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Argument(help="IN3=1 AIN1=4.2 ...; without any, all pins are shown.", autocompletion=completion.pins),
+    ] = None,
     twin: Twin = None,
     unit: Unit = None,
     json: Json = False,

@@ -1,0 +1,59 @@
+"""What the shell completes with Tab: values of options, names of running twins, their pins, kinds of faults.
+
+Nothing here may fail or print: what cannot be found out is not offered.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable
+
+import typer
+
+from steptwin.errors import SteptwinError
+
+
+def firmwares(incomplete: str) -> list[str]:
+    from steptwin.mic488.registers import FIRMWARES
+
+    return _beginning(FIRMWARES, incomplete)
+
+
+def variants(incomplete: str) -> list[str]:
+    from steptwin.m1486.variants import VARIANTS
+
+    return _beginning((variant.name for variant in VARIANTS), incomplete)
+
+
+def twins(incomplete: str) -> list[str]:
+    """Names of running twins."""
+    from steptwin.runtime.control import running
+
+    with contextlib.suppress(SteptwinError):
+        return _beginning(running(), incomplete)
+    return []
+
+
+def pins(context: typer.Context, incomplete: str) -> list[str]:
+    """``IN1=`` of the twin that ``--twin`` names, or of the only one."""
+    from steptwin.runtime.control import ask
+
+    with contextlib.suppress(SteptwinError):
+        asked = {"do": "pin", "unit": context.params.get("unit"), "set": {}}
+        return _beginning((f"{name}=" for name in ask(context.params.get("twin"), asked)), incomplete)
+    return []
+
+
+def faults(context: typer.Context, incomplete: str) -> list[str]:
+    """The kinds of faults, then ``NAME=`` of what the kind takes."""
+    from steptwin.world.faults.table import KINDS
+
+    words = context.params.get("words") or []
+    if not words or words[0] not in KINDS:
+        return _beginning(KINDS, incomplete)
+    given = {word.partition("=")[0] for word in words[1:]}
+    return _beginning((f"{each.name}=" for each in KINDS[words[0]].parameters if each.name not in given), incomplete)
+
+
+def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]
