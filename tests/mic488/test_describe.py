@@ -60,6 +60,7 @@ REQUESTS = [
     ("06 2720 0000", "write M_STOP = none (0)"),
     ("06 2711 0003", "write PROG_BANK_SEL = 3"),
     ("06 0005 FFFF", "write USER_REGISTER 5 = 65535"),
+    ("03 2725 0004", "read half of M1_POS_ACT at 10021 (0x2725), M2_POS_ACT, half of M3_POS_ACT at 10024 (0x2728)"),
     ("06 2725 FFFB", "write half of M1_POS_ACT at 10021 (0x2725) = FFFB"),
     ("10 2754 0002 04" + real(2.5), "write M1_VEL_ABS = 2.5 mm/s"),
     ("10 2764 0006 0C" + real(10, 15, 20), "write M1_POS_ABS … M3_POS_ABS = 10, 15, 20 mm"),

@@ -89,9 +89,9 @@ class Wording:
     # ------------------------------------------------------------------ parts of a request
 
     def _groups(self, space: Space, address: int, count: int) -> Iterable[list[Piece]]:
-        """Pieces of a request, those of one row (all axes of a quantity) together."""
+        """Pieces of a request, those of one row (all axes of a quantity) together; half a value stands alone."""
         pieces = self.register_map.pieces(space, address, count)
-        return (list(group) for _, group in groupby(pieces, lambda p: (p.register and p.register.key, p.whole)))
+        return (list(group) for _, group in groupby(pieces, _group_key))
 
     def _names(self, space: Space, address: int, count: int) -> str:
         return ", ".join(_name(group) for group in self._groups(space, address, count))
@@ -165,6 +165,11 @@ def _decoded(request: bytes | None) -> modbus.Request | None:
         return None if request is None else modbus.decode_request(request)
     except modbus.ModbusException:
         return None
+
+
+def _group_key(piece: Piece) -> tuple[str | None, int | None]:
+    is_half = piece.register is not None and not piece.whole
+    return piece.register and piece.register.key, piece.address if is_half else None
 
 
 def _name(group: list[Piece]) -> str:
