@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.diagnostics import Diagnostic, Fix, Severity, Source, Span, in_order, render, to_json
+from steptwin.diagnostics import MOST_SHOWN, Diagnostic, Fix, Severity, Source, Span, in_order, render, to_json
 
 
 def found(start: int, end: int, code: str = "W101", hint: str | None = None, fix: Fix | None = None) -> Diagnostic:
@@ -142,3 +142,29 @@ def test_a_suggestion_that_the_text_makes_already_is_shown_once() -> None:
     for message, hint in (("unknown; did you mean speed?", None), ("unknown", "did you mean speed?")):
         shown = render(Source("p", "x"), [Diagnostic("W104", Severity.ERROR, span, message, hint, Fix(span, "speed"))])
         assert shown.count("speed") == 1, shown
+
+
+def test_control_characters_do_not_reach_the_terminal() -> None:
+    text = "a\x1b]0;title\x07 \x9b2J\x7f\t\u202eb"
+    shown = render(
+        Source("x\x1b[1m.prg", text),
+        [Diagnostic("W1", Severity.ERROR, Span(1, 2), "odd \x1b", "hint \x07", Fix(Span(1, 2), "\x1bc"))],
+    )
+    assert shown.split("\n") == [
+        "x␛[1m.prg:1:2: error W1: odd ␛",
+        "  1 | a␛]0;title␇ \ufffd2J␡ \ufffdb",
+        "    |  ^",
+        "    = hint ␇",
+        "    = suggestion: ␛c",
+    ]
+
+
+def test_long_words_and_many_findings_are_cut() -> None:
+    word = "A" * 2_000_000
+    one = [Diagnostic("W1", Severity.ERROR, Span(0, len(word)), f"unknown {word}", word, Fix(Span(0, 1), word))]
+    assert len(render(Source("x", word), one)) < 3_000
+    many = one * 20_000
+    shown = render(Source("x", "ab"), [Diagnostic("W1", Severity.ERROR, Span(0, 1), "odd")] * 20_000)
+    assert shown.count("odd") == MOST_SHOWN
+    assert shown.endswith("\nx: 19900 more are not shown")
+    assert len(to_json(Source("x", "ab"), many)) == 20_000

@@ -13,6 +13,13 @@ from dataclasses import dataclass, field
 
 LONGEST_SHOWN = 400
 """Characters of a source line in a message; of a longer one the part around the place."""
+MOST_SHOWN = 100
+"""Diagnostics of one text shown to people; JSON has all of them."""
+LONGEST_TEXT = 500
+"""Characters of a message shown to people: it may quote a word of any length."""
+# C0 and C1 but tabs, and what turns the direction of writing round.
+_CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+_PICTURES = {chr(code): chr(0x2400 + code) for code in range(0x20)} | {"\x7f": "\u2421"}
 _LINE_END = re.compile(r"\r\n|\n|\r")
 
 
@@ -92,9 +99,12 @@ def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
 
 
 def render(source: Source, diagnostics: Sequence[Diagnostic]) -> str:
-    """The diagnostics as text: place, severity, code, message, source line with carets, hint, suggestion."""
+    """The diagnostics as text: place, severity, code, message, source line with carets, hint, suggestion.
+
+    For terminals: at most `MOST_SHOWN` of them, long texts cut, control characters made visible.
+    """
     parts: list[str] = []
-    for d in diagnostics:
+    for d in diagnostics[:MOST_SHOWN]:
         line, column = source.position(d.span.start)
         text = source.line(line)
         before = len(text[: column - 1].expandtabs(4))
@@ -107,14 +117,25 @@ def render(source: Source, diagnostics: Sequence[Diagnostic]) -> str:
             first = min(max(0, before - LONGEST_SHOWN // 2), len(shown) - LONGEST_SHOWN)
             shown, before = shown[first : first + LONGEST_SHOWN], before - first
             width = min(width, LONGEST_SHOWN - before) or 1
-        parts.append(f"{source.name}:{line}:{column}: {d.severity.value} {d.code}: {d.message}")
-        parts.append(f"  {gutter} | {shown}")
+        parts.append(visible(f"{source.name}:{line}:{column}: {d.severity.value} {d.code}: {_cut(d.message)}"))
+        parts.append(f"  {gutter} | {visible(shown)}")
         parts.append(f"  {pad} | {' ' * before}{'^' * width}")
         if d.hint:
-            parts.append(f"  {pad} = {d.hint}")
+            parts.append(visible(f"  {pad} = {_cut(d.hint)}"))
         if d.fix and f"did you mean {d.fix.text}?" not in f"{d.message} {d.hint}":
-            parts.append(f"  {pad} = suggestion: {d.fix.text.strip() or _blank_fix(d.fix.text)}")
+            parts.append(visible(f"  {pad} = suggestion: {_cut(d.fix.text.strip()) or _blank_fix(d.fix.text)}"))
+    if len(diagnostics) > MOST_SHOWN:
+        parts.append(visible(f"{source.name}: {len(diagnostics) - MOST_SHOWN} more are not shown"))
     return "\n".join(parts)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}…"
+
+
+def visible(text: str) -> str:
+    """A text for a terminal: every control character becomes one character that shows it, so that columns stay."""
+    return _CONTROL.sub(lambda found: _PICTURES.get(found[0], "\ufffd"), text)
 
 
 def _blank_fix(text: str) -> str:

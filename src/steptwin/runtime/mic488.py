@@ -10,6 +10,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from steptwin.diagnostics import visible
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos, PinMachine
 from steptwin.mic488.config import ControllerConfig
@@ -258,7 +259,7 @@ def place_of(device: Mic488) -> Place | None:
     if running is None or span is None:
         return None
     source = running.source
-    return Place(source.name, source.position(span.start)[0], source.text[span.start : span.end].strip() or "its end")
+    return Place(source.name, source.position(span.start)[0], visible(source.text[span.start : span.end].strip()) or "its end")
 
 
 def _program_place(device: Mic488) -> dict[str, object]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from steptwin.diagnostics import Severity, render
+from steptwin.diagnostics import Severity, render, visible
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
@@ -157,7 +157,7 @@ def _line(bench: Bench, happening: Happening) -> str:
 
 def _statement(bench: Bench, step: int) -> str:
     found = bench.program.steps[step]
-    return bench.program.source.text[found.start : found.end].strip()
+    return visible(bench.program.source.text[found.start : found.end].strip())
 
 
 def _ending(bench: Bench, ending: Ending) -> str:
