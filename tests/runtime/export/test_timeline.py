@@ -4,7 +4,10 @@ import io
 import json
 import random
 import re
+import shutil
+import subprocess
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,10 +18,14 @@ from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.paths import Circular, circle
 from steptwin.motion.pulses import step_times
+from steptwin.runtime.export import axis_views, write_trace
 from steptwin.runtime.export.progress import silent
 from steptwin.runtime.export.recording import profile_of, sort_out
 from steptwin.runtime.export.timeline import write_timeline
+from steptwin.runtime.world import World
 from steptwin.world.trace import Record, Trace
+
+WORLDS = Path(__file__).parents[3] / "examples" / "worlds"
 
 
 def page_of(trace: Trace, views: Any = None, until: Nanos | None = None, begin: Nanos = 0) -> str:
@@ -142,3 +149,27 @@ def test_every_record_that_is_no_track_is_a_mark(mic488: Run) -> None:
     statement, frame = data_of(page_of(trace))["marks"]
     assert statement == [1, "a", "statement", "main", "line 12"]
     assert frame[4].endswith("00 … 100 bytes")
+
+
+def shown(page: Path) -> str:
+    """The page as a browser has it after its scripts have run. The test is skipped where there is no browser."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no browser is installed (chromium)")
+    options = ["--headless", "--disable-gpu", "--no-sandbox", "--virtual-time-budget=3000", "--window-size=1300,1000"]
+    profile = f"--user-data-dir={page.parent / 'browser'}"
+    ran = subprocess.run(
+        [browser, *options, profile, "--dump-dom", page.as_uri()], capture_output=True, text=True, check=True, timeout=100
+    )
+    return ran.stdout
+
+
+def test_lanes_in_a_browser(tmp_path: Path) -> None:
+    """Axes that never move share a row; commanded and true position share a lane; the scale has a column of its own."""
+    world = World.load(WORLDS / "feeder.toml")
+    world.run(for_=8)
+    page = tmp_path / "t.html"
+    write_trace(world.trace, page, views=axis_views(world.machines, world.axes))
+    lanes = re.findall(r'class="name"[^>]*>([^<]*)<', shown(page))
+    assert lanes[:5] == ["table", "M1 position, x true", "M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
+    assert not [name for name in lanes if name.startswith("M2 ")]

@@ -62,11 +62,13 @@ class Line {
   }
 }
 
+// The curves of a lane on one scale, whose ends are left in `bounds`.
 function drawCurve(pen, lane, top, bottom) {
-  const { motion } = lane, velocity = lane.kind === "velocity", c = pen.context;
-  let [least, most] = pen.scaled ? motion.range(velocity, pen.from, pen.to) : lane.range;
+  const velocity = lane.kind === "velocity", c = pen.context;
+  let [least, most] = pen.scaled ? rangeOf(lane.curves, velocity, pen.from, pen.to) : lane.range;
   if (velocity) [least, most] = [Math.min(least, 0), Math.max(most, 0)];
   if (!(most > least)) [least, most] = [least - 1, least + 1];
+  lane.bounds = [least, most];
   const y = (value) => bottom - (value - least) / (most - least) * (bottom - top);
   if (least <= 0 && most >= 0) {
     c.save();
@@ -79,36 +81,31 @@ function drawCurve(pen, lane, top, bottom) {
     c.stroke();
     c.restore();
   }
-  const line = new Line(c);
-  for (let i = motion.at(pen.from); i < motion.size && motion.begin(i) <= pen.to; i++) {
-    const a = Math.max(motion.begin(i), pen.from), b = Math.min(motion.end(i), pen.to);
-    const steps = motion.isCurved(i, velocity) ? Math.max(1, Math.ceil((b - a) / pen.perPixel / 3)) : 1;
-    for (let k = 0; k <= steps; k++) {
-      const t = a + (b - a) * k / steps;
-      line.to(pen.x(t), y(velocity ? motion.velocity(i, t) : motion.position(i, t)));
+  for (const { motion, color, dashed } of lane.curves) {
+    c.strokeStyle = pen.color(color);
+    c.setLineDash(dashed ? [5, 3] : []);
+    const line = new Line(c);
+    for (let i = motion.at(pen.from); i < motion.size && motion.begin(i) <= pen.to; i++) {
+      const a = Math.max(motion.begin(i), pen.from), b = Math.min(motion.end(i), pen.to);
+      const steps = motion.isCurved(i, velocity) ? Math.max(1, Math.ceil((b - a) / pen.perPixel / 3)) : 1;
+      for (let k = 0; k <= steps; k++) {
+        const t = a + (b - a) * k / steps;
+        line.to(pen.x(t), y(velocity ? motion.velocity(i, t) : motion.position(i, t)));
+      }
     }
+    line.stroke();
   }
-  line.stroke();
-  if (!lane.thin) drawBounds(pen, least, most, top, bottom);
+  c.setLineDash([]);
 }
 
-function drawBounds(pen, least, most, top, bottom) {
-  const c = pen.context;
-  c.save();
+// The ends of the scale of a lane, beside the plot, where they hide no curve.
+function drawBounds(c, lane, y, color) {
+  const [least, most] = lane.bounds, unit = 10 ** (Math.floor(Math.log10(most - least)) - 4);
   c.font = '9.5px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
-  c.textAlign = "right";
-  const x = Math.min(pen.width, pen.x(SPAN)) - 5;
-  const unit = 10 ** (Math.floor(Math.log10(most - least)) - 4);
-  for (const [value, y] of [[most, top + 6], [least, bottom + 1]]) {
-    const text = number(Math.round(value / unit) * unit, 6), wide = c.measureText(text).width;
-    c.fillStyle = pen.color("--paper");
-    c.globalAlpha = 0.7;
-    c.fillRect(x - wide - 2, y - 9, wide + 4, 11);
-    c.fillStyle = pen.color("--dim");
-    c.globalAlpha = 1;
-    c.fillText(text, x, y);
+  c.fillStyle = color("--dim");
+  for (const [value, at] of [[most, y + 11], [least, y + lane.height - 5]]) {
+    c.fillText(number(Math.round(value / unit) * unit, 6), 5, at);
   }
-  c.restore();
 }
 
 // Pulses forward go up, backward down; closer together than three pixels they are a band.
@@ -186,7 +183,7 @@ function drawAnalog(pen, lane, top, bottom) {
   }
   if (level !== null) line.to(pen.width, y(level));
   line.stroke();
-  drawBounds(pen, least, most, top, bottom);
+  lane.bounds = [least, most];
 }
 
 // Marks in view: calls back with index, x, and the x of the next one.

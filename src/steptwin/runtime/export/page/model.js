@@ -42,6 +42,11 @@ class Motion {
     for (let i = 0; i < this.size; i++) if (this.direction(i) !== 0) return true;
     return false;
   }
+  // Whether the position changes at all, with pulses or without.
+  changes() {
+    const [least, most] = this.range(false, 0, SPAN);
+    return most > least;
+  }
   direction(i) { return this.pieces[i * PIECE + 6]; }
   grid(i) { return this.pieces[i * PIECE + 7]; }
   // STEP pulses given within piece i up to t.
@@ -121,26 +126,48 @@ function summaryOf(machine) {
   return { motions: motions.map((motion) => ({ motion, fastest: fastest(motion) })), marks: DATA.marks.filter((mark) => mark[1] === machine) };
 }
 
-const HEIGHTS = { group: 28, position: 62, velocity: 46, step: 26, level: 24, analog: 40, frames: 40, statement: 24, marks: 24 };
+const HEIGHTS = { group: 28, still: 22, position: 62, velocity: 46, step: 26, level: 24, analog: 40, frames: 40, statement: 24, marks: 24 };
 const COLORS = { position: "--position", true: "--true", velocity: "--velocity", step: "--step", level: "--level", analog: "--analog", frames: "--out", statement: "--statement" };
 const MARK_COLORS = { frame: "--in", statement: "--statement", event: "--event", input: "--input", fault: "--fault" };
 const MARK_NAMES = { event: "events", input: "inputs", fault: "faults" };
 
+function rangeOf(curves, velocity, from, to) {
+  const ranges = curves.map(({ motion }) => motion.range(velocity, from, to));
+  return [Math.min(...ranges.map(([least]) => least)), Math.max(...ranges.map(([, most]) => most))];
+}
+
 // All lanes of a machine, in the order in which they are shown. Times of marks are in a flat list of their own for searching.
 function lanesOf(machine) {
   const lanes = [];
+  const still = [];
   for (const axis of DATA.axes.filter((axis) => axis.machine === machine)) {
-    const motion = new Motion(axis);
-    const common = { machine, motion, unit: axis.unit };
+    const motion = new Motion(axis), load = axis.true && new Motion(axis.true), curve = { motion, color: COLORS.position };
+    const common = { machine, motion, unit: axis.unit, first: lanes.length === 0 };
     const moves = motion.moves();
-    lanes.push({ ...common, kind: "position", name: `${axis.name} position`, first: true, range: motion.range(false, 0, SPAN), thin: !moves });
-    if (axis.true) {
-      const load = new Motion(axis.true), range = load.range(false, 0, SPAN);
-      lanes.push({ machine, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, range });
+    if (!moves && !load?.changes()) {
+      const stands = motion.position(0, 0) === 0 ? "" : ` at ${positionText(motion, 0)} ${axis.unit}`;
+      still.push(`${axis.name}${stands}`);
+      continue;
+    }
+    const position = { ...common, kind: "position", name: `${axis.name} position`, curves: [curve] };
+    lanes.push(position);
+    if (load) {
+      const its = { motion: load, color: COLORS.true };
+      // In one lane where both have the same unit; the true one is dashed, so that both are seen where they agree.
+      if (axis.true.unit === axis.unit) {
+        position.name += `, ${axis.true.name}`;
+        position.curves.push({ ...its, dashed: true });
+      } else {
+        lanes.push({ machine, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, curves: [its] });
+      }
     }
     if (!moves) continue;
-    lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, range: motion.range(true, 0, SPAN) });
-    lanes.push({ ...common, kind: "step", name: `${axis.name} pulses` });
+    lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, curves: [{ motion, color: COLORS.velocity }], first: false });
+    lanes.push({ ...common, kind: "step", name: `${axis.name} pulses`, first: false });
+  }
+  for (const lane of lanes) if (lane.curves) lane.range = rangeOf(lane.curves, lane.kind === "velocity", 0, SPAN);
+  if (still.length) {
+    lanes.push({ machine, kind: "still", name: `no motion: ${still.join(", ")}`, first: lanes.length === 0 });
   }
   const pins = DATA.pins.filter((pin) => pin.machine === machine);
   pins.forEach((pin, i) => {
@@ -162,7 +189,7 @@ function lanesOf(machine) {
   });
   lanes.push(...groups.values());
   for (const lane of lanes) {
-    lane.height = lane.thin ? HEIGHTS.level : HEIGHTS[lane.kind];
+    lane.height = HEIGHTS[lane.kind];
     lane.color = lane.isTrue ? COLORS.true : COLORS[lane.kind] ?? MARK_COLORS[lane.mark];
   }
   return lanes;
@@ -183,6 +210,7 @@ function previousChange(lane, t) {
 }
 
 function flatOf(lane) {
+  if (lane.kind === "still") return [[], 1];
   return lane.motion ? [lane.motion.pieces, PIECE] : lane.pin ? [lane.pin.changes, 2] : [lane.times, 1];
 }
 
@@ -194,9 +222,14 @@ function number(value, most = 6) {
   return (text === "-0" ? "0" : text).replace("-", "−");
 }
 
+function positionText(motion, t) {
+  return motion.position(motion.at(t), t).toFixed(motion.scale === 1 ? 1 : 3).replace("-", "−");
+}
+
 function valueText(lane, t) {
   switch (lane.kind) {
-    case "position": return `${lane.motion.position(lane.motion.at(t), t).toFixed(lane.motion.scale === 1 ? 1 : 3).replace("-", "−")} ${lane.unit}`;
+    case "position": return `${lane.curves.map(({ motion }) => positionText(motion, t)).join(" / ")} ${lane.unit}`;
+    case "still": return "";
     case "velocity": return `${number(lane.motion.velocity(lane.motion.at(t), t), 5)} ${lane.unit}/s`;
     case "step": return number(lane.motion.count(t), 15);
     case "level": return lane.pin.level(t) ? "1" : "0";

@@ -1,7 +1,7 @@
 // View, cursor and mark; keys and mouse.
 
 const $ = (id) => document.getElementById(id);
-const plot = $("plot"), ruler = $("ruler"), overview = $("overview"), lanesElement = $("lanes");
+const plot = $("plot"), scale = $("scale-ends"), ruler = $("ruler"), overview = $("overview"), lanesElement = $("lanes");
 const view = { from: 0, to: SPAN, scaled: false };
 let cursor = 0, mark = null, hover = null, chosen = 0, dirty = false, overviewImage = null, lanesKey = "", layout = 0;
 const LEAST_VIEW = 200;
@@ -153,9 +153,18 @@ function paint() {
     c.fillRect(Math.round(pen.x(hover)), 0, 1, height);
     c.globalAlpha = 1;
   }
+  paintScale(scroll);
   paintRuler();
   paintOverview();
   tell();
+}
+
+function paintScale(scroll) {
+  const [c, , height] = prepare(scale);
+  for (const lane of lanes) {
+    const y = lane.y - scroll;
+    if (lane.bounds && y + lane.height > 0 && y < height) drawBounds(c, lane, y, color);
+  }
 }
 
 function paintLanes(pen, scroll, width, height) {
@@ -354,7 +363,7 @@ function click(e) {
 
 // The nearest change of a lane within so many pixels.
 function nearChange(lane, t, pixels) {
-  if (!lane || lane.group) return null;
+  if (!lane || lane.group || lane.kind === "still") return null;
   const reach = pixels * (view.to - view.from) / plot.clientWidth;
   const near = [previousChange(lane, t + 1), nextChange(lane, t)].filter((x) => x !== null && Math.abs(x - t) <= reach);
   return near.length ? near.reduce((a, b) => (Math.abs(a - t) <= Math.abs(b - t) ? a : b)) : null;
