@@ -152,7 +152,7 @@ def test_control_characters_do_not_reach_the_terminal() -> None:
     )
     assert shown.split("\n") == [
         "x␛[1m.prg:1:2: error W1: odd ␛",
-        "  1 | a␛]0;title␇ \ufffd2J␡ \ufffdb",
+        "  1 | a␛]0;title␇ \ufffd2J␡    \ufffdb",
         "    |  ^",
         "    = hint ␇",
         "    = suggestion: ␛c",
