@@ -22,6 +22,7 @@ from steptwin.cli.device import shown, table, tell_under_way, tied
 from steptwin.errors import Misuse
 from steptwin.host import Mic488
 from steptwin.host.address import DeviceAddress, parse_device
+from steptwin.mic488.registers import register_map
 from steptwin.runtime.ports import Place
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
@@ -117,15 +118,37 @@ def test_reading(twin: Any, shell: Shell) -> None:
         "M1_STATUS": {"value": 0, "meaning": "off"},
     }
     looks = shell("watch", "M1_ACC", "OUT1", "--count", "2", "--hz", "50").splitlines()
-    assert looks[0] == "time_s\tM1_ACC u/s²\tOUT1"
-    assert [look.split("\t")[1:] for look in looks[1:]] == [["50", "OFF"]] * 2
+    assert looks[0] == "    time_s  M1_ACC u/s²        OUT1"
+    assert [look[10:] for look in looks[1:]] == ["           50         OFF"] * 2
     assert [json.loads(line)["M4_STATUS"] for line in shell("watch", "--json", "--count", "2").splitlines()] == [0, 0]
+    shell("set", "M1_ACC=10.11")
+    assert shell("get", "M1_ACC") == "M1_ACC  10.11  u/s²\n"
+    assert shell("watch", "M1_ACC", "--count", "1").splitlines()[1].split()[1] == "10.11"
+    assert json.loads(shell("watch", "M1_ACC", "--json", "--count", "1"))["M1_ACC"] == 10.11
+    assert json.loads(shell("get", "M1_ACC", "--json"))["M1_ACC"]["value"] == 10.11
+    shell("set", "M1_ACC=50")
+    address = str(register_map("1.70").of("ACC", 1).address)
+    words = f"hr:{address}-{int(address) + 1}:hex"
+    coil = f"co:{register_map('1.70').of('OUT', 2).address}"
+    assert [line.split() for line in shell("get", address, f"hr:{address}:real", words, coil, "di:5000").splitlines()] == [
+        ["M1_ACC", "50", "u/s²"],
+        [f"hr:{address}:real", "50"],
+        [f"hr:{address}:hex", "0000h"],
+        [f"hr:{int(address) + 1}:hex", "4248h"],
+        [coil, "OFF"],
+        ["di:5000", "OFF"],
+    ]
+    assert "exception 02" in shell("get", "hr:60000") + shell.errors
+    assert shell.code == 1
     shell("get", "M1_ACC", "--log-frames")
     assert "unit 1: read M1_ACC = 50 u/s²" in shell.errors
 
 
 MISTAKES: list[tuple[list[str], int, str]] = [
     (["get", "M1_POS_AKT"], 2, "did you mean M1_POS_ACT"),
+    (["get", "10021"], 2, "is the second word of"),
+    (["get", "9999"], 2, "hr:9999 asks for it nevertheless"),
+    (["get", "hr:10020:float"], 2, "expected ADDRESS"),
     (["get", "X*"], 2, "'X*' stands for no register"),
     (["set", "M1_ACC"], 2, "expected NAME=VALUE"),
     (["set", "M1_ACC=much"], 2, "'much' is no number"),

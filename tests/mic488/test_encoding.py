@@ -18,6 +18,7 @@ from steptwin.mic488.encoding import (
     real_to_words,
     saturated_dint,
     saturated_real,
+    shortest_real,
     swap_bytes,
     word_to_int,
     words_to_dint,
@@ -134,3 +135,17 @@ def test_the_block_way_equals_the_word_way(values: list[tuple[int, float]]) -> N
     words = [word for dint, real in values for word in (*dint_to_words(dint), *real_to_words(real))]
     assert swap_bytes(block) == struct.pack(f">{len(words)}H", *words)
     assert swap_bytes(swap_bytes(block)) == block
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(10.11, "10.11"), (10.13, "10.13"), (0.1, "0.1"), (16777216.0, "16777216"), (16777217.0, "16777217"), (-25.0, "-25"),
+     (1.0000001, "1.0000001"), (0.0, "0"), (1e10, "1e+10"), (math.inf, "inf"), (1e300, "1e+300")],
+)  # fmt: skip
+def test_a_real_for_people(value: float, text: str) -> None:
+    assert shortest_real(value) == text
+
+
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False))
+def test_what_people_read_is_the_same_real(value: float) -> None:
+    assert words_to_real(*real_to_words(float(shortest_real(value)))) == value

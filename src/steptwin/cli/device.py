@@ -6,6 +6,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Generator, Sequence
+from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -30,6 +31,7 @@ Device = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 LogFrames = Annotated[bool, typer.Option("--log-frames", help="Print every frame in words to the standard error.")]
 Axes = Annotated[list[str] | None, typer.Argument(metavar="[AXES]...", help="1 to 4, or M1 to M4. Default: all.")]
+REAL_LIMIT = 3.4e38
 TIED = "expected AXIS=NUMBER, such as 1=12.5 or M1=12.5"
 
 
@@ -167,20 +169,27 @@ def tell_under_way(names: Sequence[str]) -> None:
 def shown(value: object) -> str:
     if isinstance(value, bool):
         return "ON" if value else "OFF"
-    return _real(value) if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    from steptwin.mic488.encoding import shortest_real
+
+    return shortest_real(value)
 
 
-_HALF_STEP = 2.0**-25
-"""Of a REAL's size: what is nearer to it than this is nearer to no other."""
+def as_json(value: Any) -> Any:
+    """Data for JSON: what is a REAL is given with the digits that tell it from its neighbours."""
+    match value:
+        case float() if isfinite(value):
+            from steptwin.mic488.encoding import real_to_words, shortest_real, words_to_real
 
-
-def _real(value: float) -> str:
-    """As few digits as tell a REAL from its neighbours: 10.13, not 10.1300001."""
-    for digits in range(6, 9):
-        text = f"{value:.{digits}g}"
-        if abs(float(text) - value) <= abs(value) * _HALF_STEP:
-            return text
-    return f"{value:.9g}"
+            is_real = abs(value) < REAL_LIMIT and words_to_real(*real_to_words(value)) == value
+            return float(shortest_real(value)) if is_real else value
+        case dict():
+            return {key: as_json(one) for key, one in value.items()}
+        case list() | tuple():
+            return [as_json(one) for one in value]
+        case _:
+            return value
 
 
 def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
@@ -209,4 +218,4 @@ def _is_number(cell: str) -> bool:
 def print_json(value: Any) -> None:
     import json
 
-    typer.echo(json.dumps(value, ensure_ascii=False, indent=2))
+    typer.echo(json.dumps(as_json(value), ensure_ascii=False, indent=2))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from steptwin.cli.addresses import SPACES, Place, places, read_places
 from steptwin.cli.chip import chip_address, set_values
 from steptwin.cli.chip import get as chip_get
 from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, shown, table
@@ -36,7 +37,8 @@ def get(
         list[str],
         typer.Argument(
             metavar="NAME...",
-            help="M1_POS_ACT, OUT3, 'M*_ACC', USER_REGISTER[100-109], USER_REGISTER[4]:real",
+            help="M1_POS_ACT, OUT3, 'M*_ACC', USER_REGISTER[100-109], USER_REGISTER[4]:real; by address 10020, hr:10020:real, "
+            "hr:10020-10023:hex, co:6000, di:5000",
             autocompletion=names_from,
         ),
     ],
@@ -44,15 +46,14 @@ def get(
     json: Json = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Read registers by name. 'steptwin registers mic488' lists them; an M1486 tells POSITION, COUNTER, VARIABLE, FLAGS…"""
+    """Read registers by name or address. 'steptwin registers mic488' lists them; an M1486 has POSITION, COUNTER, FLAGS…"""
     chip = chip_address(device)
     if chip is not None:
         chip_get(chip, names, json=json, log_frames=log_frames)
         return
     with opened(device, log_frames=log_frames) as mic:
         registers = map_of(mic)
-        wanted = expanded(registers, names)
-        values = mic.get_shown(*wanted)
+        values = look(mic, expanded(registers, names))
     if json:
         print_json(as_data(registers, values))
     else:
@@ -103,12 +104,26 @@ def map_of(mic: Mic488) -> RegisterMap:
     return register_map(mic.firmware)
 
 
-def expanded(registers: RegisterMap, names: Sequence[str]) -> list[str]:
-    """Names with ``*`` and ``?``, and runs of user registers, as all they stand for. Raises `Misuse` for one without any."""
-    found: dict[str, None] = {}
+def look(mic: Mic488, wanted: Sequence[str | Place]) -> dict[str, tuple[Any, str]]:
+    """Values by name and by address, each with its unit."""
+    names = [one for one in wanted if isinstance(one, str)]
+    values = mic.get_shown(*names) if names else {}
+    by_address = read_places(mic, [one for one in wanted if not isinstance(one, str)])
+    return {str(one): values[one] if isinstance(one, str) else (by_address[one], "") for one in wanted}
+
+
+def expanded(registers: RegisterMap, names: Sequence[str]) -> list[str | Place]:
+    """Names with ``*`` and ``?``, runs of user registers, and addresses, as all they stand for.
+
+    Raises `Misuse` for one that stands for none.
+    """
+    found: dict[str | Place, None] = {}
     for name in names:
         run = _RUN.fullmatch(name)
-        if run is not None:
+        members: Sequence[str | Place] | None = places(name, registers)
+        if members is not None:
+            pass
+        elif run is not None:
             first, last = int(run["first"]), int(run["last"])
             step = 2 if run["tail"].lower().endswith((":dint", ":real")) else 1
             members = [f"{run['head']}{number}{run['tail']}" for number in range(first, last + 1, step)]
@@ -146,7 +161,10 @@ def _holds(register: Register) -> bool:
 
 
 def _meaning(registers: RegisterMap, name: str, value: Any) -> str:
-    register = registers.named(re.split(r"[\[:]", name)[0])
+    head = re.split(r"[\[:]", name)[0]
+    if head in SPACES:
+        return ""
+    register = registers.named(head)
     return register.values.get(int(value), "") if register.values else ""
 
 

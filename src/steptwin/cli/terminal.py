@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from steptwin.host import Mic488
 
 HELP = """\
-NAME                read a register; also 'M?_ACC', USER_REGISTER[0-9], several with blanks between
+NAME                read a register; also 'M?_ACC', USER_REGISTER[0-9], 10020, hr:10020:hex, several with blanks between
 NAME=VALUE          write one
 stop                stop all axes
 wait AXIS...        until axes have come to rest
@@ -58,7 +58,7 @@ def terminal(device: Device = None, log_frames: LogFrames = False) -> None:
 
 
 def _answer(mic: Mic488, line: str) -> None:
-    from steptwin.cli.get import expanded, map_of, value_of
+    from steptwin.cli.get import expanded, look, map_of, value_of
     from steptwin.runtime.devicesession import carry_out_one
 
     if not line:
@@ -76,7 +76,7 @@ def _answer(mic: Mic488, line: str) -> None:
             typer.echo(f"{name}: {', '.join(map(shown, result.values())) if isinstance(result, dict) else result}")
     else:
         names = expanded(map_of(mic), line.removeprefix("get ").split())
-        for name, (value, unit) in mic.get_shown(*names).items():
+        for name, (value, unit) in look(mic, names).items():
             typer.echo(f"{name} = {shown(value)} {unit}".rstrip())
 
 

@@ -8,20 +8,23 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import Annotated, Any
 
 import typer
 
 from steptwin.cli.chip import chip_address, opened_chip, read
-from steptwin.cli.device import Device, LogFrames, opened, shown, table
+from steptwin.cli.device import Device, LogFrames, as_json, opened, shown, table
 from steptwin.cli.get import expanded, map_of, names_from
+from steptwin.cli.get import look as look_at
 from steptwin.errors import Misuse
 
 Look = Callable[[], dict[str, tuple[Any, str]]]
 CHIP_NAMES = ("POSITION", "VARIABLE", "FLAGS")
 DEFAULT_NAMES = ("M?_POS_ACT", "M?_VEL_ACT", "M?_STATUS")
 MOST_HZ = 50.0
+LEAST_WIDTH = 10
+"""Of a column: as wide as most values."""
 
 
 def watch(
@@ -31,11 +34,11 @@ def watch(
     ] = None,
     device: Device = None,
     hz: Annotated[float, typer.Option(help="How often a second, up to 50; the device may be slower.")] = 5.0,
-    count: Annotated[int | None, typer.Option(help="End after so many looks.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each look.")] = False,
+    count: Annotated[int | None, typer.Option(help="Stop after N samples.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each sample.")] = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Read registers again and again. In a terminal a live table, else a line for each look with tabs between."""
+    """Read registers again and again. In a terminal a live table, else a line of aligned columns for each sample."""
     if not 0.0 < hz <= MOST_HZ:
         raise Misuse(f"--hz {hz:g}: permitted are more than 0 and at most {MOST_HZ:g}")
     if count is not None and count < 1:
@@ -63,7 +66,7 @@ def _reading(device: str | None, names: list[str] | None, *, log_frames: bool) -
         return
     with opened(device, log_frames=log_frames) as mic:
         wanted = expanded(map_of(mic), names or DEFAULT_NAMES)
-        yield lambda: mic.get_shown(*wanted)
+        yield lambda: look_at(mic, wanted)
 
 
 def _looks(look: Look, hz: float, count: int | None) -> Iterator[tuple[float, dict[str, tuple[Any, str]]]]:
@@ -83,16 +86,21 @@ def _print_json(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> No
     import json
 
     for at, values in looks:
-        typer.echo(json.dumps({"time_s": round(at, 3)} | {name: value for name, (value, _) in values.items()}))
+        typer.echo(json.dumps(as_json({"time_s": round(at, 3)} | {name: value for name, (value, _) in values.items()})))
 
 
 def _print_lines(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> None:
-    headed = False
+    widths: list[int] = []
     for at, values in looks:
-        if not headed:
-            typer.echo("\t".join(["time_s", *(f"{name} {unit}".rstrip() for name, (_, unit) in values.items())]))
-            headed = True
-        typer.echo("\t".join([f"{at:.3f}", *(shown(value) for value, _ in values.values())]))
+        if not widths:
+            heads = ["time_s", *(f"{name} {unit}".rstrip() for name, (_, unit) in values.items())]
+            widths = [max(len(head), LEAST_WIDTH) for head in heads]
+            typer.echo(_line(heads, widths))
+        typer.echo(_line([f"{at:.3f}", *(shown(value) for value, _ in values.values())], widths))
+
+
+def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
+    return "  ".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
 
 
 def _draw(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> None:

@@ -83,3 +83,12 @@ def saturated_real(value: float) -> float:
     if math.isnan(value):
         raise Misuse("NaN is no REAL of this device")
     return min(max(value, -REAL_MAX), REAL_MAX)
+
+
+def shortest_real(value: float) -> str:
+    """A REAL for people, with as few digits (6 to 9) as tell it from its neighbours: 10.11 for 10.109999656677246."""
+    try:
+        words = real_to_words(value)
+    except Misuse:
+        return f"{value:.9g}"
+    return next((text for n in range(6, 9) if real_to_words(float(text := f"{value:.{n}g}")) == words), f"{value:.9g}")
