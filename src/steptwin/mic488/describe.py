@@ -169,7 +169,7 @@ def _decoded(request: bytes | None) -> modbus.Request | None:
 
 def _group_key(piece: Piece) -> tuple[str | None, int | None]:
     is_half = piece.register is not None and not piece.whole
-    return piece.register and piece.register.key, piece.address if is_half else None
+    return None if piece.register is None else piece.register.key, piece.address if is_half else None
 
 
 def _name(group: list[Piece]) -> str:
