@@ -15,7 +15,7 @@ from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.demo import demo_config
-from steptwin.runtime.links import Port
+from steptwin.runtime.links import Feed, Port
 from steptwin.runtime.memory import StateDirectory
 from steptwin.runtime.mic488 import LineOptions, Mic488Line
 from steptwin.runtime.rfc2217 import TwinLine, over_network
@@ -113,6 +113,33 @@ def test_mic_32_with_real_timing_modbus_tcp_is_a_gateway_to_the_same_controllers
     rtu.exchange(REQUEST, 2_083_334)
     assert in_pieces(served, rtu, 100, b"") == b""
     assert [data for _, data in tcp.to_send(served.kernel.now)] == [bytes.fromhex("00010000000701030400000000")]
+
+
+def test_requests_that_wait_for_the_line_end_with_their_connection(run: Run) -> None:
+    """Whatever still holds the connection's objects."""
+
+    async def scene() -> list[int]:
+        loop: Any = asyncio.get_running_loop()
+        served = Mic488Line(ControllerConfig(), (1,), "1.70", options=LineOptions(timing=True))
+        cell = Cell(served.kernel, loop.clock())
+        feeds = [Feed(cell, served.tcp_port(), Deaf()) for _ in range(2)]
+        for number in range(8):
+            feeds[0].take(bytes((0, number, 0, 0, 0, 6, 1, 6, 0, number, 0, 1)))
+        await asyncio.sleep(0.0255)
+        feeds[0].close()
+        await asyncio.sleep(10)
+        feeds[1].take(bytes.fromhex("000100000006010300000001"))
+        await asyncio.sleep(10)
+        feeds[1].close()
+        cell.close()
+        return list(served.devices[1].user[:8])
+
+    assert run(scene()) == [1, 1, 1, 0, 0, 0, 0, 0]
+
+
+class Deaf:
+    def write(self, data: bytes) -> None:
+        """To nobody."""
 
 
 # ---------------------------------------------------------------------- pins

@@ -96,7 +96,7 @@ def test_requests_of_a_connection_that_is_gone_are_not_executed(bank: Any) -> No
     gateway = Gateway(TimedUnits({1: bank}, TIMING))
     gone, port = TcpGatewayPort(gateway), TcpGatewayPort(gateway)
     gone.receive(ask(1), 0)
-    del gone
+    gone.close()
     port.receive(ask(2), 10**9)
     assert run(2 * 10**9, port) == [[(10**9 + SENT, answered(2))]]
     assert len(bank.executed) == 1

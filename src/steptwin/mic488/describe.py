@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import NamedTuple
 
-from steptwin.mic488.encoding import shortest_real, word_to_int, words_to_dint, words_to_real
+from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
 from steptwin.mic488.registermap import DataType, Kind, Piece, Register, RegisterMap, Space, Type, show_address
 from steptwin.mic488.registers import axes_of_mask
 from steptwin.wire import pdu as modbus
@@ -139,7 +139,7 @@ class Wording:
         pairs = zip(words[::2], words[1::2], strict=True)
         if first.type is Type.DINT or (first.type is Type.VALUE and self.data_type is DataType.DINT):
             return self._pulses(registers, [words_to_dint(low, high) for low, high in pairs])
-        shown = [shortest_real(words_to_real(low, high)) for low, high in pairs]
+        shown = [f"{words_to_real(low, high):.7g}" for low, high in pairs]
         return _with_units(shown, [self._unit(r) for r in registers])
 
     def _pulses(self, registers: Sequence[Register], counts: Sequence[int]) -> str:
@@ -168,8 +168,9 @@ def _decoded(request: bytes | None) -> modbus.Request | None:
 
 
 def _group_key(piece: Piece) -> tuple[str | None, int | None]:
-    is_half = piece.register is not None and not piece.whole
-    return None if piece.register is None else piece.register.key, piece.address if is_half else None
+    if piece.register is None:
+        return None, None
+    return piece.register.key, None if piece.whole else piece.address
 
 
 def _name(group: list[Piece]) -> str:

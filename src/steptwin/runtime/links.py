@@ -38,6 +38,13 @@ class TalkingPort(Port, Protocol):
         ...
 
 
+@runtime_checkable
+class ClosingPort(Port, Protocol):
+    """A port that has to know when the other end has gone."""
+
+    def close(self) -> None: ...
+
+
 class Writer(Protocol):
     def write(self, data: bytes) -> None: ...
 
@@ -98,8 +105,8 @@ class Feed:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self._talks is not None:
-            self._talks.close()
+        if isinstance(self._port, ClosingPort):
+            self._port.close()
 
 
 class Link(Protocol):

@@ -47,7 +47,6 @@ class Gateway(Stateful):
         self.units = units
         self._free: Nanos = 0  # when the last response has left the line
         self._count = 0
-        # A connection that is closed takes its requests with it.
         self._waiting_ports: WeakSet[GatewayPort] = WeakSet()
 
     def enqueue(self, port: GatewayPort, units: tuple[int, ...], raw: bytes, pdu: bytes, now: Nanos) -> bool:
@@ -59,8 +58,8 @@ class Gateway(Stateful):
         self._waiting_ports.add(port)
         return True
 
-    def restored(self, port: GatewayPort) -> None:
-        """The state of ``port`` was put back."""
+    def requeue(self, port: GatewayPort) -> None:
+        """The requests of ``port`` were replaced."""
         if port.waiting:
             self._waiting_ports.add(port)
         else:
@@ -136,7 +135,12 @@ class GatewayPort(Stateful):
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
-        self._gateway.restored(self)
+        self._gateway.requeue(self)
+
+    def close(self) -> None:
+        """The connection is gone, and with it the requests that wait."""
+        self.waiting.clear()
+        self._gateway.requeue(self)
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         self.receive(data, now)

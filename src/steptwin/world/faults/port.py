@@ -8,6 +8,7 @@ from typing import ClassVar, Protocol
 
 from steptwin.machine import Nanos
 from steptwin.state import Plain, Stateful
+from steptwin.wire.gateway import GatewayPort
 from steptwin.wire.slave import Direction, FrameObserver
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer
@@ -144,7 +145,9 @@ class FaultyPort(Stateful):
             self._be_faulty()
 
     def close(self) -> None:
-        """Nobody is there any more."""
+        """The program is gone."""
+        if isinstance(self._inner, GatewayPort):
+            self._inner.close()
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
