@@ -18,8 +18,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.cli import main
-from steptwin.cli.device import shown, table, tell_under_way, tied
-from steptwin.errors import Misuse
+from steptwin.cli.device import HeldUp, shown, table, tell_under_way, tied
+from steptwin.errors import Misuse, Refusal
 from steptwin.host import Mic488
 from steptwin.host.address import DeviceAddress, parse_device
 from steptwin.mic488.registers import register_map
@@ -109,6 +109,18 @@ def test_a_session(twin: Any, shell: Shell) -> None:
     assert lines[-1] == "outputs on: OUT3"
     data = json.loads(shell("info", "--json"))
     assert (data["firmware"], data["program"], data["axes"][0]["meaning"], data["outputs"][2]) == ("1.70", "stopped", "off", True)
+
+
+def test_a_command_that_was_suspended_before_a_motion_does_not_move(monkeypatch: pytest.MonkeyPatch) -> None:
+    time = [0.0]
+    monkeypatch.setattr("steptwin.cli.device.time.monotonic", lambda: time[0])
+    held_up = HeldUp()
+    for _ in range(3):
+        time[0] += 15.0
+        held_up.check()
+    time[0] += 3600.0
+    with pytest.raises(Refusal, match="not moved: the command was suspended, or held up by the line, for 3600 s; give it again"):
+        held_up.check()
 
 
 def test_reading(twin: Any, shell: Shell) -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import pytest
 
 from steptwin.errors import LineFailure, Refusal
-from steptwin.host.exchange import Exchanger, Job, LineLost, More, NoAnswer, Overtaken
+from steptwin.host.exchange import Exchanger, Job, LineLost, More, NoAnswer, Overtaken, SentLate, TooLate
 from steptwin.host.permission import Permission
-from steptwin.machine import MILLISECOND
+from steptwin.machine import MILLISECOND, SECOND
 
 TIMEOUT = 300 * MILLISECOND
 
@@ -301,3 +301,99 @@ def test_everybody_is_told_once() -> None:
     e.receive(b"one!", 1)
     e.fail_all(LineLost("gone"))
     assert told == ["one", "two"]
+
+
+# ---------------------------------------------------------------------- permissions
+
+
+class Time:
+    """A clock that is set by hand."""
+
+    def __init__(self) -> None:
+        self.now = 0
+
+    def __call__(self) -> int:
+        return self.now
+
+
+def permitted(e: Exchanger[Ask, str], time: Time, *, most: int = 1) -> Job[Ask, str]:
+    return submit(e, "one", changes=True, most=most, permission=Permission(time, SECOND))
+
+
+def test_what_was_asked_for_too_long_ago_is_not_sent() -> None:
+    e, time = engine(), Time()
+    job = permitted(e, time)
+    time.now = SECOND + 1
+    assert e.step(time.now) == b""
+    with pytest.raises(
+        TooLate, match="'device a: one' was not sent: it was asked for more than 1 s ago; the program was suspended"
+    ):
+        job.result()
+
+
+def test_what_was_sent_once_and_is_too_late_to_be_repeated_is_in_doubt() -> None:
+    e, time = engine(), Time()
+    job = permitted(e, time, most=3)
+    assert e.step(0) == b"one"
+    time.now = SECOND + 1
+    assert e.step(time.now) == b""
+    with pytest.raises(NoAnswer, match="it is not known whether the device has carried it out"):
+        job.result()
+
+
+def test_the_second_part_of_an_exchange_is_not_sent_too_late() -> None:
+    e, time = engine(), Time()
+    job, waiting = permitted(e, time), submit(e, "two")
+    e.step(0)
+    e.receive(b"one+", 1)
+    time.now = SECOND + 1
+    assert e.step(time.now) == b"two"
+    e.receive(b"two!", time.now + 1)
+    assert waiting.result() == "two!"
+    with pytest.raises(TooLate):
+        job.result()
+
+
+def test_the_second_part_of_an_exchange_that_nobody_waits_for_is_not_sent_where_it_acts() -> None:
+    """As after Ctrl-C between an M1486 command and its CR."""
+    e, time = engine(), Time()
+    job = permitted(e, time)
+    e.step(0)
+    e.withdraw(job)
+    e.receive(b"one+", 1)
+    assert e.step(2) == b""
+    assert not e.busy
+
+
+@pytest.mark.parametrize("answer", [b"one!", b""])
+def test_what_was_sent_too_late_is_told(answer: bytes) -> None:
+    """The program was suspended between the last look at the clock and the sending."""
+    e, time = engine(), Time()
+    job = permitted(e, time)
+    assert e.step(0) == b"one"
+    time.now = 2 * SECOND
+    e.written()
+    if answer:
+        e.receive(answer, time.now + 1)
+    else:
+        e.step(time.now + 1)
+    with pytest.raises(SentLate, match="'device a: one' was sent more than 1 s after it was asked for") as caught:
+        job.result()
+    assert caught.value.uncertain
+
+
+def test_a_permission_is_extended_by_progress_but_never_revived() -> None:
+    time = Time()
+    permission = Permission(time, SECOND)
+    for _ in range(5):
+        time.now += SECOND
+        permission.extend()
+        assert not permission.has_expired()
+    time.now += SECOND + 1
+    permission.extend()
+    assert permission.has_expired()
+    time.now -= SECOND
+    assert permission.has_expired()
+    since = Permission(time, SECOND)
+    since.extend(time.now - SECOND - 1)
+    assert since.has_expired()

@@ -334,3 +334,25 @@ def test_trouble_with_one_chip_is_told_to_who_waits_for_it() -> None:
     with pytest.raises(Restarted, match="chip 7 was switched off or reset meanwhile"):
         chips[1].wait()
     assert chips[0].counter() == 128_000
+
+
+def test_waiting_for_the_line_is_no_suspension() -> None:
+    """A block of one chip keeps the line for half a minute; the move of another waits for it, and begins."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_task_line(wire)
+    one, two = AsyncM1486(line, 0), AsyncM1486(line, 7)
+
+    async def main() -> None:
+        await one.open()
+        await two.open()
+        await two.configure(microstep=1)
+        block = asyncio.create_task(one.run_block(["f640", "r", "w30000"]))
+        await asyncio.sleep(1.0)
+        began = wire.now
+        await two.move_by(10.0)
+        assert wire.now - began > 25 * SECOND
+        assert (await two.wait()).ok
+        assert (await block).ok
+
+    run_in(wire, main())
+    assert (wire.true(0), wire.true(7)) == (640, 640)
