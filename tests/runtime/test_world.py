@@ -16,6 +16,9 @@ from steptwin.machine import SECOND
 from steptwin.mic488.status import Status
 from steptwin.runtime.session import session_of
 from steptwin.runtime.world import World
+from steptwin.wbc.check import check
+from steptwin.wbc.image import build
+from steptwin.wbc.positions import parse_positions
 from steptwin.world import script as do
 from steptwin.world.expression import Condition
 from steptwin.world.kernel import Kernel
@@ -661,3 +664,16 @@ def test_scripts_that_have_ended_are_forgotten() -> None:
     assert [script.name for script in branch.scripts] == ["event-1", "release go"]
     branch.run(for_=0.05)
     assert branch.mic488["b"].pins["IN4"] == 1.0
+
+
+def test_a_compiled_image_runs_like_a_program_with_its_own_table(tmp_path: Path) -> None:
+    table, _ = parse_positions("A;1;x;x;x\nB;7;x;x;x\n")
+    executable = check("M1 = ON\nMOVEPTP 1\nWAITPOS\nOUT1 = ON\nWAIT IN1 = ON\n", table).executable
+    assert executable is not None
+    data, refused = build(executable, table)
+    assert (data is None, refused) == (False, [])
+    (tmp_path / "a.wbc").write_bytes(data or b"")
+    (tmp_path / "w.toml").write_text('[[mic488]]\nname = "a"\nprogram = "a.wbc"\nstart = true\n')
+    world = World.load(tmp_path / "w.toml")
+    world.run(for_="20 s")
+    assert world.mic488["a"].axis[1].position == 7.0

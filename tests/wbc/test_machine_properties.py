@@ -69,12 +69,20 @@ def act(device: Mic488, one: Act) -> None:
         device.touch()
 
 
-def seen(device: Mic488) -> tuple[Any, ...]:
-    """What there is to see of a controller, inside and outside."""
+def seen(device: Mic488) -> dict[str, Any]:
+    """What there is to see of a controller, inside and outside, by name: a failure shows which of it differs."""
     control, now = device.program, device.now
-    axes = [(axis.status, axis.coordinate_p(now), axis.profile.velocity(now)) for axis in device.axes]
-    events = [(event.time, event.code, event.text) for event in device.events]
-    return device.take_edges(), (control.state, control.statement, control.fault), device.user.tobytes(), axes, events
+    shown: dict[str, Any] = {
+        "edges": device.take_edges(),
+        "state": control.state,
+        "statement": control.statement,
+        "fault": control.fault,
+        "user registers": {number: word for number, word in enumerate(device.user) if word},
+        "events": [(event.time, event.code, event.text) for event in device.events],
+    }
+    for axis in device.axes:
+        shown[f"M{axis.number}"] = axis.status, axis.coordinate_p(now), axis.profile.velocity(now)
+    return shown
 
 
 END = 2 * SECOND

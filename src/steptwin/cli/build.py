@@ -33,8 +33,9 @@ def build(
     labels INT_INn; with --inferred also the other motions and PROGRESET. Variables, END, $I, $D and $R have none.
     """
     from steptwin.diagnostics import Severity, render
-    from steptwin.runtime.programfiles import IMAGE, Companions, read_program
+    from steptwin.runtime.programfiles import Companions, read_program
     from steptwin.runtime.textfiles import write_bytes
+    from steptwin.wbc.decompile import IMAGE
     from steptwin.wbc.dialect import dialect_for
     from steptwin.wbc.image import build as build_image
     from steptwin.wbc.positions import PositionTable

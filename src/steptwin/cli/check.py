@@ -188,8 +188,6 @@ _CHECKERS: dict[str, Callable[[Source, Options], Report]] = {".prg": _check_wbc}
 
 
 def _checker(file: Path) -> Callable[[Source, Options], Report]:
-    from steptwin.runtime.programfiles import IMAGE
-
-    if file.suffix.lower() == IMAGE:
+    if file.suffix.lower() == ".wbc":
         raise Misuse(f"{file} is a compiled image: steptwin decompile makes a program of it")
     return _CHECKERS.get(file.suffix.lower(), _check_m1486)

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from steptwin.diagnostics import Diagnostic, Severity, Source, Span
+from steptwin.diagnostics import Diagnostic, Severity, Source
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import read_bytes
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.program import LoadedProgram, load, setup_of
-from steptwin.runtime.programfiles import IMAGE
 from steptwin.runtime.textfiles import read_text
 from steptwin.wbc.check import Checked, check
-from steptwin.wbc.decompile import MARK, ImageError, decompile
+from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import DEFAULT, Dialect
-from steptwin.wbc.findings import INFERRED
 from steptwin.wbc.positions import PositionTable, parse_positions
 
 Findings: TypeAlias = tuple[tuple[Source, list[Diagnostic]], ...]
@@ -31,28 +29,6 @@ class Banks:
     programs: Mapping[int, LoadedProgram] = field(default_factory=dict)
     positions: Mapping[int, PositionTable] = field(default_factory=dict)
     findings: Findings = ()
-
-
-def read_image(path: Path) -> tuple[Source, PositionTable, list[Diagnostic]]:
-    """Source and position table of a compiled image, and what is doubtful in it.
-
-    Raises `Misuse` for what is no image, or has statements that are not known.
-    """
-    try:
-        found = decompile(read_bytes(path))
-    except ImageError as error:
-        raise Misuse(f"cannot run {path}: {error}") from None
-    if found.unknown:
-        records = "1 of its records is" if found.unknown == 1 else f"{found.unknown} of its records are"
-        raise Misuse(f"cannot run {path}: {records} not known; 'steptwin decompile' shows the others")
-    doubts: list[Diagnostic] = []
-    if found.inferred:
-        place = found.text.index(MARK)
-        statements = "1 statement is" if found.inferred == 1 else f"{found.inferred} statements are"
-        message = f"{statements} inferred from the order of the vendor's keywords (WBC-40)"
-        hint = f"they are marked '{MARK}' by steptwin decompile; whether the device does the same is not known"
-        doubts.append(INFERRED.at(Span(place, place + len(MARK)), message, hint))
-    return Source(str(path), found.text), found.positions, doubts
 
 
 class ProgramErrors(SteptwinError):
@@ -101,7 +77,7 @@ def read_banks(
     sources: dict[int, Source] = {}
     for bank, path in programs.items():
         if path.suffix.lower() == IMAGE:
-            sources[bank], table, doubts = read_image(path)
+            sources[bank], table, doubts = program_of(read_bytes(path), str(path))
             findings.append((sources[bank], doubts))
             if table.rows and bank not in positions:
                 tables[bank] = table

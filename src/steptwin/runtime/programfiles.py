@@ -12,6 +12,7 @@ from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.program import setup_of
 from steptwin.runtime.textfiles import read_text
 from steptwin.wbc.check import Checked, check
+from steptwin.wbc.decompile import IMAGE
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.positions import PositionTable, parse_positions
 
@@ -27,10 +28,6 @@ class ProgramFiles:
 
     def count(self, severity: Severity) -> int:
         return sum(d.severity is severity for _, diagnostics in self.findings for d in diagnostics)
-
-
-IMAGE = ".wbc"
-"""The suffix of compiled images."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,12 @@ import struct
 from dataclasses import dataclass
 from itertools import pairwise
 
-from steptwin.diagnostics import Source
+from steptwin.diagnostics import Diagnostic, Source, Span
 from steptwin.errors import Misuse
 from steptwin.wbc import image as im
 from steptwin.wbc.check import check
 from steptwin.wbc.events import INPUT_LABELS
+from steptwin.wbc.findings import INFERRED
 from steptwin.wbc.positions import PARAMETERS, PositionTable, number_text, table_of
 from steptwin.wbc.printer import format_text
 from steptwin.wbc.real import shortest
@@ -39,6 +40,10 @@ _INFERRED_OPS = (frozenset(_MOTIONS) | frozenset(_HALTS) | frozenset(_ROW_MOTION
     im.HOME,
     im.MOVEPTP,
 }
+
+
+IMAGE = ".wbc"
+"""The suffix of compiled images."""
 
 
 class ImageError(Misuse):
@@ -101,6 +106,28 @@ def decompile(data: bytes) -> Decompiled:
         if wrong <= attempt.raw:
             raise ImageError(f"slots {sorted(wrong)} of this image cannot be written as source")
         raw = attempt.raw | wrong
+
+
+def program_of(data: bytes, name: str) -> tuple[Source, PositionTable, list[Diagnostic]]:
+    """The program and position table of an image that is to be run, and what is doubtful in it.
+
+    Raises `Misuse` for what is no image, or has records that are not known.
+    """
+    try:
+        found = decompile(data)
+    except ImageError as error:
+        raise Misuse(f"cannot run {name}: {error}") from None
+    if found.unknown:
+        records = "1 of its records is" if found.unknown == 1 else f"{found.unknown} of its records are"
+        raise Misuse(f"cannot run {name}: {records} not known; 'steptwin decompile' shows the others")
+    doubts: list[Diagnostic] = []
+    if found.inferred:
+        place = found.text.index(MARK)
+        statements = "1 statement is" if found.inferred == 1 else f"{found.inferred} statements are"
+        message = f"{statements} inferred from the order of the vendor's keywords (WBC-40)"
+        hint = f"they are marked '{MARK}' by steptwin decompile; whether the device does the same is not known"
+        doubts.append(INFERRED.at(Span(place, place + len(MARK)), message, hint))
+    return Source(name, found.text), found.positions, doubts
 
 
 def _differing(text: str, attempt: _Attempt, table: PositionTable, image: Image) -> set[int]:

@@ -22,6 +22,7 @@ from steptwin.mic488.inputs import index_input
 from steptwin.mic488.program import LoadedProgram, load, setup_of
 from steptwin.textcodec import decode
 from steptwin.wbc.check import check
+from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
@@ -169,11 +170,17 @@ class _Builder:
             self._warn(Source(spec.positions, self._text(spec.positions)), findings)
             positions[0] = table
         if spec.program is not None:
-            checked = check(self._text(spec.program), positions.get(0), setup_of(config), dialect_for(spec.firmware))
+            if spec.program.lower().endswith(IMAGE):
+                source, table, doubts = program_of(self._data(spec.program), spec.program)
+                self._warn(source, doubts)
+                if table.rows:
+                    positions.setdefault(0, table)
+            else:
+                source = Source(spec.program, self._text(spec.program))
+            checked = check(source.text, positions.get(0), setup_of(config), dialect_for(spec.firmware))
             if checked.errors:
-                shown = render(Source(spec.program, self._text(spec.program)), checked.errors)
-                raise Misuse(f"the program does not check:\n{shown}")
-            self._warn(Source(spec.program, self._text(spec.program)), checked.diagnostics)
+                raise Misuse(f"the program does not check:\n{render(source, checked.errors)}")
+            self._warn(source, checked.diagnostics)
             programs[0] = load(checked, spec.program)
         statement_time = STATEMENT_TIME if spec.statement_time is None else spec.statement_time
         return Mic488(
