@@ -11,6 +11,7 @@ The fixture `serve` starts the real command.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
@@ -18,7 +19,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -96,6 +98,26 @@ def require_library(require_peer: Callable[[str], str]) -> Callable[[str], list[
     return find
 
 
+def run_command(arguments: Sequence[str], environment: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+    """``steptwin`` with these arguments in this process, which saves the start of an interpreter."""
+    from steptwin.cli import main
+
+    out, errors = io.StringIO(), io.StringIO()
+    code: object = 0
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(errors):
+        for name in os.environ.keys() - environment.keys():
+            patch.delenv(name)
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        patch.setattr(sys, "argv", [STEPTWIN, *arguments])
+        try:
+            main()
+        except SystemExit as ended:
+            code = ended.code or 0
+    assert isinstance(code, int), code
+    return subprocess.CompletedProcess([STEPTWIN, *arguments], code, out.getvalue(), errors.getvalue())
+
+
 class Served:
     """A twin served by the real command in a process of its own."""
 
@@ -141,7 +163,7 @@ class Served:
 
     def command(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run ``steptwin`` where this twin is the only one, and the device that commands mean."""
-        return subprocess.run([STEPTWIN, *arguments], capture_output=True, text=True, env=self.environment, check=False)
+        return run_command(arguments, self.environment)
 
     def state(self) -> dict[str, Any]:
         return json.loads(self.command("state", "--json").stdout)
