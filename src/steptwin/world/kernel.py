@@ -344,19 +344,24 @@ class Kernel:
 
 
 class _Plans:
-    """The plans of a machine's axes, as far as they have been told."""
+    """The plans and coordinates of a machine's axes, as recorded last."""
 
-    __slots__ = ("_drives", "_name", "_profiles", "_revisions")
+    __slots__ = ("_drives", "_name", "_origins", "_profiles", "_revisions")
 
     def __init__(self, name: str, machine: DrivingMachine) -> None:
         self._name = name
         self._drives = [(i, str(i + 1), drive) for i, drive in enumerate(machine.axes)]
         self._revisions = [-1] * len(self._drives)
         self._profiles: list[Profile | None] = [None] * len(self._drives)
+        self._origins = [0] * len(self._drives)
 
     def tell(self, record: Recorder, now: Nanos) -> None:
-        """Tell of new plans; that an axis rests where it was to come to rest is none."""
+        """Record new plans, and coordinates that are set anew; that an axis rests where it was to come to rest is no new plan."""
         for i, number, drive in self._drives:
+            origin = getattr(drive, "offset_p", 0)
+            if origin != self._origins[i]:
+                self._origins[i] = origin
+                record(Record(now, self._name, "coordinate", number, origin))
             if self._revisions[i] == drive.revision:
                 continue
             before, profile = self._profiles[i], drive.profile
@@ -367,6 +372,7 @@ class _Plans:
     def take_as_told(self) -> None:
         for i, _, drive in self._drives:
             self._revisions[i], self._profiles[i] = drive.revision, drive.profile
+            self._origins[i] = getattr(drive, "offset_p", 0)
 
 
 class Around(NamedTuple):

@@ -165,11 +165,12 @@ def shown(page: Path) -> str:
 
 
 def test_lanes_in_a_browser(tmp_path: Path) -> None:
-    """Axes that never move share a row; commanded and true position share a lane; the scale has a column of its own."""
+    """Axes that never move share a row; commanded and true position share a lane; an axis that has homed shows its count too."""
     world = World.load(WORLDS / "feeder.toml")
     world.run(for_=8)
     page = tmp_path / "t.html"
     write_trace(world.trace, page, views=axis_views(world.machines, world.axes))
     lanes = re.findall(r'class="name"[^>]*>([^<]*)<', shown(page))
-    assert lanes[:5] == ["table", "M1 position, x true", "M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
+    assert lanes[:3] == ["table", "M1 position, x true", "M1 since power-on"]
+    assert lanes[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
     assert not [name for name in lanes if name.startswith("M2 ")]

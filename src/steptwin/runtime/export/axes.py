@@ -68,6 +68,10 @@ class AxisView(NamedTuple):
         return f"{self.name}_position_{self.unit}"
 
     @property
+    def counted_name(self) -> str:
+        return f"{self.name}_since_power_on_{self.unit}"
+
+    @property
     def velocity_name(self) -> str:
         return f"{self.name}_velocity_{self.unit}_s"
 

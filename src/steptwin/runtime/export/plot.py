@@ -188,7 +188,7 @@ def _clock(seconds: float) -> str:
 
 def _motion(above: Axes, below: Axes, track: AxisTrack, recording: Recording) -> None:
     view = track.view
-    times, positions, velocities = _points(track, recording)
+    times, positions, velocities = _points(track.coordinate() or track, recording)
     name = _label(track, recording)
     for panel, values, color, label in (
         (above, positions, _POSITION, f"{name} position\n{view.unit}"),

@@ -34,6 +34,8 @@ class AxisTrack:
     plans: list[Plan] = field(default_factory=list)
     loads: list[Carried] = field(default_factory=list)
     """Where the load is, by moments, as far as it does not go with the pulses from the beginning."""
+    origins: list[tuple[Nanos, int]] = field(default_factory=list)
+    """By how many pulses the coordinate is above the count, by moments."""
 
     @property
     def name(self) -> str:
@@ -52,6 +54,22 @@ class AxisTrack:
             if after >= until:
                 return
 
+    def coordinate(self) -> AxisTrack | None:
+        """The position that registers show, which jumps where it is set anew; None where that is the count since power-on."""
+        if not self.origins:
+            return None
+        track = AxisTrack(self.machine, self.view)
+        moments = [moment for moment, _ in self.origins]
+        for begin in sorted({*self.times, *(moment for moment in moments if moment >= self.times[0])}):
+            past = bisect_right(moments, begin) - 1
+            track.add(begin, profile_of(self.plan(begin)), self.origins[past][1] if past >= 0 else 0)
+        return track
+
+    def add(self, begin: Nanos, profile: Profile, above_p: int) -> None:
+        """From ``begin`` on it is ``above_p`` pulses above where ``profile`` has it."""
+        self.times.append(begin)
+        self.plans.append(type(profile)(profile.start, profile.base + above_p, profile.segments, profile.final_p))
+
     def true(self) -> AxisTrack | None:
         """The motion of the load, ``zero_p`` included; None where it is not known, or can only be that of the drive."""
         mechanics = self.view.mechanics
@@ -64,8 +82,7 @@ class AxisTrack:
             _, follows, pulses = self.loads[past] if past >= 0 else Carried(begin, True, 0)
             profile = profile_of(self.plan(begin)) if follows else at_rest(begin, pulses)
             off = mechanics.zero_p + (pulses if follows else 0)
-            track.times.append(begin)
-            track.plans.append(type(profile)(profile.start, profile.base + off, profile.segments, profile.final_p))
+            track.add(begin, profile, off)
         return track
 
     def most_pulses(self, after: Nanos, until: Nanos) -> int:
@@ -176,6 +193,8 @@ def sort_out(
             while loads and loads[-1].begin >= time:
                 loads.pop()
             loads += [Carried(*one) for one in value]
+        elif isinstance(value, int) and kind == "coordinate":
+            _axis(axes, machine, subject, views).origins.append((time, value))
         elif isinstance(value, (int, float)) and kind == "edge":
             track = pins.setdefault((machine, subject), PinTrack(machine, subject))
             track.times.append(time)

@@ -145,7 +145,7 @@ def _is_value(kind: str, value: object) -> bool:
     return kind not in _VALUES or fits(value, _VALUES[kind])
 
 
-_VALUES: Mapping[str, Any] = {"load": tuple[tuple[int, bool, int], ...], "edge": float, "frame": bytes}
+_VALUES: Mapping[str, Any] = {"load": tuple[tuple[int, bool, int], ...], "coordinate": int, "edge": float, "frame": bytes}
 
 
 # ---------------------------------------------------------------------- values

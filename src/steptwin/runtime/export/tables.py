@@ -29,15 +29,17 @@ Columns: TypeAlias = dict[str, NDArray[Any]]
 def samples(recording: Recording, period: Nanos) -> Iterator[tuple[Nanos, Columns]]:
     """The table in parts: the moment of the last row, and the columns. There is at least one row."""
     at = recording.begin
-    loads = [axis.true() for axis in recording.axes]
+    others = [(axis.coordinate(), axis.true()) for axis in recording.axes]
     while at <= recording.until:
         rows = min((recording.until - at) // period + 1, _ROWS)
         times = at + period * np.arange(rows, dtype=np.int64)
         columns: Columns = {"time_s": times / SECOND}
-        for axis, load in zip(recording.axes, loads, strict=True):
+        for axis, (coordinate, load) in zip(recording.axes, others, strict=True):
             view = axis.view
-            moved = _motion(axis, times)
+            moved = _motion(coordinate or axis, times)
             columns[f"{axis.machine}.{view.position_name}"], columns[f"{axis.machine}.{view.velocity_name}"] = moved
+            if coordinate is not None:
+                columns[f"{axis.machine}.{view.counted_name}"], _ = _motion(axis, times)
             if load is not None and view.mechanics is not None:
                 columns[f"{axis.machine}.{view.mechanics.position_name}"], _ = _motion(load, times)
         columns |= {pin.name: _levels(pin, times) for pin in recording.pins}

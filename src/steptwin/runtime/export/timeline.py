@@ -58,10 +58,11 @@ def _part(name: str) -> str:
 
 
 def _axis(track: AxisTrack, recording: Recording, progress: Progress, number: int) -> dict[str, object]:
-    """What is commanded, and under ``true`` where the load is, if that can be elsewhere."""
+    """The coordinate; under ``counted`` the count since power-on and under ``true`` where the load is, if that can be another."""
     progress(recording.begin + (recording.until - recording.begin) * (number + 1) // (len(recording.axes) + 1))
-    load = track.true()
-    return _motion(track, recording) | ({} if load is None else {"true": _motion(load, recording)})
+    coordinate, load = track.coordinate(), track.true()
+    counted = {} if coordinate is None else {"counted": _motion(track, recording)}
+    return _motion(coordinate or track, recording) | counted | ({} if load is None else {"true": _motion(load, recording)})
 
 
 def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:

@@ -134,10 +134,14 @@ class _Dump:
 
     def _add_motion(self, track: AxisTrack, recording: Recording, quiet: _Quiet) -> None:
         view = track.view
-        points = curve(track, recording.begin, recording.until)
+        coordinate = track.coordinate()
+        points = curve(coordinate or track, recording.begin, recording.until)
         scale = view.pulses_per_unit
         self._add_real(track.machine, view.position_name, points.times, [p / scale for p in points.positions], quiet)
         self._add_real(track.machine, view.velocity_name, points.times, [v / scale for v in points.velocities], quiet)
+        if coordinate is not None:
+            points = curve(track, recording.begin, recording.until)
+            self._add_real(track.machine, view.counted_name, points.times, [p / scale for p in points.positions], quiet)
         load = track.true()
         if load is not None and view.mechanics is not None:
             points, scale = curve(load, recording.begin, recording.until), load.view.pulses_per_unit

@@ -143,8 +143,8 @@ function lanesOf(machine) {
   for (const axis of DATA.axes.filter((axis) => axis.machine === machine)) {
     const motion = new Motion(axis), load = axis.true && new Motion(axis.true), curve = { motion, color: COLORS.position };
     const common = { machine, motion, unit: axis.unit, first: lanes.length === 0 };
-    const moves = motion.moves();
-    if (!moves && !load?.changes()) {
+    const moves = motion.moves(), count = axis.counted ? new Motion(axis.counted) : motion;
+    if (!moves && !load?.changes() && !axis.counted) {
       const stands = motion.position(0, 0) === 0 ? "" : ` at ${positionText(motion, 0)} ${axis.unit}`;
       still.push(`${axis.name}${stands}`);
       continue;
@@ -161,9 +161,13 @@ function lanesOf(machine) {
         lanes.push({ machine, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, curves: [its] });
       }
     }
+    if (axis.counted) {
+      const its = { motion: count, color: COLORS.position };
+      lanes.push({ machine, motion: count, unit: axis.unit, kind: "position", name: `${axis.name} since power-on`, curves: [its] });
+    }
     if (!moves) continue;
     lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, curves: [{ motion, color: COLORS.velocity }], first: false });
-    lanes.push({ ...common, kind: "step", name: `${axis.name} pulses`, first: false });
+    lanes.push({ ...common, motion: count, kind: "step", name: `${axis.name} pulses`, first: false });
   }
   for (const lane of lanes) if (lane.curves) lane.range = rangeOf(lane.curves, lane.kind === "velocity", 0, SPAN);
   if (still.length) {
