@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from typed import Done, typed
 
 from steptwin.errors import Misuse
 from steptwin.host.address import parse_device
+from steptwin.host.m1486 import unit
+from steptwin.machine import MILLISECOND
 
-STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 PROGRAM = "[\n@1\nf640\nr\nw100\nd\nr\nj1\n]\n"
 
 
@@ -30,12 +30,18 @@ def test_an_address_says_what_kind_of_device_is_meant() -> None:
             parse_device(text)
 
 
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chips of these tests answer at once or not at all, so what is typed again need not wait for a noisy line."""
+    monkeypatch.setattr(unit, "PAUSES_NS", (40 * MILLISECOND, 100 * MILLISECOND))
+
+
 def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path: Path) -> None:
     twin = serve_m1486("--variant", "B", "--chain", "0,7")
     device = f"{twin.pty},chip=7"
 
-    def run(*arguments: str, code: int = 0) -> str:
-        done = twin.command(*arguments, "--device", device)
+    def run(*arguments: str, code: int = 0, place: str = device) -> str:
+        done = typed(*arguments, "--device", place, env=twin.environment)
         assert done.returncode == code, done.stderr
         return done.stdout or done.stderr
 
@@ -60,7 +66,7 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert run("send", str(program)) == (
         f"{program} is in the M1486B and has been started by its ]: the motor may move; 'steptwin stop --program' ends it\n"
     )
-    assert "does not answer yet" in run("info", code=1)
+    assert "does not answer yet" in run("info", code=1, place=f"{device},variant=B,timeout=0.2")
     run("stop", "--program")
     assert run("get", "counter").startswith("COUNTER")
     program.write_text("v99999\n")
@@ -74,7 +80,7 @@ def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: 
 
     def sent(text: str, address: str) -> tuple[int, str]:
         program.write_text(text)
-        done = twin.command("send", str(program), "-d", f"{twin.pty},{address}")
+        done = typed("send", str(program), "-d", f"{twin.pty},{address}", env=twin.environment)
         return done.returncode, done.stdout or done.stderr
 
     started = " and has been started by its ]: the motor may move; 'steptwin stop --program' ends it"
@@ -85,8 +91,9 @@ def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: 
     assert sent("f64\nr\nx0\nr\n", "chip=7")[0] == 0
     code, told = sent("f64\nr\nx0\nr\n", "kind=m1486")
     assert (code, "what stands before its first X is for which chip?" in told) == (2, True)
-    assert [twin.command("get", "counter", "-d", f"{twin.pty},chip={chip}").stdout.split()[1] for chip in "07"] == ["1280", "0"]
-    code, told = sent("x3\nr\n", "kind=m1486")
+    counters = [typed("get", "counter", "-d", f"{twin.pty},chip={chip}", env=twin.environment).stdout for chip in "07"]
+    assert [counter.split()[1] for counter in counters] == ["1280", "0"]
+    code, told = sent("x3\nr\n", "kind=m1486,timeout=0.2")
     assert (code, "chip 3 does not echo" in told) == (1, True)
     assert sent("xg\nr\n", "kind=m1486")[0] == 2
 
@@ -95,7 +102,11 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
     """Both kinds of device, and a server of Modbus TCP, which hangs up when it hears characters."""
     chips, controller = serve_m1486("--variant", "B", "--chain", "1,B"), serve("--demo")
     places = [str(chips.pty), f"tcp://127.0.0.1:{chips.tcp_port}", f"tcp://127.0.0.1:{controller.tcp_port}"]
-    found = json.loads(chips.command("scan", *places, "--units", "1", "--baud", "2400,4800", "--json").stdout)
+
+    def scan(*arguments: str) -> Done:
+        return typed("scan", *arguments, env=chips.environment)
+
+    found = json.loads(scan(*places, "--units", "1", "--baud", "2400,4800", "--json").stdout)
     assert [(f["address"], f["baud"], f["kind"], f.get("chip"), f.get("variant"), f.get("unit")) for f in found] == [
         (places[0], 2400, "m1486", 1, "B", None),
         (places[0], 2400, "m1486", 11, "B", None),
@@ -103,14 +114,14 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
         (places[1], None, "m1486", 11, "B", None),
         (places[2], None, "mic488", None, None, 1),
     ]
-    assert chips.command("scan", places[0]).stdout.splitlines()[1] == f"{places[0]}  4800  chip B  M1486B"
-    alone = chips.command("scan", str(controller.pty), "--kind", "m1486")
+    assert scan(places[0]).stdout.splitlines()[1] == f"{places[0]}  4800  chip B  M1486B"
+    alone = scan(str(controller.pty), "--kind", "m1486")
     assert (alone.returncode, alone.stderr) == (1, f"nobody answers on {controller.pty}\n")
-    assert chips.command("scan", places[2], "--kind", "mic488", "--units", "1").returncode == 0
+    assert scan(places[2], "--kind", "mic488", "--units", "1").returncode == 0
 
 
 def position_of(twin: Any, place: str, chip: int) -> float:
-    found = json.loads(twin.command("get", "POSITION", "-d", f"{place},chip={chip}", "--json").stdout)
+    found = json.loads(typed("get", "POSITION", "-d", f"{place},chip={chip}", "--json", env=twin.environment).stdout)
     return float(found["POSITION"]["value"] if isinstance(found["POSITION"], dict) else found["POSITION"])
 
 
@@ -120,11 +131,8 @@ def test_a_terminal_moves_the_chip_it_was_told_whatever_stands_in_the_input_buff
     place = f"tcp://127.0.0.1:{twin.tcp_port}"
     device = f"{place},chip=7"
 
-    def typed(script: str) -> tuple[int, str, str]:
-        run = subprocess.run(
-            [STEPTWIN, "terminal", "-d", device], input=script, capture_output=True, text=True, env=twin.environment, check=False
-        )
-        return run.returncode, run.stdout, run.stderr
+    def terminal(script: str) -> tuple[int, str, str]:
+        return tuple(typed("terminal", "-d", device, env=twin.environment, script=script))
 
     for rubbish in (b"", bytes.fromhex("01 03 27 74 00 02 8e 67"), b"f999", b"r"):
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
@@ -137,7 +145,7 @@ def test_a_terminal_moves_the_chip_it_was_told_whatever_stands_in_the_input_buff
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
             line.sendall(b"x0\r" + rubbish)
             time.sleep(0.2)
-        assert typed("f640\nr\nwait\n") == (0, "42H  U20 type letter in ASCII: M1486B\n", "")
+        assert terminal("f640\nr\nwait\n") == (0, "42H  U20 type letter in ASCII: M1486B\n", "")
         assert position_of(twin, place, 7) == stood + 10.0, rubbish
         assert position_of(twin, place, 0) == before, rubbish
 
@@ -145,9 +153,8 @@ def test_a_terminal_moves_the_chip_it_was_told_whatever_stands_in_the_input_buff
 def test_a_terminal_to_a_chip_that_is_not_there_types_only_k(serve_m1486: Callable[..., Any]) -> None:
     twin = serve_m1486("--variant", "B", "--chain", "0,7")
     place = f"tcp://127.0.0.1:{twin.tcp_port}"
-    command = [STEPTWIN, "terminal", "-d", f"{place},chip=5"]
     for script, code in (("f640\nr\n", 1), ("k\n", 0)):
-        run = subprocess.run(command, input=script, capture_output=True, text=True, env=twin.environment, check=False)
+        run = typed("terminal", "-d", f"{place},chip=5", env=twin.environment, script=script)
         assert (run.returncode, run.stdout) == (code, "")
     assert position_of(twin, place, 0) == position_of(twin, place, 7) == 0.0
 
@@ -156,7 +163,7 @@ def test_info_without_a_kind_leaves_nothing_in_front_of_the_next_command(serve_m
     twin = serve_m1486("--variant", "B")
     place = f"tcp://127.0.0.1:{twin.tcp_port}"
     for address in (place, f"rtu-{place}"):
-        run = twin.command("info", "-d", address)
+        run = typed("info", "-d", address, env=twin.environment)
         assert run.returncode == 1
         assert "If these are M1486 chips, put ',kind=m1486' behind the address" in run.stderr
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
@@ -169,16 +176,14 @@ def test_a_terminal_on_a_pipe(serve_m1486: Callable[..., Any]) -> None:
     """As the manual has the commands, for whichever chip; a script ends with the first thing that goes wrong."""
     twin = serve_m1486("--variant", "B", "--chain", "0,7")
 
-    def typed(script: str, device: str) -> tuple[int, list[str], str]:
-        run = subprocess.run(
-            [STEPTWIN, "terminal", "-d", device], input=script, capture_output=True, text=True, env=twin.environment, check=False
-        )
-        return run.returncode, run.stdout.splitlines(), run.stderr
+    def terminal(script: str, device: str) -> tuple[int, list[str], str]:
+        done = typed("terminal", "-d", device, env=twin.environment, script=script)
+        return done.returncode, done.stdout.splitlines(), done.stderr
 
     position = "32H  U2 position, middle byte: 50"
     script = "v2000 ; fast\nf12800\nr\nu2\nx0\nu2\nt41\nu17\nt57\nu15\nwait\nquit\nr\n"
     for place in (str(twin.pty), f"tcp://127.0.0.1:{twin.tcp_port}"):
-        code, lines, errors = typed(script, f"{place},chip=7")
+        code, lines, errors = terminal(script, f"{place},chip=7")
         assert (code, errors) == (0, "")
         assert lines == [
             position,
@@ -190,11 +195,11 @@ def test_a_terminal_on_a_pipe(serve_m1486: Callable[..., Any]) -> None:
             "42H  U20 type letter in ASCII: M1486B",
         ]
         position = "64H  U2 position, middle byte: 100"
-        typed("c57\nc41\n", f"{place},chip=0")
-    code, lines, errors = typed("v99999\nr\n", f"{twin.pty},kind=m1486")
+        terminal("c57\nc41\n", f"{place},chip=0")
+    code, lines, errors = terminal("v99999\nr\n", f"{twin.pty},kind=m1486")
     assert (code, lines, "V99999 is out of range" in errors) == (2, [], True)
-    code, lines, errors = typed("m1\ng+\nr\nf6400000\nf6400000\nf6400000\nf6400000\n", f"{twin.pty},chip=7")
+    code, lines, errors = terminal("m1\ng+\nr\nf6400000\nf6400000\nf6400000\nf6400000\n", f"{twin.pty},chip=7")
     assert (code, "5EH  no room in the input buffer: a character is lost" in lines) == (1, True)
     assert "'wait' before it waits for that" in errors
-    assert typed("k\n", f"{twin.pty},chip=7")[0] == 0
-    assert twin.command("stop", "-d", f"{twin.pty},chip=7").returncode == 0
+    assert terminal("k\n", f"{twin.pty},chip=7")[0] == 0
+    assert typed("stop", "-d", f"{twin.pty},chip=7", env=twin.environment).returncode == 0
