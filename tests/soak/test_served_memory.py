@@ -14,12 +14,14 @@ from soak import scaled
 from virtual_loop import run_virtually
 
 from steptwin.m1486.check import check
+from steptwin.m1486.chip import EVENTS_KEPT, Event
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.variants import variant
 from steptwin.mic488.config import ControllerConfig
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.links import Feed, Port
 from steptwin.runtime.m1486 import ChainOptions, M1486Line
+from steptwin.runtime.m1486_characters import UPLOADS_WAITING
 from steptwin.runtime.mic488 import LineOptions, Mic488Line
 from steptwin.wire.crc import crc16
 
@@ -27,7 +29,7 @@ REQUESTS = 1_000_000
 PIECES = 150_000
 """Of typed text: about a million characters."""
 FIRST = 6_000
-"""Fill whatever is bounded: kept events, compiled commands and requests, the command memory."""
+"""Requests before the first count: they compile what is asked often and write the whole command memory."""
 
 
 class Client:
@@ -44,12 +46,23 @@ Line = M1486Line | Mic488Line
 Begin = Callable[[Line, Cell], Callable[[bytes], None]]
 
 
+def fill(line: Line) -> None:
+    """Fill the stores whose size is bounded by a number, however long requests would take to do so."""
+    for machine in (line.chips if isinstance(line, M1486Line) else line.devices).values():
+        for _ in range(EVENTS_KEPT):
+            machine.event("filling", "an event")
+    if isinstance(line, M1486Line):
+        for _ in range(UPLOADS_WAITING):
+            line.frames.upload(Event(0, "upload", "U20 sends 42H"))
+
+
 async def _grown(line: Line, begin: Begin, sent: Iterator[bytes], requests: int, pause_s: float) -> tuple[Held, Held]:
     """What is held after the first requests and after many more, each time when all work is done."""
     loop: Any = asyncio.get_running_loop()
     cell = Cell(line.kernel, loop.clock())
     line.frames.sinks.append(lambda frame: None)
     line.watch_events(lambda unit, event: None)
+    fill(line)
     send = begin(line, cell)
     cell.start()
 
