@@ -274,22 +274,18 @@ def _saver(path: Path) -> Generator[tuple[subprocess.Popen[str], IO[str]], None,
 def test_a_saving_process_killed_again_and_again_loses_nothing(tmp_path: Path) -> None:
     """The content found is one that was saved, whole, and not older than the last save that returned."""
     chance = random.Random(488)
-    kills = 0
     found = 0
-    end = time.monotonic() + 4.0
-    while kills < 50 and time.monotonic() < end:
+    for _ in range(15):
         with _saver(tmp_path) as (child, says):
             first = int(says.readline())
             assert first == found + 1
             time.sleep(chance.uniform(0.0, 0.02))
             child.send_signal(signal.SIGKILL)
             told = [first, *map(int, says.read().split("\n")[:-1])]
-        kills += 1
         with StateDirectory(tmp_path) as state:
             content = state.load("unit1")
         assert content is not None
         found = int.from_bytes(content[:4], "big")
         assert content == image(found)
         assert told[-1] <= found <= told[-1] + 1
-    assert kills >= 10
-    assert found > kills
+    assert found > 15
