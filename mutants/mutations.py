@@ -1,7 +1,8 @@
 """Small mistakes in Python source: each replaces one stretch of text, all else stays as it is.
 
 Mutated are comparisons, arithmetic and logical operators, numbers, truth values, statements (left out) and arguments (left out or
-swapped), in functions as well as in tables and defaults. Not mutated: texts, annotations, decorators and imports.
+swapped), in functions as well as in tables and defaults. Not mutated: texts, annotations, decorators, imports, and what changes
+nothing: the order in max() and min(), the ``strict`` of zip().
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ class _Finder:
     def _children(self, node: ast.AST) -> Iterator[ast.AST]:
         """What is executed: no annotations, decorators, texts."""
         for name, value in ast.iter_fields(node):
-            if name in {"annotation", "returns", "decorator_list", "type_params"}:
+            if name in {"annotation", "returns", "decorator_list", "type_params"} or getattr(node, "arg", None) == "strict":
                 continue
             for child in value if isinstance(value, list) else [value]:
                 if isinstance(child, ast.AST) and not isinstance(child, ast.JoinedStr | ast.Import | ast.ImportFrom):
@@ -143,11 +144,13 @@ class _Finder:
 
     def _arguments(self, node: ast.Call) -> Iterator[Mutation]:
         for keyword in node.keywords:
-            if keyword.arg is not None:
+            if keyword.arg not in (None, "strict"):
                 end = self._end(keyword)
                 rest = self._source[end:]
                 comma = len(rest) - len(rest.lstrip()) if rest.lstrip().startswith(",") else -1
                 yield Mutation(self._start(keyword), end + comma + 1 if comma >= 0 else end, "", "argument")
+        if isinstance(node.func, ast.Name) and node.func.id in ("max", "min"):
+            return
         for left, right in zip(node.args, node.args[1:], strict=False):
             if not isinstance(left, ast.Starred) and not isinstance(right, ast.Starred):
                 swapped = [self._source[self._start(side) : self._end(side)] for side in (right, left)]

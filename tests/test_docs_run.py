@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pages import PAGES, RUN, Reader, blocks
+from pages import PAGES, RUN, Reader, blocks, only
 
 WITH_CODE = [page for page in PAGES if any(block.language in RUN and block.reason is None for block in blocks(page))]
 
@@ -48,8 +48,10 @@ def test_commands_are_in_blocks_that_are_run() -> None:
 
 
 def test_the_excerpt_of_a_run_is_what_it_prints(tmp_path: Path) -> None:
-    (command,) = [line for b in blocks("docs/wbc.md") if b.language == "sh" for line in b.commands() if "run feeder.prg" in line]
-    (excerpt,) = [block.code for block in blocks("docs/wbc.md") if block.language == "text"]
+    page = blocks("docs/wbc.md")
+    typed = [line for block in page if block.language == "sh" for line in block.commands() if "run feeder.prg" in line]
+    command = only(typed, "the command 'run feeder.prg' of docs/wbc.md")
+    excerpt = only([block.code for block in page if block.language == "text"], "blocks with output in docs/wbc.md")
     with Reader(tmp_path) as reader:
         reader.command("cd examples/mic488")
         assert excerpt in reader.command(command)

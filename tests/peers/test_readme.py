@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pages import only
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -73,7 +75,7 @@ def test_the_readmes_session(require_peer: Callable[[str], str], serve: Callable
 
 def test_the_pty_as_getting_started_polls_it(require_peer: Callable[[str], str], serve: Callable[..., Any]) -> None:
     pty = str(serve("--demo").pty)
-    ((_, *arguments),) = commands("docs/getting-started.md", "mbpoll")
+    _, *arguments = only(commands("docs/getting-started.md", "mbpoll"), "mbpoll commands of docs/getting-started.md")
     assert poll([require_peer("mbpoll"), *arguments[:-1], pty], 2) == [0.0, 0.0]
 
 

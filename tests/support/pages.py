@@ -14,10 +14,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
+
+T = TypeVar("T")
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -52,6 +55,12 @@ def blocks(page: str) -> list[Block]:
         Block(page, text.count("\n", 0, found.start("code")), found["language"], found["code"], found["reason"])
         for found in _BLOCK.finditer(text)
     ]
+
+
+def only(found: Sequence[T], what: str) -> T:
+    """The one element; the test fails with `what` where there are none or several."""
+    assert len(found) == 1, f"{what}: expected one, found {found}"
+    return found[0]
 
 
 class Reader:
