@@ -188,8 +188,8 @@ def test_shafts_are_turned_and_coupled(asked: Ask) -> None:
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"1": 5, "5": 1}, "no axis M5: axes are M1 to M4"),
-        ({"1": 5, "x": 1}, "no axis Mx: axes are M1 to M4"),
+        ({"1": 5, "5": 1}, "no axis '5': axes are numbered 1 to 4"),
+        ({"1": 5, "x": 1}, "no axis 'x': axes are numbered 1 to 4"),
         ({"1": 5, "2": "wind"}, "M2 = 'wind': an encoder is turned by drive, free, blocked, or by +N or -N counts"),
         ({"1": 5, "2": None}, "M2 = None: an encoder is turned by drive, free, blocked, or by +N or -N counts"),
     ],

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.mic488.registers import AXES
 from steptwin.runtime.links import where
 from steptwin.runtime.ownership import InUse, Ownership
 
@@ -115,8 +116,10 @@ def number(name: str, value: object) -> float:
 
 
 def axis_number(text: str) -> int:
-    """The number of an axis in a request, 0 for what is none."""
-    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0
+    """The number of an axis of a MIC488 in a request. Raises `Misuse`."""
+    if not (text.isascii() and text.isdigit() and len(text) < 10 and 1 <= int(text) <= AXES):
+        raise Misuse(f"no axis {text!r}: axes are numbered 1 to {AXES}")
+    return int(text)
 
 
 # ---------------------------------------------------------------------- serving

@@ -16,7 +16,7 @@ from steptwin.machine import SECOND, Nanos, PinMachine
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Event, Mic488, check_pin, check_turn, pause_observer
 from steptwin.mic488.encoder import Coupling
-from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
+from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.vision import Com1Port
 from steptwin.runtime.cell import Cell
 from steptwin.runtime.control import axis_number, changes, number
@@ -219,8 +219,6 @@ def _encoder(device: Mic488, request: Mapping[str, Any], now: Nanos) -> object:
     wanted: list[tuple[int, int | Coupling]] = []
     for name, change in changes(request).items():
         axis = axis_number(name)
-        if not 1 <= axis <= AXES:
-            raise Misuse(f"no axis M{name}: axes are M1 to M{AXES}")
         if not isinstance(change, int) or isinstance(change, bool):
             wanted.append((axis, _coupling(axis, change)))
             continue
