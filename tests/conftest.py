@@ -98,8 +98,8 @@ def require_library(require_peer: Callable[[str], str]) -> Callable[[str], list[
     return find
 
 
-def run_command(arguments: Sequence[str], environment: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
-    """``steptwin`` with these arguments in this process, which saves the start of an interpreter."""
+def run_command(arguments: Sequence[str], environment: Mapping[str, str], script: str = "") -> subprocess.CompletedProcess[str]:
+    """``steptwin`` with these arguments in this process, which saves the start of an interpreter; ``script`` is piped into it."""
     from steptwin.cli import main
 
     out, errors = io.StringIO(), io.StringIO()
@@ -110,6 +110,7 @@ def run_command(arguments: Sequence[str], environment: Mapping[str, str]) -> sub
         for name, value in environment.items():
             patch.setenv(name, value)
         patch.setattr(sys, "argv", [STEPTWIN, *arguments])
+        patch.setattr(sys, "stdin", io.StringIO(script))
         try:
             main()
         except SystemExit as ended:
@@ -161,9 +162,9 @@ class Served:
     def rtu_tcp_port(self) -> int:
         return self._end_points["rtu-tcp"]["port"]
 
-    def command(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run ``steptwin`` where this twin is the only one, and the device that commands mean."""
-        return run_command(arguments, self.environment)
+    def command(self, *arguments: str, script: str = "") -> subprocess.CompletedProcess[str]:
+        """Run ``steptwin`` where this twin is the only one, and the device that commands mean; ``script`` is piped into it."""
+        return run_command(arguments, self.environment, script)
 
     def state(self) -> dict[str, Any]:
         return json.loads(self.command("state", "--json").stdout)

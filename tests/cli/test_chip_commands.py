@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import socket
+import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typed import Done, typed
 
 from steptwin.errors import Misuse
 from steptwin.host.address import parse_device
@@ -41,7 +41,7 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     device = f"{twin.pty},chip=7"
 
     def run(*arguments: str, code: int = 0, place: str = device) -> str:
-        done = typed(*arguments, "--device", place, env=twin.environment)
+        done = twin.command(*arguments, "--device", place)
         assert done.returncode == code, done.stderr
         return done.stdout or done.stderr
 
@@ -56,7 +56,7 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert "'7=40': an M1486 has one axis: expected 1=NUMBER" in run("move", "7=40", code=2)
     assert "'1=40 2=3': '40 2=3' is no number" in run("move", "1=40", "2=3", code=2)
     assert "a time to wait of -1 s is outside" in run("move", "1=40", "--timeout", "-1", code=2)
-    assert run("watch", "position", "--count", "1").splitlines()[1].endswith("\t40")
+    assert run("watch", "position", "--count", "1").splitlines()[1].split()[1] == "40"
     assert "is nothing an M1486 tells: there are POSITION" in run("get", "M1_POS_ACT", code=2)
     assert "an M1486 has info, get, set" in run("enable", "1", code=2)
     assert "velocity = 30000: M1486B takes 16 to 20 000 step/s" in run("set", "V=30000", code=2)
@@ -80,7 +80,7 @@ def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: 
 
     def sent(text: str, address: str) -> tuple[int, str]:
         program.write_text(text)
-        done = typed("send", str(program), "-d", f"{twin.pty},{address}", env=twin.environment)
+        done = twin.command("send", str(program), "-d", f"{twin.pty},{address}")
         return done.returncode, done.stdout or done.stderr
 
     started = " and has been started by its ]: the motor may move; 'steptwin stop --program' ends it"
@@ -91,7 +91,7 @@ def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: 
     assert sent("f64\nr\nx0\nr\n", "chip=7")[0] == 0
     code, told = sent("f64\nr\nx0\nr\n", "kind=m1486")
     assert (code, "what stands before its first X is for which chip?" in told) == (2, True)
-    counters = [typed("get", "counter", "-d", f"{twin.pty},chip={chip}", env=twin.environment).stdout for chip in "07"]
+    counters = [twin.command("get", "counter", "-d", f"{twin.pty},chip={chip}").stdout for chip in "07"]
     assert [counter.split()[1] for counter in counters] == ["1280", "0"]
     code, told = sent("x3\nr\n", "kind=m1486,timeout=0.2")
     assert (code, "chip 3 does not echo" in told) == (1, True)
@@ -103,8 +103,8 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
     chips, controller = serve_m1486("--variant", "B", "--chain", "1,B"), serve("--demo")
     places = [str(chips.pty), f"tcp://127.0.0.1:{chips.tcp_port}", f"tcp://127.0.0.1:{controller.tcp_port}"]
 
-    def scan(*arguments: str) -> Done:
-        return typed("scan", *arguments, env=chips.environment)
+    def scan(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return chips.command("scan", *arguments)
 
     found = json.loads(scan(*places, "--units", "1", "--baud", "2400,4800", "--json").stdout)
     assert [(f["address"], f["baud"], f["kind"], f.get("chip"), f.get("variant"), f.get("unit")) for f in found] == [
@@ -121,7 +121,7 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
 
 
 def position_of(twin: Any, place: str, chip: int) -> float:
-    found = json.loads(typed("get", "POSITION", "-d", f"{place},chip={chip}", "--json", env=twin.environment).stdout)
+    found = json.loads(twin.command("get", "POSITION", "-d", f"{place},chip={chip}", "--json").stdout)
     return float(found["POSITION"]["value"] if isinstance(found["POSITION"], dict) else found["POSITION"])
 
 
@@ -132,7 +132,8 @@ def test_a_terminal_moves_the_chip_it_was_told_whatever_stands_in_the_input_buff
     device = f"{place},chip=7"
 
     def terminal(script: str) -> tuple[int, str, str]:
-        return tuple(typed("terminal", "-d", device, env=twin.environment, script=script))
+        done = twin.command("terminal", "-d", device, script=script)
+        return done.returncode, done.stdout, done.stderr
 
     for rubbish in (b"", bytes.fromhex("01 03 27 74 00 02 8e 67"), b"f999", b"r"):
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
@@ -154,7 +155,7 @@ def test_a_terminal_to_a_chip_that_is_not_there_types_only_k(serve_m1486: Callab
     twin = serve_m1486("--variant", "B", "--chain", "0,7")
     place = f"tcp://127.0.0.1:{twin.tcp_port}"
     for script, code in (("f640\nr\n", 1), ("k\n", 0)):
-        run = typed("terminal", "-d", f"{place},chip=5", env=twin.environment, script=script)
+        run = twin.command("terminal", "-d", f"{place},chip=5", script=script)
         assert (run.returncode, run.stdout) == (code, "")
     assert position_of(twin, place, 0) == position_of(twin, place, 7) == 0.0
 
@@ -163,7 +164,7 @@ def test_info_without_a_kind_leaves_nothing_in_front_of_the_next_command(serve_m
     twin = serve_m1486("--variant", "B")
     place = f"tcp://127.0.0.1:{twin.tcp_port}"
     for address in (place, f"rtu-{place}"):
-        run = typed("info", "-d", address, env=twin.environment)
+        run = twin.command("info", "-d", address)
         assert run.returncode == 1
         assert "If these are M1486 chips, put ',kind=m1486' behind the address" in run.stderr
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
@@ -177,7 +178,7 @@ def test_a_terminal_on_a_pipe(serve_m1486: Callable[..., Any]) -> None:
     twin = serve_m1486("--variant", "B", "--chain", "0,7")
 
     def terminal(script: str, device: str) -> tuple[int, list[str], str]:
-        done = typed("terminal", "-d", device, env=twin.environment, script=script)
+        done = twin.command("terminal", "-d", device, script=script)
         return done.returncode, done.stdout.splitlines(), done.stderr
 
     position = "32H  U2 position, middle byte: 50"
@@ -202,4 +203,4 @@ def test_a_terminal_on_a_pipe(serve_m1486: Callable[..., Any]) -> None:
     assert (code, "5EH  no room in the input buffer: a character is lost" in lines) == (1, True)
     assert "'wait' before it waits for that" in errors
     assert terminal("k\n", f"{twin.pty},chip=7")[0] == 0
-    assert typed("stop", "-d", f"{twin.pty},chip=7", env=twin.environment).returncode == 0
+    assert twin.command("stop", "-d", f"{twin.pty},chip=7").returncode == 0

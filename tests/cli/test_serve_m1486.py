@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typed import typed
 
 from steptwin.errors import Misuse
 from steptwin.runtime.serve_m1486 import M1486Options, remarks_of, serve
@@ -91,20 +90,20 @@ def test_a_hand_at_the_chips(serve_m1486: Serve) -> None:
     twin = serve_m1486("--variant", "B", "--chain", "0,A", "--wire", "0.B1=A.B3")
     host = Host(twin.tcp_port)
     assert host.ask("xA\nz3\nu20\nx0\nu16\n", 1) == b"\x01"
-    assert "waits until B3 is low" in typed("state", "--unit", "A", env=twin.environment).stdout
-    assert typed("pin", "--unit", "A", "B3=0", env=twin.environment).returncode == 0
+    assert "waits until B3 is low" in twin.command("state", "--unit", "A").stdout
+    assert twin.command("pin", "--unit", "A", "B3=0").returncode == 0
     assert host.hear(1) == b"B"
-    shown = typed("pin", "--unit", "a", env=twin.environment).stdout
+    shown = twin.command("pin", "--unit", "a").stdout
     assert "B3     0" in shown.splitlines()
     assert host.ask("x0\nc1\nu20\n", 1) == b"B"
 
-    assert typed("power-cycle", env=twin.environment).returncode == 0
-    lines = typed("state", "--unit", "0", env=twin.environment).stdout.splitlines()
+    assert twin.command("power-cycle").returncode == 0
+    lines = twin.command("state", "--unit", "0").stdout.splitlines()
     assert lines[0].startswith("M1486B at address 0, 4800 bit/s, ")
     assert lines[1:3] == ["program  has nothing to do", "memory   0 of 2032 bits, input buffer 0 of 32 characters"]
-    refused = typed("pin", "B1=0", env=twin.environment)
+    refused = twin.command("pin", "B1=0")
     assert (refused.returncode, refused.stderr) == (2, "steptwin: several chips are served: choose one with --unit: 0, A\n")
-    cannot = typed("encoder", "M1+1", env=twin.environment)
+    cannot = twin.command("encoder", "M1+1")
     assert cannot.returncode == 2
     assert "this twin cannot do 'encoder': it can pin, power-cycle, state" in cannot.stderr
     host.close()
@@ -126,7 +125,7 @@ def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None
     (tmp_path / "p.m1486").write_text("[\nz3\nu20\n]\n")
     twin = serve_m1486("--variant", "B", "--program", str(tmp_path / "p.m1486"))
     host = Host(twin.tcp_port)
-    typed("pin", "B3=0", env=twin.environment)
+    twin.command("pin", "B3=0")
     assert host.hear(1) == b"B"
     host.close()
 
