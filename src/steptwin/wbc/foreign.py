@@ -36,7 +36,9 @@ class Line(NamedTuple):
         return self.words[0].text.upper()
 
     def text(self, first: int, last: int | None = None) -> str:
-        """The text from one word to another, both included; to the last one where none is given."""
+        """The text from one word to another, both included; to the last one where none is given. Empty where there is no word."""
+        if first >= len(self.words):
+            return ""
         return self.code[self.words[first].start - self.start : self.words[-1 if last is None else last].end - self.start]
 
 
