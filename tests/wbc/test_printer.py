@@ -153,7 +153,26 @@ def test_raw_records_are_written_in_capitals() -> None:
     assert format_text(f"//!RECORD  {'0a' * 16}\n") == f"//!record {'0A' * 16}\n"
 
 
-ARRANGED = ("M1=1", "END", "IF x=1", "ENDIF", "A:", "#b 1", "#long", " 5", "// c", " ", "  ", "    ", "\t", "\n", "\n", "\r\n")
+ARRANGED = (
+    "M1=1",
+    "END",
+    "IF x=1",
+    "ENDIF",
+    "A:",
+    "#b 1",
+    "#long",
+    " 5",
+    "// c",
+    " ",
+    "  ",
+    "    ",
+    "\t",
+    "\n",
+    "\n",
+    "\r\n",
+    "\u2002",
+    "\xa0",
+)
 
 
 def said(text: str) -> list[Line]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from steptwin.wbc.lexer import BLANKS
 from steptwin.wbc.statements import CLOSING, OPENING
 from steptwin.wbc.tree import Broken, Command, Constant, Label, Line, PositionRecord, Record, Statement
 
@@ -34,7 +35,7 @@ def columns_of(text: str, place: int) -> frozenset[tuple[int, int]]:
 
 def indentation(text: str) -> int:
     """Columns before the first character of a line."""
-    return len(text[: len(text) - len(text.lstrip())].expandtabs(_TABS[0]))
+    return len(text[: len(text) - len(text.lstrip(BLANKS))].expandtabs(_TABS[0]))
 
 
 def aligned(cells: Sequence[Cell | None], borders: Sequence[bool]) -> list[int | None]:

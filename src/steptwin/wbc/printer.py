@@ -77,7 +77,7 @@ def _with_comments(lines: Sequence[Line], written: Sequence[str], bodies: Sequen
         if line.comment is None:
             printed.append(body)
         elif column is not None:
-            printed.append(f"{body.rstrip():<{column}}{line.comment.text}")
+            printed.append(f"{body if line.statement else '':<{column}}{line.comment.text}")
         else:
             printed.append(body + (" " * _BEFORE_COMMENT if line.statement else "") + line.comment.text)
     return printed
