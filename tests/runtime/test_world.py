@@ -677,3 +677,28 @@ def test_a_compiled_image_runs_like_a_program_with_its_own_table(tmp_path: Path)
     world = World.load(tmp_path / "w.toml")
     world.run(for_="20 s")
     assert world.mic488["a"].axis[1].position == 7.0
+
+
+def test_a_step_that_goes_back_in_time_goes_on_from_there() -> None:
+    """What a script does after it has restored a snapshot is what the restored script does."""
+    world = small()
+    went_back: list[float] = []
+
+    def go_back() -> None:
+        if not went_back:
+            went_back.append(world.time)
+            world.restore(before)
+
+    def operator() -> Steps:
+        yield do.Wait(SECOND)
+        yield do.Call(go_back)
+        yield do.Note("after it")
+
+    world.script(operator)
+    world.run(until=0.5)
+    before = world.snapshot()
+    world.run(until=1)
+    assert went_back == [1.0]
+    world.run(until=3)
+    assert [(record.time, record.value) for record in world.trace.events("world")] == [(SECOND, "after it")]
+    assert world.scripts == []

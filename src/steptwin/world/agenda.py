@@ -1,7 +1,7 @@
-"""When scripts that wait are looked at: at moments, and when kernels change on which it depends what they wait for.
+"""When waiting scripts are evaluated: at fixed moments, and when a kernel has changed on which their condition depends.
 
-A script that watches is looked at when its own moment has come or one of its kernels has changed, never for what others do: what
-a world costs is the sum of what happens in it.
+A watching script is evaluated when its due moment has come or one of its kernels has changed, never because of other scripts. So
+the cost of a world grows with the number of its events only.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Agenda:
         self._timed.put(script, until)
 
     def watch(self, script: Script, due: Nanos | None) -> None:
-        """A script that waits for something is looked at next at ``due``; None: when a kernel has changed."""
+        """A watching script is evaluated at ``due``; None: only when a kernel has changed."""
         script.entry = 0
         if due is not None:
             self._watching.put(script, due)
@@ -82,14 +82,13 @@ class Agenda:
         script.entry = 0
 
     def first(self) -> Nanos | None:
-        """The first moment at which a script is to be looked at."""
+        """The first moment at which a script is due."""
         timed, watching = self._timed.first(), self._watching.first()
         return watching if timed is None else timed if watching is None else min(timed, watching)
 
-    def take_timed(self, now: Nanos) -> Iterator[Script]:
-        """Those whose moment has come, also while more of them are added."""
-        while (script := self._timed.take(now)) is not None:
-            yield script
+    def take_timed(self, now: Nanos) -> Script | None:
+        """One whose moment has come, which then waits no longer."""
+        return self._timed.take(now)
 
     def take_watching(self, now: Nanos) -> list[Script]:
         """Those that watch and are due."""
@@ -100,7 +99,7 @@ class Agenda:
 
 
 class Watchers:
-    """Which scripts depend on which kernels, and which kernels have changed since somebody asked."""
+    """Which scripts depend on which kernels, and which kernels have changed since the last `take`."""
 
     __slots__ = ("_again", "_changed", "_scripts")
 
@@ -125,11 +124,11 @@ class Watchers:
             kernel.on_change = self.change
 
     def change(self, kernel: Kernel) -> None:
-        """What depends on a kernel may be another now."""
+        """Scripts that depend on ``kernel`` have to be evaluated."""
         self._changed[kernel] = None
 
     def again(self, script: Script) -> None:
-        """A script has been looked at in vain."""
+        """A script was evaluated and has to wait on."""
         self._again[script.number] = script
 
     def take(self) -> list[Script]:

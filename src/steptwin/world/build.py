@@ -97,7 +97,7 @@ class _Builder:
         self._driven: dict[PinName, Path] = {}
         """What drives each input."""
         self._circuits: dict[PinName, tuple[Circuit, str | None]] = {}
-        """The contacts of inputs, and how they are said to be joined."""
+        """The contacts of inputs, and their ``join``."""
         self._make_machines()
         self._make_kernels()
         self._make_lines()

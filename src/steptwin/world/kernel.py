@@ -121,7 +121,7 @@ class Kernel:
         self._levels: dict[PinName, float] = {}
         """What was driven to each input last."""
         self._given: dict[PinName, tuple[Nanos, float]] = {}
-        """The last edge recorded of each input."""
+        """The last edge recorded of each input that was driven."""
         self._flights: list[Flight] = []
         self._plans: list[_Plans] = []
         """Of each machine, as recorded last."""
@@ -196,15 +196,16 @@ class Kernel:
         self.give(target, level, is_first=before is None)
 
     def give(self, target: PinName, level: float, *, is_first: bool = False) -> None:
-        """An input is given a level now. What it has then, for a fault may hold it, is recorded where that is new or the first.
+        """Drive an input now. Its resulting level, which a fault may hold, is recorded where it changes or ``is_first``.
 
-        What its machine tells of the same edge is not recorded again.
+        The machine's own report of the same edge is not recorded again.
         """
         machine, (_, pin) = self.machines[target.machine], target
         if self._record is None:
             machine.set_pin(pin, level, self.now)
             return
-        before = machine.pins()[pin]
+        known = self._given.get(target)
+        before = machine.pins()[pin] if known is None else known[1]
         machine.set_pin(pin, level, self.now)
         after = machine.pins()[pin]
         if is_first or after != before:
@@ -212,7 +213,7 @@ class Kernel:
             self._record(Record(self.now, target.machine, "edge", pin, after))
 
     def take_as_recorded(self, target: PinName, now: Nanos, level: float) -> None:
-        """An edge of an input is in the trace already, should its machine tell of it."""
+        """Mark an edge of an input as recorded, in case its machine reports it too."""
         self._given[target] = now, level
 
     def _send(self, wire: Wire, value: float) -> None:
@@ -302,6 +303,8 @@ class Kernel:
         pin = PinName(name, edge.pin)
         if self._record is not None and self._given.get(pin) != (edge.time, edge.value):
             self._record(Record(edge.time, name, "edge", edge.pin, edge.value))
+            if pin in self._given:
+                self._given[pin] = edge.time, edge.value
         for observer in self.observers:
             observer(name, edge)
         for wire in self._wires.get(pin, ()):
@@ -356,7 +359,7 @@ class _Plans:
         self._origins = [0] * len(self._drives)
 
     def tell(self, record: Recorder, now: Nanos) -> None:
-        """Record new plans, and coordinates that are set anew; that an axis rests where it was to come to rest is no new plan."""
+        """Record new plans, and changes of coordinates. An axis at rest where its plan ended has no new plan."""
         for i, number, drive in self._drives:
             origin = getattr(drive, "offset_p", 0)
             if origin != self._origins[i]:

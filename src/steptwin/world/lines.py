@@ -101,7 +101,7 @@ class Line(Stateful):
         port = self._port(place, kind)
         if hasattr(port, "on_output"):
             faulty: FaultyPort = FaultyTalkingPort(
-                port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_heard=place != SCRIPTS
+                port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
             port.on_output = self._kernel.mark
         else:
@@ -206,7 +206,7 @@ class ModbusLine(Line):
             units = TimedUnits(devices, timing)
             self._timed = units, Gateway(units)
         self.master = Master(self._ask, 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
-        """Who asks for the scripts."""
+        """Sends the requests of scripts."""
 
     def _ask(self, frame: bytes, now: Nanos) -> None:
         self.receive(SCRIPTS, frame, now)
@@ -275,7 +275,7 @@ class ChipLine(Line):
         super().receive(place, data, now)
 
     def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
-        if place == SCRIPTS:  # where all that comes is recorded, and nobody fetches it
+        if place == SCRIPTS:  # output is recorded here; scripts do not read it
             for moment, data in pieces:
                 self._tell(moment, "chips", Direction.OUT, data)
         else:

@@ -18,7 +18,7 @@ MOST_WAITING = 10_000
 
 
 class Master(Stateful):
-    """Asks in the order in which it is told to. Requests are numbered from 1.
+    """Sends requests in the order of the calls. They are numbered from 1.
 
     ``send`` puts a request on the line; its answer may come at once or later (`answered`). ``pause`` passes between an answer and
     the next request. A request without an answer in its time is given up.
@@ -57,7 +57,7 @@ class Master(Stateful):
         self._go_on(now)
 
     def answered(self, data: bytes, moment: Nanos) -> None:
-        """Something has come from the line; nobody waits for what comes too late."""
+        """Data has arrived from the line. Without a pending request it is dropped."""
         if self._pending is not None:
             self._finish(data, moment + self._pause)
 

@@ -195,7 +195,9 @@ def _first_not_below_0(all_q: list[Quadratic], begin: float, end: float, slack: 
 
     def is_up(q: Quadratic, u: float) -> bool:
         value = _at(q, u)
-        return value > slack or (value >= -slack and _slope(q, u) >= 0.0)
+        if value > slack or value < -slack:
+            return value > 0.0
+        return _slope(q, u) >= 0.0 or (q[2] > 0.0 and _at(q, -q[1] / (2.0 * q[2])) >= -slack)
 
     rising = sorted(u for q in all_q for u in _roots(q) if begin < u < end and _slope(q, u) > 0.0)
     return next((u for u in (begin, *rising) if all(is_up(q, u) for q in all_q)), None)

@@ -1,4 +1,4 @@
-"""What is told of a run at its end."""
+"""Failures and warnings that are reported at the end of a run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from steptwin.world.trace import Record
 
 MOST_KEPT = 1000
-"""A script may be wrong once a second for months: more records than these are counted only. The trace has all of them."""
+"""A script may fail once a second for months: further records are only counted. The trace has all of them."""
 
 
 class ReportsState(NamedTuple):

@@ -37,7 +37,7 @@ class Waiting(NamedTuple):
 
 
 class Sent:
-    """What a generator was sent so far, in as many bytes as it takes: scripts may run for months."""
+    """All values sent to a generator so far, stored compactly: scripts may run for months."""
 
     __slots__ = ("_bytes", "_kinds", "_lengths", "_numbers")
 

@@ -1,4 +1,4 @@
-"""The scripts of a world: what each does next, and when."""
+"""The scripts of a world: which step each takes next, and when."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Scripts:
 
     def end(self, script: Script) -> None:
         """It takes no further step."""
-        if script.number in self._scripts:
+        if self._scripts.get(script.number) is script:
             script.end()
             self._remove(script)
 
@@ -60,12 +60,13 @@ class Scripts:
         script.waiting = None
         self._agenda_of(script).remove(script)
         self._watchers.set(script, ())
-        self._scripts.pop(script.number, None)
+        if self._scripts.get(script.number) is script:  # a step may have restored another state
+            del self._scripts[script.number]
 
     def _agenda_of(self, script: Script) -> Agenda:
         return self._guests if script.is_outside else self._own
 
-    # ------------------------------------------------------------------ when they are looked at
+    # ------------------------------------------------------------------ when they are due
 
     def first(self) -> tuple[Nanos | None, Nanos | None]:
         """When the first script of the description is due, and when the first one from outside."""
@@ -73,7 +74,7 @@ class Scripts:
         return self._own.first(), self._guests.first()
 
     def _renew(self) -> None:
-        """Find anew when those are due for which something has changed."""
+        """Update the due moments of scripts whose kernels have changed."""
         while changed := self._watchers.take():
             for script in changed:
                 self._plan(script)
@@ -122,16 +123,16 @@ class Scripts:
     def _run(self, agenda: Agenda) -> None:
         """First those whose moment has come, then those that watch, in their order. Each is looked at once; what comes to be due
         behind the one that acts is left for the next time."""
-        now = self._plant.now
-        for script in agenda.take_timed(now):
-            self._resume(script, None)
+        plant = self._plant  # whose moment changes where a step restores a snapshot
+        while (timed := agenda.take_timed(plant.now)) is not None:
+            self._resume(timed, None)
         ready: dict[int, Script] = {}
         order: list[int] = []
         behind: list[Script] = []
         last = -1
         while True:
             self._renew()
-            for script in agenda.take_watching(now):
+            for script in agenda.take_watching(plant.now):
                 if script.number <= last:
                     behind.append(script)
                 elif script.number not in ready:
@@ -143,10 +144,10 @@ class Scripts:
             self._look(ready.pop(last))
         for script in behind:
             if script.waiting is not None:
-                agenda.watch(script, now)
+                agenda.watch(script, plant.now)
 
     def _look(self, script: Script) -> None:
-        """Let a script that watches go on if what it waits for has come, or its time is over."""
+        """Resume a watching script if its condition holds, its answer has come, or its time is over."""
         waiting, now = script.waiting, self._plant.now
         if waiting is None:
             return
@@ -165,7 +166,7 @@ class Scripts:
             self._watchers.again(script)
 
     def _answer(self, waiting: Waiting) -> bytes | None:
-        """The PDU of the answer, for who asked for it."""
+        """The PDU of the answer to a `Request`; None for a `Write`."""
         if not waiting.is_request:
             return None
         (asked,) = waiting.asked
@@ -191,6 +192,8 @@ class Scripts:
                 self._remove(script)
                 return
             waiting, value = self._take(step, script)
+            if script.ended:
+                return
             if waiting is not None:
                 self._wait(script, waiting)
                 return
@@ -205,7 +208,7 @@ class Scripts:
             case do.At():
                 return (Waiting(step.time) if step.time > plant.now else None), None
             case do.Until():
-                plant.condition(step.condition)  # wrong ones are told here
+                plant.condition(step.condition)  # raises `Misuse` here
                 return Waiting(None if step.within is None else plant.now + step.within, step.condition), None
             case do.Stop():
                 plant.stopped = step.reason if plant.stopped is None else plant.stopped
@@ -227,7 +230,7 @@ class Scripts:
         return None, None
 
     def _write(self, step: do.Write, script: Script) -> Waiting | None:
-        """As a master does it: what follows comes after the answers."""
+        """Write as a master does: wait for the answers before the next step."""
         plant = self._plant
         lines = dict.fromkeys(plant.plan.line_of[name][0].name for name, *_ in step.values if name in plant.plan.line_of)
         before = {name: self._master(name).asked for name in lines}

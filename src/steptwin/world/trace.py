@@ -6,7 +6,7 @@ other, so the records of several machines are merged by (time, order of the mach
 Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
 a pulse for every unit of position; ``load`` where the load of an axis is until the next such record: tuples (moment, whether it
 goes with the pulses of the drive, how many pulses from them, or else at which), before the first record with them; ``coordinate``
-by how many pulses the coordinate of an axis (POS_ACT) is above them from now on, before the first record by none; ``edge`` the
+by how many pulses POS_ACT of an axis is above its count from now on (0 before the first record); ``edge`` the
 new level of a pin, input or output (0.0, 1.0 or volts); ``frame`` the bytes of a frame (subject link and direction,
 ``"tcp-1/in"``); ``statement`` the number of the line a program executes (subject: program); ``event`` a text (subject: its
 code); ``input`` what came from outside (subject: what was done); ``fault`` a text (subject: its name).

@@ -55,7 +55,7 @@ class AxisTrack:
                 return
 
     def coordinate(self) -> AxisTrack | None:
-        """The position that registers show, which jumps where it is set anew; None where that is the count since power-on."""
+        """The position that registers show, which jumps where it is set; None where it is the count since power-on."""
         if not self.origins:
             return None
         track = AxisTrack(self.machine, self.view)

@@ -100,7 +100,7 @@ class FaultyMachine(Stateful):
     def __init__(
         self, inner: DrivingMachine, name: str, faults: Faults, body: Body, on_edge: Callable[[str, Nanos, float], None]
     ) -> None:
-        """``on_edge`` is told of the edges of inputs that faults make, which are recorded here."""
+        """``on_edge`` is called for each edge of an input that a fault makes; the edge is recorded here."""
         self._on_edge = on_edge
         self.inner = inner
         self.changed = inner.changed

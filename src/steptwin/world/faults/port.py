@@ -293,21 +293,21 @@ class FaultyPort(Stateful):
 class FaultyTalkingPort(FaultyPort):
     """Before a port that has something to send without having been asked.
 
-    ``is_heard``: a program there reads it; else nothing can go wrong with it.
+    ``is_read``: a program reads what the port sends; otherwise its output gives no occasion for faults.
     """
 
-    __slots__ = ("_is_heard", "_talking")
-    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_heard", "_talking"}
+    __slots__ = ("_is_read", "_talking")
+    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_read", "_talking"}
 
     def __init__(
-        self, port: InnerTalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "", is_heard: bool = True
+        self, port: InnerTalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "", is_read: bool = True
     ) -> None:
-        self._is_heard = is_heard
+        self._is_read = is_read
         self._talking = port
         super().__init__(port, link, faults, line, line_name=line_name)
 
     def _bytewise(self, direction: str) -> list[Active]:
-        return super()._bytewise(direction) if self._is_heard or direction != "out" else []
+        return super()._bytewise(direction) if self._is_read or direction != "out" else []
 
     @property
     def on_output(self) -> Callable[[], None] | None:
