@@ -10,6 +10,8 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import signal
+import sys
 import tempfile
 import tomllib
 from collections import Counter
@@ -101,6 +103,7 @@ def main() -> None:
     options = parser.parse_args()
     if unknown := set(options.packages) - set(CORE):
         parser.error(f"no package of the core: {', '.join(sorted(unknown))}; they are {', '.join(CORE)}")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the pytest that runs is ended, too
     os.nice(19)
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     known = equivalents()
