@@ -14,6 +14,8 @@ from steptwin.host.blocking import finish
 from steptwin.host.m1486 import AsyncM1486
 
 SETTINGS = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
+AWAY_S = 70.0
+"""Longer than any time the driver knows."""
 RACE_U = 30 * 64
 """Minimum microsteps that a motor makes which was started too late and is stopped at once: 0.15 s at 200 steps/s."""
 
@@ -40,7 +42,7 @@ OPERATIONS: dict[str, Callable[[AsyncM1486], Awaitable[Any]]] = {
 def trial(name: str, at: int | None, *, tasks: bool) -> tuple[int, str]:
     """Do an operation with a suspension at point ``at``: how many points it has, and what was wrong."""
     wire = ChipWire(addresses=(7,))
-    suspension = Suspension(wire)
+    suspension = Suspension(wire, AWAY_S)
     line: Any = suspension.task(chip_task_line(wire)) if tasks else suspension.thread(chip_line(wire))
     chip = AsyncM1486(line, 7)
     stood: list[int] = []
@@ -82,7 +84,7 @@ def trial(name: str, at: int | None, *, tasks: bool) -> tuple[int, str]:
     last_moment = suspension.what in AT_THE_LAST_MOMENT
     # Nothing that was typed stays in the chip, for the next CR on the line to carry out.
     wire.send(b"\r")
-    wire.sleep(100.0)
+    wire.sleep(20.0)
     moved = abs(wire.true(7) - stood[0])
     if moved > (RACE_U if last_moment else 0):
         return points, f"{name}, suspended {suspension.what} (point {at}): moved by {moved} min. microsteps"
