@@ -16,7 +16,7 @@ from statistics import median
 
 from pymodbus.client import AsyncModbusTcpClient, ModbusTcpClient
 
-from steptwin.host import AsyncMic488, AsyncModbusLine, Mic488, ModbusLine
+from steptwin.drivers import AsyncMic488, AsyncModbusLine, Mic488, ModbusLine
 
 READS = 4000
 WARM_UP = 500

@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from steptwin.files.export import AxisView, write_trace
+from steptwin.files.export.axes import PhaseOutputs
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.runtime.export import AxisView, write_trace
-from steptwin.runtime.export.axes import PhaseOutputs
 from steptwin.world.trace import Record, Trace
 
 HOUR: Nanos = 3600 * SECOND

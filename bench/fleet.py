@@ -7,13 +7,14 @@ import gc
 import socket
 import sys
 
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.descriptors import descriptors
+from steptwin.live.tcp import Clients, Connection
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488
-from steptwin.runtime.cell import Cell
-from steptwin.runtime.clock import Clock
-from steptwin.runtime.descriptors import descriptors
-from steptwin.runtime.tcp import Address, Clients, Connection
 from steptwin.wire.slave import TcpSlavePort
+from steptwin.world.addresses import Address
 from steptwin.world.kernel import Kernel
 
 ENABLE_ALL = bytes.fromhex("06271e000f")

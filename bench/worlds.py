@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import time
 
-from steptwin.runtime.world import World
+from steptwin.files.world import World
 
 CONTROLLER = """
 [[mic488]]

@@ -14,7 +14,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "host")
+CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "drivers")
 """Packages that are mutated; tests/<package> mirrors each of them."""
 
 PYTEST = (sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider")

@@ -11,6 +11,7 @@ The fixture `serve` starts the real command.
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 import os
@@ -19,14 +20,22 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 import pytest
 from hypothesis import Phase, settings
 from soak import time_limit
+from virtual_loop import VirtualLoop, run_virtually
+
+from steptwin.live.cell import Cell
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.device import Mic488
+from steptwin.world.kernel import Kernel
+
+T = TypeVar("T")
 
 pytest_plugins = ["pytester"]
 
@@ -227,3 +236,32 @@ def _serving(tmp_path_factory: pytest.TempPathFactory, kind: type[Served]) -> It
     finally:
         for twin in served:
             twin.close()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def own_runtime_directory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Twins of tests that run at the same time have the same names."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
+        yield
+
+
+@pytest.fixture
+def run() -> Callable[[Coroutine[Any, Any, T]], T]:
+    """``run(coroutine)`` in virtual time; what the loop has to complain about fails the test."""
+    return run_virtually
+
+
+@pytest.fixture
+def make_cell() -> Callable[[], tuple[Cell, Mic488]]:
+    """``make_cell()``, in a running virtual loop: a cell with one MIC488 as it comes from the shop."""
+
+    def make() -> tuple[Cell, Mic488]:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        device = Mic488(ControllerConfig())
+        kernel = Kernel()
+        kernel.add("1", device)
+        return Cell(kernel, loop.clock()), device
+
+    return make

@@ -37,7 +37,7 @@ def test_the_command_line_brings_nothing_heavy() -> None:
 
 
 def test_exports_bring_their_libraries_when_they_write() -> None:
-    assert brought_by(["steptwin.runtime.export"]) & HEAVY == set()
+    assert brought_by(["steptwin.files.export"]) & HEAVY == set()
 
 
 def test_the_probe_sees_what_an_import_brings() -> None:

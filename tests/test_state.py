@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import pytest
 
 import steptwin
+from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.vision import Com1Port
-from steptwin.runtime.world import World
 from steptwin.state import Stateful
 from steptwin.wire.crc import with_crc
 from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort

@@ -42,7 +42,7 @@ def test_a_test_that_hangs_in_a_callback_of_asyncio_is_ended(pytester: pytest.Py
 
 def test_interrupts_are_tested_where_sigint_is_ignored_too() -> None:
     """A shell without job control starts background commands, and so perhaps pytest, with SIGINT ignored."""
-    tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/runtime/test_interrupts.py"]
+    tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/live/test_interrupts.py"]
     ended = subprocess.run(
         ["bash", "-c", "trap '' INT HUP; exec \"$@\"", "bash", sys.executable, *tests],
         cwd=ROOT,

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import sys
 
+from steptwin.drivers import Mic488, Reason
 from steptwin.errors import LineFailure, Refusal
-from steptwin.host import Mic488, Reason
 
 PLACES = {"load": 0.0, "cut": 120.0, "unload": 200.0}
 """In mm."""

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
+from steptwin.drivers.address import parse_device
+from steptwin.drivers.m1486 import unit
 from steptwin.errors import Misuse
-from steptwin.host.address import parse_device
-from steptwin.host.m1486 import unit
 from steptwin.machine import MILLISECOND
 
 PROGRAM = "[\n@1\nf640\nr\nw100\nd\nr\nj1\n]\n"

@@ -20,9 +20,9 @@ from typing import Any
 import pytest
 
 from steptwin.errors import SteptwinError
+from steptwin.live.control import ask
 from steptwin.mic488.registermap import Space
 from steptwin.mic488.registers import register_map
-from steptwin.runtime.control import ask
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 LIMIT_S = 60.0

@@ -19,11 +19,11 @@ from hypothesis import strategies as st
 
 from steptwin.cli import main
 from steptwin.cli.device import HeldUp, shown, table, tell_under_way, tied
+from steptwin.drivers import Mic488
+from steptwin.drivers.address import DeviceAddress, parse_device
 from steptwin.errors import Misuse, Refusal
-from steptwin.host import Mic488
-from steptwin.host.address import DeviceAddress, parse_device
+from steptwin.live.ports import Place
 from steptwin.mic488.registers import register_map
-from steptwin.runtime.ports import Place
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
@@ -193,7 +193,7 @@ def test_who_does_not_answer(twin: Any, shell: Shell, monkeypatch: pytest.Monkey
     assert "no answer to 'unit 9: read the control registers of firmware" in shell.errors
     assert "If these are M1486 chips, put ',kind=m1486' behind the address" in shell.errors
     monkeypatch.delenv("STEPTWIN_DEVICE")
-    monkeypatch.setattr("steptwin.host.address.DEFAULT", "tcp://127.0.0.1:1")
+    monkeypatch.setattr("steptwin.drivers.address.DEFAULT", "tcp://127.0.0.1:1")
     shell("info")
     assert (shell.code, "start one with 'steptwin serve mic488 --demo', or name a device" in shell.errors) == (1, True)
 
@@ -276,8 +276,8 @@ def test_scanning(twin: Any, shell: Shell) -> None:
 
 
 def test_ports(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("steptwin.runtime.ports.serial_ports", lambda: [Place("/dev/ttyUSB7", "FTDI (0403:6001)")])
-    monkeypatch.setattr("steptwin.runtime.ports.twin_ports", lambda: [Place("/run/mic488", "twin mic488")])
+    monkeypatch.setattr("steptwin.live.ports.serial_ports", lambda: [Place("/dev/ttyUSB7", "FTDI (0403:6001)")])
+    monkeypatch.setattr("steptwin.live.ports.twin_ports", lambda: [Place("/run/mic488", "twin mic488")])
     assert shell("ports").splitlines() == ["/dev/ttyUSB7  FTDI (0403:6001)", "/run/mic488   twin mic488"]
     assert json.loads(shell("ports", "--json"))[0] == {"address": "/dev/ttyUSB7", "what": "FTDI (0403:6001)"}
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from steptwin.cli import main
+from steptwin.files.export import write_trace
 from steptwin.machine import SECOND
 from steptwin.motion import MotionState, plan_position
-from steptwin.runtime.export import write_trace
 from steptwin.world.trace import Record, Trace
 
 Run = Callable[..., tuple[int, str, str]]

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 from steptwin.cli import app
 from steptwin.errors import Misuse
-from steptwin.runtime.serve_m1486 import M1486Options
-from steptwin.runtime.serve_m1486 import serve as serve_chips
-from steptwin.runtime.serve_mic488 import Mic488Options, serve
+from steptwin.served.serve_m1486 import M1486Options
+from steptwin.served.serve_m1486 import serve as serve_chips
+from steptwin.served.serve_mic488 import Mic488Options, serve
 from steptwin.world.faults import KINDS
 
 Serve = Callable[..., Any]

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from steptwin.cli import app
 from steptwin.errors import Misuse
-from steptwin.runtime.export import read_trace
+from steptwin.files.export import read_trace
 
 Run = Callable[..., Result]
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.runtime.serve_m1486 import M1486Options, remarks_of, serve
+from steptwin.served.serve_m1486 import M1486Options, remarks_of, serve
 
 Serve = Callable[..., Any]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.host import AsyncMic488, Mic488, Reason, Refused
+from steptwin.drivers import AsyncMic488, Mic488, Reason, Refused
 from steptwin.wire.pdu import Read
 
 SOURCE = Path(__file__).with_name("slave.c")

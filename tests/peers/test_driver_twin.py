@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from steptwin.host import AsyncMic488, LineLost, Mic488, ModbusLine, Reason, Untold
+from steptwin.drivers import AsyncMic488, LineLost, Mic488, ModbusLine, Reason, Untold
 from steptwin.mic488.status import Status
 
 
@@ -85,7 +85,7 @@ def test_two_controllers_and_two_threads_on_one_line(serve: Callable[..., Any]) 
 
 JOG = """
 import sys
-from steptwin.host import Mic488
+from steptwin.drivers import Mic488
 with Mic488(sys.argv[1]) as mic:
     mic.enable(1)
     with mic.axis(1).jog(5.0, hold_s=2.0) as jog:

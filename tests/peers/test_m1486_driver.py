@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from steptwin.host import LineLost
-from steptwin.host.m1486 import M1486, AsyncM1486, AsyncM1486Line, ChipReason, M1486Line, PositionUnknown
+from steptwin.drivers import LineLost
+from steptwin.drivers.m1486 import M1486, AsyncM1486, AsyncM1486Line, ChipReason, M1486Line, PositionUnknown
 
 Serve = Callable[..., Any]
 KNOWN = {"start_stop": 200, "acceleration": 50000, "velocity": 2000, "profile": 25000, "microstep": 1, "qualification": 1}

@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 import serial
 
+from steptwin.drivers import AsyncMic488, Mic488
+from steptwin.drivers.m1486 import M1486, M1486Line
 from steptwin.errors import LineFailure
-from steptwin.host import AsyncMic488, Mic488
-from steptwin.host.m1486 import M1486, M1486Line
 
 READ_POSITION = bytes.fromhex("01 03 27 24 00 02 8E B4")
 AT_ZERO = bytes.fromhex("01 03 04 00 00 00 00 FA 33")

@@ -13,17 +13,17 @@ from held import Held, held
 from soak import scaled
 from virtual_loop import run_virtually
 
+from steptwin.live.cell import Cell
+from steptwin.live.links import Feed, Port
 from steptwin.m1486.check import check
 from steptwin.m1486.chip import EVENTS_KEPT, Event
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.variants import variant
 from steptwin.mic488.config import ControllerConfig
-from steptwin.runtime.cell import Cell
-from steptwin.runtime.links import Feed, Port
-from steptwin.runtime.m1486 import ChainOptions, M1486Line
-from steptwin.runtime.m1486_characters import UPLOADS_WAITING
-from steptwin.runtime.mic488 import LineOptions, Mic488Line
+from steptwin.served.m1486 import ChainOptions, M1486Line
+from steptwin.served.mic488 import LineOptions, Mic488Line
 from steptwin.wire.crc import crc16
+from steptwin.words.characters import UPLOADS_WAITING
 
 REQUESTS = 1_000_000
 PIECES = 150_000

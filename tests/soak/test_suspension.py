@@ -10,7 +10,7 @@ from host_rig import Wire, driver, thread_line
 from soak import factor, scaled
 from suspension import Suspension
 
-from steptwin.host import Mic488
+from steptwin.drivers import Mic488
 from steptwin.machine import MILLISECOND
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from soak import scaled
 
+from steptwin.commands import up_world
+from steptwin.commands.up_world import LiveWorld, PlacePort
 from steptwin.errors import Misuse
+from steptwin.files.session import load, save
+from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
-from steptwin.runtime import up_world
-from steptwin.runtime.session import load, save
-from steptwin.runtime.up_world import LiveWorld, PlacePort
-from steptwin.runtime.world import World
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes
 from steptwin.world.lines import SCRIPTS, ModbusLine

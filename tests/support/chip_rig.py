@@ -14,11 +14,11 @@ from typing import Any, Literal, TypeVar
 
 from host_rig import MemoryEndpoint, VirtualLoop
 
-from steptwin.host.m1486 import sync
-from steptwin.host.m1486.lines import TALK, talking
-from steptwin.host.m1486.talk import Say
-from steptwin.host.tasks import TaskLine
-from steptwin.host.threads import ThreadLine
+from steptwin.drivers.m1486 import sync
+from steptwin.drivers.m1486.lines import TALK, talking
+from steptwin.drivers.m1486.talk import Say
+from steptwin.drivers.tasks import TaskLine
+from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486 import chip as twin
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant

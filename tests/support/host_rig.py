@@ -13,12 +13,12 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
-from steptwin.host import AsyncMic488, Mic488
-from steptwin.host.exchange import Exchanger, LineLost
-from steptwin.host.mic488.frames import FrameWords
-from steptwin.host.modbus import Query, RtuMaster, TcpMaster
-from steptwin.host.tasks import TaskLine
-from steptwin.host.threads import ThreadLine
+from steptwin.drivers import AsyncMic488, Mic488
+from steptwin.drivers.exchange import Exchanger, LineLost
+from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.modbus import Query, RtuMaster, TcpMaster
+from steptwin.drivers.tasks import TaskLine
+from steptwin.drivers.threads import ThreadLine
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488 as Twin

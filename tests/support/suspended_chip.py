@@ -9,9 +9,9 @@ from typing import Any
 from chip_rig import ChipWire, chip_line, chip_task_line
 from suspension import AT_THE_LAST_MOMENT, Suspension
 
+from steptwin.drivers.blocking import finish
+from steptwin.drivers.m1486 import AsyncM1486
 from steptwin.errors import SteptwinError
-from steptwin.host.blocking import finish
-from steptwin.host.m1486 import AsyncM1486
 
 SETTINGS = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
 AWAY_S = 70.0

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 from chip_rig import ChipWire
 from host_rig import MemoryChannel, MemoryEndpoint, MemoryTransport, Wire, run_virtual
 
-from steptwin.host.tasks import TaskLine
-from steptwin.host.threads import ThreadLine
+from steptwin.drivers.tasks import TaskLine
+from steptwin.drivers.threads import ThreadLine
 from steptwin.machine import SECOND
 
 T = TypeVar("T")

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 from mic488_rig import EN, OUT, STOP, Rig
 
+from steptwin.commands.m1486_bench import Bench as M1486Bench
+from steptwin.files.export import AxisView, axis_views
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Event
-from steptwin.runtime.demo import demo_config
-from steptwin.runtime.export import AxisView, axis_views
-from steptwin.runtime.m1486_bench import Bench as M1486Bench
+from steptwin.served.demo import demo_config
 from steptwin.world.trace import Record, Trace
 
 

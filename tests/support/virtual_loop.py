@@ -7,7 +7,7 @@ import selectors
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
-from steptwin.runtime.clock import Clock
+from steptwin.live.clock import Clock
 
 T = TypeVar("T")
 

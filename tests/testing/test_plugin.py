@@ -84,7 +84,7 @@ def test_virtual_time_gives_the_same_each_time(run: Run) -> None:
 def test_in_real_time_programs_find_the_twin_at_its_address(run: Run, link: str) -> None:
     run(f"""
         import pytest
-        from steptwin.host import Mic488
+        from steptwin.drivers import Mic488
 
         @pytest.mark.mic488(link={link!r}, unit=3, firmware="1.23")
         def test_it(mic488):

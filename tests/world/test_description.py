@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.runtime.world import World
 from steptwin.world.description import read_world
 from steptwin.world.durations import duration
 from steptwin.world.reader import Text, WorldError

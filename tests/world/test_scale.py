@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.runtime.world import World
+from steptwin.files.world import World
 from steptwin.world.motor import Motor
 from steptwin.world.reader import WorldError
 

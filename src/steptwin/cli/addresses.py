@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.host import Mic488
+    from steptwin.drivers import Mic488
     from steptwin.mic488.registermap import RegisterMap
 
 SPACES = {"hr": 3, "co": 1, "di": 2}

@@ -33,8 +33,8 @@ def build(
     labels INT_INn; with --inferred also the other motions and PROGRESET. Variables, END, $I, $D and $R have none.
     """
     from steptwin.diagnostics import Severity, render
-    from steptwin.runtime.programfiles import Companions, read_program
-    from steptwin.runtime.textfiles import write_bytes
+    from steptwin.files.programfiles import Companions, read_program
+    from steptwin.files.textfiles import write_bytes
     from steptwin.wbc.decompile import IMAGE
     from steptwin.wbc.dialect import dialect_for
     from steptwin.wbc.image import build as build_image

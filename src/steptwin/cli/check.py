@@ -75,7 +75,7 @@ def check(
 ) -> None:
     """Check a program and report everything wrong or doubtful in it: WBC in .prg files, M1486 in all others."""
     from steptwin.diagnostics import Severity, render, to_json
-    from steptwin.runtime.textfiles import read_text
+    from steptwin.files.textfiles import read_text
 
     checker = _checker(file)
     source = read_text(file).source
@@ -164,7 +164,7 @@ def _memory_data(source: Source, chip: ChipMemory) -> dict[str, Any]:
 
 
 def _check_wbc(source: Source, options: Options) -> Report:
-    from steptwin.runtime.programfiles import Companions, check_source
+    from steptwin.files.programfiles import Companions, check_source
     from steptwin.wbc.dialect import DEFAULT, dialect_for
 
     options.refuse("WBC", "variant", "interface", "memory")

@@ -1,6 +1,6 @@
 """What the commands for devices do with an M1486: info, get, set, watch, move, stop, send.
 
-From Python: `steptwin.host.m1486.M1486`.
+From Python: `steptwin.drivers.m1486.M1486`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from steptwin.cli.device import HeldUp, complain, number_of, print_json, shown, 
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.host.address import DeviceAddress
-    from steptwin.host.m1486 import M1486, ChipMoveEnd
+    from steptwin.drivers.address import DeviceAddress
+    from steptwin.drivers.m1486 import M1486, ChipMoveEnd
 
 Shown = dict[str, tuple[Any, str]]
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
@@ -39,7 +39,7 @@ def chip_address(device: str | None) -> DeviceAddress | None:
     """The address if it is an M1486's."""
     if device is None:
         return None
-    from steptwin.host.address import parse_device
+    from steptwin.drivers.address import parse_device
 
     address = parse_device(device)
     return address if address.kind == "m1486" else None
@@ -47,7 +47,7 @@ def chip_address(device: str | None) -> DeviceAddress | None:
 
 @contextlib.contextmanager
 def opened_chip(address: DeviceAddress, *, log_frames: bool = False) -> Generator[M1486]:
-    from steptwin.host.m1486 import M1486
+    from steptwin.drivers.m1486 import M1486
 
     with M1486(
         address.place,
@@ -198,7 +198,7 @@ def move(
 
 def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
     """K is typed whether the chip can be asked or not: one that moves cannot."""
-    from steptwin.host.m1486 import M1486
+    from steptwin.drivers.m1486 import M1486
 
     chip = M1486(
         address.place,
@@ -220,9 +220,9 @@ def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
 
 def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
     """Download a program into the chips it names by ``X``, or the one meant; it runs from its ``]`` on."""
-    from steptwin.host.m1486 import M1486, M1486Line
-    from steptwin.host.m1486.sync import download_to
-    from steptwin.runtime.textfiles import read_text
+    from steptwin.drivers.m1486 import M1486, M1486Line
+    from steptwin.drivers.m1486.sync import download_to
+    from steptwin.files.textfiles import read_text
 
     text = read_text(file).source.text
     addresses = _addressed(text, address.chip, file)
@@ -251,7 +251,7 @@ def _started(text: str) -> str:
 
 def _addressed(text: str, chip: int | None, file: Path) -> list[int | None]:
     """The chips a program is for: those it names by X, and ``chip`` for what stands before. What is wrong in it is told later."""
-    from steptwin.host.m1486.download import parts
+    from steptwin.drivers.m1486.download import parts
     from steptwin.m1486.syntax import parse
 
     named = dict.fromkeys(chip if address is None else address for address, _ in parts(parse(text).program))

@@ -27,7 +27,7 @@ def variants(incomplete: str) -> list[str]:
 
 def twins(incomplete: str) -> list[str]:
     """Names of running twins."""
-    from steptwin.runtime.control import running
+    from steptwin.live.control import running
 
     with contextlib.suppress(SteptwinError):
         return _beginning(running(), incomplete)
@@ -36,7 +36,7 @@ def twins(incomplete: str) -> list[str]:
 
 def pins(context: typer.Context, incomplete: str) -> list[str]:
     """``IN1=`` of the twin that ``--twin`` names, or of the only one."""
-    from steptwin.runtime.control import ask
+    from steptwin.live.control import ask
 
     with contextlib.suppress(SteptwinError):
         asked = {"do": "pin", "unit": context.params.get("unit"), "set": {}}

@@ -22,8 +22,8 @@ def decompile(
     positions: Annotated[Path | None, typer.Option(help="Position table to write; default: beside the program, as .csv.")] = None,
 ) -> None:
     """Turn a compiled image into a program and a position table that build to the same bytes."""
-    from steptwin.files import read_bytes
-    from steptwin.runtime.textfiles import write_bytes
+    from steptwin.files.textfiles import write_bytes
+    from steptwin.inputfiles import read_bytes
     from steptwin.wbc.decompile import decompile as decompile_image
 
     found = decompile_image(read_bytes(file))

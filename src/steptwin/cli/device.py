@@ -14,8 +14,8 @@ import typer
 from steptwin.errors import LineFailure, Misuse, Refusal
 
 if TYPE_CHECKING:
-    from steptwin.host import Mic488
-    from steptwin.host.m1486.identify import SearchLine
+    from steptwin.drivers import Mic488
+    from steptwin.drivers.m1486.identify import SearchLine
 
 Device = Annotated[
     str | None,
@@ -38,8 +38,8 @@ TIED = "expected AXIS=NUMBER, such as 1=12.5 or M1=12.5"
 @contextlib.contextmanager
 def opened(device: str | None, *, observe: bool = True, log_frames: bool = False) -> Generator[Mic488]:
     """The controller meant. ``observe``: DATA_TYPE is left as it is."""
-    from steptwin.host import LineLost, Mic488, NoAnswer
-    from steptwin.host.address import DEFAULT, parse_device
+    from steptwin.drivers import LineLost, Mic488, NoAnswer
+    from steptwin.drivers.address import DEFAULT, parse_device
 
     address = parse_device(device or DEFAULT)
     if address.kind != "mic488":
@@ -75,8 +75,8 @@ def opened(device: str | None, *, observe: bool = True, log_frames: bool = False
 @contextlib.contextmanager
 def search_line(place: str, baud: int) -> Generator[SearchLine]:
     """A line on which M1486 chips are looked for."""
-    from steptwin.host.blocking import finish
-    from steptwin.host.m1486.identify import SearchLine
+    from steptwin.drivers.blocking import finish
+    from steptwin.drivers.m1486.identify import SearchLine
 
     line = SearchLine(place, baud=baud)
     finish(line.open())
@@ -88,9 +88,9 @@ def search_line(place: str, baud: int) -> Generator[SearchLine]:
 
 def drop_rubbish(place: str, baud: int) -> None:
     """If those that did not answer Modbus are M1486 chips, its bytes stand in front of the next command: they are ended."""
-    from steptwin.host.address import CHIP_BAUD
-    from steptwin.host.blocking import finish
-    from steptwin.host.m1486.identify import end_line
+    from steptwin.drivers.address import CHIP_BAUD
+    from steptwin.drivers.blocking import finish
+    from steptwin.drivers.m1486.identify import end_line
 
     for rate in (baud,) if "://" in place else (baud, CHIP_BAUD):
         with contextlib.suppress(LineFailure, Misuse), search_line(place, rate) as line:

@@ -1,6 +1,6 @@
 """``steptwin export``: a recorded trace as files for other programs.
 
-From Python: `steptwin.runtime.export.write_trace`.
+From Python: `steptwin.files.export.write_trace`.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def export(
     period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
 ) -> None:
     """Write a recorded trace as a timeline (html), a picture (png, svg), signals (vcd) or samples (csv, parquet)."""
-    from steptwin.runtime.export import bar, read_trace, write_trace
-    from steptwin.runtime.timedinputs import parse_duration
+    from steptwin.files.export import bar, read_trace, write_trace
+    from steptwin.files.timedinputs import parse_duration
 
     if not to and output is None:
         raise Misuse(f"nothing to write: name formats with --to ({', '.join(Form)}) or a file with --output")

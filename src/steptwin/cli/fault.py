@@ -40,7 +40,7 @@ def fault(
         return
     if clear and clear_all:
         raise Misuse("--clear and --clear-all exclude each other")
-    from steptwin.runtime.control import ask
+    from steptwin.live.control import ask
 
     wanted = []
     if words:

@@ -20,7 +20,7 @@ def fmt(
     check: Annotated[bool, typer.Option("--check", help="Change nothing; exit code 1 if a file is not in the style.")] = False,
 ) -> None:
     """Write WBC programs in one style: blanks, indentation, keywords in capitals. Lines with errors stay as they are."""
-    from steptwin.runtime.textfiles import read_text, write_bytes
+    from steptwin.files.textfiles import read_text, write_bytes
     from steptwin.wbc.printer import format_text
 
     changed = 0

@@ -1,6 +1,6 @@
 """``steptwin get``, ``set``: registers by name.
 
-From Python: `steptwin.host.Mic488.get_shown` and `set`.
+From Python: `steptwin.drivers.Mic488.get_shown` and `set`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, sho
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.host import Mic488
+    from steptwin.drivers import Mic488
     from steptwin.mic488.registermap import Register, RegisterMap
 
 _RUN = re.compile(r"(?P<head>\w+\[)(?P<first>\d+)-(?P<last>\d+)(?P<tail>\].*)")
@@ -79,7 +79,7 @@ def set_(
     if chip is not None:
         set_values(chip, changes, log_frames=log_frames)
         return
-    from steptwin.host.mic488.values import encoded, named
+    from steptwin.drivers.mic488.values import encoded, named
     from steptwin.mic488.registermap import DataType
 
     given = [_change(change) for change in changes]
@@ -146,7 +146,7 @@ def _change(text: str) -> tuple[str, str, str]:
 
 def value_of(register: Register, value: str, whole: str) -> float:
     """A value as typed: a number, ON or OFF, or the text of an enumerated value. Raises `Misuse` naming ``whole``."""
-    from steptwin.host.mic488 import values
+    from steptwin.drivers.mic488 import values
 
     try:
         return values.value_of(register, value)

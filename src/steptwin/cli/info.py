@@ -1,6 +1,6 @@
 """``steptwin info``: a controller at a glance.
 
-From Python: `steptwin.host.Mic488.status`.
+From Python: `steptwin.drivers.Mic488.status`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from steptwin.cli.chip import info as chip_info
 from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, shown, table
 
 if TYPE_CHECKING:
-    from steptwin.host import Mic488, Mic488Status
+    from steptwin.drivers import Mic488, Mic488Status
 
 _PROGRAM = {0: "stopped", 1: "running", 2: "paused"}
 
@@ -35,7 +35,7 @@ def info(device: Device = None, json: Json = False, log_frames: LogFrames = Fals
 
 
 def _data(mic: Mic488, status: Mic488Status) -> dict[str, Any]:
-    from steptwin.host.mic488.motion import status_text
+    from steptwin.drivers.mic488.motion import status_text
 
     axes = [
         {"axis": number, "position": position, "velocity": velocity, "unit": unit, "status": code, "meaning": status_text(code)}

@@ -1,6 +1,6 @@
 """``steptwin monitor``: registers, axes and frames of a controller on the terminal.
 
-From Python: `steptwin.host.AsyncMic488`.
+From Python: `steptwin.drivers.AsyncMic488`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """``steptwin enable``, ``disable``, ``home``, ``move``, ``jog``, ``stop``: axes from the command line.
 
-From Python: `steptwin.host.Mic488` and its axes.
+From Python: `steptwin.drivers.Mic488` and its axes.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from steptwin.cli.device import (
 from steptwin.errors import Misuse, Refusal
 
 if TYPE_CHECKING:
-    from steptwin.host import Mic488, MoveEnd
-    from steptwin.host.address import DeviceAddress
+    from steptwin.drivers import Mic488, MoveEnd
+    from steptwin.drivers.address import DeviceAddress
 
 Wait = Annotated[bool, typer.Option("--wait/--no-wait", help="Wait for the end, and stop at Ctrl-C.")]
 Timeout = Annotated[float | None, typer.Option(help="Seconds to wait at most. Default: computed from the motion.")]
@@ -124,7 +124,7 @@ def _move_chip(
     json: bool,
     log_frames: bool,
 ) -> None:
-    from steptwin.host.line import check_wait
+    from steptwin.drivers.line import check_wait
 
     check_wait(timeout)
     given = " ".join(targets)
@@ -176,7 +176,7 @@ def _do(
     json: bool,
     log_frames: bool,
 ) -> None:
-    from steptwin.host.line import check_wait
+    from steptwin.drivers.line import check_wait
 
     check_wait(timeout)
     with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible():

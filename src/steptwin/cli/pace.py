@@ -1,6 +1,6 @@
 """``steptwin pause``, ``step``, ``resume``, ``save``: the time of a running world.
 
-From Python: `steptwin.runtime.world.World`, whose time stands whenever it is not told to run, and `steptwin.runtime.session`.
+From Python: `steptwin.files.world.World`, whose time stands whenever it is not told to run, and `steptwin.files.session`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def step(
     json: Json = False,
 ) -> None:
     """Let a running world go on for a time, as fast as it can, and stand there; shows what happens on the way."""
-    from steptwin.runtime.timedinputs import parse_duration
+    from steptwin.files.timedinputs import parse_duration
 
     request: dict[str, object] = {"do": "step", "until": until}
     if duration is not None:
@@ -67,7 +67,7 @@ def save(
     json: Json = False,
 ) -> None:
     """Write a session of a running world up to now: for 'steptwin replay', and for 'run' and 'up' to go on from."""
-    from steptwin.runtime.beginning import check_session_target
+    from steptwin.files.beginning import check_session_target
 
     check_session_target(file)
     there = _ask(twin, {"do": "save", "file": str(file.absolute())})
@@ -77,7 +77,7 @@ def save(
 
 
 def _ask(twin: str | None, request: dict[str, object]) -> Any:
-    from steptwin.runtime.control import ask
+    from steptwin.live.control import ask
 
     return ask(twin, request)
 

@@ -1,6 +1,6 @@
 """``steptwin record``, ``diff``: the same session with a twin and with the device, and where they differ.
 
-From Python: `steptwin.runtime.devicesession`.
+From Python: `steptwin.commands.devicesession`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def record(
 
     All lines are checked before the first is carried out.
     """
-    from steptwin.runtime.devicesession import carry_out, steps_of, to_text
+    from steptwin.commands.devicesession import carry_out, steps_of, to_text
 
     text = _read(session)
     with opened(device, observe=False, log_frames=log_frames) as mic:
@@ -63,7 +63,7 @@ def diff(
     json: Json = False,
 ) -> None:
     """Report where two recordings of the same session differ. Exit code 1 if they do."""
-    from steptwin.runtime.devicesession import differences, from_text
+    from steptwin.commands.devicesession import differences, from_text
 
     found = differences(from_text(_read(one), str(one)), from_text(_read(two), str(two)), tolerance=tolerance, time_s=time)
     if json:
@@ -79,7 +79,7 @@ def _data(step: int, line: str, what: str, one: Any, two: Any) -> dict[str, Any]
 
 
 def _read(path: Path) -> str:
-    from steptwin.files import MOST_RECORDED_BYTES, read_bytes
+    from steptwin.inputfiles import MOST_RECORDED_BYTES, read_bytes
 
     try:
         return read_bytes(path, MOST_RECORDED_BYTES).decode()

@@ -1,6 +1,6 @@
 """``steptwin replay``: a recorded session again. Exit code 1 if something else happens.
 
-From Python: `steptwin.runtime.session.load`, then ``replay()``.
+From Python: `steptwin.files.session.load`, then ``replay()``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ def replay(
     trace: Annotated[Path | None, typer.Option(help="Write what happened to a file or into a directory.")] = None,
 ) -> None:
     """Run a recorded session again and compare what happens."""
-    from steptwin.runtime.run_world import replay as run_again
+    from steptwin.commands.run_world import replay as run_again
 
     if not run_again(file, trace, typer.echo, lambda text: typer.echo(text, err=True)):
         raise typer.Exit(1)

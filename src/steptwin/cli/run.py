@@ -1,6 +1,6 @@
 """``steptwin run``: a program in virtual time, and what it does when. Exit code 1 if something in it went wrong.
 
-From Python: `steptwin.runtime.run_m1486.run` and its neighbours.
+From Python: `steptwin.commands.run_m1486.run` and its neighbours.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
+    from steptwin.files.timedinputs import TimedInput
     from steptwin.machine import Nanos
-    from steptwin.runtime.timedinputs import TimedInput
 
 
 _NAMES = {"moment": "from"}
@@ -119,7 +119,7 @@ def run(
     ] = False,
 ) -> None:
     """Run a program or a world in virtual time: its moves, waits, outputs and uploads with their times. A session goes on."""
-    from steptwin.runtime.timedinputs import parse_duration, parse_inputs
+    from steptwin.files.timedinputs import parse_duration, parse_inputs
 
     runner = _RUNNERS.get(file.suffix.lower())
     if runner is None:
@@ -130,11 +130,11 @@ def run(
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
     if trace is not None:
-        from steptwin.runtime.export import check_target
+        from steptwin.files.export import check_target
 
         check_target(trace)
     if session is not None:
-        from steptwin.runtime.beginning import check_session_target
+        from steptwin.files.beginning import check_session_target
 
         check_session_target(session)
     options = Options(
@@ -167,9 +167,9 @@ _WORLDS = ("fault", "session", "seed", "moment", "allow_outside", "strict")
 
 
 def _run_m1486(file: Path, options: Options) -> bool:
+    from steptwin.commands.run_m1486 import M1486Run
+    from steptwin.commands.run_m1486 import run as run_program
     from steptwin.m1486.variants import DEFAULT
-    from steptwin.runtime.run_m1486 import M1486Run
-    from steptwin.runtime.run_m1486 import run as run_program
 
     options.refuse("M1486 programs", "positions", "config", "firmware", "travel", "statement_time", *_WORLDS)
     wanted = M1486Run(
@@ -187,10 +187,10 @@ def _run_m1486(file: Path, options: Options) -> bool:
 
 
 def _run_wbc(file: Path, options: Options) -> bool:
-    from steptwin.runtime.run_wbc import WbcRun
-    from steptwin.runtime.run_wbc import run as run_program
-    from steptwin.runtime.timedinputs import parse_duration
-    from steptwin.runtime.wbc_bench import parse_travel
+    from steptwin.commands.run_wbc import WbcRun
+    from steptwin.commands.run_wbc import run as run_program
+    from steptwin.commands.wbc_bench import parse_travel
+    from steptwin.files.timedinputs import parse_duration
     from steptwin.wbc.dialect import DEFAULT
 
     options.refuse("WBC programs", "variant", "interface", "wire", *_WORLDS)
@@ -211,8 +211,8 @@ def _run_wbc(file: Path, options: Options) -> bool:
 
 
 def _run_world(file: Path, options: Options) -> bool:
-    from steptwin.runtime.run_world import WorldRun
-    from steptwin.runtime.run_world import run as run_world
+    from steptwin.commands.run_world import WorldRun
+    from steptwin.commands.run_world import run as run_world
 
     mechanics = ("positions", "config", "firmware", "travel", "statement_time", "variant", "interface", "wire")
     options.refuse("worlds, whose file says all that", *mechanics)

@@ -1,6 +1,6 @@
 """``steptwin ports``, ``scan``: where a device could be, and where one is.
 
-From Python: `steptwin.runtime.ports`, `steptwin.host.mic488.identify.scan`, `steptwin.host.m1486.identify.scan_chips`.
+From Python: `steptwin.live.ports`, `steptwin.drivers.mic488.identify.scan`, `steptwin.drivers.m1486.identify.scan_chips`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Kind(enum.StrEnum):
 
 def ports(json: Json = False) -> None:
     """List serial ports, and the pseudo terminals of running twins."""
-    from steptwin.runtime.ports import serial_ports, twin_ports
+    from steptwin.live.ports import serial_ports, twin_ports
 
     places = serial_ports() + twin_ports()
     if json:
@@ -60,7 +60,7 @@ def scan(
 
     Exit code 1 when nobody is found.
     """
-    from steptwin.runtime.ports import serial_ports, twin_ports
+    from steptwin.live.ports import serial_ports, twin_ports
 
     numbers = numbers_of(units, "--units", 1, 247)
     bauds = None if baud is None else numbers_of(baud, "--baud", 300, 1_000_000)
@@ -88,7 +88,7 @@ def _which(row: dict[str, Any]) -> str:
 
 def _found_at(place: str, kind: Kind, units: list[int], bauds: list[int] | None, timeout: float) -> list[dict[str, Any]]:
     """All that answer at an address; nobody where it cannot be opened, which is told."""
-    from steptwin.host.m1486.identify import CHIP_BAUDS
+    from steptwin.drivers.m1486.identify import CHIP_BAUDS
 
     rows: list[dict[str, Any]] = []
     try:
@@ -124,9 +124,9 @@ def _row(place: str, baud: int, kind: Kind, what: str, **more: object) -> dict[s
 
 
 def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]:
-    from steptwin.host import LineLost
-    from steptwin.host.blocking import finish
-    from steptwin.host.m1486.identify import scan_chips
+    from steptwin.drivers import LineLost
+    from steptwin.drivers.blocking import finish
+    from steptwin.drivers.m1486.identify import scan_chips
     from steptwin.machine import SECOND
 
     for baud in bauds:
@@ -154,8 +154,8 @@ def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]
 
 def _let_chips_listen(place: str, bauds: list[int]) -> None:
     """At the likeliest rate last: what is said at the others is rubbish at it."""
-    from steptwin.host.blocking import finish
-    from steptwin.host.m1486.identify import let_all_listen
+    from steptwin.drivers.blocking import finish
+    from steptwin.drivers.m1486.identify import let_all_listen
 
     for baud in reversed(bauds):
         with contextlib.suppress(LineFailure), search_line(place, baud) as line:
@@ -163,9 +163,9 @@ def _let_chips_listen(place: str, bauds: list[int]) -> None:
 
 
 def _controllers(place: str, bauds: list[int], units: list[int], timeout: float) -> list[dict[str, Any]]:
-    from steptwin.host.blocking import finish
-    from steptwin.host.mic488.identify import scan as scan_units
-    from steptwin.host.mic488.sync import ModbusLine
+    from steptwin.drivers.blocking import finish
+    from steptwin.drivers.mic488.identify import scan as scan_units
+    from steptwin.drivers.mic488.sync import ModbusLine
     from steptwin.machine import SECOND
 
     for baud in bauds:

@@ -1,6 +1,6 @@
 """``steptwin send``: a program into a device.
 
-From Python: `steptwin.host.m1486.M1486.download`.
+From Python: `steptwin.drivers.m1486.M1486.download`.
 """
 
 from __future__ import annotations

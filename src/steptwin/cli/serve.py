@@ -90,11 +90,11 @@ def mic488(
     Without any of --pty, --serial, --tcp, --rtu-tcp and --rfc2217 it listens on a pty, on 127.0.0.1:5020 (Modbus TCP) and on
     127.0.0.1:5021 (RTU over TCP).
     """
-    from steptwin.runtime.serve_mic488 import Mic488Options, serve
-    from steptwin.runtime.timedinputs import parse_duration
+    from steptwin.files.timedinputs import parse_duration
+    from steptwin.served.serve_mic488 import Mic488Options, serve
 
     if not (pty or serial or tcp or rtu_tcp or rfc2217):
-        from steptwin.runtime.control import runtime_directory
+        from steptwin.live.control import runtime_directory
 
         host = _default_host(listen_any)
         pty, tcp, rtu_tcp = runtime_directory() / name, f"{host}:{MODBUS_TCP_PORT}", f"{host}:{RTU_TCP_PORT}"
@@ -161,10 +161,10 @@ def m1486(
 
     Without any of --pty, --serial, --tcp and --rfc2217 it listens on a pty and on 127.0.0.1:5022 (raw TCP).
     """
-    from steptwin.runtime.serve_m1486 import M1486Options, serve
+    from steptwin.served.serve_m1486 import M1486Options, serve
 
     if not (pty or serial or tcp or rfc2217):
-        from steptwin.runtime.control import runtime_directory
+        from steptwin.live.control import runtime_directory
 
         pty, tcp = runtime_directory() / name, f"{_default_host(listen_any)}:{M1486_TCP_PORT}"
     serve(

@@ -1,6 +1,6 @@
 """``steptwin sniff``: what two others say to each other, in words, until Ctrl-C.
 
-From Python: `steptwin.runtime.sniff.sniff`.
+From Python: `steptwin.commands.sniff.sniff`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from steptwin.cli import completion
 from steptwin.cli.device import complain
 
 if TYPE_CHECKING:
-    from steptwin.runtime.frames import FrameLine
+    from steptwin.words.frames import FrameLine
 
 
 class Language(enum.StrEnum):
@@ -41,10 +41,10 @@ def sniff(
     """
     import asyncio
 
-    from steptwin.host.place import parse_place
-    from steptwin.runtime.sniff import Decoder, M1486Decoder, ModbusDecoder
-    from steptwin.runtime.sniff import sniff as run
-    from steptwin.runtime.tcp import parse_address
+    from steptwin.commands.sniff import Decoder, M1486Decoder, ModbusDecoder
+    from steptwin.commands.sniff import sniff as run
+    from steptwin.drivers.place import parse_place
+    from steptwin.world.addresses import parse_address
 
     place = parse_place(address, baud)
     where = None if listen is None else parse_address(listen, listen_any=False)
@@ -63,8 +63,8 @@ def sniff(
 
 
 def _print(frame: FrameLine) -> None:
+    from steptwin.commands.sniff import ARROWS
     from steptwin.machine import SECOND
-    from steptwin.runtime.sniff import ARROWS
 
     arrow = ARROWS[frame.direction] if frame.raw else "?"
     raw = f"{frame.raw.hex(' ')}  " if frame.raw else ""

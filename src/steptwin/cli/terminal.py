@@ -1,6 +1,6 @@
 """``steptwin terminal``: talk to a controller line by line.
 
-From Python: `steptwin.host.Mic488.get_shown` and `set`. An M1486's is `steptwin.cli.terminal_chip`.
+From Python: `steptwin.drivers.Mic488.get_shown` and `set`. An M1486's is `steptwin.cli.terminal_chip`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steptwin.cli.terminal_chip import chip_terminal
 from steptwin.errors import Misuse, SteptwinError
 
 if TYPE_CHECKING:
-    from steptwin.host import Mic488
+    from steptwin.drivers import Mic488
 
 HELP = """\
 NAME                read a register; also 'M?_ACC', USER_REGISTER[0-9], 10020, hr:10020:hex, several with blanks between
@@ -59,7 +59,7 @@ def terminal(device: Device = None, log_frames: LogFrames = False) -> None:
 
 def _answer(mic: Mic488, line: str) -> None:
     from steptwin.cli.get import expanded, look, map_of, value_of
-    from steptwin.runtime.devicesession import carry_out_one
+    from steptwin.commands.devicesession import carry_out_one
 
     if not line:
         return

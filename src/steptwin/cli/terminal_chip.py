@@ -1,6 +1,6 @@
 """``steptwin terminal`` for the M1486: its one-letter commands, as the manual has them.
 
-From Python: `steptwin.runtime.m1486_terminal.ChipTerminal`.
+From Python: `steptwin.commands.m1486_terminal.ChipTerminal`.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from steptwin.cli.device import complain, number_of
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 
 if TYPE_CHECKING:
-    from steptwin.host.address import DeviceAddress
-    from steptwin.host.place import Channel
+    from steptwin.commands.m1486_terminal import ChipTerminal
+    from steptwin.drivers.address import DeviceAddress
+    from steptwin.drivers.place import Channel
     from steptwin.m1486.variants import Variant
-    from steptwin.runtime.m1486_terminal import ChipTerminal
 
 HELP = """\
 COMMAND             as the manual has it: x7, v2000, f12800, r, u1, t41, [ … ; k stops at once
@@ -87,7 +87,7 @@ class _Connection:
     """The line to the chips. Before the first command the chip is selected and verified by its echo; only K does without."""
 
     def __init__(self, address: DeviceAddress, kind: Variant | None, tell: Callable[[str], object], *, log_frames: bool) -> None:
-        from steptwin.host.m1486.lines import line_endpoint
+        from steptwin.drivers.m1486.lines import line_endpoint
 
         self._address = address
         self._kind = kind
@@ -106,8 +106,8 @@ class _Connection:
 
     def verified(self) -> ChipTerminal:
         """The line, with the chip selected. Raises `LineFailure` where it does not echo."""
-        from steptwin.host.m1486.failures import NoEcho
-        from steptwin.host.m1486.wake import wake
+        from steptwin.drivers.m1486.failures import NoEcho
+        from steptwin.drivers.m1486.wake import wake
 
         if self._terminal is not None and self._is_verified:
             return self._terminal
@@ -135,7 +135,7 @@ class _Connection:
         return self._terminal or self.unverified()
 
     def _opened(self, channel: Channel) -> ChipTerminal:
-        from steptwin.runtime.m1486_terminal import ChipTerminal
+        from steptwin.commands.m1486_terminal import ChipTerminal
 
         self._terminal = ChipTerminal(channel, self._address.baud, self._kind, self._tell)
         self._terminal.selected = "" if self._address.chip is None else f"{self._address.chip:X}"
@@ -161,7 +161,7 @@ def _answer(connection: _Connection, line: str, kind: Variant | None, *, log_fra
     elif word == "raw":
         _typed(connection.verified(), rest, log_frames=log_frames, waits=waits)
     elif line:
-        from steptwin.runtime.m1486_terminal import command_of
+        from steptwin.commands.m1486_terminal import command_of
 
         command = command_of(line, kind)
         if command is not None:

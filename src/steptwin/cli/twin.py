@@ -121,7 +121,7 @@ def _numbers(numbers: list[int]) -> str:
 
 
 def _ask(twin: str | None, request: dict[str, object]) -> Any:
-    from steptwin.runtime.control import ask
+    from steptwin.live.control import ask
 
     unit = request.get("unit")
     if isinstance(unit, str) and unit.isdecimal() and len(unit) < _LONGEST_UNIT:

@@ -1,6 +1,6 @@
 """``steptwin up``: a world in real time. Exit code 1 if an expectation of its scripts did not hold.
 
-From Python: `steptwin.runtime.world.World`, which runs in virtual time.
+From Python: `steptwin.files.world.World`, which runs in virtual time.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ def up(
         return
     if world is None:
         raise Misuse("which world? give the TOML file that describes it")
-    from steptwin.runtime.timedinputs import parse_duration
-    from steptwin.runtime.up_world import UpOptions
-    from steptwin.runtime.up_world import up as run_up
+    from steptwin.commands.up_world import UpOptions
+    from steptwin.commands.up_world import up as run_up
+    from steptwin.files.timedinputs import parse_duration
 
     options = UpOptions(
         world=world,

@@ -1,6 +1,6 @@
 """``steptwin watch``: registers again and again, until Ctrl-C.
 
-From Python: `steptwin.host.Mic488.get_shown` in a loop.
+From Python: `steptwin.drivers.Mic488.get_shown` in a loop.
 """
 
 from __future__ import annotations

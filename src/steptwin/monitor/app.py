@@ -12,9 +12,9 @@ from textual.containers import Vertical
 from textual.widget import Widget
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, TabbedContent, TabPane, Tabs
 
+from steptwin.drivers.mic488.frames import Heard
+from steptwin.drivers.mic488.values import value_of
 from steptwin.errors import LineFailure, SteptwinError
-from steptwin.host.mic488.frames import Heard
-from steptwin.host.mic488.values import value_of
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.registermap import DataType, Register, Type
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS

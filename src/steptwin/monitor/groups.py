@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.host.mic488.values import Value
+from steptwin.drivers.mic488.values import Value
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type
 
 AXES = "M"

@@ -7,12 +7,12 @@ import contextlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from steptwin.drivers import AsyncJog, AsyncMic488, Mic488Status
+from steptwin.drivers.address import DEFAULT, parse_device
+from steptwin.drivers.mic488.frames import Heard
+from steptwin.drivers.mic488.program import ProgramState
+from steptwin.drivers.mic488.values import Value
 from steptwin.errors import Misuse, SteptwinError
-from steptwin.host import AsyncJog, AsyncMic488, Mic488Status
-from steptwin.host.address import DEFAULT, parse_device
-from steptwin.host.mic488.frames import Heard
-from steptwin.host.mic488.program import ProgramState
-from steptwin.host.mic488.values import Value
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import register_map
 

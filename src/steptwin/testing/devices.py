@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from steptwin.drivers import Mic488
+from steptwin.drivers.address import parse_device
+from steptwin.drivers.place import parse_place
 from steptwin.errors import Misuse
-from steptwin.host import Mic488
-from steptwin.host.address import parse_device
-from steptwin.host.place import parse_place
 from steptwin.mic488.config import ControllerConfig
 
 ANY = ""

@@ -10,17 +10,17 @@ from typing import Literal, TypeVar
 
 import pytest
 
+from steptwin.drivers import m1486 as host
+from steptwin.drivers.address import parse_device
+from steptwin.drivers.place import Channel, parse_place
 from steptwin.errors import Misuse
-from steptwin.host import m1486 as host
-from steptwin.host.address import parse_device
-from steptwin.host.place import Channel, parse_place
+from steptwin.live.links import Port
 from steptwin.m1486.chip import M1486, OPEN_ADDRESS
 from steptwin.m1486.lines import interface
 from steptwin.m1486.variants import DEFAULT, variant
 from steptwin.machine import Nanos
-from steptwin.runtime.links import Port
-from steptwin.runtime.m1486 import ChainOptions, M1486Line, chip_name, pin_change
-from steptwin.runtime.serve_m1486 import program_image
+from steptwin.served.m1486 import ChainOptions, M1486Line, chip_name, pin_change
+from steptwin.served.serve_m1486 import program_image
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip

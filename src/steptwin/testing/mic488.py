@@ -11,19 +11,19 @@ from typing import Literal, NamedTuple, TypeVar
 import pytest
 
 from steptwin.diagnostics import render
+from steptwin.drivers import Mic488, load_config
+from steptwin.drivers.address import parse_device
 from steptwin.errors import Misuse
-from steptwin.host import Mic488, load_config
-from steptwin.host.address import parse_device
+from steptwin.files.programbanks import Banks, ProgramErrors, read_banks
+from steptwin.live.links import Port
 from steptwin.machine import Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488 as Twin
 from steptwin.mic488.device import check_pin
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, register_map
 from steptwin.mic488.status import Status
-from steptwin.runtime.demo import demo_config
-from steptwin.runtime.links import Port
-from steptwin.runtime.mic488 import LineOptions, Mic488Line
-from steptwin.runtime.programbanks import Banks, ProgramErrors, read_banks
+from steptwin.served.demo import demo_config
+from steptwin.served.mic488 import LineOptions, Mic488Line
 from steptwin.testing.devices import driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, check_time, check_word

@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from steptwin.errors import Misuse, SteptwinError
+from steptwin.live.cell import Advancing, Cell
+from steptwin.live.clock import Clock
+from steptwin.live.links import Link, Port
+from steptwin.live.pty import PtyLink
+from steptwin.live.tcp import Clients, TcpLink
 from steptwin.machine import SECOND, Nanos
-from steptwin.runtime.cell import Advancing, Cell
-from steptwin.runtime.clock import Clock
-from steptwin.runtime.links import Link, Port
-from steptwin.runtime.pty import PtyLink
-from steptwin.runtime.tcp import LOOPBACK, Address, Clients, TcpLink
+from steptwin.world.addresses import LOOPBACK, Address
 
 T = TypeVar("T")
 

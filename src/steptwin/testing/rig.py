@@ -11,13 +11,13 @@ from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeAlias, Type
 import pytest
 
 from steptwin.errors import Misuse
+from steptwin.live.lines import Happening, ServedLine
 from steptwin.machine import SECOND, Nanos
-from steptwin.runtime.faults import FaultDesk
-from steptwin.runtime.frames import FrameLine
-from steptwin.runtime.lines import Happening, ServedLine
+from steptwin.served.faults import FaultDesk
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.virtualtime import VirtualTime
 from steptwin.wire.slave import Direction
+from steptwin.words.frames import FrameLine
 from steptwin.world.kernel import Kernel
 
 T = TypeVar("T")

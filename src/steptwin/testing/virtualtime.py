@@ -8,16 +8,16 @@ from heapq import heappop, heappush
 from itertools import count
 from typing import TypeVar
 
-from steptwin.host import LineLost, Mic488
-from steptwin.host.m1486 import M1486
-from steptwin.host.m1486.lines import BAUD, TALK, talking
-from steptwin.host.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
-from steptwin.host.place import Channel, Place
-from steptwin.host.threads import ThreadLine
+from steptwin.drivers import LineLost, Mic488
+from steptwin.drivers.m1486 import M1486
+from steptwin.drivers.m1486.lines import BAUD, TALK, talking
+from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
+from steptwin.drivers.place import Channel, Place
+from steptwin.drivers.threads import ThreadLine
+from steptwin.live.cell import Advancing
+from steptwin.live.links import Port, TalkingPort
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
-from steptwin.runtime.cell import Advancing
-from steptwin.runtime.links import Port, TalkingPort
 
 T = TypeVar("T")
 
@@ -80,7 +80,7 @@ class VirtualTime:
 
 
 class MemoryEndpoint:
-    """A line of a twin as a driver opens it: see `steptwin.host.place.Endpoint`. Bytes take no time."""
+    """A line of a twin as a driver opens it: see `steptwin.drivers.place.Endpoint`. Bytes take no time."""
 
     def __init__(self, time: VirtualTime, make_port: Callable[[], Port], place: str) -> None:
         self._time = time

@@ -8,19 +8,19 @@ from itertools import count
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeVar
 
+from steptwin.drivers import Mic488
+from steptwin.drivers.address import parse_device
+from steptwin.drivers.place import Channel, parse_place
 from steptwin.errors import Misuse
-from steptwin.host import Mic488
-from steptwin.host.address import parse_device
-from steptwin.host.place import Channel, parse_place
+from steptwin.files.world import World
+from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488 as Twin
-from steptwin.runtime.run_world import describe, is_told
-from steptwin.runtime.up_world import LiveWorld, PlacePort
-from steptwin.runtime.world import World
 from steptwin.testing.devices import ANY, driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import Rig, check_time
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
+from steptwin.words.records import describe, is_told
 from steptwin.world import script as do
 from steptwin.world.faults import read
 from steptwin.world.trace import Record

@@ -13,6 +13,7 @@ from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import MILLISECOND
 from steptwin.mic488.registers import FIRMWARES
 from steptwin.wire.rtu import MAX_UNIT
+from steptwin.world.addresses import parse_address
 from steptwin.world.reader import (
     Key,
     flag,
@@ -37,8 +38,10 @@ def _optional(read: Callable[[Any], Any], name: str, meaning: str, default: Any 
     return Key(name, read, meaning, default, attribute)
 
 
-def _texts(value: Any) -> str:
-    return text_value(value)
+def _address_text(value: Any) -> str:
+    """HOST:PORT as it is written; whether it may be reached by others is decided where the line is opened."""
+    parse_address(text_value(value), listen_any=True)
+    return value
 
 
 def _firmware(value: Any) -> str:
@@ -84,10 +87,10 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
             "real: characters take their time; strict (modbus): and a pause above 750 us drops a frame; off",
             "off",
         ),
-        _optional(_texts, "tcp", "HOST:PORT for live clients (Modbus TCP, or raw characters)"),
-        _optional(_texts, "rtu_tcp", "HOST:PORT for live clients of RTU over TCP"),
-        _optional(_texts, "pty", "path of a pseudo terminal for a live client"),
-        _optional(_texts, "serial", "a real serial port"),
+        _optional(_address_text, "tcp", "HOST:PORT for live clients (Modbus TCP, or raw characters)"),
+        _optional(_address_text, "rtu_tcp", "HOST:PORT for live clients of RTU over TCP"),
+        _optional(text_value, "pty", "path of a pseudo terminal for a live client"),
+        _optional(text_value, "serial", "a real serial port"),
     ),
     "mic488": (
         Key("name", name_value, "how the rest of the file names it"),

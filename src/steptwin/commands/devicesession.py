@@ -1,0 +1,236 @@
+"""A session with a controller as lines of text, for the terminal, for recordings and for comparing devices.
+
+| line | does |
+|---|---|
+| ``get NAME...`` | reads registers at one moment |
+| ``set NAME=VALUE`` | writes one: a number, ON, OFF or the name of a value |
+| ``sleep SECONDS`` | waits |
+| ``wait AXIS...`` | waits until axes have come to rest, and says why they have |
+| ``raw HEX`` | sends a PDU (function and data) |
+
+``#`` begins a comment. Refusals of the controller are results, not the end.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from steptwin.drivers import Mic488
+from steptwin.drivers.mic488.values import encoded, named, plan, value_of
+from steptwin.errors import Misuse, Refusal
+from steptwin.mic488.registermap import DataType, RegisterMap
+from steptwin.mic488.registers import register_map
+from steptwin.wire import pdu
+
+FORM = "expected get NAME..., set NAME=VALUE, sleep SECONDS, wait AXIS... or raw HEX"
+FORMAT = "steptwin session 1"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A line that was carried out: ``at_s`` since the beginning of the session, and what came of it."""
+
+    line: str
+    at_s: float
+    result: dict[str, Any] = field(default_factory=dict)
+
+
+Action = Callable[[Mic488], dict[str, Any]]
+"""Carries a step out, and tells what came of it."""
+
+
+def steps_of(text: str, registers: RegisterMap) -> list[tuple[str, Action]]:
+    """The lines of a session for a controller with these registers. Raises `Misuse` naming the first that is no step."""
+    steps = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.partition("#")[0].strip()
+        if line:
+            try:
+                steps.append((line, action_of(line, registers)))
+            except Misuse as error:
+                raise Misuse(f"line {number}: {error}") from None
+    if not steps:
+        raise Misuse(f"there is no step: {FORM}")
+    return steps
+
+
+def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[Step]:
+    """Each step after the other. Raises `Refusal` for one that makes no sense after those before it, and `LineFailure`."""
+    begin = time.monotonic()
+    for line, action in steps:
+        try:
+            yield Step(line, time.monotonic() - begin, _result(mic, action))
+        except Misuse as error:
+            raise Refusal(f"{line!r}: {error}") from error
+
+
+def carry_out_one(mic: Mic488, line: str) -> dict[str, Any]:
+    """What came of one step. Raises `Misuse` for one that makes no sense and `LineFailure`."""
+    return _result(mic, action_of(line, register_map(mic.firmware)))
+
+
+def _result(mic: Mic488, action: Action) -> dict[str, Any]:
+    try:
+        return action(mic)
+    except Misuse:
+        raise
+    except Refusal as refusal:
+        return {"refused": str(refusal).removeprefix(f"{mic.place}: ")}
+
+
+def action_of(line: str, registers: RegisterMap) -> Action:
+    """What a line does. Raises `Misuse` for one that makes no sense, so that it is known before anything is sent."""
+    word, *rest = line.split()
+    step = _STEPS.get(word)
+    if step is None:
+        raise Misuse(f"{line!r}: {FORM}")
+    try:
+        return step(rest, registers)
+    except Misuse as error:
+        raise Misuse(f"{line!r}: {error}") from None
+
+
+def _get(names: list[str], registers: RegisterMap) -> Action:
+    if not names:
+        raise Misuse("no name of a register is given")
+    plan(registers, [named(registers, name) for name in names])
+    return lambda mic: mic.get(*names)
+
+
+def _set(rest: list[str], registers: RegisterMap) -> Action:
+    name, equals, typed = "".join(rest).partition("=")
+    if not equals:
+        raise Misuse("expected set NAME=VALUE")
+    item = named(registers, name)
+    value = value_of(item.register, typed)
+    encoded(item, value, DataType.REAL)
+
+    def write(mic: Mic488) -> dict[str, Any]:
+        mic.set(name, value)
+        return {}
+
+    return write
+
+
+def _sleep(rest: list[str], registers: RegisterMap) -> Action:
+    try:
+        (text,) = rest
+        seconds = float(text)
+        if not 0.0 <= seconds <= 3600.0:
+            raise ValueError
+    except ValueError:
+        raise Misuse("expected seconds from 0 to 3600") from None
+
+    def sleep(mic: Mic488) -> dict[str, Any]:
+        time.sleep(seconds)
+        return {}
+
+    return sleep
+
+
+def _wait(rest: list[str], registers: RegisterMap) -> Action:
+    numbers = [text.upper().removeprefix("M") for text in rest]
+    if not all(number in ("1", "2", "3", "4") for number in numbers):
+        raise Misuse("expected axes, 1 to 4 or M1 to M4")
+    axes = [int(number) for number in numbers]
+
+    def wait(mic: Mic488) -> dict[str, Any]:
+        ends = mic.wait(*axes, check=False)
+        return {f"M{axis}": {"reason": end.reason.value, "position": end.position_u} for axis, end in ends.items()}
+
+    return wait
+
+
+def _raw(rest: list[str], registers: RegisterMap) -> Action:
+    try:
+        request = pdu.decode_request(bytes.fromhex("".join(rest)))
+    except ValueError:
+        raise Misuse("expected hexadecimal digits") from None
+    except pdu.ModbusException as exception:
+        raise Misuse(exception.detail or str(exception)) from None
+    return lambda mic: {"answer": pdu.encode_response(mic.request(request)).hex(" ")}
+
+
+_STEPS: dict[str, Callable[[list[str], RegisterMap], Action]] = {
+    "get": _get,
+    "set": _set,
+    "sleep": _sleep,
+    "wait": _wait,
+    "raw": _raw,
+}
+
+
+# ---------------------------------------------------------------------- recordings
+
+
+def to_text(steps: Iterable[Step], about: dict[str, Any]) -> Iterator[str]:
+    """A recording: a head, then a line of JSON for each step."""
+    yield json.dumps({"format": FORMAT, **about}, ensure_ascii=False)
+    for step in steps:
+        yield json.dumps({"line": step.line, "at_s": round(step.at_s, 4), "result": step.result}, ensure_ascii=False)
+
+
+def from_text(text: str, name: str) -> list[Step]:
+    """Raises `Misuse` for what is no recording."""
+    head, *lines = text.splitlines() or [""]
+    try:
+        if json.loads(head)["format"] != FORMAT:
+            raise ValueError
+        return [Step(str(data["line"]), float(data["at_s"]), dict(data["result"])) for data in map(json.loads, lines)]
+    except (ValueError, KeyError, TypeError):
+        raise Misuse(f"{name} is no recording of a session ('steptwin record' makes them)") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Where two recordings of the same session say something else. ``step`` counts from 1."""
+
+    step: int
+    line: str
+    what: str
+    one: Any
+    two: Any
+
+    def __str__(self) -> str:
+        return f"step {self.step}, {self.line}: {self.what}: {_said(self.one)} | {_said(self.two)}"
+
+
+def _said(value: Any) -> str:
+    return "nothing" if value is None else json.dumps(value, ensure_ascii=False)
+
+
+def differences(one: list[Step], two: list[Step], *, tolerance: float = 0.0, time_s: float | None = None) -> list[Difference]:
+    """What differs by more than ``tolerance``, and with ``time_s`` what came earlier or later than that.
+
+    Raises `Misuse` for recordings of different sessions.
+    """
+    if [step.line for step in one] != [step.line for step in two]:
+        raise Misuse("these are recordings of different sessions: their lines are not the same")
+    found = []
+    for number, (a, b) in enumerate(zip(one, two, strict=True), start=1):
+        flat_a, flat_b = dict(_flat(a.result)), dict(_flat(b.result))
+        for what in flat_a | flat_b:
+            first, second = flat_a.get(what), flat_b.get(what)
+            if not _alike(first, second, tolerance):
+                found.append(Difference(number, a.line, what, first, second))
+        if time_s is not None and abs(a.at_s - b.at_s) > time_s:
+            found.append(Difference(number, a.line, "time in s", a.at_s, b.at_s))
+    return found
+
+
+def _flat(result: dict[str, Any], head: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in result.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{head}{name} ")
+        else:
+            yield f"{head}{name}", value
+
+
+def _alike(one: Any, two: Any, tolerance: float) -> bool:
+    if isinstance(one, int | float) and isinstance(two, int | float) and not isinstance(one, bool):
+        return abs(one - two) <= tolerance
+    return one == two

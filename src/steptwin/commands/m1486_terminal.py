@@ -1,0 +1,300 @@
+"""Talking to M1486 chips as a person types: commands go out as they are, what comes back is put into words."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+from steptwin.drivers.place import Channel
+from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
+from steptwin.m1486.lines import INTERFACES
+from steptwin.m1486.ranges import out_of_range
+from steptwin.m1486.receiver import EMPTY, NO_ROOM, THREE_FREE
+from steptwin.m1486.registers import UPLOADS
+from steptwin.m1486.syntax import Command, parse_line
+from steptwin.m1486.variants import VARIANTS, Store, Variant
+from steptwin.machine import SECOND
+from steptwin.wire.line import SerialLine
+
+LOOK_S = 0.02
+HELD_UP_S = 2.0
+"""Longer than any step of the thread takes by itself."""
+QUIET_S = 0.1
+"""What a chip sends by itself comes at once, or through adapters that hold it back for 16 ms and more."""
+_ROOM = {
+    NO_ROOM: "no room in the input buffer: a character is lost",
+    EMPTY: "the input buffer is empty",
+    THREE_FREE: "three places are free in the input buffer",
+}
+_IMMEDIATE = ("K", "X")
+"""Commands that act when received, and need no EEPROM."""
+_UPLOAD = re.compile(rb"\s*[Uu]\s*(\d+)\s*")
+_SELECT = re.compile(r"[Xx]\s*([0-9A-Fa-fGg])")
+
+
+def command_of(text: str, variant: Variant | None) -> Command | None:
+    """The command somebody types, None for a comment alone. Raises `Misuse` for what the chip would drop as wrong data (M-11).
+
+    Where the type is not known, what some type takes is right.
+    """
+    line, found = parse_line(text)
+    command = line.command
+    if found or (command is None and line.comment is None):
+        raise Misuse(f"{text!r} is no command{f': {found[0].message}' if found else ''}")
+    if command is not None:
+        doubts = [out_of_range(command, one) for one in ([variant] if variant is not None else VARIANTS)]
+        if None not in doubts:
+            raise Misuse(f"{text!r}: {doubts[-1]}")
+    return command
+
+
+class ChipWords:
+    """What comes from a line in words, given what was typed. No I/O, no clock.
+
+    The bytes do not say what they are. With function 41 ON a line comes back before all else; then its end inverted, where it
+    took the last places of the input buffer, or 5EH for what found none; then bytes asked for by ``U``, in their order.
+    """
+
+    def __init__(self) -> None:
+        self._typed: list[bytes] = []
+        self._asked: deque[int] = deque()
+        self.refused = 0
+        """How many characters found no room so far."""
+
+    @property
+    def is_awaiting(self) -> bool:
+        """Whether an upload that was asked for has not come."""
+        return bool(self._asked)
+
+    def typed(self, line: str) -> None:
+        """A line was sent, without its CR."""
+        data = line.encode("latin-1")
+        self._typed.append(data + b"\r")
+        upload = _UPLOAD.fullmatch(data)
+        if upload is not None:
+            self._asked.append(int(upload[1]))
+
+    def heard(self, data: bytes) -> list[str]:
+        """All that came between two silences."""
+        told: list[str] = []
+        for line in self._typed:
+            data = self._answered(line, data, told)
+        self._typed.clear()
+        # More than was asked for: function 57 reports before what is uploaded.
+        reports = len(data) - len(self._asked)
+        for byte in data:
+            is_report = byte in _ROOM and reports > 0
+            reports -= is_report
+            told.append(self._room(byte) if is_report or not self._asked else self._upload(byte))
+        return told
+
+    def _answered(self, line: bytes, data: bytes, told: list[str]) -> bytes:
+        """What is left when the echo of a line and what was said about room are taken away."""
+        place = 0
+        notes: list[str] = []
+        echoed = refused = 0
+        for byte in line:
+            if data[place : place + 1] == bytes((byte,)):
+                place += 1
+                echoed += 1
+            answer = data[place] if place < len(data) else None
+            if answer == ~byte & 0xFF:
+                name = "CR" if byte == ord("\r") else repr(chr(byte))
+                notes.append(f"{answer:02X}H  {name} inverted: it took one of the last three places of the input buffer")
+            elif answer == NO_ROOM:
+                refused += 1
+                notes.append(f"5EH  {_ROOM[NO_ROOM]}")
+            elif notes:
+                break  # a buffer that is full stays so to the end of a line: it was something else
+            else:
+                continue
+            place += 1
+        else:
+            if notes or echoed == len(line):
+                told += notes
+                self.refused += refused
+                return data[place:]
+        return data
+
+    def _upload(self, byte: int) -> str:
+        number = self._asked.popleft()
+        name = UPLOADS.get(number, "reserved").partition(":")[0]
+        doubt = f" (or: {_ROOM[byte]})" if byte in _ROOM else ""
+        return f"{byte:02X}H  U{number} {name}: {_value(number, byte)}{doubt}"
+
+    def _room(self, byte: int) -> str:
+        self.refused += byte == NO_ROOM
+        what = _ROOM.get(byte) or (f"{byte}, {chr(byte)!r}" if 0x20 <= byte < 0x7F else str(byte))
+        return f"{byte:02X}H  {what}"
+
+
+def _value(number: int, byte: int) -> str:
+    match number:
+        case 14:
+            return f"ON {_on((*USER_FLAGS, CARRY), byte)}"
+        case 17 | 18 | 19:
+            return f"ON {_on(FUNCTIONS[8 * (number - 17) :], byte)}"
+        case 15:
+            return next((interface.title for interface in INTERFACES if interface.code == byte), str(byte))
+        case 20:
+            return next((variant.title for variant in VARIANTS if variant.type_letter == byte), str(byte))
+        case _:
+            return str(byte)
+
+
+def _on(numbers: range | tuple[int, ...], byte: int) -> str:
+    return " ".join(str(number) for bit, number in enumerate(numbers[:8]) if byte >> bit & 1) or "none"
+
+
+class ChipTerminal:
+    """A line somebody types on. ``tell`` is given what comes back in words, from a thread of its own.
+
+    ``variant``: an E type is given the time of its EEPROM for each command.
+    """
+
+    def __init__(
+        self,
+        channel: Channel,
+        baud: int,
+        variant: Variant | None,
+        tell: Callable[[str], object],
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock = clock
+        self._channel = channel
+        self._serial = SerialLine(baud)
+        self._quiet_s = QUIET_S + self._serial.duration(3) / SECOND
+        self._write_s = variant.write_ns / SECOND if variant is not None and variant.store is Store.EEPROM else 0.0
+        self._tell = tell
+        self._words = ChipWords()
+        self._changed = threading.Condition()
+        self._outgoing: deque[str] = deque()
+        self._unsettled = 0  # lines whose echo may be to come
+        self._sent = 0  # those of them that have gone out
+        self._heard = bytearray()
+        self._quiet_at = self._ready_at = 0.0
+        self._failure: LineFailure | None = None
+        self._dropped: LineFailure | None = None  # to be raised once
+        self._ends = False
+        self.selected = ""
+        """The chip chosen by the last ``X``; nothing where all listen."""
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def type(self, text: str) -> None:
+        """Send a line and its CR. Raises `Misuse` for what is no byte, and the `LineFailure` that has ended the line."""
+        try:
+            text.encode("latin-1")
+        except UnicodeEncodeError as error:
+            raise Misuse(f"{text!r}: {text[error.start]!r} is no character of one byte") from None
+        chosen = _SELECT.fullmatch(text.strip())
+        if chosen is not None:
+            self.selected = chosen[1].upper().replace("G", "")
+        with self._changed:
+            self._check()
+            self._unsettled += 1
+            self._outgoing.append(text)
+
+    def settle(self, timeout_s: float) -> int:
+        """Wait until what was typed has gone out, uploads asked for have come, and nothing comes any more.
+
+        Returns how many characters have found no room so far. Raises `LineFailure` when an upload does not come in time.
+        """
+        limit = self._clock() + timeout_s
+        with self._changed:
+            while self._unsettled or self._words.is_awaiting:
+                self._check()
+                if not self._unsettled and self._words.refused:
+                    break
+                if not self._changed.wait(max(limit - self._clock(), 0.0)) and self._clock() >= limit:
+                    raise LineFailure(
+                        f"no answer to U within {timeout_s:g} s: the chip moves, waits, runs a program or is not there"
+                    )
+            self._check()
+            return self._words.refused
+
+    def close(self) -> None:
+        self._ends = True
+        self._thread.join()
+        self._channel.close()
+
+    def _check(self) -> None:
+        dropped, self._dropped = self._dropped, None
+        if dropped is not None:
+            raise dropped
+        if self._failure is not None:
+            raise self._failure
+
+    # ------------------------------------------------------------------ the thread
+
+    def _run(self) -> None:
+        looked = self._clock()
+        try:
+            while not self._ends:
+                before, looked = looked, self._clock()
+                if looked - before > HELD_UP_S:
+                    self._drop_waiting(looked - before)
+                self._send()
+                data = self._channel.read(LOOK_S)
+                if data:
+                    self._heard += data
+                    self._quiet_at = self._clock() + self._quiet_s
+                elif (self._heard or self._sent) and self._clock() >= self._quiet_at:
+                    self._put_into_words()
+        except LineFailure as failure:
+            with self._changed:
+                self._failure = failure
+                self._changed.notify_all()
+
+    def _drop_waiting(self, seconds: float) -> None:
+        """The program was suspended: nothing is to move any more by what was typed before."""
+        with self._changed:
+            dropped = [line for line in self._outgoing if line.strip()[:1].upper() not in _IMMEDIATE]
+            if dropped:
+                self._outgoing = deque(line for line in self._outgoing if line not in dropped)
+                self._unsettled -= len(dropped)
+                self._dropped = LineFailure(
+                    f"{', '.join(dropped)}: not typed, because the program was suspended for {seconds:.0f} s"
+                )
+                self._changed.notify_all()
+
+    def _send(self) -> None:
+        with self._changed:
+            text = self._next()
+        if text is None:
+            return
+        data = (text + "\r").encode("latin-1")
+        self._words.typed(text)
+        self._channel.write(data)
+        self._sent += 1
+        now = self._clock()
+        self._quiet_at = now + self._serial.duration(len(data)) / SECOND + self._quiet_s
+        if text.strip().upper()[:1] not in _IMMEDIATE:
+            self._ready_at = now + self._write_s
+
+    def _next(self) -> str | None:
+        """K goes before what waits for an EEPROM, unless another chip is to be selected first. X needs no EEPROM either."""
+        waiting = self._outgoing
+        for place, line in enumerate(waiting):
+            kind = line.strip().upper()[:1]
+            if kind == "K" or (kind == "X" and place == 0):
+                del waiting[place]
+                return line
+            if kind == "X":
+                break
+        return waiting.popleft() if waiting and self._clock() >= self._ready_at else None
+
+    def _put_into_words(self) -> None:
+        told = self._words.heard(bytes(self._heard))
+        self._heard.clear()
+        for text in told:
+            self._tell(text)
+        with self._changed:
+            self._unsettled -= self._sent
+            self._sent = 0
+            self._changed.notify_all()

@@ -1,0 +1,245 @@
+"""`steptwin run MACHINE.toml` and `steptwin replay FILE`: a world in virtual time, and what happened in it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.files import session as sessions
+from steptwin.files.beginning import begin_world, set_faults
+from steptwin.files.export import axis_views, bar, write_trace
+from steptwin.files.export.progress import Progress
+from steptwin.files.timedinputs import TimedInput
+from steptwin.files.world import LONGEST_RUN_NS, World
+from steptwin.live.interrupts import FirstInterrupt
+from steptwin.machine import SECOND, Nanos
+from steptwin.words.records import describe, is_told
+from steptwin.world import script as do
+from steptwin.world.references import check_step
+
+USUAL_LIMIT_NS: Nanos = 60 * SECOND
+SESSION = "session.json"
+INTERRUPTED = "Ctrl-C"
+JSON_VERSION = 1
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldRun:
+    """What is to be run. ``until`` is a condition; ``limit`` ends the run where that does not come true.
+
+    Without ``limit`` it is a minute, and with ``until`` an hour.
+    """
+
+    world: Path
+    """A description, or a session to go on from."""
+    moment: Nanos | None = None
+    """That of the session; None: its end."""
+    seed: int | None = None
+    limit: Nanos | None = None
+    until: str | None = None
+    inputs: Sequence[TimedInput] = ()
+    faults: Sequence[str] = ()
+    trace: Path | None = None
+    session: Path | None = None
+    allow_outside: bool = False
+    """Files of the description may lie anywhere."""
+    strict: bool = False
+    """Whether what was waited for in vain counts as a failure."""
+    as_json: bool = False
+
+
+def run(options: WorldRun, say: Say, warn: Say) -> bool:
+    """Run a world and report what happened; whether all expectations held. ``warn`` is told what is doubtful in its files.
+
+    Raises `Misuse` for what cannot be run, and `KeyboardInterrupt` after one that Ctrl-C has ended, when everything is written.
+    """
+    keep_trace = options.trace is not None or not options.as_json
+    world = begin_world(
+        options.world,
+        warn,
+        moment=options.moment,
+        seed=options.seed,
+        keep_trace=keep_trace,
+        allow_outside=options.allow_outside,
+    )
+    began = world.now
+    known = Counter(record.machine for record in filter(is_told, world.trace))
+    _arrange(world, options)
+    usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
+    limit = options.limit if options.limit is not None else usual
+    wall = time.perf_counter()
+    with bar(f"running {world.spec.name}", began, began + limit) as progress:
+        reason = _run(world, options.until, limit, progress)
+    wall_s = time.perf_counter() - wall
+    written = _write(world, options)
+    session = sessions.session_of(world)
+    if options.session is not None:
+        sessions.save(session, options.session)
+        written.append(options.session)
+    in_vain = options.until if reason is None else None
+    outcome = Outcome(began, known, reason, in_vain, wall_s, session.digest, written)
+    report = _json if options.as_json else _lines
+    report(world, outcome, say)
+    if reason is INTERRUPTED:
+        raise KeyboardInterrupt
+    in_time = not world.overdue and in_vain is None
+    return not world.failures and (in_time or not options.strict)
+
+
+def _run(world: World, until: str | None, limit: Nanos, progress: Progress) -> str | None:
+    """Run on; gives why it ended before its time. What has been done by the first Ctrl-C is kept."""
+
+    def watch(now: Nanos) -> None:
+        progress(now)
+        if interrupt.came:
+            raise _Interrupted
+
+    with FirstInterrupt() as interrupt:
+        try:
+            return world.run(until=until, for_=limit / SECOND, watch=watch)
+        except _Interrupted:
+            return INTERRUPTED
+
+
+class _Interrupted(Exception):
+    """Somebody wants a run to end."""
+
+
+class Outcome(NamedTuple):
+    """How a run ended; ``reason`` is why before its time, ``in_vain`` what did not come true in its time.
+
+    ``known``: how many of the records that are told each machine had when it ``began``.
+    """
+
+    began: Nanos
+    known: Counter[str]
+    reason: str | None
+    in_vain: str | None
+    wall_s: float
+    digest: str
+    written: list[Path]
+
+
+def _arrange(world: World, options: WorldRun) -> None:
+    """Inputs and faults of the command line."""
+    set_faults(world, options.faults)
+    for given in options.inputs:
+        machine, dot, pin = given.pin.rpartition(".")
+        names = {name.upper(): name for name in world.machines}
+        if not dot and len(names) == 1:
+            machine = next(iter(names))
+        if machine.upper() not in names:
+            raise Misuse(f"--input {given.pin}: expected MACHINE.PIN; machines are {', '.join(world.machines)}")
+        name = names[machine.upper()]
+        step = do.Set(((name, pin.upper(), given.value),))
+        try:
+            check_step(world, step)
+            world.at(given.time / SECOND, step, name=f"--input {given.pin}")
+        except Misuse as error:
+            raise Misuse(f"--input {name}.{pin}: {error}") from None
+    if options.until is not None:
+        world.condition(options.until)
+
+
+def _write(world: World, options: WorldRun) -> list[Path]:
+    if options.trace is None:
+        return []
+    written = _write_trace(world, options.trace)
+    if options.trace.is_dir():
+        where = options.trace / SESSION
+        sessions.save(sessions.session_of(world), where)
+        written.append(where)
+    return written
+
+
+def _write_trace(world: World, where: Path) -> list[Path]:
+    views = axis_views(world.machines, world.axes)
+    return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now, watch=bar)
+
+
+# ---------------------------------------------------------------------- output
+
+
+def _lines(world: World, outcome: Outcome, say: Say) -> None:
+    for record in filter(is_told, world.trace):
+        if outcome.known[record.machine]:
+            outcome.known[record.machine] -= 1
+        else:
+            say(describe(record))
+    say("")
+    for name, axis in world.axis.items():
+        lost = f"   {axis.lost} pulses lost" if axis.lost else ""
+        say(f"{name:<10} {axis.position:12.4f} {axis.unit}{lost}")
+    for name, view in world.mic488.items():
+        free = [n for n in view.axis if not any(fitted.spec.drive == (name, f"M{n}") for fitted in world.axes.values())]
+        for number in free:
+            axis_view = view.axis[number]
+            if axis_view.position or axis_view.enabled:
+                say(f"{name + f'.M{number}':<10} {axis_view.position:12.4f} {axis_view.unit}")
+    for name, chip in world.m1486.items():
+        say(f"{name:<10} {chip.position:12d} minimum microsteps")
+    ended = "" if outcome.reason is None else f", ended by: {outcome.reason}"
+    begun = f", from {outcome.began / SECOND:g} s on" if outcome.began else ""
+    say(f"{world.time:g} s of {world.spec.name}{begun} in {outcome.wall_s:.2f} s{ended}")
+    for failure in world.failures:
+        say(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
+    if world.failures.more:
+        say(f"{world.failures.more} more expectations failed")
+    for late in world.overdue:
+        say(f"warning: at {late.time / SECOND:g} s {late.value}")
+    if world.overdue.more:
+        say(f"warning: {world.overdue.more} more of these")
+    if outcome.in_vain is not None:
+        say(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
+    for path in outcome.written:
+        say(f"wrote {path}")
+    say(f"digest {outcome.digest}")
+
+
+def _json(world: World, outcome: Outcome, say: Say) -> None:
+    data: dict[str, Any] = {
+        "version": JSON_VERSION,
+        "world": world.spec.name,
+        "from_s": outcome.began / SECOND,
+        "time_s": world.time,
+        "wall_s": round(outcome.wall_s, 3),
+        "ended_by": outcome.reason,
+        "in_vain": outcome.in_vain,
+        "failures": [{"time_s": f.time / SECOND, "condition": f.value} for f in world.failures],
+        "overdue": [{"time_s": late.time / SECOND, "what": late.value} for late in world.overdue],
+        "axes": {
+            name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}
+            for name, axis in world.axis.items()
+        },
+        "controllers": {
+            name: {"status": view.status, "positions": [axis.position for axis in view.axis.values()]}
+            for name, view in world.mic488.items()
+        },
+        "chips": {name: {"position": chip.position, "counter": chip.counter} for name, chip in world.m1486.items()},
+        "files": [str(path) for path in outcome.written],
+        "digest": outcome.digest,
+    }
+    say(json.dumps(data, ensure_ascii=False, indent=2))
+
+
+def replay(path: Path, trace: Path | None, say: Say, warn: Say) -> bool:
+    """Run a session again; whether the same happened. Raises `Misuse` for what is no session."""
+    session = sessions.load(path)
+    world = session.replay()
+    digest = world.trace.digest()
+    if trace is not None:
+        for written in _write_trace(world, trace):
+            say(f"wrote {written}")
+    if digest == session.digest:
+        say(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")
+        return True
+    warn(f"{path}: another thing happened: digest {digest}, the session has {session.digest} (steptwin {session.version})")
+    return False

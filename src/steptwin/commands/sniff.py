@@ -1,0 +1,270 @@
+"""A line between two others in words: listening on it, or standing in it and passing everything on."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol, cast
+
+from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.listening import RtuListener, TcpListener
+from steptwin.drivers.place import Place
+from steptwin.errors import LineFailure, Misuse
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.links import Port
+from steptwin.live.pty import PtyLink
+from steptwin.live.tcp import Clients, TcpLink
+from steptwin.m1486.receiver import CR
+from steptwin.m1486.registers import UPLOADS
+from steptwin.m1486.variants import variant
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.mic488.registers import register_map
+from steptwin.wire.slave import Direction
+from steptwin.words.characters import REPORTS, CharacterLog, LineSplitter
+from steptwin.words.frames import FrameLine
+from steptwin.world.addresses import Address
+from steptwin.world.kernel import Kernel
+
+Sink = Callable[[FrameLine], None]
+QUIET_NS: Nanos = 100 * MILLISECOND
+"""After this silence of the chips nothing belongs to what they have said before."""
+MOST_TYPED = 4096
+"""Characters whose echo is waited for: far more than an input buffer holds."""
+ARROWS = {Direction.IN: "→", Direction.OUT: "←"}
+
+
+class Decoder(Protocol):
+    """Puts bytes into words. ``direction`` is None where both come from one wire."""
+
+    def heard(self, data: bytes, now: Nanos, direction: Direction | None) -> None: ...
+    def deadline(self) -> Nanos | None: ...
+    def expire(self, now: Nanos) -> None: ...
+
+
+class ModbusDecoder:
+    """Modbus RTU or TCP, in the words of a MIC488."""
+
+    def __init__(self, sink: Sink, firmware: str, *, tcp: bool) -> None:
+        words = FrameWords(register_map(firmware), tcp=tcp)
+        words.sinks.append(lambda h: sink(FrameLine(h.time, "", h.direction or Direction.OUT, h.raw, h.meaning)))
+        self._tcp = TcpListener(words) if tcp else None
+        self._rtu = RtuListener(words)
+
+    def heard(self, data: bytes, now: Nanos, direction: Direction | None) -> None:
+        if self._tcp is not None and direction is not None:
+            self._tcp.heard(data, now, direction)
+        else:
+            self._rtu.heard(data, now)
+
+    def deadline(self) -> Nanos | None:
+        return self._rtu.deadline()
+
+    def expire(self, now: Nanos) -> None:
+        self._rtu.expire(now)
+
+
+class M1486Decoder:
+    """Commands and answers of M1486 chips. On one wire everything is taken for commands.
+
+    The bytes of the chips do not say what they are. What repeats the characters typed, in their order and to the CR, is their
+    echo (function 41); else what comes after a command U is taken for what it uploads.
+    """
+
+    def __init__(self, sink: Sink, kind: str) -> None:
+        self._sink = sink
+        self._log = CharacterLog(variant(kind))
+        self._log.sinks.append(self._told)
+        self._lines = LineSplitter(self._log, "")
+        self._typed: deque[int] = deque(maxlen=MOST_TYPED)  # whose echo may come
+        self._count = 0  # of all characters typed
+        self._uploads: deque[tuple[int, int]] = deque()  # numbers, with the count of characters up to their CR
+        self._repeated = b""  # what came and repeats what was typed
+        self._repeated_ns: Nanos = 0
+
+    def _told(self, line: FrameLine) -> None:
+        upload = re.match(rb"\s*[Uu]\s*(\d+)\s*\r", line.raw) if line.direction is Direction.IN else None
+        if upload is not None:
+            self._uploads.append((int(upload[1]), self._count))
+        self._sink(line)
+
+    def heard(self, data: bytes, now: Nanos, direction: Direction | None) -> None:
+        for byte in data:
+            if direction is Direction.OUT:
+                self._came(byte, now)
+                continue
+            if direction is Direction.IN:
+                self._typed.append(byte)
+                self._count += 1
+            self._lines.take(bytes((byte,)), now)
+
+    def _came(self, byte: int, now: Nanos) -> None:
+        if not self._uploads and byte in self._typed:
+            while byte != self._typed[0]:
+                self._typed.popleft()  # typed before function 41 was ON
+        if self._typed and byte == self._typed[0]:
+            self._typed.popleft()
+            self._repeated += bytes((byte,))
+            self._repeated_ns = now
+            if byte == CR:
+                self._is_echo()
+            return
+        self._settle()
+        if self._uploads:
+            self._is_upload(byte, now)
+        elif self._typed and byte not in REPORTS and byte < 0x80:
+            typed = chr(self._typed.popleft())
+            meaning = f"{chr(byte)!r} where {typed!r} was typed: a garbled echo, or that of several chips at once"
+            self._sink(FrameLine(now, "", Direction.OUT, bytes((byte,)), meaning))
+        else:
+            self._log.sent(now, byte)
+
+    def _settle(self) -> None:
+        """Nothing more repeats what was typed."""
+        if self._uploads:
+            for byte in self._repeated:
+                self._is_upload(byte, self._repeated_ns)
+            self._repeated = b""
+        elif self._repeated:
+            self._is_echo()
+
+    def _is_echo(self) -> None:
+        echo, self._repeated = self._repeated, b""
+        self._sink(FrameLine(self._repeated_ns, "", Direction.OUT, echo, f"echo of {echo.decode('latin-1')!r}"))
+
+    def _is_upload(self, byte: int, now: Nanos) -> None:
+        if not self._uploads:
+            self._log.sent(now, byte)
+            return
+        number, count = self._uploads.popleft()
+        while len(self._typed) > self._count - count:
+            self._typed.popleft()  # an echo would have come before
+        meaning = f"U{number} {UPLOADS.get(number, 'reserved')} = {byte}"
+        self._sink(FrameLine(now, "", Direction.OUT, bytes((byte,)), meaning))
+
+    def deadline(self) -> Nanos | None:
+        return self._repeated_ns + QUIET_NS if self._repeated else None
+
+    def expire(self, now: Nanos) -> None:
+        if self._repeated and now >= self._repeated_ns + QUIET_NS:
+            self._settle()
+
+
+class _Between:
+    """A port that passes on what its client sends, and gives him what the device says. See `TalkingPort`."""
+
+    broken: str | None = None
+
+    def __init__(self, tap: Tap) -> None:
+        self._tap = tap
+        self._waiting: deque[tuple[Nanos, bytes]] = deque()
+        self.on_output: Callable[[], None] | None = None
+        tap.clients.append(self)
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        self._tap.pass_on(data)
+        return b""
+
+    def say(self, data: bytes, now: Nanos) -> None:
+        self._waiting.append((now, data))
+        if self.on_output is not None:
+            self.on_output()
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        said = list(self._waiting)
+        self._waiting.clear()
+        return said
+
+    def deadline(self) -> Nanos | None:
+        return None
+
+    def close(self) -> None:
+        if self in self._tap.clients:
+            self._tap.clients.remove(self)
+
+
+class Tap(asyncio.Protocol):
+    """The connection to the device; programs that want to talk to it come as `clients`."""
+
+    def __init__(self, decoder: Decoder, *, stands_between: bool) -> None:
+        self.clients: list[_Between] = []
+        self.ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        self._decoder = decoder
+        self._stands_between = stands_between
+        self._begin = time.monotonic_ns()
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)  # serialx' is no subclass
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if not self.ended.done():
+            self.ended.set_result(str(exc) if exc else "the other end closed it")
+
+    def data_received(self, data: bytes) -> None:
+        now = self._now()
+        for client in self.clients:
+            client.say(data, now)
+        self._heard(data, Direction.OUT if self._stands_between else None)
+
+    def pass_on(self, data: bytes) -> None:
+        if self._transport is not None:
+            self._transport.write(data)
+        self._heard(data, Direction.IN)
+
+    def _now(self) -> Nanos:
+        return time.monotonic_ns() - self._begin
+
+    def _heard(self, data: bytes, direction: Direction | None) -> None:
+        decoder = self._decoder
+        decoder.heard(data, self._now(), direction)
+        due = decoder.deadline()
+        if due is not None:
+            delay_s = max(due - self._now(), 0) / SECOND
+            asyncio.get_running_loop().call_later(delay_s, lambda: decoder.expire(self._now()))
+
+
+async def sniff(
+    place: Place,
+    decoder: Decoder,
+    *,
+    listen: Address | None = None,
+    pty: Path | None = None,
+    ready: Callable[[str], object] = str,
+) -> None:
+    """Put a line into words until it is gone, which is raised as `LineFailure`.
+
+    ``listen`` or ``pty``: where programs connect that then talk to the device through this. ``ready`` is told where.
+    """
+    if place.framed and listen is None:
+        raise Misuse("a Modbus TCP connection cannot be listened to: stand in it, --listen HOST:PORT")
+    tap = Tap(decoder, stands_between=listen is not None or pty is not None)
+    transport = await place.endpoint.connect(lambda: tap)
+    cell = Cell(Kernel(), Clock())
+    links: list[TcpLink | PtyLink] = []
+
+    def port() -> Port:
+        return _Between(tap)
+
+    try:
+        if listen is not None:
+            tcp = TcpLink(cell, listen, port, Clients())
+            links.append(tcp)
+            ready(str(await tcp.open()))
+        if pty is not None:
+            terminal = PtyLink(cell, pty, port)
+            links.append(terminal)
+            ready(str(await terminal.open()))
+        if not links:
+            ready(f"listening on {place.endpoint}")
+        why = await tap.ended
+        raise LineFailure(f"{place.endpoint} is gone: {why}")
+    finally:
+        for link in links:
+            await link.close()
+        transport.abort()
+        cell.close()

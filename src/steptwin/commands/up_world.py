@@ -1,0 +1,196 @@
+"""`steptwin up MACHINE.toml`: a world in real time, whose lines other programs can talk on."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import count
+from math import inf
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.files import session as sessions
+from steptwin.files.beginning import begin_world, check_session_target, set_faults
+from steptwin.files.export import axis_views, check_target, write_trace
+from steptwin.files.world import World
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.output import Output
+from steptwin.live.pace import Pace, read_speed
+from steptwin.live.server import Server, clear_ready_file
+from steptwin.live.serving import check_name
+from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world_control import WorldControl
+from steptwin.machine import Nanos
+from steptwin.words.records import describe, is_told
+from steptwin.world.actions import Leave
+from steptwin.world.addresses import check_addresses, parse_address
+from steptwin.world.lines import SCRIPTS
+from steptwin.world.spec import LineSpec
+from steptwin.world.trace import Record
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UpOptions:
+    """The command's options as given; see ``steptwin up --help``."""
+
+    world: Path
+    """A description, or a session to go on from."""
+    moment: Nanos | None = None
+    """That of the session; None: its end."""
+    seed: int | None = None
+    speed: str = "1"
+    name: str | None = None
+    session: Path | None = None
+    trace: Path | None = None
+    faults: Sequence[str] = ()
+    ready_file: Path | None = None
+    strict: bool = False
+    """Whether what was waited for in vain counts as a failure."""
+    listen_any: bool = False
+    allow_outside: bool = False
+    """Files of the description may lie anywhere."""
+
+
+def up(options: UpOptions) -> bool:
+    """Run a world until SIGINT, SIGTERM or SIGHUP, or until a script stops it; whether all expectations held.
+
+    Raises `Misuse` or another `SteptwinError` with a text for the user.
+    """
+    name = options.name or options.world.stem
+    check_name(name)
+    speed = read_speed(options.speed, least=0)
+    world = begin_world(
+        options.world,
+        lambda text: sys.stderr.write(f"{text}\n"),
+        moment=options.moment,
+        seed=options.seed,
+        keep_trace=options.trace is not None,
+        keep_inputs=options.session is not None,
+        allow_outside=options.allow_outside,
+    )
+    _send_away(world)
+    set_faults(world, options.faults)
+    outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
+    if speed == inf and outside:
+        raise Misuse(f"--speed max: line {outside[0].name!r} has clients outside, which need a clock; use 'steptwin run'")
+    check_addresses((address for line in world.spec.lines for address in (line.tcp, line.rtu_tcp)), listen_any=options.listen_any)
+    if options.trace is not None:
+        check_target(options.trace)
+    if options.session is not None:
+        check_session_target(options.session)
+    if options.ready_file is not None:
+        clear_ready_file(options.ready_file)
+    asyncio.run(_serve(options, world, speed, name, has_clients=bool(outside)))
+    return not world.failures and not (options.strict and world.overdue)
+
+
+def _send_away(world: World) -> None:
+    """Who was there in the session is not there now."""
+    for line in world.lines.values():
+        for place in [place for place in line.places if place != SCRIPTS]:
+            world.outside(Leave(line.name, place))
+
+
+async def _serve(options: UpOptions, world: World, speed: float, name: str, *, has_clients: bool) -> None:
+    with ExitStack() as stack:
+        output = Output(sys.stdout)
+        stack.callback(output.close)
+        live = LiveWorld(world, output.line)
+        server = Server(Cell(live, Clock(begin=world.now)), output.line)
+        pace = Pace(live, server.cell, output.line, has_clients=has_clients)
+        live.on_stop = server.end
+        begun = False
+        try:
+            await _open(server, live, pace, options, name)
+            begun = True
+            _greet(output, server, world)
+            world.trace.watchers.append(lambda record: _tell(output, record))
+            pace.begin(speed)
+            await server.until_ended()
+            server.cell.enter()
+        finally:
+            pace.close()
+            await server.close()
+            if begun:
+                _keep(options, live, output)
+
+
+def _greet(output: Output, server: Server, world: World) -> None:
+    output.line(f"{world.spec.name}: {', '.join(world.machines)}")
+    for end_point in server.end_points:
+        output.line(f"  {end_point.protocol:<24} {end_point.place}")
+    output.line("Ctrl-C ends")
+
+
+def _tell(output: Output, record: Record) -> None:
+    if is_told(record):
+        output.line(describe(record))
+
+
+def _keep(options: UpOptions, live: LiveWorld, output: Output) -> None:
+    """Write what was asked for when it is over. The session first: a trace can be made from it. Raises `Misuse`."""
+    world = live.world
+    world.advance(world.now)
+    world.settle_all()
+    failures: list[str] = []
+    for where, write in ((options.session, _write_session), (options.trace, _write_trace)):
+        if where is not None:
+            try:
+                for path in write(where, live):
+                    output.line(f"wrote {path}")
+            except Misuse as error:
+                failures.append(str(error))
+    ended = "" if world.stopped is None else f", ended by: {world.stopped}"
+    inputs = f", {len(live.session().inputs)} inputs" if options.session is not None else ""
+    output.line(f"{world.time:.3f} s{inputs}{ended}, digest {world.trace.digest()}")
+    if failures:
+        raise Misuse("\n".join(failures))
+
+
+def _write_session(where: Path, live: LiveWorld) -> list[Path]:
+    sessions.save(live.session(), where)
+    return [where]
+
+
+def _write_trace(where: Path, live: LiveWorld) -> list[Path]:
+    world = live.world
+    views = axis_views(world.machines, world.axes)
+    return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now)
+
+
+# ---------------------------------------------------------------------- links
+
+
+async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, name: str) -> None:
+    await server.open_control(name, {**WorldControl(server.cell, live).handlers(), **pace.handlers()})
+    for line in live.world.spec.lines:
+        await _open_line(server, live, line, options)
+    if options.ready_file is not None:
+        server.write_ready_file(options.ready_file, name)
+
+
+async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: UpOptions) -> None:
+    number = count(1)
+    serial_kind = "rtu" if line.kind == "modbus" else "raw"
+    what = f"Modbus RTU, {line.name}" if line.kind == "modbus" else f"M1486 line, {line.name}"
+
+    def maker(link: str, kind: str, *, several: bool) -> Callable[[], PlacePort]:
+        return lambda: PlacePort(live, line.name, f"{link}-{next(number)}" if several else link, kind)
+
+    if line.pty is not None:
+        await server.open_pty(Path(line.pty), what, maker("pty", serial_kind, several=False))
+    if line.serial is not None:
+        baud = line.baud or 38400
+        await server.open_serial(line.serial, baud, what, maker("serial", serial_kind, several=False))
+    if line.tcp is not None:
+        address = parse_address(line.tcp, listen_any=options.listen_any)
+        kind = "tcp" if line.kind == "modbus" else "raw"
+        protocol = f"Modbus TCP, {line.name}" if line.kind == "modbus" else what
+        await server.open_tcp("tcp", address, protocol, maker("tcp", kind, several=True))
+    if line.rtu_tcp is not None:
+        address = parse_address(line.rtu_tcp, listen_any=options.listen_any)
+        await server.open_tcp("rtu-tcp", address, f"RTU over TCP, {line.name}", maker("rtu", "rtu", several=True))

@@ -1,0 +1,53 @@
+"""Ordinary calls made of a driver's coroutines.
+
+On a `steptwin.drivers.threads.ThreadLine` a coroutine never suspends, so one step runs it to its end. The blocking classes hold a
+driver and name its methods; nothing is said twice.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Coroutine
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
+
+P = ParamSpec("P")
+R = TypeVar("R")
+R_co = TypeVar("R_co", covariant=True)
+
+
+def finish(coroutine: Coroutine[Any, Any, R]) -> R:
+    """The result of a coroutine that never suspends."""
+    try:
+        coroutine.send(None)
+    except StopIteration as done:
+        return done.value
+    coroutine.close()
+    raise RuntimeError("this line belongs to an event loop: use the asynchronous driver")
+
+
+class Method(Protocol[P, R_co]):
+    """A method as type checkers see it."""
+
+    def __get__(self, instance: Any, owner: Any = None) -> Callable[P, R_co]: ...
+
+
+def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, R]]) -> Method[P, R]:
+    """The method of a blocking class that does what ``method`` does for its ``_driver``."""
+
+    @functools.wraps(method)
+    def call(self: Any, *args: P.args, **kwargs: P.kwargs) -> R:
+        return finish(method(self._driver, *args, **kwargs))
+
+    return cast("Method[P, R]", call)
+
+
+class Blocking:
+    """Base of the blocking classes."""
+
+    __slots__ = ("_driver",)
+
+    def __init__(self, driver: Any) -> None:
+        self._driver = driver
+
+    def __repr__(self) -> str:
+        return repr(self._driver).replace("Async", "", 1)

@@ -1,0 +1,420 @@
+"""One line, one exchange at a time: who is next, what is sent, what counts as its answer, when to give up. No I/O, no clock.
+
+A shell (`steptwin.drivers.threads`, `steptwin.drivers.tasks`) has the bytes and the time. It calls `step` whenever `deadline` has
+come or something was submitted, sends what `step` returns, calls `written`, and hands what it receives to `receive`.
+
+The order of those who wait: an urgent job (a stop) is the next on the line whatever waits. Otherwise first come, first served;
+a device that was asked just now is given its pause, and jobs for other devices may go first meanwhile. Nothing is sent while
+an exchange is going on.
+
+What is said on a line is the affair of its `Discipline`; nothing here knows Modbus.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Hashable
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+from steptwin.drivers.permission import Permission
+from steptwin.errors import LineFailure, Refusal, SteptwinError
+from steptwin.machine import SECOND, Nanos
+
+
+class Request(Protocol):
+    """What is asked. Its text says so to people: ``unit 1: read M1_POS_ACT``."""
+
+    @property
+    def device(self) -> Hashable:
+        """Whom it is for: each device on a line has its own pace."""
+        ...
+
+    @property
+    def changes(self) -> bool:
+        """Whether the device does more than answer, so that after a lost answer nobody knows whether it did."""
+        ...
+
+
+Q = TypeVar("Q", bound=Request)
+A = TypeVar("A")
+Q_contra = TypeVar("Q_contra", bound=Request, contravariant=True)
+A_co = TypeVar("A_co", covariant=True)
+
+
+class More(NamedTuple):
+    """The exchange goes on: this is to be sent next.
+
+    ``may_wait``: an urgent job may go first, and then the exchange is begun anew.
+    """
+
+    data: bytes
+    may_wait: bool
+
+
+class Discipline(Protocol[Q_contra, A_co]):
+    """What is said on a line: how a request becomes bytes, what counts as its answer, how to come back in step."""
+
+    @property
+    def free_ns(self) -> Nanos:
+        """Nothing may be sent before."""
+        ...
+
+    @property
+    def wary(self) -> bool:
+        """Whether an answer may still come that nobody waits for: what came while nobody listened is to be thrown away first."""
+        ...
+
+    def start(self, request: Q_contra, now: Nanos, *, urgent: bool) -> bytes:
+        """Begin an exchange: what is to be sent."""
+        ...
+
+    def receive(self, data: bytes, now: Nanos) -> A_co | More | None:
+        """Bytes that came during the exchange: its answer, what to send next, or None while more is needed.
+
+        Raises `Refusal` when the peer refused, `LineLost` when the connection has become useless, and another `LineFailure`
+        when the exchange has failed.
+        """
+        ...
+
+    def allowance_ns(self, request: Q_contra) -> Nanos:
+        """Time that request and answer take on the wire, before which no answer can be missed."""
+        ...
+
+    def abandon(self, now: Nanos) -> bytes:
+        """Nobody waits for the answer any more. What was heard of it."""
+        ...
+
+    def stray(self, data: bytes, now: Nanos) -> None:
+        """Bytes that came while no exchange was going on."""
+        ...
+
+    def reset(self) -> None:
+        """The connection is new: nothing said before can arrive on it."""
+        ...
+
+
+class NoAnswer(LineFailure):
+    """Nobody answered, or not understandably, as often as was allowed.
+
+    ``uncertain``: the device may have carried the request out nevertheless.
+    """
+
+    def __init__(self, place: str, request: Request, attempts: int, timeout_ns: Nanos, heard: bytes) -> None:
+        self.attempts = attempts
+        self.heard = heard
+        self.uncertain = request.changes
+        tries = "" if attempts == 1 else f", tried {attempts} times"
+        what = f"only {heard.hex(' ')} was received, which is no answer" if heard else "nothing was received"
+        doubt = "; it is not known whether the device has carried it out" if self.uncertain else ""
+        super().__init__(f"{place}: no answer to '{request}' within {timeout_ns / SECOND:g} s{tries}; {what}{doubt}")
+
+
+class LineLost(LineFailure):
+    """The port or the connection is gone, or could not be opened. ``uncertain`` as of `NoAnswer`."""
+
+    uncertain = False
+
+
+class Overtaken(Refusal):
+    """A motion was not begun because a stop of its axis was given meanwhile."""
+
+    def __init__(self, request: object, attempts: int) -> None:
+        sent = " again" if attempts else ""
+        super().__init__(f"'{request}' was not sent{sent}: a stop was given meanwhile")
+
+
+class TooLate(Refusal):
+    """Something was not sent: too much time had passed since it was asked for, as when the program was suspended."""
+
+    def __init__(self, request: object, patience_ns: Nanos) -> None:
+        super().__init__(
+            f"'{request}' was not sent: it was asked for more than {patience_ns / SECOND:g} s ago; the program was suspended, or "
+            "the line was busy. Ask for it again"
+        )
+
+
+class SentLate(LineFailure):
+    """Something was sent too long after it was asked for: the program was suspended while it was sent."""
+
+    uncertain = True
+
+    def __init__(self, request: object, patience_ns: Nanos) -> None:
+        super().__init__(
+            f"'{request}' was sent more than {patience_ns / SECOND:g} s after it was asked for, because the program was "
+            "suspended at that moment; a motion that began by it was stopped"
+        )
+
+
+class Job(Generic[Q, A]):
+    """An exchange that is waited for.
+
+    ``most``: how often it may be sent; more than once only if repeating it cannot move anything twice. ``permission`` is checked
+    before anything of it is sent. ``tell`` is called when it is done.
+    """
+
+    __slots__ = (
+        "_answer", "_error", "attempts", "done", "is_late", "missed", "most", "permission", "request", "tell", "timeout_ns",
+        "urgent",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        request: Q,
+        timeout_ns: Nanos,
+        *,
+        most: int = 1,
+        urgent: bool = False,
+        permission: Permission | None = None,
+    ) -> None:
+        self.request = request
+        self.timeout_ns = timeout_ns
+        self.most = most
+        self.urgent = urgent
+        self.permission = permission
+        self.attempts = 0
+        """How often it has been sent in vain."""
+        self.missed: LineFailure | None = None
+        """Why the last attempt was in vain."""
+        self.is_late = False
+        """Whether it was sent although its permission had expired: the program was suspended between check and sending."""
+        self.done = False
+        self.tell: Callable[[], object] | None = None
+        self._answer: A | None = None
+        self._error: SteptwinError | None = None
+
+    def result(self) -> A:
+        """The answer of a job that is done, or its error raised."""
+        if self._error is not None:
+            raise self._error
+        return self._answer  # type: ignore[return-value]
+
+    def refusal(self) -> SteptwinError | None:
+        """Why nothing of it may be sent now; None while it may."""
+        permission = self.permission
+        if permission is None:
+            return None
+        if permission.is_stopped():
+            return Overtaken(self.request, self.attempts)
+        if permission.has_expired():
+            return self.missed or TooLate(self.request, permission.patience_ns)
+        return None
+
+    def succeed(self, answer: A) -> None:
+        if self.is_late and self.permission is not None:
+            self.fail(SentLate(self.request, self.permission.patience_ns))
+            return
+        self._answer = answer
+        self.done = True
+        if self.tell is not None:
+            self.tell()
+
+    def fail(self, error: SteptwinError) -> None:
+        self._error = error
+        self.done = True
+        if self.tell is not None:
+            self.tell()
+
+
+class Exchanger(Generic[Q, A]):
+    """The jobs of one line. ``interval_ns`` is the least time between two frames to the same device."""
+
+    __slots__ = (
+        "_current",
+        "_deadline",
+        "_due",
+        "_interval_ns",
+        "_more",
+        "_next",
+        "_urgent",
+        "_waiting",
+        "discipline",
+        "place",
+    )
+
+    def __init__(self, discipline: Discipline[Q, A], place: str, interval_ns: Nanos = 0) -> None:
+        self.discipline = discipline
+        self.place = place
+        self._interval_ns = interval_ns
+        self._urgent: deque[Job[Q, A]] = deque()
+        self._waiting: deque[Job[Q, A]] = deque()
+        self._current: Job[Q, A] | None = None
+        self._more: More | None = None  # what the current exchange has still to send
+        self._deadline: Nanos = 0  # of the current exchange
+        self._due: Nanos | None = None  # when the next one may begin
+        self._next: dict[Hashable, Nanos] = {}  # when a device may be asked again
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether an exchange is going on."""
+        return self._current is not None
+
+    @property
+    def busy(self) -> bool:
+        """Whether there is anything to be done."""
+        return self._current is not None or bool(self._urgent) or bool(self._waiting)
+
+    def deadline(self) -> Nanos | None:
+        """When `step` has something to do if nothing else happens."""
+        return self._deadline if self._current is not None else self._due
+
+    # ------------------------------------------------------------------ those who wait
+
+    def submit(self, job: Job[Q, A]) -> None:
+        (self._urgent if job.urgent else self._waiting).append(job)
+
+    def withdraw(self, job: Job[Q, A]) -> None:
+        """Whoever wanted it is gone. It is not sent any more; what is on the line runs to its end."""
+        job.tell = None
+        job.done = True
+
+    def fail_all(self, error: SteptwinError) -> None:
+        """The line cannot be used: all who wait are told."""
+        jobs = [*self._urgent, *self._waiting]
+        self._urgent.clear()
+        self._waiting.clear()
+        self._due = None
+        for job in jobs:
+            if not job.done:
+                job.fail(error)
+
+    # ------------------------------------------------------------------ time
+
+    def step(self, now: Nanos) -> bytes:
+        """What is to be sent at ``now``; nothing while an answer is awaited or nobody waits."""
+        current = self._current
+        if current is not None:
+            if now < self._deadline:
+                return b""
+            if self._more is not None:
+                return self._go_on(current, now)
+            heard = self.discipline.abandon(now)
+            self._current = None
+            self._missed(current, NoAnswer(self.place, current.request, current.attempts + 1, current.timeout_ns, heard))
+        return self._begin(now)
+
+    def _begin(self, now: Nanos) -> bytes:
+        self._due = None
+        queue = self._urgent
+        if not queue:
+            queue = self._waiting
+            if not queue:
+                return b""
+        job = self._choose(queue, now)
+        if job is None:
+            return b""
+        request = job.request
+        data = self.discipline.start(request, now, urgent=job.urgent)
+        self._current = job
+        self._sent(job, now)
+        return data
+
+    def _choose(self, queue: deque[Job[Q, A]], now: Nanos) -> Job[Q, A] | None:
+        """Take the next job out of ``queue``, or find out when there will be one."""
+        due: Nanos | None = None
+        free = self.discipline.free_ns
+        for job in list(queue) if len(queue) > 1 else (queue[0],):
+            if job.done:
+                queue.remove(job)
+                continue
+            refusal = job.refusal()
+            if refusal is not None:
+                queue.remove(job)
+                job.fail(refusal)
+                continue
+            begin = self._next.get(job.request.device, 0)
+            if begin < free:
+                begin = free
+            if begin <= now:
+                queue.remove(job)
+                return job
+            if due is None or begin < due:
+                due = begin
+            if job.urgent:
+                break
+        if due is None and (self._urgent or self._waiting):
+            due = now  # jobs were refused: others may be behind them
+        self._due = due
+        return None
+
+    def _go_on(self, job: Job[Q, A], now: Nanos) -> bytes:
+        more = self._more
+        self._more = None
+        refusal = job.refusal()
+        if refusal is not None or (job.done and job.permission is not None):
+            self.discipline.abandon(now)
+            self._current = None
+            if refusal is not None and not job.done:
+                job.fail(refusal)
+            return self._begin(now)
+        self._sent(job, now)
+        return b"" if more is None else more.data
+
+    def written(self) -> None:
+        """The bytes `step` has returned are on their way. The program may have been suspended since."""
+        job = self._current
+        if job is not None and job.permission is not None and job.permission.has_expired():
+            job.is_late = True
+
+    def _sent(self, job: Job[Q, A], now: Nanos) -> None:
+        self._deadline = now + job.timeout_ns + self.discipline.allowance_ns(job.request)
+        if self._interval_ns:
+            self._next[job.request.device] = now + self._interval_ns
+
+    def _missed(self, job: Job[Q, A], error: LineFailure) -> None:
+        """An attempt was in vain: try again before the others of its rank, or give up."""
+        job.attempts += 1
+        job.missed = error
+        if job.done:
+            return
+        if job.is_late and job.permission is not None:
+            job.fail(SentLate(job.request, job.permission.patience_ns))
+        elif job.attempts < job.most:
+            (self._urgent if job.urgent else self._waiting).appendleft(job)
+        else:
+            job.fail(error)
+
+    # ------------------------------------------------------------------ bytes
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Bytes came. Raises `LineLost` when the connection has to be given up; the shell then calls `lost`."""
+        job = self._current
+        if job is None or self._more is not None:
+            self.discipline.stray(data, now)
+            return
+        try:
+            answer = self.discipline.receive(data, now)
+        except LineLost:
+            raise
+        except (Refusal, LineFailure) as error:
+            self._current = None
+            if not job.done:
+                job.fail(error)
+            return
+        if answer is None:
+            return
+        if isinstance(answer, More):
+            self._continue(job, answer, now)
+            return
+        self._current = None
+        if not job.done:
+            job.succeed(answer)
+
+    def _continue(self, job: Job[Q, A], more: More, now: Nanos) -> None:
+        if more.may_wait and (job.done or (self._urgent and not job.urgent)):
+            self._current = None
+            if not job.done:
+                self._waiting.appendleft(job)
+            return
+        self._more = more
+        self._deadline = max(now, self.discipline.free_ns, self._next.get(job.request.device, 0))
+
+    def lost(self, error: LineLost) -> None:
+        """The connection is gone. The exchange going on is begun anew on the next one if that is allowed."""
+        self.discipline.reset()
+        job, self._current, self._more = self._current, None, None
+        if job is not None:
+            failure = (
+                LineLost(f"{error}; it is not known whether '{job.request}' was carried out") if job.request.changes else error
+            )
+            failure.uncertain = job.request.changes
+            self._missed(job, failure)

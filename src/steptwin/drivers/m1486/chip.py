@@ -1,0 +1,314 @@
+"""A chip as a driver opens it, reads it and sets it; nothing here moves it. `steptwin.drivers.m1486.driver` does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from types import TracebackType
+from typing import Self
+
+from steptwin.drivers.line import Line
+from steptwin.drivers.m1486.failures import PositionUnknown
+from steptwin.drivers.m1486.lines import BAUD, AsyncM1486Line
+from steptwin.drivers.m1486.settings import COMMANDS, ChipSettings, checked_number
+from steptwin.drivers.m1486.talk import Say
+from steptwin.drivers.m1486.unit import Unit
+from steptwin.errors import Misuse
+from steptwin.m1486.functions import CARRY, FUNCTIONS, LIMITOFF, REPORT, RETURN, USER_FLAGS
+from steptwin.m1486.lines import LINES
+from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.variants import Variant
+from steptwin.m1486.variants import variant as variant_named
+from steptwin.machine import SECOND
+
+TIMEOUT_S = 0.5
+LARGEST = 16_000_000
+"""Farthest distance and position of F, B, G and =, in minimum microsteps."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChipStatus:
+    """A chip at rest at a glance."""
+
+    type: str
+    interface: str
+    series: int
+    counter_u: int
+    """The position counter, in minimum microsteps."""
+    position: float
+    unit: str
+    is_position_valid: bool
+    variable: int
+    flags: dict[int, bool]
+    functions: dict[int, bool]
+
+
+class AsyncChip:
+    """See `steptwin.drivers.m1486.driver.AsyncM1486`."""
+
+    def __init__(
+        self,
+        where: str | Line[Say, bytes],
+        address: int | None = None,
+        *,
+        baud: int = BAUD,
+        variant: str | None = None,
+        steps_per_unit: float = 1.0,
+        unit: str = "step",
+        origin_u: int = 0,
+        timeout_s: float = TIMEOUT_S,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        if not 0.0 < timeout_s <= 60.0:
+            raise Misuse(f"a time-out of {timeout_s:g} s is outside 0 to 60 s")
+        if address is not None and address not in range(16):
+            raise Misuse(f"address {address}: permitted are 0 to 15")
+        if not (isfinite(steps_per_unit) and steps_per_unit > 0.0):
+            raise Misuse(f"steps_per_unit = {steps_per_unit:g}: must be above 0")
+        if not 0 <= origin_u <= LARGEST:
+            raise Misuse(f"origin_u = {origin_u}: permitted are 0 to {LARGEST} minimum microsteps")
+        self._variant = None if variant is None else variant_named(variant)
+        self._own = isinstance(where, str)
+        self.line: Line[Say, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
+        self._unit = Unit(self.line, address, timeout_ns=round(timeout_s * SECOND))
+        self.unit = unit
+        self.scale_u = FULL_STEP * steps_per_unit
+        """Minimum microsteps in a unit."""
+        self.origin_u = origin_u
+
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Say, bytes]:
+        return AsyncM1486Line(address, baud=baud, log=log)
+
+    def __repr__(self) -> str:
+        return f"<AsyncM1486 {self._unit.name} on {self.line.place}>"
+
+    @property
+    def address(self) -> int | None:
+        return self._unit.address
+
+    @property
+    def variant(self) -> Variant:
+        """The type, once the chip was opened."""
+        return self._unit.variant
+
+    @property
+    def settings(self) -> ChipSettings:
+        """What the chip is set to as far as drivers on this line have set it."""
+        return self._unit.notes.settings
+
+    # ------------------------------------------------------------------ opening
+
+    async def open(self) -> None:
+        """Open the line, have the chip echo, find out what it is. Raises `NoEcho`, `Busy` while it moves, `WrongType`."""
+        await self.line.open()
+        try:
+            async with self._unit.turn():
+                if self._unit.notes.variant is None:
+                    self._unit.notes.variant = self._variant
+                await self._unit.look()
+        except BaseException:
+            if self._variant is None:
+                self._unit.notes.variant = None
+            await self.close()
+            raise
+
+    async def open_line(self) -> None:
+        """Open the line only: enough for `stop` and `stop_program` of a chip that moves, which cannot be asked anything."""
+        await self.line.open()
+
+    async def close(self) -> None:
+        """Close the line, unless it is shared. The chip goes on with what it does."""
+        if self._own:
+            await self.line.close()
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self.close()
+
+    # ------------------------------------------------------------------ reading
+
+    async def counter(self) -> int:
+        """The position counter, in minimum microsteps. Raises `Busy` while the chip moves: the line gives none then (M-28)."""
+        async with self._unit.turn():
+            return await self._unit.read_number(1)
+
+    async def position(self) -> float:
+        """Where the motor is. Raises `Busy` while it moves, `PositionUnknown` after a move that was stopped."""
+        counter = await self.counter()
+        self._check_position()
+        return self._shown(counter)
+
+    def _check_position(self) -> None:
+        if not self._unit.notes.is_position_valid:
+            raise PositionUnknown(
+                f"{self.line.place}: the counter of {self._unit.name} shows where it was sent, not where it was stopped: "
+                "seek a line whose place is known, and say where that is (set_position)"
+            )
+
+    def _shown(self, counter_u: int) -> float:
+        return (counter_u - self.origin_u) / self.scale_u
+
+    def _counter_of(self, position: float) -> int:
+        if not isfinite(position):
+            raise Misuse(f"{position} {self.unit} is no position")
+        counter = self._on_grid(position, self.origin_u)
+        if not 0 <= counter <= LARGEST:
+            least, most = self._shown(0), self._shown(LARGEST)
+            raise Misuse(f"position {position:g} {self.unit} is outside {least:g} to {most:g} {self.unit}")
+        return counter
+
+    def _on_grid(self, value: float, offset_u: int) -> int:
+        """The value in minimum microsteps, on the nearest microstep."""
+        grid = self.settings.grid_u
+        exact = value * self.scale_u + offset_u
+        rounded = round(exact / grid) * grid
+        if self.settings.microstep is None and abs(exact - rounded) > 0.5:
+            raise Misuse(
+                f"{value:g} {self.unit} is {exact:g} minimum microsteps and no whole full step ({FULL_STEP}), and M of "
+                f"{self._unit.name} is not known: configure(microstep=...) first"
+            )
+        return rounded
+
+    async def variable(self) -> int:
+        """The internal variable, 24 bits."""
+        async with self._unit.turn():
+            return await self._unit.read_number(4)
+
+    async def flags(self) -> dict[int, bool]:
+        """Flags 80 to 87."""
+        async with self._unit.turn():
+            (byte,) = await self._unit.read(14)
+        return {number: bool(byte >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))}
+
+    async def functions(self) -> dict[int, bool]:
+        """Functions 40 to 63."""
+        async with self._unit.turn():
+            word = int.from_bytes(bytes(await self._unit.read(17, 18, 19)), "little")
+        self._unit.notes.functions = word
+        return {number: bool(word >> bit & 1) for bit, number in enumerate(FUNCTIONS)}
+
+    async def status(self) -> ChipStatus:
+        """Everything the chip tells of itself. Raises `Busy` while it moves."""
+        async with self._unit.turn():
+            found = await self._unit.read(1, 2, 3, 4, 5, 6, 14, 15, 16, 17, 18, 19)
+        word = int.from_bytes(bytes(found[9:12]), "little")
+        counter = int.from_bytes(bytes(found[0:3]), "little")
+        interface = self._unit.notes.interface
+        return ChipStatus(
+            type=self.variant.title,
+            interface=f"mode {found[7]}" if interface is None else interface.title,
+            series=found[8],
+            counter_u=counter,
+            position=self._shown(counter),
+            unit=self.unit,
+            is_position_valid=self._unit.notes.is_position_valid,
+            variable=int.from_bytes(bytes(found[3:6]), "little"),
+            flags={number: bool(found[6] >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))},
+            functions={number: bool(word >> bit & 1) for bit, number in enumerate(FUNCTIONS)},
+        )
+
+    async def is_busy(self) -> bool:
+        """Whether the chip moves, waits or runs its program."""
+        async with self._unit.turn():
+            return await self._unit.asks_who() is None
+
+    # ------------------------------------------------------------------ settings
+
+    async def configure(
+        self,
+        *,
+        start_stop: float | None = None,
+        acceleration: float | None = None,
+        velocity: float | None = None,
+        profile: float | None = None,
+        microstep: int | None = None,
+        qualification: int | None = None,
+        waveform: int | None = None,
+    ) -> None:
+        """Set S, V, P (full steps/s), A (full steps/s²), M, Q and N, as the commands take them; M and Q before the others.
+
+        Raises `Misuse` with the permitted range, for M and Q that do not go together too.
+        """
+        unit = self._unit
+        given = {
+            "microstep": microstep,
+            "qualification": qualification,
+            "start_stop": start_stop,
+            "acceleration": acceleration,
+            "velocity": velocity,
+            "profile": profile,
+            "waveform": waveform,
+        }
+        numbers = {
+            name: checked_number(COMMANDS[name], value, unit.variant, name) for name, value in given.items() if value is not None
+        }
+        wanted = unit.notes.settings.with_(**numbers)
+        wanted.check()
+        async with unit.turn():
+            await unit.rest()
+            for name, number in numbers.items():
+                unit.notes.settings = unit.notes.settings.with_(**{name: None})
+                await unit.say(f"{COMMANDS[name]}{number}")
+                unit.notes.settings = unit.notes.settings.with_(**{name: number})
+
+    async def set_position(self, position: float) -> None:
+        """Say where the motor is. It does not move."""
+        counter = self._counter_of(position)
+        async with self._unit.turn():
+            await self._unit.rest()
+            self._unit.notes.is_position_valid = False
+            await self._unit.say(f"={counter}" if counter else "c100")
+            self._unit.notes.is_position_valid = True
+
+    async def set_output(self, line: int, on: bool) -> None:
+        """Set B1 to B21 high or low."""
+        if line not in LINES:
+            raise Misuse(f"no line {line}: lines are {LINES[0]} to {LINES[-1]}")
+        interface = self._unit.notes.interface
+        if interface is not None and line in interface.occupied:
+            raise Misuse(f"B{line} belongs to the {interface.title} interface")
+        await self._switch(line, on)
+
+    async def set_flag(self, flag: int, on: bool) -> None:
+        """Set user flag 80 to 86."""
+        if flag not in USER_FLAGS:
+            raise Misuse(f"no user flag {flag}: they are {USER_FLAGS[0]} to {USER_FLAGS[-1]}")
+        await self._switch(flag, on)
+
+    async def set_function(self, function: int, on: bool) -> None:
+        """Switch function 40 to 63. 41 (echo) and 57 (report) are the driver's own."""
+        if function not in FUNCTIONS:
+            raise Misuse(f"no function {function}: they are {FUNCTIONS[0]} to {FUNCTIONS[-1]}")
+        if function in (RETURN, REPORT):
+            raise Misuse(f"function {function} is what this driver lives by: it stays {'ON' if function == RETURN else 'OFF'}")
+        await self._switch(function, on)
+        self._unit.notes.note_function(function, on=on)
+
+    async def set_limit(self, on: bool) -> None:
+        """Have LIMIT stop the motor (function 42 OFF) or not, as to leave the switch again."""
+        await self.set_function(LIMITOFF, not on)
+
+    async def _switch(self, number: int, on: bool) -> None:
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f"{'t' if on else 'c'}{number}", acts=True)
+
+    async def set_variable(self, number: int) -> None:
+        """Give the internal variable a value, 0 to 2^24 − 1."""
+        checked_number(":", number, self.variant, "the internal variable")
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f":{number}")
+
+    async def inputs(self, first: int = 1, count: int = 4) -> tuple[bool, ...]:
+        """Levels of up to nine lines from ``first`` on. They go through the internal variable, which is theirs afterwards."""
+        checked_number("?", 10 * first + count, self.variant, f"{count} lines from B{first} on")
+        async with self._unit.turn():
+            await self._unit.rest()
+            await self._unit.say(f"?{10 * first + count}")
+            bits = await self._unit.read_number(4, rests=True)
+        return tuple(bool(bits >> bit & 1) for bit in range(count))

@@ -1,0 +1,277 @@
+"""Programs into a chip: typed command by command with the chip's flow control, a file in ``[ ]`` whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from steptwin.diagnostics import Severity, Source, render
+from steptwin.drivers.exchange import SentLate
+from steptwin.drivers.m1486.failures import Busy, DoubtfulMove, FileGivenUp
+from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, Told
+from steptwin.drivers.m1486.settings import ChipSettings, after_reset
+from steptwin.drivers.m1486.talk import WHO
+from steptwin.drivers.m1486.unit import Unit
+from steptwin.drivers.permission import Permission
+from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.m1486.lines import STEP_DIRECTION, Interface
+from steptwin.m1486.syntax import Command, Condition, Program
+from steptwin.m1486.variants import Store, Variant
+from steptwin.machine import MILLISECOND, SECOND
+
+Progress = Callable[[int, int], object]
+"""Told how many commands were typed, of how many."""
+
+MOST_TOLD = 10
+"""So many errors of a program are told: a file of another kind has one in each line."""
+ERASE_MARGIN_S = 0.1
+FULL_PAUSE_NS = 50 * MILLISECOND
+"""The input buffer is given this long to empty when characters come back inverted."""
+_MOVES = frozenset("r)(jk'[ie")
+"""What moves, or leads to commands typed before."""
+
+
+def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> Program:
+    """Raises `Misuse` with the errors in it."""
+    from steptwin.m1486.check import check
+
+    checked = check(text, variant, interface)
+    if not checked.is_sound:
+        errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
+        more = f"\nand {len(errors) - MOST_TOLD} more errors" if len(errors) > MOST_TOLD else ""
+        raise Misuse(f"{name} is not sent:\n{render(Source(name, text), errors[:MOST_TOLD])}{more}")
+    return checked.program
+
+
+def parts(program: Program) -> list[tuple[int | None, list[Command]]]:
+    """The commands in order, cut where ``X`` chooses another chip; None before the first X."""
+    found: list[tuple[int | None, list[Command]]] = [(None, [])]
+    for command in program.commands:
+        if command.key == "XG":
+            raise Misuse("XG is not sent: what several chips take at once cannot be verified; name each chip with X")
+        if command.key == "X":
+            found.append((command.number, []))
+        else:
+            found[-1][1].append(command)
+    return [(address, commands) for address, commands in found if commands]
+
+
+def probes(commands: Sequence[Command]) -> list[bool]:
+    """Whether a question may be typed before each command: not where the program comes by again, in a loop or behind a label that
+    is jumped back to, because it would be part of it: every turn would upload a byte.
+    """
+    allowed = [True] * len(commands)
+    loops: list[int] = []
+    labels: dict[int | None, int] = {}
+    for index, command in enumerate(commands):
+        begin = index
+        if command.key == "L":
+            loops.append(index)
+        elif command.key == "@":
+            labels.setdefault(command.number, index)
+        elif command.key == "E" and loops:
+            begin = loops.pop()
+        elif command.key in ("J", "'", "I"):
+            condition = command.argument
+            label = condition.label if isinstance(condition, Condition) else command.number
+            begin = min(labels.values(), default=index) if label is None else labels.get(label, index)
+        for inside in range(begin + 1, index + 1):
+            allowed[inside] = False
+    return allowed
+
+
+async def send_program(
+    units: Mapping[int | None, Unit],
+    text: str,
+    *,
+    progress: Progress | None = None,
+    name: str = "program",
+) -> bytes:
+    """Type a program into the chips it names; ``units[None]`` gets what stands before any ``X``. Returns what ``U`` uploaded
+    outside ``[ ]``.
+    """
+    first = next(iter(units.values()))
+    other = next((unit for unit in units.values() if unit.variant is not first.variant), None)
+    if other is not None:
+        kinds = f"{first.name} is an {first.variant.title}, {other.name} an {other.variant.title}"
+        raise Misuse(f"{name} is not sent: {kinds}; a program is checked for one type: send each its own")
+    program = checked_program(text, first.variant, first.notes.interface or STEP_DIRECTION, name)
+    found = parts(program)
+    for address, commands in found:
+        if address not in units:
+            if address is None:
+                raise Misuse(f"{name} is not sent: no X before {commands[0]} says which chip it is for")
+            raise Misuse(f"{name} is not sent: there is no chip {address:X}, which it names")
+    total = sum(len(commands) for _, commands in found)
+    done = 0
+    uploaded = b""
+
+    def tell(count: int) -> None:
+        if progress is not None:
+            progress(done + count, total)
+
+    for address, commands in found:
+        uploaded += await _Typist(units[address], tell).type(commands)
+        done += len(commands)
+    return uploaded
+
+
+class _Typist:
+    """Types commands into one chip."""
+
+    def __init__(self, unit: Unit, tell: Callable[[int], object]) -> None:
+        self._unit = unit
+        self._tell = tell
+        self._permission = unit.permission()
+        self._capacity = unit.variant.input_bits // 8
+        self._typed = 0  # characters that may lie in the input buffer
+        self._may_ask = True  # see `probes`
+
+    async def type(self, commands: Sequence[Command]) -> bytes:
+        unit = self._unit
+        uploaded = b""
+        index = 0
+        allowed = probes(commands)
+        async with unit.turn(self._permission):
+            await unit.rest()
+            while index < len(commands):
+                self._may_ask = allowed[index]
+                if self._may_ask and self._typed and not all(allowed[index + 1 : index + 2]):
+                    await self._empty()  # the last chance
+                if commands[index].key == "[":
+                    closes = next(n for n in range(index, len(commands)) if commands[n].key == "]")
+                    await self._file(commands[index : closes + 1], index)
+                    index = closes + 1
+                else:
+                    uploaded += await self._command(commands[index])
+                    index += 1
+                self._permission.extend()
+                self._tell(index)
+        return uploaded
+
+    async def _file(self, commands: Sequence[Command], done: int) -> None:
+        unit = self._unit
+        await self._empty()
+        if unit.variant.store is Store.EEPROM:
+            await reset(unit)
+        await type_file(
+            unit, [str(command).lower() for command in commands], self._permission, lambda count: self._tell(done + count)
+        )
+        self._typed = self._capacity
+
+    async def _command(self, command: Command) -> bytes:
+        unit = self._unit
+        text = str(command).lower()
+        if command.key == "\\":
+            await self._empty()
+            await reset(unit)
+            return b""
+        if command.key == "K":
+            await unit.kill()
+            return b""
+        if self._typed + len(text) + 1 + len(WHO) + 1 > self._capacity - 3:
+            await self._empty()
+        if text[0] in _MOVES:
+            await begin(unit, text, ChipMotion.BLOCK, self._permission)
+        else:
+            unit.notes.settings = ChipSettings()
+            if command.key == "U":
+                await self._empty()
+                return await unit.say(text, answers=True)
+            await unit.say(text, acts=True)
+        self._typed += len(text) + 1
+        if unit.talk.nearly_full:
+            await self._empty()
+        return b""
+
+    async def _empty(self) -> None:
+        """Until the chip has done all it was told: its buffer is empty then. Raises `Busy` after a minute.
+
+        Where nothing may be asked only a moment: a chip that does not move empties it meanwhile, one that does answers 5EH.
+        """
+        unit = self._unit
+        if not self._may_ask:
+            await unit.line.sleep(FULL_PAUSE_NS / SECOND)
+            return
+        if await unit.asks_who(round(UNKNOWN_S * SECOND), self._permission) is None:
+            raise Busy(f"{unit.place}: {unit.name} takes no more: it {unit.why_busy()}")
+        self._typed = 0
+
+
+async def type_file(unit: Unit, lines: Sequence[str], permission: Permission, tell: Callable[[int], object]) -> None:
+    """Type a file from ``[`` to ``]``, which makes it run.
+
+    When something goes wrong before, nothing of it runs: the chip is reset, which is how the manual has a file given up (chapter
+    II, Memory), and `FileGivenUp` is raised. Raises `DoubtfulMove` when nobody knows whether ``]`` was heard.
+    """
+    try:
+        for count, line in enumerate(lines[:-1], start=1):
+            await unit.say(line, once=True, retype=count == 1)
+            if unit.talk.nearly_full:
+                await unit.line.sleep(FULL_PAUSE_NS / SECOND)
+            permission.extend()
+            tell(count)
+        await begin(unit, lines[-1], ChipMotion.BLOCK, permission, retype=False)
+    except (DoubtfulMove, SentLate):
+        raise
+    except (LineFailure, Refusal) as failure:
+        try:
+            await reset(unit)
+        except (LineFailure, Refusal) as second:
+            raise FileGivenUp(
+                f"{unit.place}: the file for {unit.name} could not be typed ({failure}), and the chip not be reset ({second}): "
+                "it still waits for the rest of it"
+            ) from failure
+        raise FileGivenUp(
+            f"{unit.place}: the file for {unit.name} was not typed to its end ({failure}); the chip was reset: nothing of it "
+            "runs, position and settings are those of power-up"
+        ) from failure
+    tell(len(lines))
+
+
+async def begin(
+    unit: Unit,
+    text: str,
+    kind: ChipMotion,
+    permission: Permission,
+    *,
+    target_u: int | None = None,
+    duration_s: float | None = None,
+    retype: bool = True,
+) -> None:
+    """Say what begins a motion, once."""
+    notes = unit.notes
+
+    def told(target_u: int | None, duration_s: float | None) -> None:
+        if kind is ChipMotion.BLOCK:
+            notes.settings = ChipSettings()
+            unit.talk.uploads = notes.uploads = bytearray()
+        # What an E type is told it does when it has written it.
+        notes.motion = Told(
+            kind, unit.line.now() + unit.write_ns, notes.stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0)
+        )
+
+    notes.motion = None
+    try:
+        await unit.act(text, permission, once=True, retype=retype, program=kind is ChipMotion.BLOCK)
+    except SentLate:
+        told(None, None)
+        raise
+    except LineFailure as failure:
+        if not getattr(failure, "uncertain", False):
+            raise
+        told(None, None)
+        raise DoubtfulMove(unit.name, kind.value, failure) from failure
+    told(target_u, duration_s)
+
+
+async def reset(unit: Unit) -> None:
+    """``\\``, and the time an E type takes for it."""
+    await unit.say("\\", stored=False)
+    notes = unit.notes
+    unit.talk.forget(unit.address)
+    notes.forget()
+    notes.was_awake = False
+    notes.is_position_valid = True
+    notes.settings = ChipSettings() if notes.interface is None else after_reset(unit.variant, notes.interface)
+    if unit.variant.erase_ns:
+        await unit.line.sleep(unit.variant.erase_ns / SECOND + ERASE_MARGIN_S)

@@ -1,0 +1,285 @@
+"""An M1486 as a driver shows it, for asyncio. `steptwin.drivers.m1486.sync` has the same for threads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import isfinite
+
+from steptwin.drivers.line import check_wait
+from steptwin.drivers.m1486.chip import LARGEST, AsyncChip
+from steptwin.drivers.m1486.download import Progress, begin, reset, send_program, type_file
+from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed
+from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMoveEnd, Told
+from steptwin.drivers.m1486.settings import COMMANDS, checked_number
+from steptwin.drivers.m1486.unit import SLICE_NS
+from steptwin.drivers.m1486.waiting import wait_for
+from steptwin.drivers.permission import Permission
+from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.commands import memory_bits
+from steptwin.m1486.functions import FUNCTIONS, RECOVER
+from steptwin.m1486.unit import MASK
+from steptwin.m1486.variants import Store
+from steptwin.machine import SECOND
+
+MARK = "u15"
+"""The last command of a block: uploads the driver interface, a byte that is no type letter."""
+_TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
+"""Commands that may be typed alone: they move nothing, lead nowhere and are not answered."""
+
+
+class AsyncM1486(AsyncChip):
+    """A chip at an address (``/dev/ttyUSB0``, ``tcp://host:5022``) or on a line shared with others.
+
+    ``address`` 0 to 15 as its pins say; None for the only chip on a line. ``variant``: found out when not given; a type for
+    24 MHz cannot be told from its brother and has to be named. Positions are in ``unit``, ``steps_per_unit`` full steps each;
+    the position counter has no sign, and ``origin_u`` is its value, in minimum microsteps, where the position is 0.
+
+    The driver switches function 41 (echo) on and 57 (report) off. It types nothing before `open` (or ``async with``).
+    """
+
+    # ------------------------------------------------------------------ motion
+
+    async def move_to(self, position: float) -> None:
+        """Begin to move to a position, rounded to a microstep. `wait` waits for the end.
+
+        Raises `Misuse` for a position the counter has not, `Busy`, `PositionUnknown`; `DoubtfulMove` when nobody knows whether
+        it was begun. R is sent once only.
+        """
+        target = self._counter_of(position)
+        unit = self._unit
+        permission = unit.permission()
+        async with unit.turn(permission):
+            before = await unit.read_number(1)
+            self._check_position()
+            await self._move(f"g{target}" if target else "h", target - before, target, permission)
+
+    async def move_by(self, distance: float) -> None:
+        """Begin to move by a distance, rounded to a microstep. Errors as `move_to`."""
+        if not isfinite(distance):
+            raise Misuse(f"{distance} {self.unit} is no distance")
+        distance_u = self._on_grid(distance, 0)
+        if abs(distance_u) > LARGEST:
+            raise Misuse(f"distance {distance:g} {self.unit} is outside ±{LARGEST / self.scale_u:g} {self.unit}")
+        unit = self._unit
+        permission = unit.permission()
+        async with unit.turn(permission):
+            before = await unit.read_number(1)
+            text = f"{'f' if distance_u > 0 else 'b'}{abs(distance_u)}"
+            await self._move(text, distance_u, before + distance_u & MASK, permission)
+
+    async def _move(self, specification: str, distance_u: int, target_u: int, permission: Permission) -> None:
+        if distance_u == 0:
+            notes = self._unit.notes
+            notes.motion = Told(ChipMotion.MOVE, self.line.now(), notes.stops, target_u, 0.0)
+            return
+        await self._unit.say(specification)
+        duration = self.settings.travel_s(distance_u, self.variant)
+        await begin(self._unit, "r", ChipMotion.MOVE, permission, target_u=target_u, duration_s=duration)
+
+    async def run(self, direction: int, velocity: float | None = None) -> None:
+        """Run until stopped, in direction +1 or −1; ``velocity`` sets V first (full steps/s)."""
+        if direction not in (1, -1):
+            raise Misuse(f"direction {direction}: permitted are 1 and -1")
+        permission = self._unit.permission()
+        if velocity is not None:
+            await self.configure(velocity=velocity)
+        async with self._unit.turn(permission):
+            await self._unit.rest()
+            await self._unit.say("g+" if direction > 0 else "g-")
+            await begin(self._unit, "r", ChipMotion.ENDLESS, permission)
+
+    async def seek(self, direction: int, line: int) -> None:
+        """Begin to move at start/stop speed until a line has its end level: low for B1–3, 8–11, 16–19, else high.
+
+        The number of the line goes through the internal variable: so no garbled digit can make the motor seek another line.
+        """
+        if direction not in (1, -1):
+            raise Misuse(f"direction {direction}: permitted are 1 and -1")
+        checked_number(")", line, self.variant, "the line to seek")
+        permission = self._unit.permission()
+        async with self._unit.turn(permission):
+            await self._unit.rest()
+            await self._unit.say(f":{line}")
+            await begin(self._unit, ")" if direction > 0 else "(", ChipMotion.SEEK, permission)
+
+    async def start_program(self, label: int) -> None:
+        """Go to a label of what is in the command memory. Its number goes through the internal variable, as of `seek`."""
+        checked_number("j", label, self.variant, "the label")
+        permission = self._unit.permission()
+        async with self._unit.turn(permission):
+            await self._unit.rest()
+            await self._unit.say(f":{label}")
+            await begin(self._unit, "j", ChipMotion.BLOCK, permission)
+
+    async def stop(self) -> None:
+        """K: brake with the ramp. Goes before everything that waits for the line; moves that wait are not begun any more.
+
+        A program goes on after it unless function 51 is OFF: `stop_program` ends it. Raises `steptwin.drivers.Untold`.
+        """
+        notes = self._unit.notes
+        motion = notes.motion
+        if motion is not None and motion.kind in (ChipMotion.MOVE, ChipMotion.BLOCK) and not motion.is_over(self.line.now()):
+            notes.is_position_valid = False
+        await self._unit.kill()
+
+    async def recover(self) -> None:
+        """C75: what Kill has stopped goes on, where function 51 is OFF. A program may move the motor at once."""
+        permission = self._unit.permission()
+        async with self._unit.turn(permission):
+            await self._unit.act("c75", permission, stored=False, program=True)
+            self._unit.notes.is_killed = False
+
+    async def stop_program(self, timeout_s: float = 10.0) -> None:
+        """End what the chip does: its motion by Kill, its program by wrong data (function 44 has to be OFF). Nothing is erased.
+
+        Raises `Busy` when that did not help: then only `reset` or RST does, which lose the position.
+        """
+        unit = self._unit
+        notes = unit.notes
+        if notes.motion is None or notes.motion.kind is not ChipMotion.ENDLESS:
+            notes.is_position_valid = False
+        await unit.kill(program=True)
+        permission = unit.permission()
+        async with unit.turn(permission):
+            unit.talk.settle(unit.address)  # questions went with the program
+            if notes.function(RECOVER) is not True:
+                await unit.act("c75", permission, stored=False, program=True)
+            notes.is_killed = False
+            notes.motion = None
+            if await unit.asks_who(round(timeout_s * SECOND)) is None:
+                raise Busy(
+                    f"{self.line.place}: {unit.name} goes on nevertheless: function 44 is ON, LIMIT is low, or it brakes yet"
+                )
+
+    async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> ChipMoveEnd:
+        """Wait until the chip has done what it was told, and say why a motion ended.
+
+        Without ``timeout_s`` the time is computed from the motion where all its settings are known, else it is a minute. With
+        other chips on the line it is left to them until shortly before the computed end, and the ends of their moves are watched
+        too; a wait of unknown length keeps it, but for stops.
+        Raises `ChipMoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
+        reported as the end.
+        """
+        end = await wait_for(self._unit, timeout_s, self.unit, self._shown, check=check)
+        if check and not end.ok:
+            raise ChipMoveFailed(end)
+        return end
+
+    # ------------------------------------------------------------------ commands and programs
+
+    async def command(self, text: str) -> None:
+        """Type one command, as ``t6`` or ``f12800``. What moves, jumps or answers has a method of its own.
+
+        Raises `Misuse` for what the chip would drop.
+        """
+        unit = self._unit
+        typed = unit.checked(text)
+        if typed[0] not in _TYPED:
+            raise Misuse(f"{text!r} is no command to type alone: motions, files and questions have methods of their own")
+        permission = unit.permission()
+        async with unit.turn(permission):
+            await unit.rest()
+            self._learn(typed)
+            await unit.act(typed, permission, once=typed[0] in "d+-*/")
+
+    def _learn(self, typed: str) -> None:
+        """Settings typed by hand are known again when they are configured."""
+        notes = self._unit.notes
+        name = next((name for name, letter in COMMANDS.items() if letter == typed[0]), None)
+        if name is not None:
+            notes.settings = notes.settings.with_(**{name: int(typed[1:]) if typed[1:] else None})
+        if typed[0] in "tc" and typed[1:].isdecimal() and int(typed[1:]) in FUNCTIONS:
+            notes.note_function(int(typed[1:]), on=typed[0] == "t")
+
+    async def run_block(self, commands: Iterable[str], timeout_s: float | None = None) -> ChipMoveEnd:
+        """Have commands done one after the other, as a file in ``[ ]`` that nothing of runs before it is there whole, and wait
+        until the last one is done. The chip says so by an upload that is typed as the last of them (manual chapter II, Memory):
+        without it the block was cut short (``ChipReason.CUT``), as by a command that is wrong data when it comes to be done.
+
+        Not for E types, which would keep it in their EEPROM. ``timeout_s``: by default a minute. Raises `Misuse` for commands
+        that have no place in a block, `FileGivenUp` when it could not be typed whole.
+        """
+        check_wait(timeout_s)
+        unit = self._unit
+        if unit.variant.store is Store.EEPROM:
+            raise Misuse(f"{unit.variant.title} keeps what stands in [ ] in its EEPROM: use download")
+        typed = [unit.checked(command) for command in commands]
+        for command in typed:
+            if command[0] in "[]\\kxu" or command == "c75":
+                raise Misuse(f"{command!r} has no place in a block")
+        if 8 + sum(memory_bits(command[0].upper()) for command in (*typed, MARK)) > unit.variant.memory_bits - 8:
+            raise Misuse(f"the block is larger than the command memory of {unit.variant.title}, {unit.variant.memory_bits} bits")
+        permission = unit.permission()
+        async with unit.turn(permission):
+            await unit.rest()
+            await type_file(unit, ["[", *typed, MARK, "]"], permission, lambda count: None)
+            if unit.notes.motion is not None:
+                unit.notes.motion.is_marked = True
+        return await self.wait(timeout_s if timeout_s is not None else UNKNOWN_S)
+
+    async def uploaded(self, count: int = 1, timeout_s: float = 10.0) -> bytes:
+        """The next bytes that the program of the chip uploads, in their order: ``U`` among its commands sends one each time it is
+        met (manual chapter VII, Upload).
+
+        The program has to have been started by this driver, and by it alone on this line, for bytes do not say whose they are:
+        else `Misuse`. Raises `LineFailure` when so many have not come in time; those that have are kept for the next call.
+        """
+        check_wait(timeout_s)
+        unit = self._unit
+        if count < 1:
+            raise Misuse(f"{count} bytes: at least 1")
+        kept = unit.notes.uploads
+        if kept is None:
+            raise Misuse(f"{self.line.place}: no program of {unit.name} was started here: download or start_program")
+        if any(notes.motion is not None and notes.motion.kind is ChipMotion.BLOCK for notes in unit.others()):
+            raise Misuse(
+                f"{self.line.place}: another chip runs a program too, and bytes do not say whose they are: wait for its end"
+            )
+        limit = self.line.now() + round(timeout_s * SECOND)
+        while len(kept) < count:
+            async with unit.turn():
+                await unit.hear_upload(SLICE_NS)
+            if len(kept) < count and self.line.now() >= limit:
+                raise LineFailure(f"{self.line.place}: {unit.name} uploaded {len(kept)} of {count} bytes within {timeout_s:g} s")
+        found = bytes(kept[:count])
+        del kept[:count]
+        return found
+
+    async def reset(self, *, force: bool = False) -> None:
+        """``\\``: defaults, position 0, and an E type forgets its stored file. Raises `Busy` while the chip does something.
+
+        ``force``: also then. Its motion is stopped by Kill before, and a file in ``[ ]`` it waits for the rest of is given up.
+        """
+        unit = self._unit
+        if force:
+            await self.stop()
+        async with unit.turn():
+            if not force:
+                await unit.rest()
+            await reset(unit)
+
+    async def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
+        """Type a program into the chip: a file in ``[ ]``, which runs from ``]`` on and which an E type keeps, or plain commands.
+
+        An E type is erased before a file. Returns what ``U`` outside ``[ ]`` uploaded. Raises `Misuse` with the first errors the
+        checker finds, `NoRoom`, `FileGivenUp`.
+        """
+        return await send_program({self.address: self._unit, None: self._unit}, text, progress=progress, name=name)
+
+
+async def download_to(
+    chips: Iterable[AsyncM1486],
+    text: str,
+    *,
+    first: AsyncM1486 | None = None,
+    progress: Progress | None = None,
+    name: str = "program",
+) -> bytes:
+    """Type a program that names its chips with ``X`` into chips on one line, all of one type.
+
+    ``first`` gets what stands before any ``X``. Errors as of `AsyncM1486.download`.
+    """
+    units = {chip.address: chip._unit for chip in chips}
+    if first is not None:
+        units[None] = first._unit
+    return await send_program(units, text, progress=progress, name=name)

@@ -1,0 +1,104 @@
+"""Errors of the M1486 driver, in the three families of `steptwin.errors`, in words a technician understands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.drivers.mic488.failures import Untold
+from steptwin.errors import LineFailure, Refusal
+
+if TYPE_CHECKING:
+    from steptwin.drivers.m1486.motion import ChipMoveEnd
+
+
+class NoRoom(Refusal):
+    """The chip answered 5EH: its input buffer had no room for a character of the command."""
+
+    def __init__(self, place: str, request: object) -> None:
+        super().__init__(
+            f"{place}: '{request}' was refused: the input buffer has no room (5EH); the chip moves, waits or its program is held"
+        )
+
+
+class Busy(Refusal):
+    """The chip does something that has to end first; nothing that moves was sent."""
+
+
+class PositionUnknown(Refusal):
+    """The position counter does not tell where the motor is."""
+
+
+class WrongType(Refusal):
+    """Somebody answers, but not as the chip that was expected."""
+
+
+class ChipMoveFailed(Refusal):
+    """A motion did not end as it was meant to; ``end`` tells how."""
+
+    def __init__(self, end: ChipMoveEnd) -> None:
+        self.end = end
+        super().__init__(str(end))
+
+
+class Garbled(LineFailure):
+    """A command did not come back from the chip as it was sent.
+
+    ``uncertain``: the chip may have acted on it, or on what it took for it.
+    """
+
+    def __init__(self, place: str, request: object, sent: bytes, heard: bytes, *, uncertain: bool) -> None:
+        self.uncertain = uncertain
+        doubt = "; it is not known whether the chip has acted on it" if uncertain else "; it was not carried out"
+        super().__init__(
+            f"{place}: '{request}' did not come back as it was sent: {_shown(heard)} instead of {_shown(sent)}{doubt}"
+        )
+
+
+class NoEcho(LineFailure):
+    """A chip sends nothing back."""
+
+    uncertain = False
+
+    def __init__(self, place: str, chip: str, cause: LineFailure | None) -> None:
+        super().__init__(
+            f"{place}: {chip} does not echo: it is off, has another address or baud rate, or still does what it was told before "
+            f"({cause})"
+        )
+
+
+class Restarted(LineFailure):
+    """A chip does not echo any more, as after power-up: settings and position are not what they were."""
+
+    uncertain = False
+
+    def __init__(self, place: str, chip: str) -> None:
+        super().__init__(
+            f"{place}: {chip} was switched off or reset meanwhile: its settings are those of power-up, and where it stands is "
+            "not known; nothing was carried out"
+        )
+
+
+class DoubtfulMove(LineFailure):
+    """It is not known whether a motion was begun."""
+
+    uncertain = True
+
+    def __init__(self, chip: str, what: str, cause: LineFailure) -> None:
+        super().__init__(
+            f"it is not known whether {chip} has begun {what}: the command was sent once and is not repeated ({cause}); "
+            "stop it, or wait for it and look at its position"
+        )
+
+
+class FileGivenUp(LineFailure):
+    """A file could not be brought into the chip whole; nothing of it runs."""
+
+    uncertain = False
+
+
+def untold(chip: str, cause: LineFailure) -> Untold:
+    return Untold(f"{chip} could not be stopped: it cannot be told, and goes on with what it was told before ({cause})")
+
+
+def _shown(data: bytes) -> str:
+    return repr(data.decode("latin-1")) if data else "nothing"

@@ -1,0 +1,72 @@
+"""Lines of M1486 chips made of an address. Several drivers, tasks or threads may share one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from steptwin.drivers.exchange import Exchanger
+from steptwin.drivers.m1486.talk import CharacterTalk, Say
+from steptwin.drivers.place import Endpoint, parse_place
+from steptwin.drivers.tasks import TaskLine
+from steptwin.drivers.threads import ThreadLine
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.wire.line import SerialLine
+from steptwin.wire.slave import Direction
+
+BAUD = 4800
+"""What BR1 and BR0 give when they are left open."""
+TALK = "m1486 talk"
+"""Where a line's notes have its `CharacterTalk`."""
+
+
+def talking(endpoint: Endpoint, baud: int, log: Callable[[str], object] | None) -> tuple[Exchanger[Say, bytes], CharacterTalk]:
+    """The exchanges of a line of chips."""
+
+    def heard(now: Nanos, direction: Direction, data: bytes) -> None:
+        if log is not None:
+            log(f"{now / SECOND:12.6f} s  {'→' if direction is Direction.IN else '←'} {data.hex(' '):<24}  {in_words(data)}")
+
+    talk = CharacterTalk(SerialLine(baud), str(endpoint), on_bytes=heard if log is not None else None)
+    return Exchanger(talk, str(endpoint)), talk
+
+
+def in_words(data: bytes) -> str:
+    """``f12800 CR`` and the like; what is no character as it is."""
+    return "".join(" CR " if byte == 0x0D else chr(byte) if 0x20 <= byte < 0x7F else f" {byte:02X}H " for byte in data).strip()
+
+
+def line_endpoint(address: str, baud: int) -> Endpoint:
+    place = parse_place(address, baud)
+    if address.startswith("tcp://") and address.rpartition(":")[2].strip("/").isdecimal() is False:
+        raise Misuse(f"{address!r} names no port: expected tcp://HOST:PORT, such as tcp://127.0.0.1:5022")
+    return place.endpoint
+
+
+class AsyncM1486Line(TaskLine[Say, bytes]):
+    """A line of chips for tasks, at an address (``/dev/ttyUSB0``, ``tcp://host:5022`` raw, ``rfc2217://host:port``)."""
+
+    def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
+        endpoint = line_endpoint(address, baud)
+        exchanger, talk = talking(endpoint, baud, log)
+        super().__init__(endpoint, exchanger)
+        self.notes[TALK] = talk
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self.close()
+
+
+class ThreadM1486Line(ThreadLine[Say, bytes]):
+    """The same for threads; `steptwin.drivers.m1486.sync.M1486Line` is its face."""
+
+    def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
+        endpoint = line_endpoint(address, baud)
+        exchanger, talk = talking(endpoint, baud, log)
+        super().__init__(endpoint, exchanger)
+        self.notes[TALK] = talk

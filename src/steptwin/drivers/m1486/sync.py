@@ -1,0 +1,160 @@
+"""The M1486 driver for threads: the methods of the asynchronous one as ordinary calls.
+
+Calls may come from any thread. While one waits for a chip, a stop from another goes before whatever waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import Self
+
+from steptwin.drivers.blocking import Blocking, blocking, finish
+from steptwin.drivers.line import Line
+from steptwin.drivers.m1486.chip import TIMEOUT_S
+from steptwin.drivers.m1486.download import Progress
+from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.driver import download_to as async_download_to
+from steptwin.drivers.m1486.lines import BAUD, ThreadM1486Line
+from steptwin.drivers.m1486.settings import ChipSettings
+from steptwin.drivers.m1486.talk import Say
+from steptwin.drivers.threads import ThreadLine
+from steptwin.m1486.variants import Variant
+
+
+class M1486Line(Blocking):
+    """A line of chips that several drivers and threads share. ``with`` opens and closes it."""
+
+    _driver: ThreadM1486Line
+
+    def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
+        super().__init__(ThreadM1486Line(address, baud=baud, log=log))
+
+    @property
+    def place(self) -> str:
+        return self._driver.place
+
+    @property
+    def line(self) -> ThreadM1486Line:
+        """The line as drivers use it."""
+        return self._driver
+
+    open = blocking(ThreadM1486Line.open)
+    close = blocking(ThreadM1486Line.close)
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+class _ThreadM1486(AsyncM1486):
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Say, bytes]:
+        return ThreadM1486Line(address, baud=baud, log=log)
+
+
+class M1486(Blocking):
+    """A chip for threads; arguments as of `AsyncM1486`. ``with`` opens and closes it."""
+
+    _driver: AsyncM1486
+
+    def __init__(
+        self,
+        where: str | M1486Line | ThreadLine[Say, bytes],
+        address: int | None = None,
+        *,
+        baud: int = BAUD,
+        variant: str | None = None,
+        steps_per_unit: float = 1.0,
+        unit: str = "step",
+        origin_u: int = 0,
+        timeout_s: float = TIMEOUT_S,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        driver = _ThreadM1486(
+            where.line if isinstance(where, M1486Line) else where,
+            address,
+            baud=baud,
+            variant=variant,
+            steps_per_unit=steps_per_unit,
+            unit=unit,
+            origin_u=origin_u,
+            timeout_s=timeout_s,
+            log=log,
+        )
+        super().__init__(driver)
+
+    @property
+    def place(self) -> str:
+        return self._driver.line.place
+
+    @property
+    def address(self) -> int | None:
+        return self._driver.address
+
+    @property
+    def unit(self) -> str:
+        return self._driver.unit
+
+    @property
+    def variant(self) -> Variant:
+        """The type, once the chip was opened."""
+        return self._driver.variant
+
+    @property
+    def settings(self) -> ChipSettings:
+        """What the chip is set to as far as drivers on this line have set it."""
+        return self._driver.settings
+
+    def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
+        """Type a program into the chip; see `AsyncM1486.download`."""
+        return finish(self._driver.download(text, progress=progress, name=name))
+
+    open = blocking(AsyncM1486.open)
+    open_line = blocking(AsyncM1486.open_line)
+    close = blocking(AsyncM1486.close)
+    counter = blocking(AsyncM1486.counter)
+    position = blocking(AsyncM1486.position)
+    variable = blocking(AsyncM1486.variable)
+    flags = blocking(AsyncM1486.flags)
+    functions = blocking(AsyncM1486.functions)
+    status = blocking(AsyncM1486.status)
+    is_busy = blocking(AsyncM1486.is_busy)
+    inputs = blocking(AsyncM1486.inputs)
+    configure = blocking(AsyncM1486.configure)
+    set_position = blocking(AsyncM1486.set_position)
+    set_output = blocking(AsyncM1486.set_output)
+    set_flag = blocking(AsyncM1486.set_flag)
+    set_function = blocking(AsyncM1486.set_function)
+    set_limit = blocking(AsyncM1486.set_limit)
+    set_variable = blocking(AsyncM1486.set_variable)
+    reset = blocking(AsyncM1486.reset)
+    move_to = blocking(AsyncM1486.move_to)
+    move_by = blocking(AsyncM1486.move_by)
+    run = blocking(AsyncM1486.run)
+    seek = blocking(AsyncM1486.seek)
+    start_program = blocking(AsyncM1486.start_program)
+    stop = blocking(AsyncM1486.stop)
+    recover = blocking(AsyncM1486.recover)
+    stop_program = blocking(AsyncM1486.stop_program)
+    wait = blocking(AsyncM1486.wait)
+    command = blocking(AsyncM1486.command)
+    run_block = blocking(AsyncM1486.run_block)
+    uploaded = blocking(AsyncM1486.uploaded)
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+def download_to(
+    chips: Iterable[M1486], text: str, *, first: M1486 | None = None, progress: Progress | None = None, name: str = "program"
+) -> bytes:
+    """Type a program that names its chips with ``X`` into chips on one line; see `steptwin.drivers.m1486.driver.download_to`."""
+    drivers = [chip._driver for chip in chips]
+    return finish(async_download_to(drivers, text, first=None if first is None else first._driver, progress=progress, name=name))

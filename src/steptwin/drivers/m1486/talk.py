@@ -1,0 +1,378 @@
+"""What is said on a line of M1486 chips: one-letter commands, verified by the chip's echo (function 41). Pure.
+
+The language has no checksum and no acknowledgement. So a command is typed without its CR first; the echo of every character has
+to come back as it was sent; only then CR makes the chip take it. What does not come back right is made no command at all
+(by `SPOILER`) and typed again. Characters that take one of the last three places of the input buffer come back inverted too;
+5EH says that one found no room.
+
+Commands are typed in lower case, so that no echo looks like the type letter of a chip that was asked for it earlier.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+
+from steptwin.drivers.exchange import More
+from steptwin.drivers.m1486.failures import Garbled, NoRoom
+from steptwin.errors import Misuse
+from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
+from steptwin.m1486.variants import VARIANTS
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.wire.line import SerialLine
+from steptwin.wire.slave import Direction
+
+SPOILER = b"%"
+"""No command has this character: a line that gets it is dropped as wrong data (M-11)."""
+QUIET_NS: Nanos = 30 * MILLISECOND
+"""After a failed exchange the line has to be silent this long before it is used again."""
+NOISE_NS: Nanos = 300 * MILLISECOND
+"""A line that is not silent for this long never will be."""
+WHO = "u20"
+"""Asks for the type letter. The chip answers in program order: once it does, it has done all it was told."""
+LETTERS = frozenset(variant.type_letter for variant in VARIANTS)
+ALL = None
+"""Address of a single chip, to which ``X`` is never sent."""
+_END = bytes((CR,))
+
+
+class Sort(enum.Enum):
+    """How a request is said."""
+
+    LINE = "typed, verified, then CR"
+    SELECT = "only the selection of the chip"
+    KILL = "at once, with its CR; the echo is looked at afterwards"
+    LISTEN = "nothing is said: an answer is owed"
+    LETTER = "nothing is said: letters are owed by several chips"
+    UPLOAD = "nothing is said: a program uploads"
+    BLIND = "said to chips that do not echo yet; nobody waits for an answer"
+
+
+_SILENT = (Sort.LISTEN, Sort.LETTER, Sort.UPLOAD)
+
+
+class Say:
+    """Something said to the chip with ``address`` (None: the only one on the line).
+
+    ``answers``: one byte comes back. ``acts``: it matters whether the chip did it, and how often. ``committed``: CR was sent.
+    """
+
+    __slots__ = ("acts", "address", "answers", "commented", "committed", "sort", "text")
+
+    def __init__(
+        self, address: int | None, text: str, *, sort: Sort = Sort.LINE, answers: bool = False, acts: bool = True
+    ) -> None:
+        self.address = address
+        self.text = text
+        self.sort = sort
+        self.answers = answers
+        self.acts = acts
+        self.committed = False
+        self.commented = False
+        """The chip may take the rest of the line for a comment: then nothing spoils what stands before it (M-1)."""
+
+    @property
+    def device(self) -> int | None:
+        return self.address
+
+    @property
+    def changes(self) -> bool:
+        """Whether the chip may have done it: before CR it has not."""
+        return self.acts and (self.committed or self.commented)
+
+    def __str__(self) -> str:
+        return f"{chip_name(self.address)}: {self.text.strip() or 'select'}"
+
+
+Heard = Callable[[Nanos, Direction, bytes], object]
+"""Told of what is sent and heard."""
+
+
+class CharacterTalk:
+    """The line's side of all exchanges. ``echoing`` are the chips known to echo, ``owed`` the type letters each still owes."""
+
+    def __init__(self, serial: SerialLine, place: str, *, on_bytes: Heard | None = None) -> None:
+        self._serial = serial
+        self._place = place
+        self._on_bytes = on_bytes
+        self.reset()
+
+    def reset(self) -> None:
+        self.free_ns: Nanos = 0
+        self._busy_until: Nanos = 0
+        self.selected: int | None = ALL
+        """Who listens; None: everybody, as after power-up."""
+        self.echoing: set[int | None] = set()
+        self.owed: dict[int | None, int] = {}
+        self.came: dict[int | None, int] = {}
+        """Letters owed that came while nobody listened for them."""
+        self.spoilt: dict[int | None, int] = {}
+        """How many lines each chip was made to drop: that ends a program of its (M-11)."""
+        self.uploads: bytearray | None = None
+        """Where what a program in a chip uploads is kept, while one may run."""
+        self.letters: int | None = None
+        """Letters that came, whosever they are, while several chips are watched (`steptwin.drivers.m1486.watching`)."""
+        self.surplus = 0
+        """Type letters that may come although nobody waits for them any more."""
+        self.dirty = False
+        """Whether characters of a command that was given up may lie in front of the next one."""
+        self.nearly_full = False
+        """Whether the last command met one of the last three places of the input buffer."""
+        self._is_stuck = False  # the spoiler found no room: it is to be said again
+        self._request: Say | None = None
+        self._lines: list[bytes] = []  # still to be said, the one being said first
+        self._sent = b""
+        self._heard = b""
+        self._answer: int | None = None
+
+    wary = True
+
+    def allowance_ns(self, request: Say) -> Nanos:
+        if request.sort in _SILENT:
+            return 0
+        return self._serial.duration(2 * len(request.text) + 16)
+
+    def wire_ns(self, characters: int) -> Nanos:
+        """Time that characters take on the line."""
+        return self._serial.duration(characters)
+
+    def knows(self, address: int | None) -> bool:
+        return address in self.echoing
+
+    def forget(self, address: int | None) -> None:
+        """A chip does not echo any more, as after a reset."""
+        self.echoing.discard(address)
+        self.owed.pop(address, None)
+        self.came.pop(address, None)
+
+    def owes(self, address: int | None) -> int:
+        """How many type letters a chip has been asked for that have not come."""
+        return self.owed.get(address, 0)
+
+    def settle(self, address: int | None) -> None:
+        """The chip has answered: what it still owes comes right now or was lost."""
+        self.surplus += self.owed.pop(address, 0)
+
+    def end_watch(self, owed: Mapping[int | None, int], surplus: int) -> None:
+        """Letters are again those of the only chip that owes one: what each owes, and how many come that nobody waits for."""
+        self.letters = None
+        self.surplus += surplus
+        for address, count in owed.items():
+            self.owed.pop(address, None)
+            if count:
+                self.owed[address] = count
+
+    # ------------------------------------------------------------------ saying
+
+    def start(self, request: Say, now: Nanos, *, urgent: bool) -> bytes:
+        self._request = request
+        self._heard = b""
+        self._lines = []
+        self.nearly_full = self._is_stuck = False
+        request.committed = request.commented = False
+        selection = [] if request.address in (ALL, self.selected) else [f"x{request.address:x}".encode()]
+        spoiler = [SPOILER] if self.dirty else []
+        text = request.text.encode("ascii")
+        match request.sort:
+            case Sort.LISTEN | Sort.LETTER | Sort.UPLOAD:
+                request.committed = True
+                return self._put(b"", now)
+            case Sort.BLIND:
+                # Its first line spoils what may stand before it, and is said twice.
+                request.committed = True
+                self.selected = ALL
+                self.dirty = False
+                return self._put(text, now)
+            case Sort.KILL:
+                request.committed = True
+                said = b"".join(line + _END for line in (*selection, *text.splitlines()))
+                if self.dirty:
+                    said = SPOILER + _END + said
+                elif not self.knows(request.address):
+                    said *= 2  # the first line may meet the rest of another one
+                return self._put(said, now)
+            case Sort.SELECT:
+                self._lines = [*spoiler, *selection]
+            case Sort.LINE:
+                self._lines = [*spoiler, *selection, text]
+        if not self._lines:
+            raise Misuse(f"{request}: it is selected already")
+        return self._put(self._lines[0], now)
+
+    def _put(self, data: bytes, now: Nanos) -> bytes:
+        self._sent = data
+        self._heard = b""
+        if data and self._on_bytes is not None:
+            self._on_bytes(now, Direction.IN, data)
+        return data
+
+    # ------------------------------------------------------------------ hearing
+
+    def receive(self, data: bytes, now: Nanos) -> bytes | More | None:
+        if self._on_bytes is not None:
+            self._on_bytes(now, Direction.OUT, data)
+        request = self._request
+        if request is None or request.sort is Sort.BLIND:
+            return None
+        for place, byte in enumerate(data):
+            outcome = self._take(request, byte, data[place + 1 :], now)
+            if outcome is not None:
+                return outcome
+        return None
+
+    def _take(self, request: Say, byte: int, rest: bytes, now: Nanos) -> bytes | More | None:
+        if request.sort is Sort.LISTEN:
+            return self._take_owed(request, byte)
+        if request.sort is Sort.LETTER:
+            came = [self._uploaded(one) and one in LETTERS for one in (byte, *rest)]
+            return self._done(bytes((byte,))) if any(came) else None
+        if request.sort is Sort.UPLOAD:
+            for one in (byte, *rest):
+                self._uploaded(one)
+            return self._done(bytes((byte,)))
+        if self._sent.startswith(self._heard) and len(self._heard) < len(self._sent):
+            return self._echo(request, byte, rest, now)
+        # All has come back, and an answer is waited for.
+        return self._done(bytes((byte,)))
+
+    def _take_owed(self, request: Say, byte: int) -> bytes | None:
+        if byte not in LETTERS:
+            self._uploaded(byte)
+            return None
+        self.owed[request.address] = self.owes(request.address) - 1
+        self.settle(request.address)
+        return self._done(bytes((byte,)))
+
+    def _echo(self, request: Say, byte: int, rest: bytes, now: Nanos) -> bytes | More | None:
+        expected = self._sent[len(self._heard)]
+        if byte == expected:
+            self._heard += bytes((byte,))
+            if len(self._heard) == len(self._sent):
+                return self._came_back(request, rest, now)
+            return None
+        if self._heard and byte == ~self._heard[-1] & 0xFF:
+            self.nearly_full = True
+            return None
+        if byte == NO_ROOM:
+            if expected == SPOILER[0] or (request.sort is Sort.KILL and self._heard.endswith(SPOILER)):
+                self._is_stuck = True
+                return self._echo(request, expected, rest, now)
+            self._give_up(now)
+            raise NoRoom(self._place, request)
+        # What a program uploads comes in between. A wrong echo looks the same, and is missed then: nothing is taken without it.
+        if self._uploaded(byte) or byte in (EMPTY, THREE_FREE):
+            return None
+        raise self._garbled(request, self._heard + bytes((byte,)) + rest, now)
+
+    def _garbled(self, request: Say, heard: bytes, now: Nanos) -> Garbled:
+        typed = request.sort is Sort.LINE and len(self._lines) == 1 and self._sent == self._lines[0]
+        request.commented = typed and b";" in heard
+        sent = self._sent
+        self._give_up(now)
+        return Garbled(self._place, request, sent, heard, uncertain=request.changes)
+
+    def _absorb(self, letter: int) -> bool:
+        """A type letter has come that is not the answer waited for; whether one was to be expected."""
+        if self.letters is not None and self.owed:
+            self.letters += 1
+        elif self.owed:
+            address = next(iter(self.owed))
+            self.came[address] = letter
+            self.settle(address)
+            self.surplus -= 1
+        elif self.surplus:
+            self.surplus -= 1
+        else:
+            return False
+        return True
+
+    def _came_back(self, request: Say, rest: bytes, now: Nanos) -> bytes | More | None:
+        if request.sort is Sort.KILL:
+            self.dirty = self._is_stuck
+            self.selected = request.address
+            return self._done(b"")
+        if self._sent != _END:
+            if not all(byte == ~self._heard[-1] & 0xFF or self._uploaded(byte) for byte in rest):
+                raise self._garbled(request, self._heard + rest, now)
+            self.nearly_full |= bool(rest)
+            request.committed |= len(self._lines) == 1 and request.sort is Sort.LINE
+            return More(self._put(_END, now), may_wait=False)
+        return self._line_taken(request, rest, now)
+
+    def _line_taken(self, request: Say, rest: bytes, now: Nanos) -> bytes | More | None:
+        line = self._lines.pop(0)
+        if line == SPOILER:
+            self.dirty = self._is_stuck
+            self.spoilt[request.address] = self.spoilt.get(request.address, 0) + 1
+        elif request.sort is Sort.SELECT or self._lines:
+            self.selected = request.address
+        if self._lines:
+            return More(self._put(self._lines[0], now), may_wait=False)
+        if request.text == WHO and not request.answers:
+            # Its answer may be long in coming: others may have to go first meanwhile.
+            self.owed[request.address] = self.owes(request.address) + 1
+        if not request.answers:
+            for byte in rest:
+                if byte != ~self._heard[-1] & 0xFF:
+                    self._uploaded(byte)
+            return self._done(b"")
+        for byte in rest:
+            answer = self._take(request, byte, b"", now)
+            if answer is not None:
+                return answer
+        self._sent = self._heard = b""
+        return None
+
+    def _done(self, answer: bytes) -> bytes:
+        self._request = None
+        self._lines = []
+        return answer
+
+    def _uploaded(self, byte: int) -> bool:
+        """A byte that belongs to no exchange: whether it is a letter that was to be expected, or of a program."""
+        if byte in LETTERS and self._absorb(byte):
+            return True
+        if self.uploads is None:
+            return False
+        self.uploads.append(byte)
+        return True
+
+    # ------------------------------------------------------------------ what goes wrong
+
+    def _give_up(self, now: Nanos) -> None:
+        request = self._request
+        if request is not None and request.sort is not Sort.BLIND:
+            self.dirty = True
+            if request.text == WHO and request.committed:
+                self.surplus += 1
+            if self._lines and self._lines[0].startswith(b"x") and self._sent == _END:
+                self.selected = ALL  # a selection that may have been taken or not
+                self.echoing.clear()
+        self._request = None
+        self._lines = []
+        self.free_ns = now + QUIET_NS + self._serial.duration(8)
+        self._busy_until = now + NOISE_NS + self._serial.duration(8)
+
+    def abandon(self, now: Nanos) -> bytes:
+        heard, request = self._heard, self._request
+        if request is None:
+            return b""
+        awaits_answer = request.committed and request.answers and not self._sent and not self._lines
+        if request.sort in _SILENT or request.sort is Sort.BLIND or awaits_answer:
+            self._done(b"")
+            return b""
+        self._give_up(now)
+        return heard
+
+    def stray(self, data: bytes, now: Nanos) -> None:
+        if self._on_bytes is not None and data:
+            self._on_bytes(now, Direction.OUT, data)
+        for byte in data:
+            if not self._uploaded(byte) and byte not in (EMPTY, THREE_FREE):
+                self.dirty = True  # the echo of something that now stands in front of the next command
+        if now < self._busy_until:
+            self.free_ns = min(now + QUIET_NS, self._busy_until)
+
+
+def chip_name(address: int | None) -> str:
+    return "the chip" if address is None else f"chip {address:X}"

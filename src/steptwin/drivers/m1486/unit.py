@@ -1,0 +1,458 @@
+"""One chip on a line: commands, answers, what drivers of the same chip must agree on.
+
+Everything but a stop is done in turns (`Unit.turn`): while a chip owes an answer nobody else is talked to, because bytes do not
+say whose they are. A stop goes in between.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractAsyncContextManager, suppress
+
+from steptwin.drivers.exchange import Job, NoAnswer, Overtaken, SentLate, TooLate
+from steptwin.drivers.line import Line
+from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, WrongType, untold
+from steptwin.drivers.m1486.lines import TALK
+from steptwin.drivers.m1486.motion import Told
+from steptwin.drivers.m1486.settings import ChipSettings
+from steptwin.drivers.m1486.talk import SPOILER, WHO, CharacterTalk, Say, Sort, chip_name
+from steptwin.drivers.permission import Permission
+from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN, TABLE
+from steptwin.m1486.lines import INTERFACES, Interface
+from steptwin.m1486.ranges import out_of_range
+from steptwin.m1486.syntax import parse_line
+from steptwin.m1486.variants import VARIANTS, Variant
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+
+TRIES = 3
+STOP_TRIES = 5
+"""How often a stop is said before it is given up."""
+PAUSES_NS: tuple[Nanos, ...] = (40 * MILLISECOND, 1300 * MILLISECOND)
+"""Time for ``t41`` to be done; the other is for chips that write commands into an EEPROM."""
+WAKE_COMMANDS = 5
+"""What `Unit.wake` has typed when all goes well, and a question."""
+EVERYBODY = "xg\rxg\r"
+"""All chips listen from now on. The first may meet the rest of something else."""
+PATIENCE_NS: Nanos = 10 * SECOND
+"""A motion is not begun when so much time has passed without progress towards it."""
+SLICE_NS: Nanos = 20 * MILLISECOND
+"""Whoever listens for an answer that is owed lets a stop go first this often."""
+_NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
+READINGS = 4
+"""How often something is read until it reads the same twice."""
+
+
+class Notes:
+    """What all drivers of one chip on one line share."""
+
+    def __init__(self) -> None:
+        self.variant: Variant | None = None
+        self.interface: Interface | None = None
+        self.functions: int | None = None
+        """Functions 40 to 63, the lowest number in the lowest bit."""
+        self.settings = ChipSettings()
+        self.motion: Told | None = None
+        self.is_position_valid = True
+        self.was_awake = False
+        """Whether it echoed before: if it does not any more, it was switched off."""
+        self.restarted: Restarted | None = None
+        """Somebody who watched another chip has found out that this one was switched off: to be told to who uses it next."""
+        self.stops = 0
+        """How often it was stopped: a motion asked for before must not begin after."""
+        self.is_killed = False
+        """Whether Kill may hold the program (function 51 OFF)."""
+        self.uploads: bytearray | None = None
+        """What the program that was started last has uploaded and nobody has read."""
+        self.ready_at: Nanos = 0
+        """An EEPROM is being written until then."""
+
+    def forget(self) -> None:
+        """It was switched off or reset behind our back."""
+        self.settings = ChipSettings()
+        self.functions = sum(function.default << bit for bit, function in enumerate(TABLE)) | 1 << (RETURN - FUNCTIONS.start)
+        self.motion = None
+        self.uploads = None
+        self.is_position_valid = False
+
+    def function(self, number: int) -> bool | None:
+        return None if self.functions is None else bool(self.functions >> (number - FUNCTIONS.start) & 1)
+
+    def note_function(self, number: int, *, on: bool) -> None:
+        if self.functions is not None:
+            bit = 1 << (number - FUNCTIONS.start)
+            self.functions = self.functions | bit if on else self.functions & ~bit
+
+
+class Unit:
+    """The chip with ``address`` on ``line``; None: the only one, which needs no selection."""
+
+    def __init__(self, line: Line[Say, bytes], address: int | None, *, timeout_ns: Nanos) -> None:
+        self.line = line
+        self.address = address
+        self.timeout_ns = timeout_ns
+        self.talk: CharacterTalk = line.notes[TALK]
+        known = line.notes.setdefault("m1486 chips", set())
+        if (None in known) is not (address is None) and known:
+            raise Misuse(f"{line.place}: a chip without address has to be the only one on its line")
+        known.add(address)
+        self.notes: Notes = line.notes.setdefault(("m1486", address), Notes())
+
+    @property
+    def name(self) -> str:
+        return chip_name(self.address)
+
+    @property
+    def place(self) -> str:
+        return self.line.place
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether no driver of another chip is on the line."""
+        return len(self.line.notes["m1486 chips"]) == 1
+
+    @property
+    def write_ns(self) -> Nanos:
+        """What an EEPROM takes for a command; 0 where there is none, or nobody knows."""
+        return 0 if self.notes.variant is None else self.notes.variant.write_ns
+
+    @property
+    def variant(self) -> Variant:
+        if self.notes.variant is None:
+            raise Misuse(f"{self.place}: {self.name} is not open")
+        return self.notes.variant
+
+    def turn(self, permission: Permission | None = None) -> AbstractAsyncContextManager[object]:
+        """The line for exchanges that belong together. Waiting for it extends ``permission``."""
+        return self.line.lock("m1486 turn", None if permission is None else permission.extend)
+
+    def permission(self) -> Permission:
+        """Permission for a motion that is asked for now, until the chip is stopped or nothing goes on for too long."""
+        before = self.notes.stops
+        patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
+        return Permission(self.line.now, patience_ns, lambda: self.notes.stops != before)
+
+    # ------------------------------------------------------------------ exchanges
+
+    async def _exchange(
+        self,
+        say: Say,
+        *,
+        timeout_ns: Nanos | None = None,
+        urgent: bool = False,
+        permission: Permission | None = None,
+    ) -> bytes:
+        job: Job[Say, bytes] = Job(
+            say, self.timeout_ns if timeout_ns is None else timeout_ns, urgent=urgent, permission=permission
+        )
+        return await self.line.exchange(job)
+
+    async def _blind(self, text: str, pause_ns: Nanos, *, urgent: bool = False) -> None:
+        with suppress(NoAnswer):
+            await self._exchange(Say(self.address, text, sort=Sort.BLIND), timeout_ns=pause_ns, urgent=urgent)
+
+    async def wake(self) -> None:
+        """Have the chip echo what it hears, and select it. Raises `NoEcho`."""
+        failure: LineFailure | None = None
+        rest = ""
+        for pause in PAUSES_NS:
+            try:
+                if self.address is not None:
+                    # Everybody is to echo, so that the selection is verified by whoever hears it.
+                    await self._blind(f"{rest}{EVERYBODY}t{RETURN}\r", pause)
+                    rest = ""
+                    await self._exchange(Say(self.address, "", sort=Sort.SELECT, acts=False))
+                await self._blind_echo(rest, pause)
+                await self._exchange(Say(self.address, f"t{RETURN}", acts=False))
+            except (NoAnswer, Garbled) as error:
+                failure = error
+                # What was not echoed lacks only its CR. To spoil it would end a program that runs (M-11).
+                rest = "\r" if isinstance(error, NoAnswer) else ""
+                continue
+            self.talk.echoing.add(self.address)
+            self.notes.was_awake = True
+            self._written()
+            return
+        # Nobody else is left deaf because of a chip that is not there.
+        await self._blind(rest if self.address is None else f"{rest}{EVERYBODY}", PAUSES_NS[0])
+        raise NoEcho(self.place, self.name, failure) from failure
+
+    async def _blind_echo(self, rest: str, pause: Nanos) -> None:
+        """Switch the echo on, with the selection as it is."""
+        selected = self.talk.selected
+        await self._blind(rest + 2 * f"t{RETURN}\r", pause)
+        self.talk.selected = selected
+
+    async def _ready(self) -> None:
+        """It echoes, and its EEPROM is free."""
+        restarted, self.notes.restarted = self.notes.restarted, None
+        if restarted is not None:
+            raise restarted
+        rest = self.notes.ready_at - self.line.now()
+        if rest > 0:
+            await self.line.sleep(rest / SECOND)
+        if not self.talk.knows(self.address):
+            await self._wake_again()
+            await self._ready()
+
+    async def _wake_again(self) -> None:
+        """Raises `Restarted` for a chip that echoed before and does not: nothing is as it was. (A line may also have failed.)"""
+        known = self.notes.was_awake
+        if known and await self._still_echoes():
+            return
+        await self.wake()
+        if known:
+            self.notes.forget()
+            raise Restarted(self.place, self.name)
+
+    async def _still_echoes(self) -> bool:
+        if self.address is not None:
+            # Nobody echoes the selection where the chip selected before is off.
+            await self._blind(EVERYBODY, PAUSES_NS[0])
+        for _ in range(TRIES):
+            try:
+                await self._exchange(Say(self.address, f"t{RETURN}", acts=False))
+            except Garbled:
+                continue
+            except NoAnswer:
+                return False
+            self.talk.echoing.add(self.address)
+            self._written()
+            return True
+        return False
+
+    def _written(self) -> None:
+        """A command has gone into the memory. As long as the type is not known, so little is typed that the buffer holds it."""
+        if self.notes.variant is not None:
+            self.notes.ready_at = self.line.now() + self.notes.variant.write_ns
+
+    async def say(
+        self,
+        text: str,
+        *,
+        once: bool = False,
+        acts: bool = False,
+        retype: bool = True,
+        answers: bool = False,
+        permission: Permission | None = None,
+        stored: bool = True,
+    ) -> bytes:
+        """Type a command. ``once``: CR is sent once only, because doing it twice is not as good as once. ``acts``: what the chip
+        may have taken for it matters, even if it is typed right afterwards. ``retype``: it may be typed anew before its CR.
+
+        ``stored``: the command goes into the memory, which takes an E type its time.
+        Raises `NoRoom`, `Garbled` or `NoAnswer`; with ``uncertain`` set the chip may have acted on it.
+        """
+        failure: LineFailure | None = None
+        for _ in range(TRIES):
+            await self._ready()
+            say = Say(self.address, text, answers=answers, acts=once or acts)
+            try:
+                answer = await self._exchange(say, permission=permission, timeout_ns=self._patience(answers))
+            except (Garbled, NoAnswer) as error:
+                failure = error
+                if isinstance(error, NoAnswer) and not say.committed:
+                    self.talk.forget(self.address)
+                if (say.committed and once) or (say.commented and say.acts) or not retype:
+                    raise
+                continue
+            if stored:
+                self._written()
+            return answer
+        if failure is None:
+            raise Misuse("no tries")
+        raise failure
+
+    async def act(
+        self,
+        text: str,
+        permission: Permission,
+        *,
+        once: bool = False,
+        retype: bool = True,
+        stored: bool = True,
+        program: bool = False,
+    ) -> None:
+        """Type a command that may move the motor, as `say`; ``program``: it starts a program. Nothing of it stays in the chip
+        when the permission has ended.
+
+        Raises `Overtaken`, `TooLate`; `SentLate` when it was sent too late, and then the motor was stopped.
+        """
+        try:
+            await self.say(text, once=once, acts=True, permission=permission, retype=retype, stored=stored)
+        except (Overtaken, TooLate):
+            await self.drop_line()
+            raise
+        except SentLate:
+            self.notes.is_position_valid = False
+            await self.kill(program=program)
+            raise
+
+    def _patience(self, answers: bool) -> Nanos:
+        """An answer may have to wait for the EEPROM, of a chip whose type is not known for all that `wake` has typed."""
+        variant = self.notes.variant
+        write_ns = WAKE_COMMANDS * max(one.write_ns for one in VARIANTS) if variant is None else variant.write_ns
+        return self.timeout_ns + write_ns if answers else self.timeout_ns
+
+    def checked(self, text: str) -> str:
+        """A command as it is typed. Raises `Misuse` for one the chip would drop."""
+        line, found = parse_line(text)
+        command = line.command
+        if command is None or found:
+            raise Misuse(f"{text!r} is no command{f': {found[0].message}' if found else ''}")
+        why = out_of_range(command, self.variant)
+        if why is not None:
+            raise Misuse(why)
+        return str(command).lower()
+
+    # ------------------------------------------------------------------ is it at rest, who is it
+
+    async def asks_who(self, patience_ns: Nanos = 0, permission: Permission | None = None) -> int | None:
+        """The type letter, once the chip has done all it was told; None if it has not within ``patience_ns`` or a time-out.
+
+        Waiting for it extends ``permission``.
+        """
+        patience_ns = max(patience_ns, self._patience(True))
+        if not self.talk.owes(self.address):
+            await self.ask()
+        letter = await self._listen(patience_ns, permission)
+        if letter is None and self.talk.owes(self.address) == 1:
+            await self.ask()  # the answer may have been lost
+            letter = await self._listen(self._patience(True))
+        if letter is not None:
+            await self._hear_rest()
+            self.notes.is_killed = False
+            if self.talk.uploads is self.notes.uploads:
+                self.talk.uploads = None
+        return letter
+
+    async def _hear_rest(self) -> None:
+        """A chip that was asked twice answers twice: the second letter must not be taken for what it is asked next."""
+        talk = self.talk
+        if talk.surplus:
+            listening = Say(self.address, WHO, sort=Sort.LISTEN, acts=False)
+            with suppress(NoAnswer):
+                while talk.surplus:
+                    await self._exchange(listening, timeout_ns=self._patience(True))
+            talk.surplus = 0  # lost, or of a chip that is asked no more
+
+    async def ask(self) -> None:
+        """Ask for the type letter, which comes when the chip has done all it was told."""
+        self.talk.came.pop(self.address, None)
+        await self.say(WHO)
+
+    async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
+        """Wait for a letter that is owed, in slices, so that a stop comes in between."""
+        talk = self.talk
+        limit = self.line.now() + patience_ns
+        while self.address not in talk.came:
+            listening = Say(self.address, WHO, sort=Sort.LISTEN, acts=False)
+            try:
+                return (await self._exchange(listening, timeout_ns=SLICE_NS))[0]
+            except NoAnswer:
+                if permission is not None:
+                    permission.extend()
+                if self.line.now() >= limit:
+                    return talk.came.pop(self.address, None)
+        return talk.came.pop(self.address)
+
+    async def hear_letter(self, patience_ns: Nanos) -> None:
+        """Listen for a letter that any chip owes (`CharacterTalk.letters`)."""
+        with suppress(NoAnswer):
+            await self._exchange(Say(self.address, WHO, sort=Sort.LETTER, acts=False), timeout_ns=patience_ns)
+
+    async def hear_upload(self, patience_ns: Nanos) -> None:
+        """Listen for what a program uploads."""
+        with suppress(NoAnswer):
+            await self._exchange(Say(self.address, "", sort=Sort.UPLOAD, acts=False), timeout_ns=patience_ns)
+
+    def others(self) -> list[Notes]:
+        """What is known of the other chips on the line."""
+        return [self.line.notes[("m1486", address)] for address in self.line.notes["m1486 chips"] if address != self.address]
+
+    async def rest(self) -> None:
+        """Raises `Busy` unless the chip has done all it was told, `WrongType` if it is another one."""
+        letter = await self.asks_who()
+        if letter is None:
+            raise Busy(f"{self.place}: {self.name} {self.why_busy()}")
+        notes = self.notes
+        if notes.variant is None or letter == notes.variant.type_letter:
+            return
+        (letter,) = await self.read(20, rests=True)
+        if letter != notes.variant.type_letter:
+            raise WrongType(f"{self.place}: {self.name} says it is an M1486{_NAMES.get(letter, '?')}, not {notes.variant.title}")
+
+    def why_busy(self) -> str:
+        if self.notes.is_killed and self.notes.function(RECOVER) is False:
+            return "is held by Kill, for its function 51 is OFF: recover it, which lets a program go on"
+        if self.notes.motion is not None:
+            return f"is not done with {self.notes.motion.kind.value}: wait for its end or stop it"
+        return "does not answer yet: it moves or waits, its program runs, or LIMIT holds it"
+
+    # ------------------------------------------------------------------ reading
+
+    async def read(self, *numbers: int, rests: bool = False) -> tuple[int, ...]:
+        """Bytes by the number ``U`` gives them. They are read until they read the same twice: the line has no checksum, and a
+        counter may change between its bytes. Raises `Busy` while the chip does something; ``rests``: that it does not is known.
+        """
+        if not rests:
+            await self.rest()
+        before: tuple[int, ...] | None = None
+        for _ in range(READINGS):
+            found = tuple([(await self.say(f"u{number}", answers=True))[0] for number in numbers])
+            if found == before:
+                return found
+            before = found
+        raise LineFailure(f"{self.place}: {self.name}: what U{' U'.join(map(str, numbers))} says is another thing each time")
+
+    async def read_number(self, first: int, *, rests: bool = False) -> int:
+        """24 bits from ``first`` on."""
+        low, middle, high = await self.read(first, first + 1, first + 2, rests=rests)
+        return low | middle << 8 | high << 16
+
+    async def look(self) -> None:
+        """Find out what is not known of the chip: its type, interface and functions."""
+        await self.rest()
+        code, *functions, letter = await self.read(15, 17, 18, 19, 20, rests=True)
+        if letter not in _NAMES:
+            raise WrongType(f"{self.place}: {self.name} says that its type is {letter:02X}H, which no M1486 does")
+        if self.notes.variant is None:
+            self.notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
+        self.notes.interface = next((interface for interface in INTERFACES if interface.code == code), None)
+        self.notes.functions = int.from_bytes(bytes(functions), "little")
+        if self.notes.function(REPORT):
+            await self.say(f"c{REPORT}")  # what it sends cannot be told from answers
+            self.notes.note_function(REPORT, on=False)
+
+    # ------------------------------------------------------------------ stopping
+
+    async def drop_line(self) -> None:
+        """Have the chip drop what was typed without its CR: the next CR on the line, whoever sends it, would carry it out."""
+        if self.talk.dirty:
+            with suppress(NoAnswer, Garbled):
+                await self._exchange(Say(self.address, "", sort=Sort.SELECT, acts=False))
+
+    async def kill(self, *, program: bool = False) -> None:
+        """K, before everything that waits for the line; ``program``: and wrong data before it. Raises `Untold`."""
+        notes = self.notes
+        notes.stops += 1
+        notes.is_killed = True
+        text = f"{SPOILER.decode()}\rk" if program else "k"
+        failure: LineFailure | None = None
+        for attempt in range(STOP_TRIES):
+            if attempt and not self.talk.knows(self.address):
+                break  # it was worth a try: function 41 may be ON since before
+            try:
+                await self._exchange(Say(self.address, text, sort=Sort.KILL), urgent=True)
+            except (Garbled, NoAnswer) as error:
+                failure = error
+                continue
+            self.talk.echoing.add(self.address)
+            return
+        select = "" if self.address is None else f"x{self.address:x}\r"
+        await self._blind(2 * f"{select}{text}\r", PAUSES_NS[0], urgent=True)
+        try:
+            await self.wake()
+            notes.forget()
+            await self._exchange(Say(self.address, text, sort=Sort.KILL), urgent=True)
+        except (NoEcho, Garbled, NoAnswer) as error:
+            raise untold(self.name, failure or error) from error

@@ -1,0 +1,115 @@
+"""Waiting until a chip has done what it was told, and telling why a motion ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from steptwin.drivers.line import check_wait
+from steptwin.drivers.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
+from steptwin.drivers.m1486.talk import WHO
+from steptwin.drivers.m1486.unit import SLICE_NS, Unit
+from steptwin.drivers.m1486.watching import early_ns, watch
+from steptwin.errors import LineFailure, Misuse
+from steptwin.machine import SECOND, Nanos
+
+ASK_AGAIN_NS: Nanos = SECOND
+"""A block that does not end is asked about after this time, and then each time after twice as long."""
+
+
+async def wait_for(
+    unit: Unit, timeout_s: float | None, unit_name: str, shown: Callable[[int], float], *, check: bool
+) -> ChipMoveEnd:
+    """See `steptwin.drivers.m1486.driver.AsyncM1486.wait`. ``shown`` turns the counter into a position.
+
+    A line that fails is raised with ``check``, else it is the end.
+    """
+    check_wait(timeout_s)
+    notes = unit.notes
+    motion = notes.motion
+    begin = unit.line.now()
+
+    def ended(reason: ChipReason, position: float | None, detail: str, cause: Exception | None = None) -> ChipMoveEnd:
+        seconds = (unit.line.now() - begin) / SECOND
+        return ChipMoveEnd(unit.address, reason, position, unit_name, seconds, detail, cause)
+
+    limit = begin + round((_time_out_s(unit, motion) if timeout_s is None else timeout_s) * SECOND)
+    try:
+        if motion is not None and not unit.is_alone:
+            await watch(unit, motion, limit)
+        async with unit.turn():
+            if motion is None or motion.over_at is None:
+                marked = motion if motion is not None and motion.is_marked and unit.talk.uploads is notes.uploads else None
+                if marked is not None:
+                    await _end_of_block(unit, limit)
+                letter = await unit.asks_who(max(limit - unit.line.now(), SLICE_NS))
+                if marked is not None and letter is not None:
+                    marked.is_unfinished = not notes.uploads
+                    notes.uploads = None
+                if letter is None:
+                    is_stopped = motion is not None and motion.stops != notes.stops
+                    return ended(ChipReason.STOPPED if is_stopped else ChipReason.OVERDUE, None, unit.why_busy())
+            over_at = unit.line.now() - unit.write_ns if motion is None or motion.over_at is None else motion.over_at
+            counter = await unit.read_number(1, rests=True)
+            notes.motion = None
+    except LineFailure as failure:
+        if check:
+            raise
+        return ended(ChipReason.COMMUNICATION, None, str(failure), failure)
+    reason, detail = _reason(unit, motion, counter, over_at)
+    if reason is ChipReason.DIVERTED and motion is not None and motion.target_u is not None:
+        detail = f"the target was {shown(motion.target_u):g} {unit_name}"
+    if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
+        notes.is_position_valid = False  # M-16
+    return ended(reason, shown(counter) if notes.is_position_valid else None, detail)
+
+
+async def _end_of_block(unit: Unit, limit: Nanos) -> None:
+    """Until a block has sent its mark, or the chip answers without, or ``limit``.
+
+    What the chip was asked goes with a block that it drops because of wrong data (M-11). So it is asked again, but not as often
+    as would fill its input buffer.
+    """
+    line, talk, notes = unit.line, unit.talk, unit.notes
+    most = unit.variant.input_bits // (8 * (len(WHO) + 1)) - 1
+    pause = ASK_AGAIN_NS
+    due = line.now() + pause
+    while not notes.uploads and unit.address not in talk.came and line.now() < limit:
+        await unit.hear_upload(SLICE_NS)
+        if line.now() >= due and talk.owes(unit.address) < most - 1:
+            await unit.ask()
+            pause *= 2
+            due = line.now() + pause
+    if line.now() >= limit and talk.owes(unit.address) < most:
+        await unit.ask()  # those before may be gone
+
+
+def _time_out_s(unit: Unit, motion: Told | None) -> float:
+    if motion is None or motion.stops != unit.notes.stops:
+        return UNKNOWN_S
+    if motion.kind is ChipMotion.ENDLESS:
+        raise Misuse(f"{unit.name} runs without end: give the time to wait, timeout_s")
+    return UNKNOWN_S if motion.duration_s is None else MARGIN * motion.duration_s + MARGIN_S
+
+
+_ENDS = {ChipMotion.ENDLESS: ChipReason.LIMIT, ChipMotion.SEEK: ChipReason.SOUGHT}
+
+
+def _reason(unit: Unit, motion: Told | None, counter: int, over_at: Nanos) -> tuple[ChipReason, str]:
+    """Why it ended, and more of it. ``over_at``: when it was seen to have ended."""
+    if motion is None:
+        return ChipReason.REST, ""
+    if motion.stops != unit.notes.stops:
+        return ChipReason.STOPPED, ""
+    if motion.kind is ChipMotion.BLOCK:
+        if unit.talk.spoilt.get(unit.address, 0) != motion.spoilt:
+            return ChipReason.CUT, "by trouble on the line"
+        if motion.is_unfinished:
+            return ChipReason.CUT, "a command was wrong data when it came to be done, or the end was not heard"
+        return ChipReason.DONE, ""
+    if motion.kind in _ENDS:
+        return _ENDS[motion.kind], ""
+    if motion.target_u is not None and counter != motion.target_u:
+        return ChipReason.DIVERTED, ""
+    if motion.duration_s is not None and over_at < early_ns(motion):
+        return ChipReason.EARLY, f"after at most {(over_at - motion.at) / SECOND:.2f} s of {motion.duration_s:.2f} s"
+    return ChipReason.TARGET, ""

@@ -1,0 +1,214 @@
+"""One axis of a MIC488."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from steptwin.drivers.mic488.failures import untold
+from steptwin.drivers.mic488.jog import HOLD_S, AsyncJog
+from steptwin.drivers.mic488.motion import Kind, Motion, MoveEnd
+from steptwin.drivers.mic488.unit import URGENT_TRIES, Control, Unit, check_axis
+from steptwin.drivers.mic488.waiting import Watch, wait_for
+from steptwin.errors import LineFailure, Misuse
+from steptwin.mic488.axis import MAX_SPEED_P
+from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
+
+_KEYS = {Kind.POSITION: "POS_ABS", Kind.DISTANCE: "POS_REL", Kind.VELOCITY: "VEL_ABS", Kind.HOMING: "HOME"}
+
+
+class AsyncAxis:
+    """Axis ``number`` (from 1). Positions, velocities and accelerations are in its configured unit: u, u/s, u/s²."""
+
+    def __init__(self, unit: Unit, number: int) -> None:
+        self._unit = unit
+        self.number = check_axis(number)
+        self._motion: Motion | None = None
+
+    def __repr__(self) -> str:
+        return f"<AsyncAxis M{self.number} of unit {self._unit.number} on {self._unit.place}>"
+
+    @property
+    def unit(self) -> str:
+        """Name of the configured unit; ``u`` where no configuration was given."""
+        return self._unit.unit_name(self.number)
+
+    # ------------------------------------------------------------------ what it does
+
+    async def status(self) -> int:
+        """Mx_STATUS, see `steptwin.mic488.status.Status`."""
+        return (await self._unit.control()).axes[self.number - 1]
+
+    async def position(self) -> float:
+        """Counted position in u."""
+        return await self._shown("POS_ACT")
+
+    async def velocity(self) -> float:
+        """Present velocity in u/s."""
+        return await self._shown("VEL_ACT")
+
+    async def encoder(self) -> int:
+        """Counter of the axis' encoder, in encoder pulses."""
+        item = self._unit.item("ENC_IMP", self.number)
+        return int((await self._unit.read([item]))[item])
+
+    async def _shown(self, key: str) -> float:
+        unit = self._unit
+        item = unit.item(key, self.number)
+        data_type = (await unit.control()).data_type
+        value, _ = unit.shown(item, (await unit.read([item], data_type))[item], data_type)
+        return float(value)
+
+    # ------------------------------------------------------------------ drive and settings
+
+    async def enable(self) -> None:
+        """Switch the drive on."""
+        await self._unit.write(self._unit.item("EN", self.number), True)
+
+    async def disable(self) -> None:
+        """Switch the drive off: pulses end at once. Goes before everything that waits for the line."""
+        await self._halt("EN", on=False, what="switched off")
+
+    async def set_position(self, position_u: float) -> None:
+        """Say where the axis is. It does not move; a motion going on keeps its distance (MIC-13)."""
+        await self._store("POS_ACT", position_u)
+
+    async def set_ramp(self, *, acc: float | None = None, dec: float | None = None, velocity: float | None = None) -> None:
+        """Set ACC, DEC (u/s²) and VMAX (u/s), each above 0, for the motions that follow; they are lost at power-off."""
+        for key, value in (("ACC", acc), ("DEC", dec), ("VMAX", velocity)):
+            if value is not None:
+                if key == "VMAX":
+                    self.check(Kind.VELOCITY, value)
+                await self._store(key, value)
+
+    async def set_limits(self, *, left: float | None = None, right: float | None = None) -> None:
+        """Set the soft limits POSLIM_L and POSLIM_R in u; they are lost at power-off."""
+        for key, value in (("POSLIM_L", left), ("POSLIM_R", right)):
+            if value is not None:
+                await self._store(key, value)
+
+    async def _store(self, key: str, value_u: float) -> None:
+        control = await self._unit.control()
+        await self._unit.set_axis(key, self.number, value_u, control.data_type)
+
+    # ------------------------------------------------------------------ motion
+
+    async def move_to(self, position_u: float) -> None:
+        """Begin to move to a position, with ACC, DEC and VMAX. `wait` waits for the end.
+
+        Raises `Misuse` for a position no register holds, `NotReady` when the drive is off.
+        """
+        self.check(Kind.POSITION, position_u)
+        await self._begin(Kind.POSITION, position_u)
+
+    async def move_by(self, distance_u: float) -> None:
+        """Begin to move by a distance from where the axis is at that moment.
+
+        It is sent once only: if its answer is lost, nobody knows whether the axis moves, and the `NoAnswer` says so.
+        """
+        self.check(Kind.DISTANCE, distance_u)
+        await self._begin(Kind.DISTANCE, distance_u)
+
+    async def move_velocity(self, velocity_u: float) -> None:
+        """Run at a velocity until told otherwise; 0 ramps down."""
+        self.check(Kind.VELOCITY, velocity_u)
+        await self._begin(Kind.VELOCITY, velocity_u)
+
+    async def home(self, velocity_u: float) -> None:
+        """Begin homing at this velocity: negative towards the switch KL, positive towards KR. Sent once only, as `move_by`."""
+        self.check(Kind.HOMING, velocity_u)
+        if velocity_u == 0.0:
+            raise Misuse(f"homing of M{self.number} at 0 {self.unit}/s: the sign of the velocity chooses the switch")
+        await self._begin(Kind.HOMING, velocity_u)
+
+    async def _begin(self, kind: Kind, value_u: float) -> None:
+        unit = self._unit
+        permission = unit.permission(self.number)
+        async with unit.lock(), unit.stopping_if_late(self.number):
+            control = await unit.ready(self.number)
+            self._motion = None
+            await unit.set_axis(_KEYS[kind], self.number, value_u, control.data_type, permission=permission)
+            self.told(kind, value_u, control)
+
+    def told(self, kind: Kind, value_u: float, control: Control | None) -> None:
+        """The axis has been given a motion; ``control`` is from before."""
+        before = -1 if control is None else control.axes[self.number - 1]
+        self._motion = Motion(kind, value_u, self._unit.line.now(), before)
+
+    async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> MoveEnd:
+        """Wait until the axis has come to rest, and say why it has.
+
+        Without ``timeout_s`` the time is computed from the motion; a homing, whose way nobody knows, has a minute. Raises
+        `MoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
+        reported as the end. A motion in velocity mode needs ``timeout_s``.
+        """
+        watch = Watch(self._unit, self.number, self._motion, timeout_s)
+        return (await wait_for(self._unit, {self.number: watch}, check=check))[self.number]
+
+    def watch(self, timeout_s: float | None) -> Watch:
+        return Watch(self._unit, self.number, self._motion, timeout_s)
+
+    async def stop(self) -> None:
+        """Stop at once, without ramp. Goes before everything that waits for the line.
+
+        Motions of this axis that wait for the line are not begun any more. Raises `Untold` when the controller cannot be told.
+        """
+        await self._halt("STOP", on=True, what="stopped")
+
+    async def _halt(self, key: str, *, on: bool, what: str) -> None:
+        unit = self._unit
+        unit.notes.stops[self.number] += 1
+        try:
+            await unit.write(unit.item(key, self.number), on, urgent=True, most=URGENT_TRIES)
+        except LineFailure as failure:
+            raise untold(f"M{self.number}", what, failure) from failure
+        self.forget()
+
+    def forget(self) -> None:
+        """Whatever motion was going on was ended on purpose."""
+        self._motion = None
+
+    # ------------------------------------------------------------------ jogging
+
+    def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> AsyncJog:
+        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncJog`.
+
+        ``hold_s``: how long the axis runs on without being held before it brakes by itself, from 0.2 to 2 s.
+        """
+        self.check(Kind.VELOCITY, velocity_u)
+        if velocity_u == 0.0:
+            raise Misuse(f"a jog of M{self.number} at 0 {self.unit}/s does not move")
+        return AsyncJog(self._unit, self.number, velocity_u, hold_s, self.told)
+
+    async def jog_bit(self, direction: int, on: bool) -> None:
+        """Write the coil JOG_PLUS (direction +1) or JOG_MINUS (−1): the axis runs at JOG_SPEED **until the coil is written OFF**.
+
+        Nothing stops it when this program or the line fails; `jog` is the safe way.
+        """
+        if direction not in (1, -1):
+            raise Misuse(f"direction {direction}: permitted are 1 and -1")
+        unit = self._unit
+        item = unit.item("JOG_PLUS" if direction > 0 else "JOG_MINUS", self.number)
+        if not on:
+            await unit.write(item, False, urgent=True, most=URGENT_TRIES)
+            return
+        permission = unit.permission(self.number)
+        async with unit.lock(), unit.stopping_if_late(self.number):
+            await unit.ready(self.number)
+            self._motion = None
+            await unit.write(item, True, permission=permission)
+
+    # ------------------------------------------------------------------ ranges
+
+    def check(self, kind: Kind, value_u: float) -> None:
+        """`Misuse` for a position no register holds or a velocity no output gives, as far as GEAR is known."""
+        gear = self._unit.gear(self.number)
+        is_velocity = kind in (Kind.VELOCITY, Kind.HOMING)
+        unit = f"{self.unit}/s" if is_velocity else self.unit
+        if not isfinite(value_u):
+            raise Misuse(f"M{self.number}: {value_u} {unit} is no {kind.value}")
+        if gear is None:
+            return
+        least, most = (-MAX_SPEED_P, MAX_SPEED_P) if is_velocity else (DINT_MIN, DINT_MAX)
+        if not least <= value_u * gear <= most:
+            limits = f"{least / gear:.6g}…{most / gear:.6g} {unit}"
+            raise Misuse(f"M{self.number}: {kind.value} {value_u:g} {unit} is outside {limits} ({least:.0f}…{most:.0f} pulses)")

@@ -1,0 +1,300 @@
+"""The MIC488 as a driver shows it, for asyncio. `steptwin.drivers.mic488.sync` has the same for threads."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from steptwin.drivers.line import Line
+from steptwin.drivers.mic488 import identify, snapshot
+from steptwin.drivers.mic488.axis import AsyncAxis
+from steptwin.drivers.mic488.group import trigger
+from steptwin.drivers.mic488.lines import AsyncModbusLine
+from steptwin.drivers.mic488.motion import Kind, MoveEnd
+from steptwin.drivers.mic488.program import AsyncProgram
+from steptwin.drivers.mic488.unit import Unit, axis_mask, check_axis
+from steptwin.drivers.mic488.user import AsyncUserRegisters
+from steptwin.drivers.mic488.values import Value, named
+from steptwin.drivers.mic488.waiting import wait_for
+from steptwin.drivers.modbus import Query, check_unit, words
+from steptwin.errors import Misuse
+from steptwin.inputfiles import read_bytes
+from steptwin.machine import SECOND
+from steptwin.mic488.config import ControllerConfig, read_config
+from steptwin.mic488.inifile import IniFile
+from steptwin.mic488.registermap import DataType, Effect
+from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
+from steptwin.wire import pdu
+
+TIMEOUT_S = 0.3
+TRIES = 3
+ALL_AXES = tuple(range(1, AXES + 1))
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Mic488Status:
+    """A controller at a glance. ``units`` are those of the axes; ``imp`` where DATA_TYPE is DINT and GEAR is not known."""
+
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+    units: tuple[str, ...]
+    axes: tuple[int, ...]
+    """M1_STATUS … M4_STATUS."""
+    inputs: tuple[bool, ...]
+    outputs: tuple[bool, ...]
+    controller: int | None
+    """M_STATUS, None where the firmware has none."""
+    program: int
+    """PROGRAM_CTRL: 0 stopped, 1 running, 2 paused."""
+
+
+def load_config(path: str | Path, firmware: str = DEFAULT_FIRMWARE) -> ControllerConfig:
+    """The configuration in a ``.cfg`` file of the vendor's tool. Raises `Misuse` with all its errors."""
+    return read_config(IniFile.parse(read_bytes(Path(path)), str(path)), firmware)
+
+
+class AsyncMic488:
+    """A MIC488 at an address (``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``) or on a line shared with others.
+
+    ``firmware``: found out when not given. ``config``: the vendor tool's ``.cfg`` or what is in it; without it units have no
+    name and pulses are not known. ``observe``: DATA_TYPE is left as it is, so that opening changes nothing; else it is set
+    to REAL where it is not. Motions are made with either. ``log`` is given every frame in words. Nothing is done before `open`
+    (or ``async with``).
+    """
+
+    def __init__(
+        self,
+        where: str | Line[Query, bytes],
+        unit: int = 1,
+        *,
+        baud: int = 38400,
+        firmware: str | None = None,
+        config: str | Path | ControllerConfig | None = None,
+        timeout_s: float = TIMEOUT_S,
+        observe: bool = False,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        if not 0.0 < timeout_s <= 60.0:
+            raise Misuse(f"a time-out of {timeout_s:g} s is outside 0 to 60 s")
+        self._own = isinstance(where, str)
+        self.line: Line[Query, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
+        check_unit(unit, tcp=bool(self.line.notes.get("tcp")))
+        self._firmware = firmware
+        self._observe = observe
+        if isinstance(config, str | Path):
+            config = load_config(config, firmware or DEFAULT_FIRMWARE)
+        registers = register_map(firmware or DEFAULT_FIRMWARE)
+        self._unit = Unit(self.line, unit, registers, config, timeout_ns=round(timeout_s * SECOND), tries=TRIES)
+        self._axes = {number: AsyncAxis(self._unit, number) for number in ALL_AXES}
+        self.program = AsyncProgram(self._unit)
+        self.user = AsyncUserRegisters(self._unit)
+
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Query, bytes]:
+        return AsyncModbusLine(address, baud=baud, log=log)
+
+    def __repr__(self) -> str:
+        return f"<AsyncMic488 unit {self.unit} on {self.line.place}, firmware {self.firmware}>"
+
+    @property
+    def unit(self) -> int:
+        return self._unit.number
+
+    @property
+    def firmware(self) -> str:
+        return self._unit.registers.firmware.name
+
+    @property
+    def config(self) -> ControllerConfig | None:
+        return self._unit.config
+
+    def axis(self, number: int) -> AsyncAxis:
+        """Axis 1 to 4."""
+        return self._axes[check_axis(number)]
+
+    # ------------------------------------------------------------------ opening
+
+    async def open(self) -> None:
+        """Open the line, find out the firmware, see to DATA_TYPE. Raises `LineFailure` or `NoMic488`."""
+        await self.line.open()
+        try:
+            await self.find_firmware()
+            control = await self._unit.control()
+            if control.data_type is not DataType.REAL and not self._observe:
+                _log.warning("%s: unit %d: DATA_TYPE was DINT and is set to REAL", self.line.place, self.unit)
+                await self._unit.write(self._unit.item("DATA_TYPE"), DataType.REAL)
+                await self._unit.control()
+        except BaseException:
+            await self.close()
+            raise
+
+    async def find_firmware(self) -> None:
+        """Find out the firmware again, unless it was given: another controller may have taken the place of the one before.
+
+        Raises `LineFailure` or `NoMic488`.
+        """
+        if self._firmware is None:
+            self._unit.use(register_map(await identify.firmware_of(self.line, self.unit, self._unit.timeout_ns)))
+
+    async def close(self) -> None:
+        """Close the line, unless it is shared. Axes are not stopped by it."""
+        if self._own:
+            await self.line.close()
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self.close()
+
+    # ------------------------------------------------------------------ looking
+
+    async def status(self) -> Mic488Status:
+        """Positions, velocities, statuses, inputs, outputs and M_STATUS, in four frames."""
+        unit = self._unit
+        control = await unit.control()
+        data_type = control.data_type
+        moving = unit.axis_items("POS_ACT") + unit.axis_items("VEL_ACT")
+        values = await unit.read(moving, data_type)
+        shown = [unit.shown(item, values[item], data_type) for item in moving]
+        return Mic488Status(
+            positions=tuple(float(value) for value, _ in shown[:AXES]),
+            velocities=tuple(float(value) for value, _ in shown[AXES:]),
+            units=tuple(name for _, name in shown[:AXES]),
+            axes=control.axes,
+            inputs=await self.inputs(),
+            outputs=await self.outputs(),
+            controller=control.controller,
+            program=control.program,
+        )
+
+    async def positions(self) -> tuple[float, ...]:
+        """The positions of all axes at one moment, in u."""
+        unit = self._unit
+        data_type = unit.wording.data_type
+        items = unit.axis_items("POS_ACT")
+        values = await unit.read(items, data_type)
+        return tuple(float(unit.shown(item, values[item], data_type)[0]) for item in items)
+
+    async def inputs(self) -> tuple[bool, ...]:
+        """IN1 to IN20."""
+        return await self._bits("IN", INPUTS)
+
+    async def outputs(self) -> tuple[bool, ...]:
+        """OUT1 to OUT8."""
+        return await self._bits("OUT", OUTPUTS)
+
+    async def _bits(self, key: str, count: int) -> tuple[bool, ...]:
+        items = [self._unit.item(key, number) for number in range(1, count + 1)]
+        values = await self._unit.read(items)
+        return tuple(bool(values[item]) for item in items)
+
+    async def set_output(self, number: int, on: bool) -> None:
+        """Switch OUT1 to OUT8."""
+        if not 1 <= number <= OUTPUTS:
+            raise Misuse(f"no output {number}: outputs are 1 to {OUTPUTS}")
+        await self._unit.write(self._unit.item("OUT", number), on)
+
+    # ------------------------------------------------------------------ several axes
+
+    async def enable(self, *axes: int) -> None:
+        """Switch drives on in the same instant; without axes all four."""
+        await self._unit.write(self._unit.item("M_ENABLE"), axis_mask(axes or ALL_AXES))
+
+    async def disable(self, *axes: int) -> None:
+        """Switch drives off in the same instant; without axes all four. Goes before everything that waits for the line."""
+        await self._halt("M_DISABLE", axes, "switched off")
+
+    async def stop(self, *axes: int) -> None:
+        """Stop axes in the same instant, without ramp; without axes all four. Goes before everything that waits for the line."""
+        await self._halt("M_STOP", axes, "stopped")
+
+    async def stop_all(self) -> None:
+        """Stop all axes at once, without ramp. A program that runs goes on, and may move them again: see ``program.stop``."""
+        await self.stop()
+
+    async def _halt(self, key: str, axes: Sequence[int], what: str) -> None:
+        chosen = [check_axis(axis) for axis in axes or ALL_AXES]
+        await self._unit.stop(chosen, key, what)
+        for axis in chosen:
+            self._axes[axis].forget()
+
+    async def move_together(self, positions: Mapping[int, float]) -> None:
+        """Begin to move axes to positions (u) in the same instant: ``{1: 10.0, 2: 15.0}``."""
+        await trigger(self._unit, self._axes, Kind.POSITION, positions)
+
+    async def move_together_by(self, distances: Mapping[int, float]) -> None:
+        """Begin to move axes by distances (u) in the same instant."""
+        await trigger(self._unit, self._axes, Kind.DISTANCE, distances)
+
+    async def run_together(self, velocities: Mapping[int, float]) -> None:
+        """Begin to run axes at velocities (u/s) in the same instant."""
+        await trigger(self._unit, self._axes, Kind.VELOCITY, velocities)
+
+    async def wait(self, *axes: int, timeout_s: float | None = None, check: bool = True) -> dict[int, MoveEnd]:
+        """Wait until axes (without any: all) have come to rest; see `AsyncAxis.wait`. One that fails ends the waiting."""
+        chosen = [check_axis(axis) for axis in axes or ALL_AXES]
+        return await wait_for(self._unit, {axis: self._axes[axis].watch(timeout_s) for axis in chosen}, check=check)
+
+    async def set_jog_speed(self, velocity: float) -> None:
+        """JOG_SPEED in u/s, which holds for all axes and the coils of `AsyncAxis.jog_bit`."""
+        await self._unit.write(self._unit.item("JOG_SPEED"), velocity)
+
+    # ------------------------------------------------------------------ registers by name and raw
+
+    async def get(self, *names: str) -> dict[str, Value]:
+        """Values by name (``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``), in units where they can be told."""
+        return {name: value for name, (value, _) in (await self.get_shown(*names)).items()}
+
+    async def get_shown(self, *names: str) -> dict[str, tuple[Value, str]]:
+        """As `get`, each with its unit."""
+        unit = self._unit
+        items = {name: named(unit.registers, name) for name in names}
+        data_type = (await unit.control()).data_type
+        values = await unit.read(items.values(), data_type)
+        return {name: unit.shown(item, values[item], data_type) for name, item in items.items()}
+
+    async def set(self, name: str, value: float) -> None:
+        """Write a register by name, in units where it has one. A motion register moves.
+
+        Registers whose repetition would do something twice are sent once only.
+        """
+        unit = self._unit
+        item = named(unit.registers, name)
+        axis = item.register.axis
+        moved = () if item.register.effect not in (Effect.MOVE, Effect.ADD) else ALL_AXES if axis is None else (axis,)
+        permission = unit.permission(*moved) if moved else None
+        data_type = (await unit.control()).data_type
+        async with unit.stopping_if_late(*moved):
+            await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
+
+    async def registers(self, address: int, count: int) -> tuple[int, ...]:
+        """Raw holding registers."""
+        return words(await self._unit.look(pdu.READ_HOLDING_REGISTERS, address, count))
+
+    async def request(self, request: pdu.Request) -> pdu.Response:
+        """Any request, and its answer. What is no read is sent once, unless its registers are known to bear more."""
+        return pdu.answer(request, await self._unit.ask(request))
+
+    # ------------------------------------------------------------------ snapshots
+
+    async def take_snapshot(self) -> snapshot.Snapshot:
+        """Everything the registers let one read and write."""
+        return await snapshot.take(self._unit)
+
+    async def restore_snapshot(
+        self, kept: snapshot.Snapshot, *, counters: bool = False, outputs: bool = False, dry_run: bool = False
+    ) -> list[snapshot.Change]:
+        """Write what differs from a snapshot, and tell what that was; with ``dry_run`` only tell.
+
+        ``counters``: positions and encoder counters too; ``outputs``: OUT1 to OUT8 too.
+        """
+        if dry_run:
+            return await snapshot.changes(self._unit, kept, counters=counters, outputs=outputs)
+        return await snapshot.put_back(self._unit, kept, counters=counters, outputs=outputs)

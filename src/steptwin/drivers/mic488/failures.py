@@ -1,0 +1,56 @@
+"""Errors of the MIC488 driver, in the three families of `steptwin.errors`, in words a technician understands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.errors import LineFailure, Refusal
+from steptwin.wire.pdu import EXCEPTION_NAMES, ModbusException
+
+if TYPE_CHECKING:
+    from steptwin.drivers.mic488.motion import MoveEnd
+
+
+_WHY = {
+    1: "it does not have this function",
+    2: "it does not have this register, or not for this",
+    3: "it does not take this value",
+}
+
+
+class Refused(Refusal):
+    """The controller answered with a Modbus exception; ``code`` is its number."""
+
+    def __init__(self, place: str, request: object, exception: ModbusException) -> None:
+        self.code = exception.code
+        name = EXCEPTION_NAMES.get(exception.code, "unknown")
+        why = _WHY.get(exception.code)
+        reason = f"exception {exception.code:02X}, {name}"
+        super().__init__(f"{place}: '{request}' was refused: {f'{why} ({reason})' if why else reason}")
+
+
+class NotReady(Refusal):
+    """The controller is in a state in which it would not do what was asked; nothing was sent."""
+
+
+class NoMic488(Refusal):
+    """Somebody answers, but not as a MIC488 does."""
+
+
+class MoveFailed(Refusal):
+    """A motion did not end as it was meant to; ``end`` tells how."""
+
+    def __init__(self, end: MoveEnd) -> None:
+        self.end = end
+        super().__init__(str(end))
+
+
+class Untold(LineFailure):
+    """The controller could not be told to stop, not to go on, or to leave a mode. What it does then is part of the text."""
+
+
+def untold(who: str, what: str, failure: LineFailure) -> Untold:
+    """``who`` could not be ``what`` (stopped). A controller out of reach is not one at rest."""
+    return Untold(
+        f"{who} could not be {what}: the controller cannot be told, and goes on with what it was told before ({failure})"
+    )

@@ -1,0 +1,55 @@
+"""Several axes that begin in the same instant (AXIS_CTR_MODE, manual 4.5)."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+
+from steptwin.drivers.mic488.axis import AsyncAxis
+from steptwin.drivers.mic488.failures import Untold
+from steptwin.drivers.mic488.motion import Kind
+from steptwin.drivers.mic488.unit import Unit, axis_mask, check_axis
+from steptwin.errors import LineFailure, Misuse, SteptwinError
+
+_REGISTERS = {
+    Kind.POSITION: ("POS_ABS", "AXIS_POS_ABS_TRIG"),
+    Kind.DISTANCE: ("POS_REL", "AXIS_POS_REL_TRIG"),
+    Kind.VELOCITY: ("VEL_ABS", "AXIS_VEL_ABS_TRIG"),
+}
+DIRECT, TRIGGER = 0, 1
+
+
+async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values: Mapping[int, float]) -> None:
+    """Store a value for each axis and start them with one write. The trigger itself is sent once only.
+
+    Raises `Untold` when the axes have begun to move, but the controller cannot be told that motions need no trigger any more.
+    """
+    if not values:
+        raise Misuse("no axis is given to be moved")
+    chosen = sorted(check_axis(axis) for axis in values)
+    for axis in chosen:
+        axes[axis].check(kind, values[axis])
+    register, starter = _REGISTERS[kind]
+    mode = unit.item("AXIS_CTR_MODE")
+    permission = unit.permission(*chosen)
+    async with unit.lock():
+        control = await unit.ready(*chosen)
+        try:
+            async with unit.stopping_if_late(*chosen):
+                await unit.write(mode, TRIGGER, permission=permission)
+                for axis in chosen:
+                    await unit.set_axis(register, axis, values[axis], control.data_type, permission=permission)
+                await unit.write(unit.item(starter), axis_mask(chosen), permission=permission)
+        except BaseException:
+            with contextlib.suppress(SteptwinError):
+                await unit.write(mode, DIRECT)
+            raise
+        for axis in chosen:
+            axes[axis].told(kind, values[axis], control)
+        try:
+            await unit.write(mode, DIRECT)
+        except LineFailure as failure:
+            raise Untold(
+                f"{' '.join(f'M{axis}' for axis in chosen)} began to move, but AXIS_CTR_MODE may still be TRIGGER, in which the "
+                f"controller makes no motion without a trigger: it could not be set back to DIRECT ({failure})"
+            ) from failure

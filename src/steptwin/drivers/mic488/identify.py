@@ -1,0 +1,109 @@
+"""Finding out who answers: firmware by its address map, controllers by their slave address."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from steptwin.drivers.exchange import Job, LineLost
+from steptwin.drivers.line import Line
+from steptwin.drivers.mic488.failures import NoMic488, Refused
+from steptwin.drivers.modbus import Query, words
+from steptwin.errors import LineFailure, Refusal
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.mic488.registermap import RegisterMap
+from steptwin.mic488.registers import AXES, register_map
+from steptwin.wire import pdu
+
+SCAN_NS: Nanos = 100 * MILLISECOND
+"""How long a scan waits for a unit, beside the time on the wire: USB adapters hold bytes back for 16 ms and more."""
+PROBE_TRIES = 2
+
+_GATEWAY_CODES = (0x0A, pdu.GATEWAY_TARGET_FAILED)
+_PROBED = ("1.70", "1.23")
+"""One firmware for each address map, in the order in which they are tried. 1.23 comes last: what lies at its addresses, the
+others have as user registers, which anybody can read. 1.40 has the addresses of 1.70, and no read tells them apart."""
+
+
+class Found(NamedTuple):
+    """A unit that answers. ``firmware`` is None when it is no MIC488."""
+
+    unit: int
+    firmware: str | None
+
+
+async def firmware_of(line: Line[Query, bytes], unit: int, timeout_ns: Nanos) -> str:
+    """The firmware whose addresses a controller has: ``1.70`` (which may be 1.40) or ``1.23``.
+
+    A real controller may be silent where another refuses, so no answer is as good as a refusal as long as one address map is
+    answered. Raises `NoMic488` when neither is, the `LineFailure` when nothing is answered at all, `Refused` when a
+    gateway says that nobody does.
+    """
+    refusal: Refusal | None = None
+    failure: LineFailure | None = None
+    for name in _PROBED:
+        registers = register_map(name)
+        first, last = registers.of("DATA_TYPE"), registers.of("STATUS", AXES)
+        request = pdu.Read(pdu.READ_HOLDING_REGISTERS, first.address, last.last - first.address + 1)
+        query = Query(unit, request, lambda _, name=name: f"read the control registers of firmware {name}")
+        try:
+            answer = await line.exchange(Job(query, timeout_ns, most=PROBE_TRIES))
+        except pdu.ModbusException as exception:
+            refusal = Refused(line.place, query, exception)
+            if exception.code in _GATEWAY_CODES:
+                raise refusal from None
+        except LineLost:
+            raise
+        except LineFailure as error:
+            failure = error
+        else:
+            if _plausible(registers, first.address, words(answer)):
+                return name
+    if refusal is None and failure is not None:
+        raise failure
+    raise NoMic488(
+        f"{line.place}: unit {unit} answers, but has not the registers of a MIC488 ({refusal or 'implausible values'})"
+    )
+
+
+def _plausible(registers: RegisterMap, start: int, content: tuple[int, ...]) -> bool:
+    """Whether the registers that count something hold one of it."""
+    for register in registers:
+        if register.address < start or register.last >= start + len(content) or not register.reads:
+            continue
+        word = content[register.address - start]
+        if register.values and word not in register.values:
+            return False
+    return True
+
+
+async def scan(
+    line: Line[Query, bytes],
+    units: Iterable[int],
+    *,
+    timeout_ns: Nanos = SCAN_NS,
+    progress: Callable[[int], Any] | None = None,
+) -> list[Found]:
+    """The units that answer on a line. ``progress`` is told every unit before it is asked. Raises `LineLost`."""
+    found = []
+    inputs = pdu.Read(pdu.READ_DISCRETE_INPUTS, 5000, 8)  # every firmware has them, and it is the manual's own example
+    for unit in units:
+        if progress is not None:
+            progress(unit)
+        try:
+            await line.exchange(Job(Query(unit, inputs), timeout_ns))
+        except pdu.ModbusException as exception:
+            if exception.code in _GATEWAY_CODES:
+                continue
+        except LineLost:
+            raise
+        except LineFailure:
+            continue
+        try:
+            firmware = await firmware_of(line, unit, 2 * timeout_ns)
+        except LineLost:
+            raise
+        except (Refusal, LineFailure):
+            firmware = None
+        found.append(Found(unit, firmware))
+    return found

@@ -1,0 +1,224 @@
+"""Jogging as a dead-man's switch.
+
+The axis is never told to run. Again and again it is told to move a bounded distance from where it is (POS_REL, at the velocity
+of the jog), just far enough to run on for the hold time and then brake. Held in time, it runs evenly; not held, because the
+button was let go, the program hangs, was killed or the line was cut, it comes to rest by itself.
+
+Such a move runs at VMAX, whatever its distance, and the controller has no other bounded motion: that is why a jog sets VMAX. To
+leave VMAX alone an axis would have to be told to run (VEL_ABS, the JOG coils), which nothing ends when the program dies.
+
+Suffixes: ``_u`` configured units, ``_s`` seconds, ``_ns`` nanoseconds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
+from steptwin.drivers.mic488.failures import NotReady, Untold
+from steptwin.drivers.mic488.motion import Kind, Motion, MoveEnd, Reason, reason_of, status_text
+from steptwin.drivers.mic488.unit import Control, Unit
+from steptwin.drivers.mic488.waiting import dynamics
+from steptwin.drivers.permission import Permission
+from steptwin.errors import LineFailure, Misuse, SteptwinError
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.status import Status
+
+HOLD_S = 0.4
+"""How long an axis runs on after it was held last, before it brakes."""
+HOLD_RANGE_S = (0.2, 2.0)
+SINGLE = 2.0**-23
+"""VMAX is a REAL: what it was set to is known so well."""
+RENEWALS = 4
+"""How often it is held in that time."""
+
+
+class AsyncJog:
+    """A jog of one axis: ``async with axis.jog(5.0) as jog: while pressed(): await jog.hold()``.
+
+    `hold` returns after a quarter of the hold time: call it again at once for as long as the axis is to run. It says False when
+    the axis has stopped for another reason, which `end` tells. At the end of the block the axis ramps down, and VMAX, which a
+    jog has to change, is what it was. A killed program cannot put it back: VMAX stays the velocity of the jog then. It is never
+    raised, so that what is left behind is an axis that is slower than it was set to, not a faster one: a jog faster than VMAX
+    raises `NotReady`.
+    """
+
+    def __init__(
+        self,
+        unit: Unit,
+        axis: int,
+        velocity_u: float,
+        hold_s: float,
+        told: Callable[[Kind, float, Control | None], None],
+    ) -> None:
+        least, most = HOLD_RANGE_S
+        if not least <= hold_s <= most:
+            raise Misuse(f"a hold time of {hold_s:g} s is outside {least:g} to {most:g} s")
+        self._unit = unit
+        self._axis = axis
+        self._velocity_u = velocity_u
+        self._hold_s = hold_s
+        self._told = told
+        self._renew_ns: Nanos = round(hold_s / RENEWALS * SECOND)
+        # A jog begins at once or not at all: preparing it takes four exchanges, of which two may be repeated.
+        self._begin_ns: Nanos = round(hold_s * SECOND) + 2 * unit.timeout_ns
+        self._reach_u = 0.0
+        self._vmax_u: float | None = None
+        self._held_ns: Nanos | None = None  # when it was held last
+        self._permission: Permission | None = None
+        self.end: MoveEnd | None = None
+        """Why the axis does not run any more."""
+
+    @property
+    def reach_u(self) -> float:
+        """How far the axis goes at most after it was held last, in u."""
+        return self._reach_u
+
+    async def __aenter__(self) -> Self:
+        unit, axis = self._unit, self._axis
+        begin = unit.permission(axis, patience_ns=self._begin_ns)
+        async with unit.lock():
+            control = await unit.ready(axis)
+            self._told(Kind.DISTANCE, self._velocity_u, control)
+            _, _, _, dec, vmax = await dynamics(unit, axis)
+            speed = abs(self._velocity_u)
+            if speed > vmax * (1.0 + SINGLE):
+                name = unit.unit_name(axis)
+                raise NotReady(
+                    f"{unit.place}: a jog of M{axis} at {speed:g} {name}/s is faster than its VMAX, {vmax:g} {name}/s (which a "
+                    "program that was killed while it jogged leaves at the velocity of its jog): set VMAX first"
+                )
+            self._reach_u = speed * self._hold_s + speed * speed / (2.0 * dec)
+            if vmax != speed:
+                self._vmax_u = vmax
+                await unit.set_axis("VMAX", axis, speed, control.data_type)
+        try:
+            await self._move(control, begin)
+            self._permission = Permission(unit.line.now, round(self._hold_s * SECOND), begin.is_stopped)
+            self._permission.extend(self._held_ns)
+        except Overtaken:
+            self._held_ns, self._permission = unit.line.now(), begin
+            self._stopped(Reason.STOPPED, "by this program")
+        except SteptwinError as error:
+            with contextlib.suppress(SteptwinError):
+                await self._put_back()
+            if isinstance(error, LineFailure) and not isinstance(error, SentLate):
+                raise self._untold("may have begun to jog", error) from error
+            raise
+        return self
+
+    async def hold(self) -> bool:
+        """Let the axis run on; False when it has stopped. Raises `Untold` when the controller cannot be told in time."""
+        unit, permission = self._unit, self._permission
+        if permission is None or self._held_ns is None:
+            raise Misuse("a jog is held inside its with block")
+        if self.end is not None:
+            return False
+        await unit.line.sleep((self._held_ns + self._renew_ns - unit.line.now()) / SECOND)
+        while not permission.has_expired():
+            try:
+                control = await self._look()
+                if permission.has_expired():
+                    break  # the answer may be old
+                self._judge(control.axes[self._axis - 1])
+                if self.end is None:
+                    await self._move(control, permission)
+                    permission.extend(self._held_ns)
+            except Overtaken:
+                self._stopped(Reason.STOPPED, "by this program")
+            except (TooLate, SentLate):
+                break
+            except LineFailure as failure:
+                if not permission.has_expired():
+                    continue
+                raise self._untold("cannot be held any more", failure) from failure
+            return self.end is None
+        # Whoever held the button was away: the axis must not go on by itself afterwards.
+        self._not_held()
+        return False
+
+    async def _look(self) -> Control:
+        control = await self._unit.control(timeout_ns=self._exchange_ns())
+        if control.triggered:
+            raise NotReady(f"{self._unit.place}: somebody has set AXIS_CTR_MODE to TRIGGER: M{self._axis} is not jogged any more")
+        return control
+
+    def _exchange_ns(self) -> Nanos:
+        """A lost answer must not take the time in which another could be had."""
+        return min(self._unit.timeout_ns, self._renew_ns)
+
+    async def _move(self, control: Control, permission: Permission) -> None:
+        """Let the axis run for the hold time from now on."""
+        unit, axis = self._unit, self._axis
+        distance = self._reach_u if self._velocity_u > 0.0 else -self._reach_u
+        at = unit.line.now()
+        async with unit.stopping_if_late(axis):
+            await unit.set_axis(
+                "POS_REL", axis, distance, control.data_type, permission=permission, timeout_ns=self._exchange_ns()
+            )
+        self._held_ns = at
+
+    def _judge(self, status: int) -> None:
+        """Find the end of the jog in the status of the axis."""
+        if status == Status.POSITION:
+            return
+        if status in (Status.VELOCITY, Status.HOMING):
+            self._stopped(Reason.DIVERTED, status_text(status))
+            return
+        motion = Motion(Kind.DISTANCE, self._reach_u, self._held_ns or 0, Status.ON)
+        reason = reason_of(status, motion)
+        if reason is Reason.TARGET or status == Status.CORRECTION:
+            reason = Reason.NOT_HELD
+        self._stopped(reason, status_text(status) if reason is Reason.STOPPED else "")
+
+    def _stopped(self, reason: Reason, detail: str) -> None:
+        unit = self._unit
+        held = self._held_ns or unit.line.now()
+        self.end = MoveEnd(self._axis, reason, None, unit.unit_name(self._axis), (unit.line.now() - held) / SECOND, detail)
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        try:
+            await self.release()
+        except SteptwinError:
+            if error is None or not isinstance(error, LineFailure):
+                raise
+
+    async def release(self) -> None:
+        """Ramp down, and put VMAX back. Raises `Untold` when the controller cannot be told."""
+        unit = self._unit
+        if self.end is None and self._held_ns is not None:
+            try:
+                # Not when it is too late: the axis is at rest then, and may be moved by another master.
+                await unit.set_axis("VEL_ABS", self._axis, 0.0, unit.wording.data_type, permission=self._permission)
+            except Overtaken:
+                self._stopped(Reason.STOPPED, "by this program")
+            except (TooLate, SentLate):
+                self._not_held()
+            except LineFailure as failure:
+                raise self._untold("cannot be told to stop", failure) from failure
+            else:
+                self._stopped(Reason.RELEASED, "")
+                self._told(Kind.VELOCITY, 0.0, None)
+        await self._put_back()
+
+    def _not_held(self) -> None:
+        held = self._held_ns or 0
+        self._stopped(Reason.NOT_HELD, f"{(self._unit.line.now() - held) / SECOND:.2f} s since it was held")
+
+    async def _put_back(self) -> None:
+        vmax, self._vmax_u = self._vmax_u, None
+        if vmax is not None and vmax != abs(self._velocity_u):
+            await self._unit.set_axis("VMAX", self._axis, vmax, self._unit.wording.data_type)
+
+    def _untold(self, what: str, failure: LineFailure) -> Untold:
+        unit = self._unit
+        name = unit.unit_name(self._axis)
+        since = (unit.line.now() - (self._held_ns or unit.line.now())) / SECOND
+        self._stopped(Reason.COMMUNICATION, str(failure))
+        return Untold(
+            f"M{self._axis} {what}: the controller cannot be told ({failure}). "
+            f"It stops by itself, at most {self._reach_u:g} {name} after it was held last, {since:.2f} s ago"
+        )

@@ -1,0 +1,79 @@
+"""Modbus lines made of an address. Several controllers, drivers, tasks or threads may share one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from steptwin.drivers.exchange import Exchanger
+from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.modbus import Query, RtuMaster, TcpMaster
+from steptwin.drivers.place import Place, parse_place
+from steptwin.drivers.tasks import TaskLine
+from steptwin.drivers.threads import ThreadLine
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+
+FRAMES_PER_SECOND = 100.0
+"""What a MIC488 serves (manual 2)."""
+
+
+def modbus_exchanger(
+    place: Place, frames_per_second: float | None, log: Callable[[str], object] | None
+) -> tuple[Exchanger[Query, bytes], dict[str, object]]:
+    """The exchanges of a Modbus line, and what its drivers find in its notes. ``frames_per_second`` to each device; None: any."""
+    if frames_per_second is not None and frames_per_second <= 0.0:
+        raise Misuse(f"{frames_per_second:g} frames per second: must be above 0")
+    interval: Nanos = 0 if frames_per_second is None else round(SECOND / frames_per_second)
+    notes: dict[str, object] = {"tcp": place.framed}
+    observer = None
+    if log is not None:
+        frames = FrameWords(tcp=place.framed)
+        frames.sinks.append(lambda heard: log(str(heard)))
+        notes["frames"] = frames
+        observer = frames.observe
+    where = str(place.endpoint)
+    discipline = TcpMaster(where, on_frame=observer) if place.framed else RtuMaster(place.serial, on_frame=observer)
+    return Exchanger(discipline, where, interval), notes
+
+
+class AsyncModbusLine(TaskLine[Query, bytes]):
+    """A Modbus line for tasks, at an address. ``async with`` opens and closes it."""
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        baud: int = 38400,
+        frames_per_second: float | None = FRAMES_PER_SECOND,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        place = parse_place(address, baud)
+        exchanger, notes = modbus_exchanger(place, frames_per_second, log)
+        super().__init__(place.endpoint, exchanger)
+        self.notes.update(notes)
+
+    async def __aenter__(self) -> Self:
+        await self.open()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self.close()
+
+
+class ThreadModbusLine(ThreadLine[Query, bytes]):
+    """The same for threads; `steptwin.drivers.mic488.sync.ModbusLine` is its face."""
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        baud: int = 38400,
+        frames_per_second: float | None = FRAMES_PER_SECOND,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        place = parse_place(address, baud)
+        exchanger, notes = modbus_exchanger(place, frames_per_second, log)
+        super().__init__(place.endpoint, exchanger)
+        self.notes.update(notes)

@@ -1,0 +1,58 @@
+"""Listening in on Modbus between two others: frames cut out of what is heard, and put into words. No I/O."""
+
+from __future__ import annotations
+
+from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.machine import Nanos
+from steptwin.wire import mbap
+from steptwin.wire.rtu import BURSTY_GAP_NS, Role, RtuFrame, RtuFramer
+from steptwin.wire.slave import Direction
+
+
+class RtuListener:
+    """A line on which requests and answers come from the same wire; which is which follows from the frames."""
+
+    def __init__(self, words: FrameWords, gap_ns: Nanos = BURSTY_GAP_NS) -> None:
+        self._words = words
+        self._framer = RtuFramer(gap_ns=gap_ns)
+        self._rubbish = 0
+
+    def heard(self, data: bytes, now: Nanos) -> None:
+        self._take(self._framer.feed(data, now), now)
+
+    def deadline(self) -> Nanos | None:
+        """When `expire` has something to do if nothing else comes."""
+        return self._framer.deadline()
+
+    def expire(self, now: Nanos) -> None:
+        """Nothing has come for a while."""
+        deadline = self._framer.deadline()
+        if deadline is not None and deadline <= now:
+            self._take(self._framer.expire(now), now)
+
+    def _take(self, frames: list[RtuFrame], now: Nanos) -> None:
+        for frame in frames:
+            if frame.role is Role.UNKNOWN:
+                self._words.rubbish(now, frame.raw)
+            else:
+                self._words.observe(now, Direction.IN if frame.role is Role.REQUEST else Direction.OUT, frame.raw)
+        lost = self._framer.rubbish - self._rubbish
+        if lost:
+            self._rubbish += lost
+            self._words.lost(now, lost)
+
+
+class TcpListener:
+    """The two directions of a Modbus TCP connection."""
+
+    def __init__(self, words: FrameWords) -> None:
+        self._words = words
+        self._framers = {Direction.IN: mbap.TcpFramer(), Direction.OUT: mbap.TcpFramer()}
+
+    def heard(self, data: bytes, now: Nanos, direction: Direction) -> None:
+        framer = self._framers[direction]
+        for frame in framer.feed(data):
+            self._words.observe(now, direction, frame.raw)
+        if framer.broken is not None:
+            self._words.rubbish(now, data)
+            self._framers[direction] = mbap.TcpFramer()

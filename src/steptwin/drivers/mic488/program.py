@@ -1,0 +1,57 @@
+"""The program in the controller: choose, start, pause, stop."""
+
+from __future__ import annotations
+
+import enum
+
+from steptwin.drivers.exchange import SentLate
+from steptwin.drivers.mic488.failures import untold
+from steptwin.drivers.mic488.unit import URGENT_TRIES, Unit
+from steptwin.errors import LineFailure
+from steptwin.mic488.registers import AXES
+
+
+class ProgramState(enum.IntEnum):
+    """What PROGRAM_CTRL reads (MIC-22)."""
+
+    STOPPED = 0
+    RUNNING = 1
+    PAUSED = 2
+
+
+class AsyncProgram:
+    """The program of a controller. Programs get into it with the vendor's tool; Modbus has no function for that."""
+
+    def __init__(self, unit: Unit) -> None:
+        self._unit = unit
+
+    async def state(self) -> ProgramState:
+        return ProgramState((await self._unit.control()).program)
+
+    async def select(self, program_bank: int, position_bank: int | None = None) -> None:
+        """Choose what the next start runs. Raises `Misuse` for a bank the firmware does not have."""
+        await self._unit.write(self._unit.item("PROG_BANK_SEL"), program_bank)
+        if position_bank is not None:
+            await self._unit.write(self._unit.item("POS_BANK_SEL"), position_bank)
+
+    async def start(self) -> None:
+        """Start the chosen program, or go on with a paused one. Sent once only: a lost answer leaves it open whether it runs."""
+        permission = self._unit.permission(*range(1, AXES + 1))
+        try:
+            await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
+        except SentLate:
+            await self.stop()
+            raise
+
+    async def pause(self) -> None:
+        await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.PAUSED, urgent=True)
+
+    async def stop(self) -> None:
+        """End the program, which switches drives and outputs off (MIC-31). Goes before everything that waits for the line."""
+        unit = self._unit
+        for axis in range(1, AXES + 1):
+            unit.notes.stops[axis] += 1
+        try:
+            await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.STOPPED, urgent=True, most=URGENT_TRIES)
+        except LineFailure as failure:
+            raise untold("the program", "stopped", failure) from failure

@@ -1,0 +1,258 @@
+"""The MIC488 driver for threads: the methods of the asynchronous one as ordinary calls.
+
+Calls may come from any thread. While one waits for the controller, a stop from another goes before whatever waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Generic, Self
+
+from steptwin.drivers.blocking import Blocking, blocking, finish
+from steptwin.drivers.line import Line
+from steptwin.drivers.mic488.axis import AsyncAxis
+from steptwin.drivers.mic488.driver import TIMEOUT_S, AsyncMic488
+from steptwin.drivers.mic488.jog import HOLD_S, AsyncJog
+from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, ThreadModbusLine
+from steptwin.drivers.mic488.motion import MoveEnd
+from steptwin.drivers.mic488.program import AsyncProgram
+from steptwin.drivers.mic488.user import AsyncUserRegisters, AsyncUserView, Number
+from steptwin.drivers.modbus import Query
+from steptwin.drivers.threads import ThreadLine
+from steptwin.mic488.config import ControllerConfig
+
+
+class ModbusLine(Blocking):
+    """A Modbus line that several drivers and threads share. ``with`` opens and closes it."""
+
+    _driver: ThreadModbusLine
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        baud: int = 38400,
+        frames_per_second: float | None = FRAMES_PER_SECOND,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        super().__init__(ThreadModbusLine(address, baud=baud, frames_per_second=frames_per_second, log=log))
+
+    @property
+    def place(self) -> str:
+        return self._driver.place
+
+    @property
+    def line(self) -> ThreadModbusLine:
+        """The line as drivers use it."""
+        return self._driver
+
+    open = blocking(ThreadModbusLine.open)
+    close = blocking(ThreadModbusLine.close)
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+class Jog(Blocking):
+    """A jog of one axis: ``with axis.jog(5.0) as jog: while pressed() and jog.hold(): pass``. See `AsyncJog`."""
+
+    _driver: AsyncJog
+
+    @property
+    def end(self) -> MoveEnd | None:
+        """Why the axis does not run any more."""
+        return self._driver.end
+
+    @property
+    def reach_u(self) -> float:
+        """How far the axis goes at most after it was held last, in u."""
+        return self._driver.reach_u
+
+    hold = blocking(AsyncJog.hold)
+    release = blocking(AsyncJog.release)
+
+    def __enter__(self) -> Self:
+        finish(self._driver.__aenter__())
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        finish(self._driver.__aexit__(kind, error, trace))
+
+
+class Axis(Blocking):
+    """One axis; see `AsyncAxis`."""
+
+    _driver: AsyncAxis
+
+    @property
+    def number(self) -> int:
+        return self._driver.number
+
+    @property
+    def unit(self) -> str:
+        """Name of the configured unit; ``u`` where no configuration was given."""
+        return self._driver.unit
+
+    def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> Jog:
+        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncAxis.jog`."""
+        return Jog(self._driver.jog(velocity_u, hold_s=hold_s))
+
+    status = blocking(AsyncAxis.status)
+    position = blocking(AsyncAxis.position)
+    velocity = blocking(AsyncAxis.velocity)
+    encoder = blocking(AsyncAxis.encoder)
+    enable = blocking(AsyncAxis.enable)
+    disable = blocking(AsyncAxis.disable)
+    set_position = blocking(AsyncAxis.set_position)
+    set_ramp = blocking(AsyncAxis.set_ramp)
+    set_limits = blocking(AsyncAxis.set_limits)
+    move_to = blocking(AsyncAxis.move_to)
+    move_by = blocking(AsyncAxis.move_by)
+    move_velocity = blocking(AsyncAxis.move_velocity)
+    home = blocking(AsyncAxis.home)
+    wait = blocking(AsyncAxis.wait)
+    stop = blocking(AsyncAxis.stop)
+    jog_bit = blocking(AsyncAxis.jog_bit)
+
+
+class Program(Blocking):
+    """The program in the controller; see `AsyncProgram`."""
+
+    _driver: AsyncProgram
+
+    state = blocking(AsyncProgram.state)
+    select = blocking(AsyncProgram.select)
+    start = blocking(AsyncProgram.start)
+    pause = blocking(AsyncProgram.pause)
+    stop = blocking(AsyncProgram.stop)
+
+
+class UserView(Blocking, Generic[Number]):
+    """User registers as numbers of one type; see `AsyncUserView`."""
+
+    # `blocking` would lose the type of the numbers.
+    _driver: AsyncUserView[Number]
+
+    def __init__(self, driver: AsyncUserView[Number]) -> None:
+        super().__init__(driver)
+
+    def read(self, number: int) -> Number:
+        """The value at user register ``number``."""
+        return finish(self._driver.read(number))
+
+    def read_many(self, number: int, count: int) -> list[Number]:
+        """``count`` values from user register ``number`` on."""
+        return finish(self._driver.read_many(number, count))
+
+    def write(self, number: int, value: Number) -> None:
+        finish(self._driver.write(number, value))
+
+    def write_many(self, number: int, values: Sequence[Number]) -> None:
+        """Write values from user register ``number`` on, up to 61 DINTs or REALs or 122 others at one moment."""
+        finish(self._driver.write_many(number, values))
+
+
+class UserRegisters(Blocking):
+    """The user registers; see `AsyncUserRegisters`."""
+
+    _driver: AsyncUserRegisters
+
+    def __init__(self, driver: AsyncUserRegisters) -> None:
+        super().__init__(driver)
+        self.words: UserView[int] = UserView(driver.words)
+        self.ints: UserView[int] = UserView(driver.ints)
+        self.dints: UserView[int] = UserView(driver.dints)
+        self.reals: UserView[float] = UserView(driver.reals)
+
+    save = blocking(AsyncUserRegisters.save)
+    load = blocking(AsyncUserRegisters.load)
+    zero = blocking(AsyncUserRegisters.zero)
+
+
+class _ThreadMic488(AsyncMic488):
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Query, bytes]:
+        return ThreadModbusLine(address, baud=baud, log=log)
+
+
+class Mic488(Blocking):
+    """A MIC488 for threads; arguments as of `AsyncMic488`. ``with`` opens and closes it."""
+
+    _driver: AsyncMic488
+
+    def __init__(
+        self,
+        where: str | ModbusLine | ThreadLine[Query, bytes],
+        unit: int = 1,
+        *,
+        baud: int = 38400,
+        firmware: str | None = None,
+        config: str | Path | ControllerConfig | None = None,
+        timeout_s: float = TIMEOUT_S,
+        observe: bool = False,
+        log: Callable[[str], object] | None = None,
+    ) -> None:
+        place = where.line if isinstance(where, ModbusLine) else where
+        driver = _ThreadMic488(
+            place, unit, baud=baud, firmware=firmware, config=config, timeout_s=timeout_s, observe=observe, log=log
+        )
+        super().__init__(driver)
+        self._axes = {number: Axis(driver.axis(number)) for number in range(1, 5)}
+        self.program = Program(driver.program)
+        self.user = UserRegisters(driver.user)
+
+    @property
+    def place(self) -> str:
+        return self._driver.line.place
+
+    @property
+    def unit(self) -> int:
+        return self._driver.unit
+
+    @property
+    def firmware(self) -> str:
+        return self._driver.firmware
+
+    @property
+    def config(self) -> ControllerConfig | None:
+        return self._driver.config
+
+    def axis(self, number: int) -> Axis:
+        """Axis 1 to 4."""
+        return self._axes[self._driver.axis(number).number]
+
+    open = blocking(AsyncMic488.open)
+    close = blocking(AsyncMic488.close)
+    status = blocking(AsyncMic488.status)
+    positions = blocking(AsyncMic488.positions)
+    inputs = blocking(AsyncMic488.inputs)
+    outputs = blocking(AsyncMic488.outputs)
+    set_output = blocking(AsyncMic488.set_output)
+    enable = blocking(AsyncMic488.enable)
+    disable = blocking(AsyncMic488.disable)
+    stop = blocking(AsyncMic488.stop)
+    stop_all = blocking(AsyncMic488.stop_all)
+    move_together = blocking(AsyncMic488.move_together)
+    move_together_by = blocking(AsyncMic488.move_together_by)
+    run_together = blocking(AsyncMic488.run_together)
+    wait = blocking(AsyncMic488.wait)
+    set_jog_speed = blocking(AsyncMic488.set_jog_speed)
+    get = blocking(AsyncMic488.get)
+    get_shown = blocking(AsyncMic488.get_shown)
+    set = blocking(AsyncMic488.set)
+    registers = blocking(AsyncMic488.registers)
+    request = blocking(AsyncMic488.request)
+    take_snapshot = blocking(AsyncMic488.take_snapshot)
+    restore_snapshot = blocking(AsyncMic488.restore_snapshot)
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()

@@ -1,0 +1,326 @@
+"""One controller on a line: reading and writing values, what drivers of the same controller must agree on.
+
+Suffixes: ``_u`` configured units, ``_p`` pulses, ``_ns`` nanoseconds, ``_s`` seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import AsyncGenerator, Iterable, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from typing import NamedTuple
+
+from steptwin.drivers.exchange import Job, SentLate
+from steptwin.drivers.line import Line
+from steptwin.drivers.mic488.failures import NotReady, Refused, untold
+from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.values import Block, Item, Value, View, encoded, moves, plan, repeatable, user_item
+from steptwin.drivers.modbus import Query, bits, words
+from steptwin.drivers.permission import Permission
+from steptwin.errors import LineFailure, Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.describe import Scale, Wording
+from steptwin.mic488.registermap import DataType, RegisterMap, Type
+from steptwin.mic488.registers import AXES
+from steptwin.mic488.status import Status
+from steptwin.wire import pdu
+
+QUERIES_KEPT = 256
+URGENT_TRIES = 5
+"""How often a stop is sent before it is given up."""
+PATIENCE_NS: Nanos = 5 * SECOND
+"""What changes something is sent at most so long after it was asked for."""
+
+
+class Control(NamedTuple):
+    """The control registers that say what the controller is doing; ``at`` is a moment before they were read."""
+
+    at: Nanos
+    data_type: DataType
+    program: int
+    """PROGRAM_CTRL: 0 stopped, 1 running, 2 paused."""
+    triggered: bool
+    """AXIS_CTR_MODE is TRIGGER: motion registers wait for their trigger."""
+    controller: int | None
+    """M_STATUS, None where the firmware has none."""
+    axes: tuple[int, ...]
+    """M1_STATUS … M4_STATUS."""
+
+
+class Notes:
+    """What all drivers of one controller on one line share."""
+
+    def __init__(self) -> None:
+        self.stops = [0] * (AXES + 1)
+        """How often each axis (from 1) was stopped: a motion asked for before must not begin after."""
+        self.control: Control | None = None
+
+
+class Unit:
+    """The controller with slave address ``number`` on ``line``.
+
+    ``config`` gives units and GEAR. Reads are tried ``tries`` times, writes too where that cannot move anything twice.
+    """
+
+    def __init__(
+        self,
+        line: Line[Query, bytes],
+        number: int,
+        registers: RegisterMap,
+        config: ControllerConfig | None,
+        *,
+        timeout_ns: Nanos,
+        tries: int,
+    ) -> None:
+        self.line = line
+        self.number = number
+        self.config = config
+        self.timeout_ns = timeout_ns
+        self.tries = tries
+        self.notes: Notes = line.notes.setdefault(("mic488", number), Notes())
+        self.use(registers)
+
+    def use(self, registers: RegisterMap) -> None:
+        """Talk to a controller of that firmware."""
+        self.registers = registers
+        axes = self.config.axes if self.config is not None else ()
+        self.wording = Wording(registers, [Scale(axis.unit_name, axis.gear) for axis in axes])
+        frames = self.line.notes.get("frames")
+        if isinstance(frames, FrameWords):
+            frames.know(self.number, self.wording)
+        self._queries: dict[tuple[int, int, int], Query] = {}
+        self._plans: dict[tuple[Item, ...], list[Block]] = {}
+        keys = ("DATA_TYPE", "PROGRAM_CTRL", "AXIS_CTR_MODE")
+        self._control_items = [Item(registers.of(key)) for key in keys]
+        self._has_status = "M_STATUS" in {row.key for row in registers.rows}
+        if self._has_status:
+            self._control_items.append(Item(registers.of("M_STATUS")))
+        self._control_items += self.axis_items("STATUS")
+        (self._control_block,) = plan(registers, self._control_items)
+        self._control_query = Query(self.number, self._control_block.request, lambda _: "read the control registers")
+
+    @property
+    def place(self) -> str:
+        return self.line.place
+
+    # ------------------------------------------------------------------ scales
+
+    def unit_name(self, axis: int) -> str:
+        """The configured unit of an axis; ``u`` where it is not known."""
+        return self.config.axes[axis - 1].unit_name if self.config is not None else "u"
+
+    def gear(self, axis: int) -> float | None:
+        """Pulses per unit; None where they are not known."""
+        return self.config.axes[axis - 1].gear if self.config is not None else None
+
+    # ------------------------------------------------------------------ exchanges
+
+    async def ask(
+        self,
+        request: pdu.Request,
+        *,
+        urgent: bool = False,
+        permission: Permission | None = None,
+        timeout_ns: Nanos | None = None,
+        most: int | None = None,
+    ) -> bytes:
+        """The answer PDU. Raises `Refused` or a `LineFailure`."""
+        if most is None:
+            most = self.tries if repeatable(self.registers, request) else 1
+        if permission is None and moves(self.registers, request):
+            permission = self.permission()
+        return await self._exchange(Query(self.number, request, self.wording.request), urgent, permission, timeout_ns, most)
+
+    async def _exchange(
+        self, query: Query, urgent: bool, permission: Permission | None, timeout_ns: Nanos | None, most: int
+    ) -> bytes:
+        job: Job[Query, bytes] = Job(query, timeout_ns or self.timeout_ns, most=most, urgent=urgent, permission=permission)
+        try:
+            return await self.line.exchange(job)
+        except pdu.ModbusException as exception:
+            raise Refused(self.place, query, exception) from None
+
+    async def look(self, function: int, address: int, count: int) -> bytes:
+        """The answer to a read."""
+        key = (function, address, count)
+        query = self._queries.get(key)
+        if query is None:
+            if len(self._queries) >= QUERIES_KEPT:
+                self._queries.clear()
+            query = self._queries[key] = Query(self.number, pdu.Read(function, address, count), self.wording.request)
+        return await self._exchange(query, False, None, None, self.tries)
+
+    # ------------------------------------------------------------------ values
+
+    def item(self, key: str, index: int | None = None) -> Item:
+        return Item(self.registers.of(key, index))
+
+    def axis_items(self, key: str) -> list[Item]:
+        return [self.item(key, axis) for axis in range(1, AXES + 1)]
+
+    async def read(self, items: Iterable[Item], data_type: DataType = DataType.REAL) -> dict[Item, Value]:
+        """The values as they travel with ``data_type``, in as few frames as there can be."""
+        wanted = tuple(items)
+        blocks = self._plans.get(wanted)
+        if blocks is None:
+            if len(self._plans) >= QUERIES_KEPT:
+                self._plans.clear()
+            blocks = self._plans[wanted] = plan(self.registers, wanted)
+        values: dict[Item, Value] = {}
+        for block in blocks:
+            request = block.request
+            answer = await self.look(request.function, request.address, request.count)
+            if request.function == pdu.READ_HOLDING_REGISTERS:
+                content: Sequence[int] = words(answer)
+            else:
+                content = bits(answer, request.count)
+            values |= block.values(content, data_type)
+        return values
+
+    async def write(
+        self,
+        item: Item,
+        value: Value,
+        *,
+        data_type: DataType = DataType.REAL,
+        urgent: bool = False,
+        permission: Permission | None = None,
+        timeout_ns: Nanos | None = None,
+        most: int | None = None,
+    ) -> None:
+        """Write a value as it travels with ``data_type``."""
+        axis = item.register.axis
+        request = encoded(item, value, data_type, self.unit_name(axis) if axis else "u")
+        await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most=most)
+
+    async def read_user(self, number: int, view: View, count: int) -> list[Value]:
+        """``count`` user registers from ``number`` on, seen as ``view``."""
+        first = user_item(self.registers, number, view, count)
+        items = [first.at(number + view.size * n) for n in range(count)]
+        values = await self.read(items)
+        return [values[item] for item in items]
+
+    async def write_user(self, number: int, view: View, values: Sequence[Value]) -> None:
+        first = user_item(self.registers, number, view, len(values))
+        flat: list[int] = []
+        for n, value in enumerate(values):
+            request = encoded(first.at(number + view.size * n), value, DataType.REAL)
+            flat += request.values if isinstance(request, pdu.WriteRegisters) else [request.value]  # type: ignore[union-attr]
+        most = pdu.MAX_WRITTEN_REGISTERS - pdu.MAX_WRITTEN_REGISTERS % 2
+        for start in range(0, len(flat), most):
+            await self.ask(pdu.WriteRegisters(first.address + start, tuple(flat[start : start + most])))
+
+    # ------------------------------------------------------------------ units
+
+    def shown(self, item: Item, value: Value, data_type: DataType) -> tuple[Value, str]:
+        """A value that travelled with ``data_type`` in units where they can be told, and its unit."""
+        register = item.register
+        axis = register.axis or (register.index if register.type is Type.VALUE else None)
+        name = self.unit_name(axis) if axis else "u"
+        if register.type is Type.VALUE and data_type is DataType.DINT and axis is not None:
+            gear = self.gear(axis)
+            if gear is None:
+                return value, register.unit(DataType.DINT)
+            return value / gear, register.unit(DataType.REAL, name)
+        return value, register.unit(data_type, name)
+
+    def travelling(self, item: Item, value_u: float, data_type: DataType) -> float:
+        """A value in units as it travels with ``data_type``. Raises `NotReady` where that needs an unknown GEAR."""
+        axis = item.register.axis
+        if item.register.type is not Type.VALUE or data_type is DataType.REAL or axis is None:
+            return value_u
+        gear = self.gear(axis)
+        if gear is None:
+            raise NotReady(
+                f"{self.place}: DATA_TYPE is DINT, so {item.name} takes pulses, and GEAR is not known: "
+                "give the configuration, or set DATA_TYPE to REAL"
+            )
+        return round(value_u * gear)
+
+    async def set_axis(
+        self,
+        key: str,
+        axis: int,
+        value_u: float,
+        data_type: DataType,
+        *,
+        permission: Permission | None = None,
+        timeout_ns: Nanos | None = None,
+    ) -> None:
+        """Write a register of an axis, in units."""
+        item = self.item(key, axis)
+        value = self.travelling(item, value_u, data_type)
+        await self.write(item, value, data_type=data_type, permission=permission, timeout_ns=timeout_ns)
+
+    # ------------------------------------------------------------------ what it is doing
+
+    async def control(self, after: Nanos | None = None, timeout_ns: Nanos | None = None) -> Control:
+        """The control registers, read now, or by somebody else since ``after``."""
+        known = self.notes.control
+        if after is not None and known is not None and known.at >= after:
+            return known
+        at = self.line.now()
+        answer = await self._exchange(self._control_query, False, None, timeout_ns, self.tries)
+        values = self._control_block.values(words(answer), DataType.REAL)
+        found = [int(values[item]) for item in self._control_items]
+        if found[0] not in (DataType.REAL, DataType.DINT):
+            raise NotReady(f"{self.place}: unit {self.number} says DATA_TYPE = {found[0]}, which no MIC488 does")
+        status = found[3] if self._has_status else None
+        control = Control(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
+        self.wording.data_type = control.data_type
+        self.notes.control = control
+        return control
+
+    async def ready(self, *axes: int) -> Control:
+        """The control registers, unless the controller would not make a motion now. Raises `NotReady`."""
+        control = await self.control()
+        if control.triggered:
+            raise NotReady(
+                f"{self.place}: unit {self.number} is in TRIGGER mode (AXIS_CTR_MODE = 1), in which a motion waits for its "
+                "trigger: set AXIS_CTR_MODE to 0"
+            )
+        for axis in axes:
+            if control.axes[axis - 1] == Status.OFF:  # MIC-8
+                raise NotReady(f"{self.place}: M{axis} of unit {self.number} is switched off: enable it first")
+        return control
+
+    def lock(self) -> AbstractAsyncContextManager[object]:
+        """For exchanges that nobody else's motion commands may come between."""
+        return self.line.lock(("mic488", self.number))
+
+    def permission(self, *axes: int, patience_ns: Nanos | None = None) -> Permission:
+        """Permission for what is asked for now, until one of the axes is stopped or it is too late."""
+        stops = self.notes.stops
+        before = [stops[axis] for axis in axes]
+        if patience_ns is None:
+            patience_ns = max(PATIENCE_NS, 2 * self.tries * self.timeout_ns)
+        return Permission(self.line.now, patience_ns, lambda: [stops[axis] for axis in axes] != before)
+
+    @asynccontextmanager
+    async def stopping_if_late(self, *axes: int) -> AsyncGenerator[None]:
+        """Stop the axes when what moves them was sent too late (`SentLate`)."""
+        try:
+            yield
+        except SentLate:
+            await self.stop(axes)
+            raise
+
+    async def stop(self, axes: Sequence[int], key: str = "M_STOP", what: str = "stopped") -> None:
+        """Stop axes in the same instant, before everything that waits for the line. Raises `Untold`."""
+        for axis in axes:
+            self.notes.stops[axis] += 1
+        try:
+            await self.write(self.item(key), axis_mask(axes), urgent=True, most=URGENT_TRIES)
+        except LineFailure as failure:
+            raise untold(" ".join(f"M{axis}" for axis in axes), what, failure) from failure
+
+
+def axis_mask(axes: Iterable[int]) -> int:
+    """Axes as the bits of M_STOP and its like."""
+    return sum(1 << check_axis(axis) - 1 for axis in set(axes))
+
+
+def check_axis(axis: int) -> int:
+    if axis not in range(1, AXES + 1):
+        raise Misuse(f"no axis {axis}: axes are 1 to {AXES}")
+    return axis

@@ -1,0 +1,140 @@
+"""Waiting until axes have come to rest, and telling why they have."""
+
+from __future__ import annotations
+
+from steptwin.drivers.line import check_wait
+from steptwin.drivers.mic488.failures import MoveFailed
+from steptwin.drivers.mic488.motion import MOVING, Kind, Motion, MoveEnd, Reason, reason_of, status_text, travel_s
+from steptwin.drivers.mic488.unit import Control, Unit
+from steptwin.errors import LineFailure, Misuse
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.mic488.status import Status
+
+POLL_S = 0.05
+SHARED_NS: Nanos = 30 * MILLISECOND
+"""Several who wait for the same controller are content with a status of this age."""
+SETTLE_NS: Nanos = 100 * MILLISECOND
+"""So long after a command a status may still be the one of before."""
+MARGIN_S = 1.0
+MARGIN = 1.2
+"""A motion is overdue after this many times its computed duration, and the other margin."""
+UNKNOWN_S = 60.0
+"""Time-out of a motion whose end nobody can compute: a homing, or one that somebody else has begun."""
+CORRECTION_S = 5.0
+"""Time for a correction of the position after a motion. The controller itself gives up sooner: 2 s without progress (ERR_TIME),
+unless its configuration says otherwise."""
+
+
+class Watch:
+    """Waits for one axis. ``motion`` is what it was told last, if we told it."""
+
+    def __init__(self, unit: Unit, axis: int, motion: Motion | None, timeout_s: float | None) -> None:
+        self._unit = unit
+        self._axis = axis
+        self._motion = motion
+        check_wait(timeout_s)
+        self._begin = unit.line.now()
+        self._limit: Nanos | None = None if timeout_s is None else self._begin + round(timeout_s * SECOND)
+        self._is_computed = timeout_s is None
+        self._corrects = False
+
+    @property
+    def after(self) -> Nanos:
+        """Statuses read before tell nothing."""
+        return self._begin if self._motion is None else self._motion.at
+
+    async def judge(self, control: Control) -> MoveEnd | None:
+        """How the motion ended, None while it goes on."""
+        status = control.axes[self._axis - 1]
+        motion = self._motion
+        if status in MOVING:
+            now = self._unit.line.now()
+            corrects = status == Status.CORRECTION  # which follows the motion that the time was computed of
+            if self._limit is None or (self._is_computed and corrects is not self._corrects):
+                self._limit = now + round(await self._time_out_s(status) * SECOND)
+                self._corrects = corrects
+            if control.at < self._limit:  # only a status read after the limit tells that it is exceeded
+                return None
+            return await self._end(Reason.OVERDUE, f"{status_text(status)} for {(now - self._begin) / SECOND:.1f} s")
+        if motion is not None and status == motion.before and control.at < motion.at + SETTLE_NS:
+            return None
+        reason = reason_of(status, motion)
+        return await self._end(reason, "" if reason is not Reason.STOPPED else status_text(status))
+
+    async def _end(self, reason: Reason, detail: str) -> MoveEnd:
+        unit, axis = self._unit, self._axis
+        motion = self._motion
+        item = unit.item("POS_ACT", axis)
+        control = unit.notes.control
+        data_type = unit.wording.data_type if control is None else control.data_type
+        raw = (await unit.read([item], data_type))[item]
+        position, name = unit.shown(item, raw, data_type)
+        gear = unit.gear(axis)
+        if reason is Reason.TARGET and motion is not None and motion.kind is Kind.POSITION and gear is not None:
+            # A REAL has 24 bits; half a pulse is what the target was rounded by (MIC-14).
+            tolerance = 0.51 / gear + abs(motion.value_u) * 2.0**-22
+            if abs(position - motion.value_u) > tolerance:
+                reason, detail = Reason.DIVERTED, f"the target was {motion.value_u:g} {name}"
+        return MoveEnd(axis, reason, float(position), name, (unit.line.now() - self._begin) / SECOND, detail)
+
+    async def _time_out_s(self, status: int) -> float:
+        """How long the motion may take from now on."""
+        unit, axis, motion = self._unit, self._axis, self._motion
+        if status == Status.CORRECTION:
+            known = unit.config.axes[axis - 1] if unit.config is not None else None
+            patience_s = 0.0 if known is None else (known.enc_settle_ms + known.err_time_ms) / 1000.0 + MARGIN_S
+            return max(CORRECTION_S, patience_s)
+        if status == Status.HOMING:
+            return UNKNOWN_S
+        position, velocity, acc, dec, vmax = await dynamics(unit, axis)
+        if status == Status.VELOCITY:
+            if motion is not None and motion.kind is Kind.VELOCITY and motion.value_u == 0.0:
+                return MARGIN * abs(velocity) / acc + MARGIN_S
+            raise Misuse(f"M{axis} runs in velocity mode and does not end by itself: give the time to wait, timeout_s")
+        if motion is None or motion.kind not in (Kind.POSITION, Kind.DISTANCE):
+            return UNKNOWN_S
+        distance = motion.value_u - position if motion.kind is Kind.POSITION else motion.value_u
+        duration = travel_s(distance, velocity, acc, dec, vmax)
+        return UNKNOWN_S if duration is None else MARGIN * duration + MARGIN_S
+
+
+async def dynamics(unit: Unit, axis: int) -> tuple[float, float, float, float, float]:
+    """Position, velocity, ACC, DEC, VMAX of an axis: in units where they can be told, else in pulses."""
+    items = [unit.item(key, axis) for key in ("POS_ACT", "VEL_ACT", "ACC", "DEC", "VMAX")]
+    data_type = unit.wording.data_type
+    values = await unit.read(items, data_type)
+    position, velocity, acc, dec, vmax = (float(unit.shown(item, values[item], data_type)[0]) for item in items)
+    return position, velocity, acc, dec, vmax
+
+
+async def wait_for(unit: Unit, watches: dict[int, Watch], *, check: bool) -> dict[int, MoveEnd]:
+    """Until all axes have ended, or with ``check`` until one has ended otherwise than meant: then its `MoveFailed` is raised.
+
+    A line that fails ends the waiting: with ``check`` as the failure, else as the end of all who still move.
+    """
+    ends: dict[int, MoveEnd] = {}
+    after = max(watch.after for watch in watches.values())
+    begin = unit.line.now()
+    while True:
+        try:
+            control = await unit.control(after)
+            for axis, watch in watches.items():
+                if axis not in ends:
+                    end = await watch.judge(control)
+                    if end is not None:
+                        ends[axis] = end
+        except LineFailure as failure:
+            if check:
+                raise
+            seconds = (unit.line.now() - begin) / SECOND
+            for axis in watches:
+                name = unit.unit_name(axis)
+                ends.setdefault(axis, MoveEnd(axis, Reason.COMMUNICATION, None, name, seconds, str(failure), failure))
+        if check:
+            for end in ends.values():
+                if not end.ok:
+                    raise MoveFailed(end)
+        if len(ends) == len(watches):
+            return ends
+        await unit.line.sleep(POLL_S)
+        after = unit.line.now() - SHARED_NS

@@ -1,0 +1,329 @@
+"""Modbus as a master speaks it: requests, and how they travel as RTU frames or behind an MBAP header. Pure."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import NamedTuple
+
+from steptwin.drivers.exchange import LineLost, More
+from steptwin.errors import Misuse
+from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
+from steptwin.wire import mbap, pdu, rtu
+from steptwin.wire.crc import crc16
+from steptwin.wire.line import SerialLine
+from steptwin.wire.slave import Direction, FrameObserver
+
+QUIET_NS: Nanos = rtu.BURSTY_GAP_NS
+"""After a failed exchange a line has to be silent this long before it is used again."""
+NOISE_NS: Nanos = 200 * MILLISECOND
+"""A line that is not silent for this long never will be."""
+LATE_NS: Nanos = 5 * SECOND
+"""An answer later than this does not come any more."""
+LEAST_GAP_NS: Nanos = 1750 * MICROSECOND
+"""Silence before a frame above 19200 bit/s (Modbus over serial line V1.02, section 2.5.1.1); below it 3.5 characters."""
+HELD_BYTES = 2 * rtu.MAX_FRAME
+
+_EXCEPTION_FRAME = 5
+
+
+class Query:
+    """A Modbus request to a unit. ``describe`` gives its text; ``changes`` is false for reads only."""
+
+    __slots__ = (
+        "_describe",
+        "_rtu_frame",
+        "changes",
+        "device",
+        "function",
+        "head",
+        "pdu",
+        "request",
+        "rtu_head",
+        "rtu_size",
+        "size",
+        "tcp_tail",
+    )
+
+    def __init__(self, unit: int, request: pdu.Request, describe: Callable[[bytes], str] | None = None) -> None:
+        self.device = unit
+        self.request = request
+        self.pdu = pdu.encode_request(request)
+        self.function = request.function
+        self.changes = request.function not in pdu.READS
+        self._describe = describe
+        match request:
+            case pdu.Read(function, _, count):
+                payload = (count + 7) // 8 if function in pdu.BIT_READS else 2 * count
+                self.head = bytes((function, payload))
+                self.size = 2 + payload
+            case pdu.WriteRegisters():
+                self.head, self.size = self.pdu[:5], 5
+            case _:
+                self.head, self.size = self.pdu, 5
+        self.rtu_head = bytes((unit,)) + self.head
+        self.rtu_size = self.size + 3
+        self._rtu_frame: bytes | None = None
+        self.tcp_tail = (len(self.pdu) + 1).to_bytes(4, "big") + bytes((unit,)) + self.pdu
+        """The frame on Modbus TCP behind its number."""
+
+    @property
+    def rtu_frame(self) -> bytes:
+        frame = self._rtu_frame
+        if frame is None:
+            frame = self._rtu_frame = rtu.encode_frame(self.device, self.pdu)
+        return frame
+
+    def __str__(self) -> str:
+        text = self.pdu.hex(" ") if self._describe is None else self._describe(self.pdu)
+        return f"unit {self.device}: {text}"
+
+    def answered_by(self, answer: bytes) -> bool:
+        """Whether a PDU is a positive answer to this, by its own bytes."""
+        return len(answer) == self.size and answer.startswith(self.head)
+
+
+class _Owed(NamedTuple):
+    """An answer that has not come and still may."""
+
+    query: Query
+    until: Nanos
+
+
+class RtuMaster:
+    """RTU frames on a line whose answers carry no number.
+
+    An answer that comes too late looks like the answer to a later request of the same kind. Devices answer in order; so
+    before such a request a *marker* is sent, a read whose answer has a length no owed answer has: once it is answered, nothing
+    before it can come any more. A repeated request needs none, because either answer is right for it.
+
+    ``serial`` is None where bytes take no time. Adapters that echo what is sent are noticed at the first read.
+    """
+
+    __slots__ = (
+        "_asked", "_busy_until", "_gap_ns", "_held", "_owed", "_serial", "_then", "echo", "free_ns", "on_frame",
+    )  # fmt: skip
+
+    def __init__(self, serial: SerialLine | None = None, *, on_frame: FrameObserver | None = None) -> None:
+        self._serial = serial
+        self._gap_ns = 0 if serial is None else max(LEAST_GAP_NS, serial.duration(7) // 2)
+        self.on_frame = on_frame
+        self.echo = False
+        """Whether everything sent is heard too."""
+        self.reset()
+
+    def reset(self) -> None:
+        self._owed: list[_Owed] = []
+        self._asked: Query | None = None
+        self._then: Query | None = None  # what a marker was sent for
+        self._held = b""
+        self.free_ns: Nanos = 0
+        self._busy_until: Nanos = 0  # how long noise can keep the line
+
+    @property
+    def wary(self) -> bool:
+        return bool(self._owed)
+
+    def allowance_ns(self, request: Query) -> Nanos:
+        return (
+            0 if self._serial is None else self._serial.duration(len(request.rtu_frame) + max(request.rtu_size, _EXCEPTION_FRAME))
+        )
+
+    # ------------------------------------------------------------------ asking
+
+    def start(self, request: Query, now: Nanos, *, urgent: bool) -> bytes:
+        self._held = b""
+        self._then = None
+        # A stop waits for nothing; an earlier stop's answer tells the same.
+        if self._owed and not urgent and self._could_be_confused(request, now):
+            self._then = request
+            request = self._marker(request.device)
+        return self._send(request, now)
+
+    def _send(self, query: Query, now: Nanos) -> bytes:
+        self._asked = query
+        if self.on_frame is not None:
+            self.on_frame(now, Direction.IN, query.rtu_frame)
+        return query.rtu_frame
+
+    def _could_be_confused(self, request: Query, now: Nanos) -> bool:
+        self._owed = [owed for owed in self._owed if owed.until > now]
+        return any(
+            owed.query is not request and owed.query.device == request.device and owed.query.function == request.function
+            for owed in self._owed
+        )
+
+    def _marker(self, unit: int) -> Query:
+        taken = {owed.query.rtu_size for owed in self._owed if owed.query.function == pdu.READ_HOLDING_REGISTERS}
+        count = next((n for n in range(1, pdu.MAX_REGISTERS) if 2 * n + 5 not in taken), pdu.MAX_REGISTERS)
+        return Query(unit, pdu.Read(pdu.READ_HOLDING_REGISTERS, 0, count), lambda _: "a read to find out what is still to come")
+
+    # ------------------------------------------------------------------ hearing
+
+    def receive(self, data: bytes, now: Nanos) -> bytes | More | None:
+        asked = self._asked
+        if asked is None:
+            return None
+        held = self._held + data if self._held else data
+        if len(held) == asked.rtu_size and not self.echo and held.startswith(asked.rtu_head) and crc16(held) == 0:
+            frame = held
+        else:
+            frame = self._found(asked, held)
+            if frame is None:
+                self._held = held[-HELD_BYTES:]
+                return None
+        if self.on_frame is not None:
+            self.on_frame(now, Direction.OUT, frame)
+        self.free_ns = now + self._gap_ns
+        self._held = b""
+        self._asked = None
+        if self._owed:
+            self._settle(asked)
+        then, self._then = self._then, None
+        if then is not None:
+            return More(self._send(then, now), may_wait=True)
+        answer = frame[1:-2]
+        if answer[0] != asked.function:
+            raise pdu.ModbusException(asked.function, answer[1])
+        return answer
+
+    def _found(self, asked: Query, held: bytes) -> bytes | None:
+        """The answer to ``asked`` in what was heard, behind whatever rubbish."""
+        start = 0
+        sent = asked.rtu_frame
+        if not asked.changes and held.startswith(sent):
+            self.echo = True  # no answer to a read repeats it
+        if self.echo:
+            if len(held) < len(sent):
+                return None
+            if held.startswith(sent):
+                start = len(sent)
+        first = bytes((asked.device,))
+        refused = asked.function | pdu.REFUSED
+        while (start := held.find(first, start)) >= 0 and start + _EXCEPTION_FRAME <= len(held):
+            function = held[start + 1]
+            size = 0
+            if function == asked.function and held.startswith(asked.rtu_head, start):
+                size = asked.rtu_size
+            elif function == refused and self._then is None:  # a marker is known by its length only
+                size = _EXCEPTION_FRAME
+            if size and start + size <= len(held) and crc16(held[start : start + size]) == 0:
+                return held[start : start + size]
+            start += 1
+        return None
+
+    def _settle(self, asked: Query) -> None:
+        """``asked`` was answered: what its device was asked before is not owed any more, unless this was its answer."""
+        of_device = [owed for owed in self._owed if owed.query.device == asked.device]
+        if self._then is not None or all(owed.query.function != asked.function for owed in of_device):
+            self._owed = [owed for owed in self._owed if owed.query.device != asked.device]
+
+    def abandon(self, now: Nanos) -> bytes:
+        heard, self._held = self._held, b""
+        if self._asked is not None:
+            self._owed.append(_Owed(self._asked, now + LATE_NS))
+            self._asked = None
+        self._then = None
+        self.free_ns = now + QUIET_NS
+        self._busy_until = now + NOISE_NS
+        if heard and self.on_frame is not None:
+            self.on_frame(now, Direction.OUT, heard)
+        return heard
+
+    def stray(self, data: bytes, now: Nanos) -> None:
+        if now < self._busy_until:
+            self.free_ns = min(now + QUIET_NS, self._busy_until)
+
+
+class TcpMaster:
+    """Modbus TCP. Answers carry the number of their request; late ones are known by it and passed over.
+
+    So is what has the number but answers something else, as gateways send that mix their lines up: it tells nothing of what
+    the device has done. ``place`` is where the other end is, for people.
+    """
+
+    __slots__ = ("_asked", "_framer", "_no_answer", "_number", "_number_bytes", "_place", "on_frame")
+
+    free_ns: Nanos = 0
+    wary = False
+
+    def __init__(self, place: str = "the connection", *, on_frame: FrameObserver | None = None) -> None:
+        self.on_frame = on_frame
+        self._place = place
+        self._number = 0
+        self._number_bytes = b"\0\0"
+        self.reset()
+
+    def reset(self) -> None:
+        self._asked: Query | None = None
+        self._no_answer = b""  # what came instead of an answer
+        self._framer = mbap.TcpFramer()
+
+    def allowance_ns(self, request: Query) -> Nanos:
+        return 0
+
+    def start(self, request: Query, now: Nanos, *, urgent: bool) -> bytes:
+        self._number = self._number + 1 & 0xFFFF
+        self._number_bytes = self._number.to_bytes(2, "big")
+        self._asked = request
+        self._no_answer = b""
+        frame = self._number_bytes + request.tcp_tail
+        if self.on_frame is not None:
+            self.on_frame(now, Direction.IN, frame)
+        return frame
+
+    def receive(self, data: bytes, now: Nanos) -> bytes | None:
+        asked = self._asked
+        if asked is None:
+            self._feed(data)
+            return None
+        if len(data) == asked.size + 7 and not self._framer.held and data[:2] == self._number_bytes and data[6] == asked.device:
+            answer = data[7:]
+            if asked.answered_by(answer) and data[2:6] == (len(answer) + 1).to_bytes(4, "big"):
+                if self.on_frame is not None:
+                    self.on_frame(now, Direction.OUT, data)
+                self._asked = None
+                return answer
+        for frame in self._feed(data):
+            if self.on_frame is not None:
+                self.on_frame(now, Direction.OUT, frame.raw)
+            if frame.transaction == self._number and frame.unit == asked.device:
+                answer = frame.pdu
+                if asked.answered_by(answer):
+                    self._asked = None
+                    return answer
+                if answer[0] == asked.function | pdu.REFUSED and len(answer) == 2:
+                    self._asked = None
+                    raise pdu.ModbusException(asked.function, answer[1])
+            self._no_answer = frame.raw
+        return None
+
+    def _feed(self, data: bytes) -> list[mbap.TcpFrame]:
+        frames = self._framer.feed(data)
+        if self._framer.broken is not None:
+            raise LineLost(f"{self._place}: what came is no Modbus TCP ({self._framer.broken})")
+        return frames
+
+    def abandon(self, now: Nanos) -> bytes:
+        self._asked = None
+        return self._no_answer + self._framer.held
+
+    def stray(self, data: bytes, now: Nanos) -> None:
+        self._feed(data)
+
+
+def words(answer: bytes) -> tuple[int, ...]:
+    """The registers in the answer to a read of holding registers."""
+    return struct.unpack_from(f">{answer[1] // 2}H", answer, 2)
+
+
+def bits(answer: bytes, count: int) -> list[bool]:
+    """The first ``count`` states in the answer to a read of bits."""
+    return pdu.unpack_bits(answer[2:], count)
+
+
+def check_unit(unit: int, *, tcp: bool) -> None:
+    """`Misuse` for a unit nobody answers for."""
+    least, most = (0, 255) if tcp else (1, rtu.MAX_UNIT)
+    if not least <= unit <= most:
+        raise Misuse(f"unit {unit} is outside {least} to {most}")

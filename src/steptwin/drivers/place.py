@@ -1,0 +1,252 @@
+"""Where a device is reached: ``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import os
+import socket
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, cast
+from urllib.parse import urlsplit
+
+from steptwin.drivers.exchange import LineLost
+from steptwin.errors import Misuse
+from steptwin.wire.line import SerialLine
+
+if TYPE_CHECKING:
+    from serialx import BaseSerial, BaseSerialTransport
+
+CONNECT_S = 3.0
+MODBUS_PORT = 502
+READ_BYTES = 4096
+BAUDS = (300, 1_000_000)
+FORMS = "expected a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT"
+
+
+class Channel(Protocol):
+    """Bytes to and from a line, for a thread that waits. Everything raises `LineLost` when the line is gone."""
+
+    def write(self, data: bytes) -> None: ...
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has come; nothing after ``timeout_s``."""
+        ...
+
+    def close(self) -> None: ...
+
+
+class Endpoint(Protocol):
+    """Something that can be opened. Its text is its address."""
+
+    def open(self) -> Channel:
+        """For a thread. Raises `LineLost` naming the address."""
+        ...
+
+    async def connect(self, make: Callable[[], asyncio.Protocol]) -> asyncio.Transport:
+        """For a task. Raises `LineLost` naming the address."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An address as a driver takes it apart. ``framed``: Modbus TCP rather than the bytes of a serial line."""
+
+    endpoint: Endpoint
+    framed: bool = False
+    serial: SerialLine | None = None
+    """Set where bytes take their time."""
+
+
+def parse_place(text: str, baud: int) -> Place:
+    """The place behind an address. ``baud`` matters to serial ports. Raises `Misuse`."""
+    if not BAUDS[0] <= baud <= BAUDS[1]:
+        raise Misuse(f"{baud} bit/s is outside {BAUDS[0]} to {BAUDS[1]}")
+    scheme, separator, _ = text.partition("://")
+    if not separator:
+        if not text or (":" in text and "/" not in text):
+            raise Misuse(f"{text!r} is no address: {FORMS}")
+        return Place(SerialEndpoint(text, baud), serial=SerialLine(baud))
+    if scheme == "rfc2217":
+        return Place(SerialEndpoint(text, baud), serial=SerialLine(baud))
+    if scheme not in ("tcp", "rtu-tcp"):
+        raise Misuse(f"{text!r} is no address: {FORMS}")
+    try:
+        parts = urlsplit(text)
+        host, port = parts.hostname, parts.port
+        rest = parts.path.strip("/") + parts.query + parts.fragment
+    except ValueError:
+        host, port, rest = None, None, ""
+    if not host or rest:
+        raise Misuse(f"{text!r} is no address: {FORMS}")
+    if port is None:
+        if scheme != "tcp":
+            raise Misuse(f"{text!r} names no port: {FORMS}")
+        port = MODBUS_PORT
+    return Place(TcpEndpoint(scheme, host, port), framed=scheme == "tcp")
+
+
+def reason(error: Exception) -> str:
+    """Why something failed, in words."""
+    number = getattr(error, "errno", None)
+    if isinstance(number, int) and number in errno.errorcode:
+        return os.strerror(number).lower()
+    return str(error) or type(error).__name__
+
+
+# ---------------------------------------------------------------------- TCP
+
+
+@dataclass(frozen=True, slots=True)
+class TcpEndpoint:
+    scheme: str
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}:{self.port}"
+
+    def open(self) -> Channel:
+        try:
+            return SocketChannel(socket.create_connection((self.host, self.port), CONNECT_S), str(self))
+        except OSError as error:
+            raise self._failed(error) from error
+
+    async def connect(self, make: Callable[[], asyncio.Protocol]) -> asyncio.Transport:
+        loop = asyncio.get_running_loop()
+        try:
+            async with asyncio.timeout(CONNECT_S):
+                transport, _ = await loop.create_connection(make, self.host, self.port)
+        except OSError as error:
+            raise self._failed(error) from error
+        return transport
+
+    def _failed(self, error: OSError) -> LineLost:
+        why = f"nobody answers within {CONNECT_S:g} s" if isinstance(error, TimeoutError) else reason(error)
+        return LineLost(f"cannot connect to {self}: {why}")
+
+
+class SocketChannel:
+    """A connection whose time-out the system keeps: that saves a call for each exchange."""
+
+    def __init__(self, connected: socket.socket, place: str) -> None:
+        connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        connected.setblocking(True)
+        self._socket = connected
+        self._place = place
+        self._timeout_us = 0
+
+    def write(self, data: bytes) -> None:
+        try:
+            sent = self._socket.send(data, socket.MSG_DONTWAIT)
+            if sent < len(data):
+                raise BlockingIOError(errno.EAGAIN, "")
+        except BlockingIOError:
+            raise LineLost(f"{self._place}: the other end takes nothing any more") from None
+        except OSError as error:
+            raise LineLost(f"{self._place}: {reason(error)}") from error
+
+    def read(self, timeout_s: float) -> bytes:
+        timeout_us = int(timeout_s * 1e6)
+        flags = 0
+        if timeout_us <= 0:
+            flags = socket.MSG_DONTWAIT
+        elif timeout_us != self._timeout_us:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", *divmod(timeout_us, 1_000_000)))
+            self._timeout_us = timeout_us
+        try:
+            data = self._socket.recv(READ_BYTES, flags)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise LineLost(f"{self._place}: {reason(error)}") from error
+        if not data:
+            raise LineLost(f"{self._place}: the other end closed the connection")
+        return data
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+# ---------------------------------------------------------------------- serial ports
+
+
+@dataclass(frozen=True, slots=True)
+class SerialEndpoint:
+    """A serial port, 8N1. One process at a time may have it."""
+
+    device: str
+    baud: int
+
+    def __str__(self) -> str:
+        return self.device
+
+    @property
+    def is_network(self) -> bool:
+        return self.device.startswith("rfc2217://")
+
+    def open(self) -> Channel:
+        import serialx
+
+        try:
+            if self.is_network:
+                from steptwin.drivers.rfc2217 import NetworkSerial
+
+                port: BaseSerial = NetworkSerial(self.device, self.baud)
+            else:
+                port = serialx.serial_for_url(self.device, self.baud)
+            port.open()
+        except (OSError, serialx.SerialException, ValueError) as error:
+            raise self._failed(error) from error
+        return SerialChannel(port, str(self))
+
+    async def connect(self, make: Callable[[], asyncio.Protocol]) -> asyncio.Transport:
+        import serialx
+
+        loop = asyncio.get_running_loop()
+        kind: type[BaseSerialTransport] | None = None
+        if self.is_network:
+            from steptwin.drivers.rfc2217 import NetworkSerialTransport
+
+            kind = NetworkSerialTransport
+        try:
+            transport, _ = await serialx.create_serial_connection(loop, make, self.device, self.baud, transport_cls=kind)
+        except (OSError, serialx.SerialException, ValueError) as error:
+            raise self._failed(error) from error
+        return cast(asyncio.Transport, transport)
+
+    def _failed(self, error: Exception) -> LineLost:
+        why = "another program has it" if getattr(error, "errno", None) == errno.EBUSY else reason(error)
+        return LineLost(f"cannot open serial port {self.device} at {self.baud} bit/s: {why}")
+
+
+class SerialChannel:
+    def __init__(self, port: BaseSerial, place: str) -> None:
+        self._port = port
+        self._place = place
+        self._buffer = bytearray(READ_BYTES)
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._port.write(data, timeout=1.0)
+        except Exception as error:  # whatever a platform raises, the port is of no use any more
+            raise self._gone(error) from error
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            count = self._port.readinto(self._buffer, timeout=max(timeout_s, 0.0))
+        except Exception as error:
+            raise self._gone(error) from error
+        return bytes(self._buffer[:count])
+
+    def _gone(self, error: Exception) -> LineLost:
+        return LineLost(f"serial port {self._place} is gone: {reason(error)}")
+
+    def close(self) -> None:
+        with contextlib.suppress(Exception):
+            self._port.close()

@@ -1,0 +1,178 @@
+"""A line for threads.
+
+Whoever waits for an answer runs the line until it has it; the others wait for their turn. So there is no thread of our own,
+and a process that hangs sends nothing.
+
+The methods are coroutines that never suspend: one and the same driver runs on this and on `steptwin.drivers.tasks`.
+`steptwin.drivers.blocking` makes ordinary calls of them.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Hashable
+from typing import Any, Generic
+
+from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
+from steptwin.drivers.line import LOCK_SLICE_S
+from steptwin.drivers.place import Channel, Endpoint
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+
+
+class ThreadLine(Generic[Q, A]):
+    """See `steptwin.drivers.line.Line`. ``clock`` and ``sleeping`` are the wall's."""
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        exchanger: Exchanger[Q, A],
+        *,
+        clock: Callable[[], Nanos] = time.monotonic_ns,
+        sleeping: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.notes: dict[Hashable, Any] = {}
+        self.now = clock
+        self._endpoint = endpoint
+        self._engine = exchanger
+        self._sleeping = sleeping
+        self._channel: Channel | None = None
+        self._closed = False
+        self._changed = threading.Condition(threading.Lock())
+        self._leading = False  # whether some thread runs the line
+        self._locks: dict[Hashable, threading.Lock] = {}
+
+    @property
+    def place(self) -> str:
+        return str(self._endpoint)
+
+    async def open(self) -> None:
+        with self._changed:
+            self._closed = False
+            if self._channel is None:
+                self._channel = self._endpoint.open()
+
+    async def exchange(self, job: Job[Q, A]) -> A:
+        with self._changed:
+            if self._closed:
+                raise Misuse(f"the line {self.place} is closed")
+            self._engine.submit(job)
+            try:
+                if self._leading:
+                    self._follow(job)
+                if not job.done:
+                    self._lead(job)
+            finally:
+                if not job.done:
+                    self._engine.withdraw(job)
+        return job.result()
+
+    def _follow(self, job: Job[Q, A]) -> None:
+        """Wait until somebody has done it, or nobody runs the line."""
+        job.tell = self._changed.notify_all
+        while self._leading and not job.done:
+            self._changed.wait()
+
+    def _lead(self, job: Job[Q, A]) -> None:
+        """Run the line, for others too, until ``job`` is done."""
+        self._leading = True
+        try:
+            if self._engine.discipline.wary:
+                self._empty()
+            while not job.done:
+                try:
+                    self._turn(job)
+                except LineLost as error:
+                    self._drop(error)
+        finally:
+            self._leading = False
+            if self._engine.busy:
+                self._changed.notify_all()
+
+    def _empty(self) -> None:
+        """Throw away what came while nobody listened."""
+        try:
+            while self._channel is not None and (data := self._channel.read(0.0)):
+                self._engine.receive(data, self.now())
+        except LineLost as error:
+            self._drop(error)
+
+    def _turn(self, job: Job[Q, A]) -> None:
+        engine = self._engine
+        channel = self._channel
+        if self._closed:
+            self._end()
+            return
+        if channel is None:
+            channel = self._reopened()
+            if channel is None:
+                return
+        now = self.now()
+        data = engine.step(now)
+        if data:
+            channel.write(data)
+            engine.written()
+        due = engine.deadline()
+        if due is None or job.done:
+            return
+        self._changed.release()
+        try:
+            received = channel.read((due - now) / SECOND)
+        finally:
+            self._changed.acquire()
+        if received:
+            engine.receive(received, self.now())
+
+    def _reopened(self) -> Channel | None:
+        """The line is open again, or all who wait were told why not."""
+        try:
+            self._channel = self._endpoint.open()
+        except LineLost as error:
+            self._engine.fail_all(error)
+        return self._channel
+
+    def _drop(self, error: LineLost) -> None:
+        channel, self._channel = self._channel, None
+        if channel is not None:
+            channel.close()
+        self._engine.lost(error)
+
+    async def sleep(self, seconds: float) -> None:
+        if seconds > 0.0:
+            self._sleeping(seconds)
+
+    def lock(self, key: Hashable, waiting: Callable[[], object] | None = None) -> ThreadLock:
+        return ThreadLock(self._locks.setdefault(key, threading.Lock()), waiting)
+
+    async def close(self) -> None:
+        """Close the line. What other threads wait for ends with `LineLost`, at the latest when it times out."""
+        with self._changed:
+            self._closed = True
+            if not self._leading:
+                self._end()
+
+    def _end(self) -> None:
+        error = LineLost(f"the line {self.place} was closed")
+        self._drop(error)
+        self._engine.fail_all(error)
+
+
+class ThreadLock:
+    """A lock for threads that is entered like one for tasks; ``waiting`` as of `steptwin.drivers.line.Line.lock`."""
+
+    __slots__ = ("_lock", "_waiting")
+
+    def __init__(self, lock: threading.Lock, waiting: Callable[[], object] | None) -> None:
+        self._lock = lock
+        self._waiting = waiting
+
+    async def __aenter__(self) -> None:
+        if self._waiting is None:
+            self._lock.acquire()
+            return
+        while not self._lock.acquire(timeout=LOCK_SLICE_S):
+            self._waiting()
+
+    async def __aexit__(self, *_: object) -> None:
+        self._lock.release()

@@ -1,0 +1,65 @@
+"""Where a world begins: at its description, or at a moment of a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.files import session as sessions
+from steptwin.files.textfiles import check_writable
+from steptwin.files.world import World
+from steptwin.machine import Nanos
+from steptwin.world import script as do
+from steptwin.world.faults import read as read_fault
+
+SESSION_SUFFIX = ".json"
+
+
+def is_session(path: Path) -> bool:
+    """Whether a file is taken for a session; others are taken for descriptions."""
+    return path.suffix.lower() == SESSION_SUFFIX
+
+
+def check_session_target(path: Path) -> None:
+    """Whether a session can be written there, and is one by its name afterwards. Raises `Misuse`."""
+    if not is_session(path):
+        raise Misuse(f"{path}: a session is called NAME{SESSION_SUFFIX}")
+    check_writable(path)
+
+
+def begin_world(
+    path: Path,
+    warn: Callable[[str], object],
+    *,
+    moment: Nanos | None = None,
+    seed: int | None = None,
+    keep_trace: bool = True,
+    keep_inputs: bool = True,
+    allow_outside: bool = False,
+) -> World:
+    """The world that a file describes; that of a session at its end, or at a ``moment`` with all that had come by then.
+
+    ``warn`` is told what is doubtful. Raises `Misuse`.
+    """
+    if not is_session(path):
+        if moment is not None:
+            raise Misuse(f"--from: {path} is no session; a description begins at 0 s")
+        world = World.load(path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs, allow_outside=allow_outside)
+        for warning in world.plan.warnings:
+            warn(warning)
+        return world
+    if seed is not None:
+        raise Misuse(f"--seed: {path} is a session, which goes on with its own")
+    session = sessions.load(path)
+    world = session.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
+    if moment is None and world.trace.digest() != session.digest:
+        warn(f"{path}: another thing happened than then (steptwin {session.version}): it goes on from what happens now")
+    world.go_on()
+    return world
+
+
+def set_faults(world: World, faults: Sequence[str]) -> None:
+    """Faults of the command line, from now on. Raises `Misuse`."""
+    for fault in faults:
+        world.outside(do.SetFault(read_fault(fault)))

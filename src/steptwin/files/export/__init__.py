@@ -1,0 +1,212 @@
+"""Traces as files: JSON lines that say everything, and what other programs show of it.
+
+| format | shows | needs |
+|---|---|---|
+| ``jsonl`` | every record, exactly; can be read back (`read_trace`) | |
+| ``html`` | a timeline to look through in a browser | |
+| ``png``, ``svg`` | a picture | matplotlib (extra ``plots``) |
+| ``vcd`` | what a logic analyser would have seen; for GTKWave | numpy (extra ``numbers``) |
+| ``csv`` | samples of positions, velocities and levels | numpy (extra ``numbers``) |
+| ``parquet`` | the same | pyarrow (extra ``parquet``) |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.files.export.axes import AxisView, AxisViews, axis_views
+from steptwin.files.export.progress import Progress, Watch, bar, unwatched
+from steptwin.files.export.recording import Recording, sort_out
+from steptwin.files.export.records import SavedTrace, read_records, write_records
+from steptwin.files.textfiles import check_writable
+from steptwin.inputfiles import open_regular
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.world.trace import Trace
+
+__all__ = ["FORMATS", "AxisView", "AxisViews", "SavedTrace", "axis_views", "bar", "check_target", "read_trace", "write_trace"]
+
+NAME = "trace"
+"""What files are called in a directory."""
+NO_VIEWS: AxisViews = {}
+
+
+class _Options(NamedTuple):
+    period: Nanos
+    progress: Progress
+    window: bool
+    """Whether it was asked for to show everything up to the end."""
+    texts: bool
+    """Whether signals may be texts."""
+
+
+class Format(NamedTuple):
+    """``needs`` are modules; ``extra`` is what installs them."""
+
+    meaning: str
+    needs: tuple[str, ...]
+    extra: str
+    write: Callable[[Recording, Path, _Options], None] | None
+    """None: written from the records themselves."""
+
+    @property
+    def missing(self) -> list[str]:
+        return [module for module in self.needs if find_spec(module) is None]
+
+
+def _html(recording: Recording, path: Path, options: _Options) -> None:
+    from steptwin.files.export.timeline import write_timeline
+
+    with path.open("w", encoding="utf-8") as file:
+        write_timeline(recording, file, options.progress)
+
+
+def _vcd(recording: Recording, path: Path, options: _Options) -> None:
+    from steptwin.files.export.vcd import write_vcd
+
+    with path.open("wb") as file:
+        write_vcd(recording, file, options.progress, texts=options.texts)
+
+
+def _csv(recording: Recording, path: Path, options: _Options) -> None:
+    from steptwin.files.export.tables import write_csv
+
+    with path.open("w", encoding="utf-8") as file:
+        write_csv(recording, file, options.period, options.progress)
+
+
+def _parquet(recording: Recording, path: Path, options: _Options) -> None:
+    from steptwin.files.export.tables import write_parquet
+
+    write_parquet(recording, path, options.period, options.progress)
+
+
+def _png(recording: Recording, path: Path, options: _Options) -> None:
+    from steptwin.files.export.plot import write_plot
+
+    write_plot(recording if options.window else recording.to_last_change(), path, "png", options.progress)
+
+
+def _svg(recording: Recording, path: Path, options: _Options) -> None:
+    from steptwin.files.export.plot import write_plot
+
+    write_plot(recording if options.window else recording.to_last_change(), path, "svg", options.progress)
+
+
+FORMATS: Mapping[str, Format] = {
+    "jsonl": Format("every record, exactly", (), "", None),
+    "html": Format("a timeline for the browser", (), "", _html),
+    "png": Format("a picture", ("matplotlib",), "plots", _png),
+    "svg": Format("a picture", ("matplotlib",), "plots", _svg),
+    "vcd": Format("signals for GTKWave", ("numpy",), "numbers", _vcd),
+    "csv": Format("samples", ("numpy",), "numbers", _csv),
+    "parquet": Format("samples", ("numpy", "pyarrow"), "parquet", _parquet),
+}
+USUAL = ("jsonl", "html", "png")
+"""What a directory gets: small however long the run was. Those whose libraries are missing are left out."""
+
+
+def write_trace(
+    trace: Trace,
+    where: Path | str,
+    *,
+    views: AxisViews = NO_VIEWS,
+    title: str = "",
+    ended: Nanos | None = None,
+    formats: Sequence[str] | None = None,
+    begin: Nanos = 0,
+    until: Nanos | None = None,
+    machines: Collection[str] | None = None,
+    period: Nanos = MILLISECOND,
+    texts: bool = True,
+    watch: Watch = unwatched,
+) -> list[Path]:
+    """Write ``trace`` to a file, whose suffix says its format, or into a directory, as ``trace.jsonl`` and so on; what was
+    written.
+
+    ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``title`` is the name of what ran, and
+    ``ended`` (ns) when that ended; by default when all came to rest. ``formats`` by default: for a directory `USUAL`; what a
+    file is to be where its suffix does not tell. A window of time (``begin`` to ``until``, ns) and ``machines`` limit what is
+    shown; JSON lines always have everything. Without ``until`` everything goes on to the end, but pictures end shortly after
+    the last change. ``period`` (ns) is that of samples. Without ``texts`` a VCD has no signals of type
+    string (events, frames, faults), which sigrok does not read. ``watch=bar`` shows on a terminal how far each file is.
+
+    Raises `Misuse` for what is not permitted, for libraries that are missing, and where a file cannot be written; a file is
+    there as a whole or, after an error, as it was before.
+    """
+    where = Path(where)
+    targets = _targets(where, formats)
+    if period < 1:
+        raise Misuse(f"period = {period} ns: must be 1 ns or more")
+    if len(trace) and next(iter(trace), None) is None:
+        raise Misuse("this trace has kept nothing but its digest: there is nothing to write")
+    recording = replace(sort_out(trace, views, begin, ended if until is None else until, machines), title=title)
+    ended = recording.until if ended is None else ended
+    for name, path in targets:
+        write = FORMATS[name].write
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            unfinished = path.with_name(f".{path.name}.unfinished")
+            try:
+                with watch(path.name, recording.begin, recording.until) as progress:
+                    if write is None:
+                        with unfinished.open("w", encoding="utf-8") as file:
+                            write_records(trace, views, file, progress, title=title, until=ended)
+                    else:
+                        write(recording, unfinished, _Options(period, progress, until is not None, texts))
+                unfinished.replace(path)
+            finally:
+                unfinished.unlink(missing_ok=True)
+        except OSError as error:
+            raise Misuse(f"cannot write {path}: {error.strerror or error}") from error
+    return [path for _, path in targets]
+
+
+def check_target(where: Path | str) -> None:
+    """Whether `write_trace` can write there, before much is done for it. Raises `Misuse`."""
+    for _, path in _targets(Path(where), None):
+        check_writable(path)
+
+
+def _targets(where: Path, formats: Sequence[str] | None) -> list[tuple[str, Path]]:
+    """Formats and files. All of them can be written as far as libraries go."""
+    suffix = where.suffix[1:].lower()
+    is_file = not where.is_dir() and (suffix in FORMATS or (suffix != "" and formats is not None and len(formats) == 1))
+    if suffix and not is_file and not where.is_dir() and formats is None:
+        raise Misuse(f"{where}: formats are {', '.join(FORMATS)}")
+    chosen = formats or ([suffix] if is_file else [name for name in USUAL if not FORMATS[name].missing])
+    for name in chosen:
+        _check(name)
+    if is_file:
+        if len(chosen) > 1:
+            raise Misuse(f"{where}: one file cannot be {' and '.join(chosen)}; name a directory")
+        return [(chosen[0], where)]
+    return [(name, where / f"{NAME}.{name}") for name in dict.fromkeys(chosen)]
+
+
+def _check(name: str) -> None:
+    """`Misuse` unless there is such a format and its libraries are there."""
+    found = FORMATS.get(name)
+    if found is None:
+        raise Misuse(f"no format {name!r}: formats are {', '.join(FORMATS)}")
+    if found.missing:
+        raise Misuse(
+            f"{name} needs {' and '.join(found.missing)}, which {'is' if len(found.missing) == 1 else 'are'} not installed: "
+            f"in a clone 'make extras' installs them, elsewhere 'pip install {' '.join(found.missing)}'"
+        )
+
+
+def read_trace(where: Path | str) -> SavedTrace:
+    """What `write_trace` wrote as JSON lines: a file, or a directory with ``trace.jsonl``.
+
+    Raises `Misuse` where it cannot be read, is not a trace, or is not as it was written (its digest tells).
+    """
+    path = Path(where)
+    if path.is_dir():
+        path /= f"{NAME}.jsonl"
+    with open_regular(path) as file:
+        return read_records(file, str(path))

@@ -1,0 +1,164 @@
+"""A page with a timeline: one file without anything from outside that any browser opens, exact at every scale.
+
+Motion goes into the page as polynomials, not as samples, so that the page can be looked at down to single pulses.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from html import escape
+from importlib.resources import files
+from typing import IO
+
+from steptwin.files.export.polyline import Piece, pieces_of
+from steptwin.files.export.progress import Progress
+from steptwin.files.export.recording import AxisTrack, PinTrack, Plan, Recording, profile_of
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import Profile, Segment
+from steptwin.motion.divisions import StepTrain
+from steptwin.world.trace import Record
+
+_SCRIPTS = ("model.js", "draw.js", "timeline.js")
+_CLOSE_P = 0.01
+"""Cubics that stand for an arc are off by about as much at most."""
+_LEAST_NS = 100_000
+"""Shorter stretches of an arc are not divided."""
+_MOST_BYTES = 64
+"""Of a frame in the page."""
+
+
+def write_timeline(recording: Recording, file: IO[str], progress: Progress) -> None:
+    names = recording.title or ", ".join(recording.machines[:4]) + (" …" if len(recording.machines) > 4 else "")
+    data = {
+        "begin": recording.begin,
+        "span": recording.until - recording.begin,
+        "machines": recording.machines,
+        "axes": [_axis(track, recording, progress, i) for i, track in enumerate(recording.axes)],
+        "pins": [_pin(pin, recording) for pin in recording.pins],
+        "marks": [_mark(record, recording.begin) for record in recording.marks if record.time <= recording.until],
+    }
+    parts = {
+        "title": escape(names),
+        "style": _part("timeline.css"),
+        "script": "".join(map(_part, _SCRIPTS)),
+        # A "</script>" in a text must not end the script.
+        "data": json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
+    }
+    file.write(re.sub(r"/\*(\w+)\*/", lambda found: parts[found[1]], _part("timeline.html")))
+    progress(recording.until)
+
+
+def _part(name: str) -> str:
+    return (files("steptwin.files.export") / "page" / name).read_text("utf-8")
+
+
+# ---------------------------------------------------------------------- axes
+
+
+def _axis(track: AxisTrack, recording: Recording, progress: Progress, number: int) -> dict[str, object]:
+    """The coordinate; under ``counted`` the count since power-on and under ``true`` where the load is, if that can be another."""
+    progress(recording.begin + (recording.until - recording.begin) * (number + 1) // (len(recording.axes) + 1))
+    coordinate, load = track.coordinate(), track.true()
+    counted = {} if coordinate is None else {"counted": _motion(track, recording)}
+    return _motion(coordinate or track, recording) | counted | ({} if load is None else {"true": _motion(load, recording)})
+
+
+def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
+    """Flat ``pieces``, eight numbers each: begin (ns from that of the window), coefficients c0…c3 of the position (pulses) in
+    powers of seconds from there, counted position, direction (0: no pulses), pulses of the profile for one STEP pulse.
+    """
+    numbers: list[float] = []
+    for plan, after, until in track.stretches(recording.begin, recording.until):
+        for piece, grid, stood in _divided(plan, after, until):
+            for begin, cubic in _cubics(piece):
+                direction = 0 if piece.segment is None else piece.segment.direction
+                count = stood if begin == piece.begin else plan.count(begin)
+                rounded = [float(f"{c:.12g}") for c in cubic]
+                numbers += [begin - recording.begin, *rounded, count, direction, grid]
+    view = track.view
+    return {
+        "machine": track.machine, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit, "pieces": numbers,
+    }  # fmt: skip
+
+
+def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[Piece, int, int]]:
+    """(piece, grid, counted position where it begins); a piece ends where the division changes."""
+    profile = profile_of(plan)
+    cuts: list[Nanos] = []
+    if isinstance(plan, StepTrain):
+        changes = [profile.pulse_time(division.begin, profile.start) for division in plan.divisions[1:]]
+        cuts = [time for time in changes if time is not None and after < time < until]
+    for begin, end in zip([after, *cuts], [*cuts, until], strict=True):
+        now = max(begin, profile.start)
+        grid = plan.division(now).grid if isinstance(plan, StepTrain) else 1
+        for piece in pieces_of(profile, begin, end):
+            yield piece, grid, plan.count(max(piece.begin, profile.start))
+
+
+def _cubics(piece: Piece) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
+    """Moments and coefficients, in seconds from there, of the polynomials that make up ``piece``."""
+    segment = piece.segment
+    if segment is None:
+        yield piece.begin, (piece.look(piece.begin)[0], 0.0, 0.0, 0.0)
+    elif isinstance(segment, Segment):
+        yield piece.begin, _from(segment, piece.profile, piece.begin)
+    else:
+        yield from _along_arc(piece, piece.begin, piece.end)
+
+
+def _along_arc(piece: Piece, begin: Nanos, end: Nanos) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
+    """Halved until the cubics are close."""
+    c0, c1, c2, c3 = cubic = _between(piece, begin, end)
+    middle = (begin + end) // 2
+    u = (middle - begin) / SECOND
+    if end - begin < _LEAST_NS or abs(c0 + u * (c1 + u * (c2 + u * c3)) - piece.look(middle)[0]) < _CLOSE_P:
+        yield begin, cubic
+    else:
+        yield from _along_arc(piece, begin, middle)
+        yield from _along_arc(piece, middle, end)
+
+
+def _from(s: Segment, profile: Profile, begin: Nanos) -> tuple[float, float, float, float]:
+    u = (begin - profile.start) / SECOND - s.anchor_s
+    return (
+        profile.base + s.c0 + u * (s.c1 + u * (s.c2 + u * s.c3)),
+        s.c1 + u * (2.0 * s.c2 + u * 3.0 * s.c3),
+        s.c2 + 3.0 * s.c3 * u,
+        s.c3,
+    )
+
+
+def _between(piece: Piece, begin: Nanos, end: Nanos) -> tuple[float, float, float, float]:
+    """The cubic with the positions and velocities of ``piece`` at both moments."""
+    (p0, v0), (p1, v1) = piece.look(begin), piece.look(end)
+    d = (end - begin) / SECOND
+    if d == 0.0:
+        return p0, v0, 0.0, 0.0
+    mean = (p1 - p0) / d
+    return p0, v0, (3.0 * mean - 2.0 * v0 - v1) / d, (v0 + v1 - 2.0 * mean) / (d * d)
+
+
+# ---------------------------------------------------------------------- pins and marks
+
+
+def _pin(pin: PinTrack, recording: Recording) -> dict[str, object]:
+    begin = recording.begin
+    return {
+        "machine": pin.machine,
+        "name": pin.pin,
+        "analog": pin.analog,
+        "before": pin.level(begin),
+        "changes": [x for time, level in pin.changes(begin, recording.until) for x in (time - begin, level)],
+    }
+
+
+def _mark(record: Record, begin: Nanos) -> list[object]:
+    """Moment (ns), machine, kind, subject, text."""
+    value = record.value
+    if isinstance(value, bytes):
+        text = value[:_MOST_BYTES].hex(" ") + (f" … {len(value)} bytes" if len(value) > _MOST_BYTES else "")
+    else:
+        text = f"line {value}" if record.kind == "statement" else "" if value is None else str(value)
+    return [record.time - begin, record.machine, record.kind, record.subject, text]

@@ -1,0 +1,102 @@
+"""Programs and position tables from files into the banks of a MIC488."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeAlias
+
+from steptwin.diagnostics import Diagnostic, Severity, Source
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.files.textfiles import read_text
+from steptwin.inputfiles import read_bytes
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.program import LoadedProgram, load, setup_of
+from steptwin.wbc.check import Checked, check
+from steptwin.wbc.decompile import IMAGE, program_of
+from steptwin.wbc.dialect import DEFAULT, Dialect
+from steptwin.wbc.positions import PositionTable, parse_positions
+
+Findings: TypeAlias = tuple[tuple[Source, list[Diagnostic]], ...]
+"""What was said about files, by file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Banks:
+    """What a controller has in its banks, and everything said about the files it came from."""
+
+    programs: Mapping[int, LoadedProgram] = field(default_factory=dict)
+    positions: Mapping[int, PositionTable] = field(default_factory=dict)
+    findings: Findings = ()
+
+
+class ProgramErrors(SteptwinError):
+    """Programs or tables with errors."""
+
+    def __init__(self, findings: Findings) -> None:
+        self.findings = findings
+        wrong = [source.name for source, diagnostics in findings if any(d.severity is Severity.ERROR for d in diagnostics)]
+        super().__init__(f"{' and '.join(wrong)} cannot be loaded: see the errors above")
+
+
+def parse_banks(option: str, given: Sequence[str], banks: int) -> dict[int, Path]:
+    """``0=FILE`` is for bank 0, and so is ``FILE``. Raises `Misuse` for banks that are not there or given twice."""
+    files: dict[int, Path] = {}
+    for text in given:
+        number, equals, name = text.partition("=")
+        if not equals or not number.strip().isdecimal():
+            number, name = "0", text
+        bank = int(number)
+        if not name:
+            raise Misuse(f"{option} {text}: expected BANK=FILE, such as 0=machine.prg")
+        if bank >= banks:
+            raise Misuse(f"{option} {text}: permitted are banks 0 to {banks - 1}")
+        if bank in files:
+            raise Misuse(f"{option} {text}: bank {bank} has {files[bank]} already")
+        files[bank] = Path(name)
+    return files
+
+
+def read_banks(
+    programs: Mapping[int, Path],
+    positions: Mapping[int, Path],
+    config: ControllerConfig,
+    dialect: Dialect = DEFAULT,
+    *,
+    option: str = "--positions {bank}=FILE",
+) -> Banks:
+    """Read and check what goes into the banks: programs (`.prg`) and compiled images (`.wbc`), which bring their own table.
+
+    Names of positions are found in the table of the program's own bank number, or else in the only table there is. Raises
+    `ProgramErrors`, and `Misuse` for files that cannot be read or run, and for a program that names positions where there is no
+    table; ``option`` is how a table for a bank is given.
+    """
+    tables: dict[int, PositionTable] = {}
+    findings: list[tuple[Source, list[Diagnostic]]] = []
+    sources: dict[int, Source] = {}
+    for bank, path in programs.items():
+        if path.suffix.lower() == IMAGE:
+            sources[bank], table, doubts = program_of(read_bytes(path), str(path))
+            findings.append((sources[bank], doubts))
+            if table.rows and bank not in positions:
+                tables[bank] = table
+        else:
+            sources[bank] = read_text(path).source
+    for bank, path in positions.items():
+        source = read_text(path).source
+        tables[bank], found = parse_positions(source.text)
+        findings.append((source, found))
+    only = next(iter(tables.values())) if len(tables) == 1 else None
+    checked: dict[int, tuple[Checked, Path]] = {}
+    for bank, path in programs.items():
+        source = sources[bank]
+        program = check(source.text, tables.get(bank, only), setup_of(config), dialect)
+        checked[bank] = program, path
+        findings.append((source, program.diagnostics))
+    if any(d.severity is Severity.ERROR for _, diagnostics in findings for d in diagnostics):
+        raise ProgramErrors(tuple(findings))
+    for bank, (program, path) in checked.items():
+        if program.executable is None:
+            raise Misuse(f"{path} names positions: give the table with {option.format(bank=bank)}")
+    return Banks({bank: load(program, str(path)) for bank, (program, path) in checked.items()}, tables, tuple(findings))

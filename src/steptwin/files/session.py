@@ -1,0 +1,236 @@
+"""Sessions: a world, its files, and everything that came from outside with its moments, in one file of JSON.
+
+``steptwin replay FILE`` runs it again and compares the digest of what happened. Nothing else is needed for that.
+"""
+
+from __future__ import annotations
+
+import json
+from base64 import b64decode, b64encode
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from steptwin import __version__
+from steptwin.errors import Misuse
+from steptwin.files.plaintypes import fitting
+from steptwin.files.textfiles import write_bytes
+from steptwin.files.world import World
+from steptwin.inputfiles import MOST_RECORDED_BYTES, read_bytes
+from steptwin.machine import SECOND, Nanos
+from steptwin.world import script as do
+from steptwin.world.actions import ACTIONS, Outside
+from steptwin.world.description import read_world
+from steptwin.world.durations import LONGEST_NS
+from steptwin.world.faults import Fault, parse
+from steptwin.world.overrides import Overrides
+from steptwin.world.plant import Given
+
+FORMAT = 1
+LONGEST_NUMBER = 100
+"""Digits of a whole number; what is permitted has far fewer."""
+
+_STEPS = {kind.__name__: kind for kind in ACTIONS}
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A run of a world. ``digest`` is that of its trace at ``until``; ``firmware`` says what ran on each MIC488."""
+
+    name: str
+    text: str
+    files: Mapping[str, bytes]
+    firmware: Mapping[str, str]
+    seed: int
+    inputs: tuple[Given, ...]
+    until: Nanos
+    digest: str
+    overrides: Overrides = field(default_factory=dict)
+    """Values that replace those of the text."""
+    version: str = __version__
+
+    def world(self, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
+        """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
+        world = World(
+            read_world(self.name, self.text, self.seed, self.overrides),
+            self.files,
+            keep_trace=keep_trace,
+            keep_inputs=keep_inputs,
+        )
+        ran = {name: view.device.firmware.name for name, view in world.mic488.items()}
+        for name, firmware in self.firmware.items():
+            if ran.get(name) != firmware:
+                raise Misuse(
+                    f"the session says that {name} runs firmware {firmware}, its world {ran.get(name, 'has no such machine')}"
+                )
+        return world
+
+    def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
+        """The world after all of it, or after what had come by the moment ``until``, from which it may go another way.
+
+        Raises `Misuse` where inputs do not fit the world, and for a moment after the session's end.
+        """
+        end = self.until if until is None else until
+        if end > self.until:
+            raise Misuse(f"the session ends at {self.until / SECOND:g} s, before {end / SECOND:g} s")
+        world = self.world(keep_trace=keep_trace, keep_inputs=keep_inputs)
+        for time, what, settled in self.inputs:
+            if time > self.until:
+                raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")
+            if time > end:
+                break
+            _bring(world, time)
+            if settled:
+                world.advance(time)
+            world.outside(what)
+        _bring(world, end)
+        _settle(world)
+        return world
+
+
+def _bring(world: World, moment: Nanos) -> None:
+    """To a moment, past those at which runs were stopped."""
+    while world.now < moment:
+        world.go_on()
+        world.advance(moment)
+
+
+def _settle(world: World) -> None:
+    """A session ends when everything of its last moment has happened."""
+    world.advance(world.now)
+    world.settle_all()
+
+
+def session_of(world: World) -> Session:
+    """The session of a world up to now. What Python code did to the world is in it, the code is not.
+
+    Raises `Misuse` for a world that does not keep its inputs.
+    """
+    if not world.keeps_inputs:
+        raise Misuse("this world records no session: it does not keep its inputs")
+    _settle(world)
+    spec = world.spec
+    return Session(
+        spec.text.source.name,
+        spec.text.source.text,
+        world.files,
+        {name: view.device.firmware.name for name, view in world.mic488.items()},
+        spec.seed,
+        tuple(world.inputs),
+        world.now,
+        world.trace.digest(),
+        spec.overrides,
+    )
+
+
+def save(session: Session, path: Path | str) -> None:
+    """Write a session, as JSON. Raises `Misuse` when the file cannot be written."""
+    data = {
+        "steptwin_session": FORMAT,
+        "version": session.version,
+        "name": session.name,
+        "seed": session.seed,
+        "overrides": dict(session.overrides),
+        "firmware": dict(session.firmware),
+        "until_ns": session.until,
+        "digest": session.digest,
+        "world": session.text,
+        "files": {name: b64encode(content).decode() for name, content in session.files.items()},
+        "inputs": [
+            {"time_ns": time, "settled": settled, "do": type(what).__name__, **_plain(what)}
+            for time, what, settled in session.inputs
+        ],
+    }
+    write_bytes(Path(path), (json.dumps(data, indent=1) + "\n").encode())
+
+
+def load(path: Path | str) -> Session:
+    """What `save` wrote. Raises `Misuse` for a file that cannot be read or is no session."""
+    content = read_bytes(Path(path), MOST_RECORDED_BYTES)
+    try:
+        data = json.loads(content, parse_int=_whole, parse_constant=_finite)
+        if data["steptwin_session"] != FORMAT:
+            raise Misuse(f"{path} is a session of format {data['steptwin_session']}: this version reads {FORMAT}")
+        return _session(data)
+    except (LookupError, TypeError, ValueError, RecursionError, OverflowError, AttributeError) as error:
+        raise error if isinstance(error, Misuse) else Misuse(f"{path} is no session of a world: {_why(error)}") from None
+
+
+def _whole(text: str) -> int:
+    if len(text) > LONGEST_NUMBER:
+        raise ValueError(f"a number has {len(text)} digits")
+    return int(text)
+
+
+def _finite(text: str) -> float:
+    raise ValueError(f"{text} is no number of a session")
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"{error} is missing"
+    return "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+
+
+def _session(data: Mapping[str, Any]) -> Session:
+    """Raises `LookupError`, `TypeError` and `ValueError` for what is no session."""
+    until = fitting("until_ns", data["until_ns"], int)
+    if not 0 <= until <= LONGEST_NS:
+        raise ValueError(f"until_ns is {until}: permitted are 0 to {LONGEST_NS}")
+    inputs = tuple(_given(fitting("an input", item, dict)) for item in fitting("inputs", data["inputs"], list))
+    times = [given.time for given in inputs]
+    if times != sorted(times) or (times and times[0] < 0):
+        raise ValueError("the moments of the inputs are not in order")
+    return Session(
+        fitting("name", data["name"], str),
+        fitting("world", data["world"], str),
+        {name: b64decode(content) for name, content in fitting("files", data["files"], dict).items()},
+        {
+            name: fitting(f"firmware of {name}", firmware, str)
+            for name, firmware in fitting("firmware", data["firmware"], dict).items()
+        },
+        fitting("seed", data["seed"], int),
+        inputs,
+        until,
+        fitting("digest", data["digest"], str),
+        fitting("overrides", data.get("overrides", {}), dict),
+        fitting("version", data["version"], str),
+    )
+
+
+def _plain(what: Outside) -> dict[str, Any]:
+    if isinstance(what, tuple):
+        return {name: _value(value) for name, value in what._asdict().items()}
+    return {field.name: _value(getattr(what, field.name)) for field in fields(what)} if is_dataclass(what) else {}
+
+
+def _value(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return {"hex": value.hex()}
+    if isinstance(value, Fault):
+        return {"kind": value.kind.name, "name": value.name, **{key: _value(item) for key, item in value.given.items()}}
+    if isinstance(value, tuple):
+        return [_value(item) for item in value]
+    return value
+
+
+def _given(item: dict[str, Any]) -> Given:
+    kind = _STEPS[item["do"]]
+    values = {key: _back(value) for key, value in item.items() if key not in ("time_ns", "settled", "do")}
+    if kind is do.SetFault:
+        told = fitting("fault of SetFault", item["fault"], dict)
+        fault = {key: tuple(value) if isinstance(value, list) else value for key, value in told.items()}
+        values = {"fault": parse({key: value for key, value in fault.items() if value != ""})}
+    for name, wanted in get_type_hints(kind).items():
+        if name in values:
+            fitting(f"{name} of {item['do']}", values[name], wanted)
+    return Given(fitting("time_ns", item["time_ns"], int), kind(**values), fitting("settled", item["settled"], bool))
+
+
+def _back(value: Any) -> Any:
+    if isinstance(value, dict) and "hex" in value:
+        return bytes.fromhex(value["hex"])
+    if isinstance(value, list):
+        return tuple(_back(item) for item in value)
+    return value

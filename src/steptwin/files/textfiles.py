@@ -1,0 +1,69 @@
+"""Files the user names: texts as editors leave them, and writing."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from errno import EACCES, EINVAL, EISDIR, ENOTDIR
+from pathlib import Path
+
+from steptwin.diagnostics import Source
+from steptwin.errors import Misuse
+from steptwin.inputfiles import read_bytes, shown
+from steptwin.textcodec import Decoded, decode
+
+
+@dataclass(frozen=True, slots=True)
+class TextFile:
+    """A text and how its bytes say it."""
+
+    source: Source
+    decoded: Decoded
+
+    def to_bytes(self, text: str) -> bytes:
+        """A text in the manner of this file: encoding, byte order mark, DOS end mark. Its own text gives its own bytes."""
+        return self.decoded.to_bytes(text)
+
+
+def check_writable(path: Path) -> None:
+    """Whether a file can be written here, before much is done for it; folders on the way can be made. Raises `Misuse`."""
+    try:
+        place, number = path, EISDIR if path.is_dir() else 0
+        while not number and not place.exists():
+            place = place.parent
+            number = 0 if place.is_dir() or not place.exists() else ENOTDIR
+        if not number and not os.access(place, os.W_OK):
+            number = EACCES
+    except OSError as error:  # a name that is too long
+        number = error.errno or EINVAL
+    except ValueError as error:
+        raise Misuse(f"cannot write {shown(path)}: {error}") from None
+    if number:
+        raise Misuse(f"cannot write {shown(path)}: {os.strerror(number)}")
+    if path.exists() and not path.is_file():
+        raise Misuse(f"cannot write {path}: it is no regular file")
+
+
+def check_folder(path: Path) -> None:
+    """Whether the folder a file is to be in is there. Raises `Misuse`."""
+    if not path.parent.is_dir():
+        raise Misuse(f"cannot write {shown(path)}: there is no folder {shown(path.parent)}")
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file, and the folders it is to be in. Raises `Misuse` when it cannot be written."""
+    check_writable(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+    except OSError as error:
+        raise Misuse(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def read_text(path: Path) -> TextFile:
+    """A text file in UTF-8, UTF-16 with its byte order mark, or the code page of Polish Windows.
+
+    Raises `Misuse` when it cannot be read or is no text.
+    """
+    decoded = decode(read_bytes(path), str(path))
+    return TextFile(Source(str(path), decoded.text), decoded)

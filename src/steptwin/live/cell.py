@@ -1,0 +1,102 @@
+"""A kernel in real time: `Cell.start` begins it, and an input for its machines comes between `Cell.enter` and `Cell.leave`."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Protocol
+
+from steptwin.live.clock import Clock
+from steptwin.live.descriptors import descriptors
+from steptwin.machine import MILLISECOND, Nanos
+
+LONGEST_WAIT_S = 3600.0
+"""Event loops take no arbitrarily distant timer; a longer wait is waited in parts."""
+
+LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
+"""Something due that is done later than this on the wall has not jittered: the process was stopped or cannot keep up."""
+
+
+class Advancing(Protocol):
+    """What a cell keeps up with real time: a kernel, or a whole world. As `Kernel` says."""
+
+    stale: bool
+
+    @property
+    def now(self) -> Nanos: ...
+    def advance(self, now: Nanos) -> None: ...
+    def deadline(self) -> Nanos | None: ...
+
+
+class Cell:
+    """Machines that are advanced together: at their deadlines, and when a client or an input arrives.
+
+    When the process is held up, virtual time is held up with it, so that nothing has to be caught up with; ``on_lag`` is
+    called with the delay.
+    """
+
+    __slots__ = ("_armed_for", "_batch", "_descriptors", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
+
+    def __init__(self, kernel: Advancing, clock: Clock) -> None:
+        self.kernel = kernel
+        self.clock = clock
+        self.on_lag: Callable[[Nanos], None] | None = None
+        self._loop = asyncio.get_running_loop()
+        self._descriptors = descriptors()
+        self._batch = 0
+        """That the machines have been brought to the present for."""
+        self.moments = 0
+        """Counts on whenever the machines are brought to the present: time may have passed, signals have settled."""
+        self._timer: asyncio.TimerHandle | None = None
+        self._armed_for: Nanos | None = None
+
+    def start(self) -> None:
+        """Follow the clock from now on, also without any input: what machines do by themselves happens when it is due."""
+        self.enter()
+        self._arm(self.kernel.deadline())
+
+    def enter(self) -> Nanos:
+        """Bring the machines to the present; inputs may be applied at the moment returned, then call `leave`."""
+        batch = self._descriptors.batch
+        if batch and batch == self._batch:
+            return self.kernel.now
+        self._batch = batch
+        self.moments += 1
+        now = self.clock.now()
+        due = self._armed_for
+        if due is not None and now - due > LONGEST_DELAY_NS * self.clock.speed:
+            now = self._held_up(due, now)
+        self.kernel.advance(now)
+        return now
+
+    def leave(self) -> None:
+        """Let signals settle after an input and wake up for what it leads to."""
+        if self.kernel.stale:
+            self._batch = 0  # something may be due at once
+            self._arm(self.kernel.deadline())
+
+    def _held_up(self, due: Nanos, now: Nanos) -> Nanos:
+        """Go on where the delay began."""
+        resumed = max(due, self.kernel.now)
+        self.clock.lag(now - resumed)
+        if self.on_lag is not None:
+            self.on_lag(now - resumed)
+        return resumed
+
+    def _arm(self, due: Nanos | None) -> None:
+        if due is None or self.clock.is_stopped or (self._armed_for is not None and self._armed_for <= due):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._armed_for = due
+        self._timer = self._loop.call_later(min(self.clock.wait_s(due), LONGEST_WAIT_S), self._wake)
+
+    def _wake(self) -> None:
+        self.enter()
+        self._timer = self._armed_for = None
+        self._arm(self.kernel.deadline())
+
+    def close(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = self._armed_for = None

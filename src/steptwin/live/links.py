@@ -1,0 +1,123 @@
+"""Byte streams and the ports behind them: what every kind of link has in common."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+from steptwin.live.cell import Cell
+from steptwin.machine import Nanos
+
+SLICE_BYTES = 2048
+"""A client that sends more at once is served this much at a time, so that it cannot keep others waiting."""
+
+
+class Port(Protocol):
+    """What a link needs of a wire port."""
+
+    @property
+    def broken(self) -> str | None:
+        """Why the connection has to be closed, or None."""
+        ...
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes: ...
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
+    def deadline(self) -> Nanos | None: ...
+
+
+@runtime_checkable
+class TalkingPort(Port, Protocol):
+    """A port that has something to send without having been asked; it calls ``on_output`` then."""
+
+    on_output: Callable[[], None] | None
+
+    def close(self) -> None:
+        """Nobody is there any more."""
+        ...
+
+
+@runtime_checkable
+class ClosingPort(Port, Protocol):
+    """A port that has to know when the other end has gone."""
+
+    def close(self) -> None: ...
+
+
+class Writer(Protocol):
+    def write(self, data: bytes) -> None: ...
+
+
+class Feed:
+    """Between a stream of bytes and a port: bytes in, answers out, timers for what is due later."""
+
+    __slots__ = ("_cell", "_loop", "_port", "_talks", "_timer", "_writer", "is_read")
+
+    def __init__(self, cell: Cell, port: Port, writer: Writer) -> None:
+        self._cell = cell
+        self._port = port
+        self._writer = writer
+        self._loop = asyncio.get_running_loop()
+        self._timer: asyncio.Handle | None = None
+        self.is_read = True
+        """Whether the other end takes what is written. Unasked output is lost otherwise, as on a wire."""
+        self._talks: TalkingPort | None = None
+        if isinstance(port, TalkingPort):
+            self._talks = port
+            port.on_output = self._fetch_soon
+
+    def take(self, data: bytes) -> None:
+        cell = self._cell
+        answer = self._port.exchange(data, cell.enter())
+        if answer:
+            self._writer.write(answer)
+        if cell.kernel.stale:
+            cell.leave()
+        due = self._port.deadline()
+        if due is not None:
+            self._arm(due)
+
+    def _arm(self, due: Nanos) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.call_later(self._cell.clock.wait_s(due), self._wake)
+
+    def _fetch_soon(self) -> None:
+        # The port calls this while machines are being advanced.
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.call_soon(self._wake)
+
+    def _wake(self) -> None:
+        self._timer = None
+        now = self._cell.enter()
+        is_taken = self.is_read or self._talks is None
+        for _, data in self._port.to_send(now):
+            if is_taken:
+                self._writer.write(data)
+        self._cell.leave()
+        due = self._port.deadline()
+        if due is not None:
+            self._arm(due)
+
+    def close(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if isinstance(self._port, ClosingPort):
+            self._port.close()
+
+
+class Link(Protocol):
+    """Something that connects a port with the outside."""
+
+    async def close(self) -> None: ...
+
+
+def where(error: OSError) -> str:
+    """The reason of a system error in words."""
+    # Event loops put more into the text than the reason: the address, which the caller names anyway.
+    if error.errno is not None and error.errno > 0:
+        return os.strerror(error.errno).lower()
+    return (error.strerror or str(error)).lower()

@@ -1,0 +1,44 @@
+"""Where a device could be: serial ports of this system, and what the twins of this user offer."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+
+from steptwin.errors import LineFailure, Refusal
+from steptwin.live.control import END_POINTS, ask, running
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An address as every command takes it, and what is known of it."""
+
+    address: str
+    what: str
+
+
+def serial_ports() -> list[Place]:
+    """The serial ports of this system, those of USB adapters with their maker's words."""
+    import serialx
+
+    found = []
+    for port in serialx.list_serial_ports():
+        words = [port.manufacturer, port.product, port.serial_number]
+        what = " ".join(word for word in words if word) or "serial port"
+        if port.vid is not None and port.pid is not None:
+            what += f" ({port.vid:04X}:{port.pid:04X})"
+        found.append(Place(str(port.device), what))
+    return found
+
+
+def twin_ports() -> list[Place]:
+    """The pseudo terminals of running twins, as far as they answer."""
+    found = []
+    for name in running():
+        with contextlib.suppress(LineFailure, Refusal):  # gone meanwhile
+            found += [
+                Place(point["path"], f"twin {name}, {point['protocol']}")
+                for point in ask(name, {"do": END_POINTS})
+                if point["kind"] == "pty"
+            ]
+    return found

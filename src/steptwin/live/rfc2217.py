@@ -1,0 +1,247 @@
+"""A serial port over the network, the server's side (RFC 2217 over telnet, RFC 854). No I/O.
+
+`over_network` puts it around the port of a twin: the client sees a serial port whose settings it may change. Settings that do not
+fit the line of the twin (`TwinLine`) are an event; where line timing is real nothing gets through then, in either direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from steptwin.live.links import Port, TalkingPort
+from steptwin.machine import Nanos
+
+IAC, DONT, DO, WONT, WILL, SB, SE = 255, 254, 253, 252, 251, 250, 240
+BINARY, SUPPRESS_GO_AHEAD, COM_PORT = 0, 3, 44
+OPTIONS = frozenset({BINARY, SUPPRESS_GO_AHEAD, COM_PORT})
+
+SIGNATURE, BAUD_RATE, DATA_SIZE, PARITY, STOP_SIZE, CONTROL = range(6)
+LINE_STATE_MASK, MODEM_STATE_MASK, PURGE = 10, 11, 12
+NOTIFY_MODEM_STATE = 7
+ANSWER = 100
+"""Added to a command in what the server says."""
+
+CTS_DSR_CD = 0xB0
+MOST_HELD = 256
+"""Bytes of one subnegotiation; the longest that means anything has six, a signature is what people write."""
+WHO = b"steptwin"
+
+# SET-CONTROL: a value belongs to the group whose number asks for it (flow control, BREAK, DTR, RTS, inbound flow control).
+_CONTROL_GROUPS = {
+    **dict.fromkeys((1, 2, 3, 17, 19), 0),
+    5: 4,
+    6: 4,
+    8: 7,
+    9: 7,
+    11: 10,
+    12: 10,
+    **dict.fromkeys((14, 15, 16, 18), 13),
+}
+
+
+BAUD_TOLERANCE = 0.03
+"""Rates that differ by less than this are read without errors: a receiver samples the last bit of ten in its middle half."""
+_PARITIES = {1: "N", 2: "O", 3: "E", 4: "M", 5: "S"}
+_STOP_BITS = {1: "1", 2: "2", 3: "1.5"}
+
+
+def _unnoticed(text: str) -> None:
+    """For ports that are made without anybody to tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class TwinLine:
+    """The serial line of a twin, 8N1. ``baud`` gives its present rate in bit/s; ``notice`` is called with events for people."""
+
+    baud: Callable[[], int] = lambda: 38400
+    is_timed: bool = False
+    notice: Callable[[str], None] = _unnoticed
+
+
+class Telnet:
+    """Takes a client's stream apart: data for the device, and what is to be answered about the port.
+
+    ``baud``, ``data_bits``, ``parity`` (1 none, 2 odd, 3 even, 4 mark, 5 space) and ``stop_bits`` (1, 2, 3 for 1.5) are what the
+    client has set; before that those of the line.
+    """
+
+    def __init__(self, baud: int = 38400) -> None:
+        self.broken: str | None = None
+        self.baud = baud
+        self._sizes = {DATA_SIZE: 8, PARITY: 1, STOP_SIZE: 1}
+        self._control = {0: 1, 4: 6, 7: 8, 10: 11, 13: 14}
+        self._ours: set[int] = set()
+        self._theirs: set[int] = set()
+        self._command = b""  # the beginning of a command, from its IAC on
+
+    @property
+    def settings(self) -> str:
+        """What the client has set, such as ``9600 bit/s 8E1``."""
+        sizes = self._sizes
+        parity, stop = sizes[PARITY], sizes[STOP_SIZE]
+        return f"{self.baud} bit/s {sizes[DATA_SIZE]}{_PARITIES.get(parity, '?')}{_STOP_BITS.get(stop, '?')}"
+
+    def fits(self, baud: int) -> bool:
+        """Whether characters of the client are read as they are by a line with 8N1 at ``baud``. Further stop bits are a pause."""
+        sizes = self._sizes
+        return abs(self.baud - baud) <= BAUD_TOLERANCE * baud and (sizes[DATA_SIZE], sizes[PARITY]) == (8, 1)
+
+    def receive(self, data: bytes) -> tuple[bytes, bytes]:
+        """The data in it, and the answer to the rest."""
+        if not self._command and IAC not in data:
+            return data, b""
+        plain = bytearray()
+        answers = bytearray()
+        for byte in data:
+            if self._command:
+                self._go_on(byte, plain, answers)
+            elif byte == IAC:
+                self._command = bytes((IAC,))
+            else:
+                plain.append(byte)
+        return bytes(plain), bytes(answers)
+
+    def _go_on(self, byte: int, plain: bytearray, answers: bytearray) -> None:
+        command = self._command = self._command + bytes((byte,))
+        kind = command[1]
+        if len(command) == 2:
+            if byte == IAC:
+                plain.append(IAC)
+            if byte not in (SB, DO, DONT, WILL, WONT):
+                self._command = b""
+        elif kind == SB:
+            if byte == SE and _ends_command(command):
+                answers += self._answered(command[2:-2].replace(b"\xff\xff", b"\xff"))
+                self._command = b""
+            elif len(command) > MOST_HELD:
+                self.broken = "a telnet command does not end"
+                self._command = b""
+        else:
+            answers += self._negotiated(kind, byte)
+            self._command = b""
+
+    def _negotiated(self, kind: int, option: int) -> bytes:
+        """Agree to what is known, refuse the rest, and say nothing about what is so already."""
+        side, agree, refuse = (self._ours, WILL, WONT) if kind in (DO, DONT) else (self._theirs, DO, DONT)
+        if kind in (DO, WILL):
+            if option not in OPTIONS:
+                return bytes((IAC, refuse, option))
+            if option in side:
+                return b""
+            side.add(option)
+            told = bytes((IAC, agree, option))
+            if option == COM_PORT and not self._com_port_elsewhere(side):
+                told += self._say(NOTIFY_MODEM_STATE, bytes((CTS_DSR_CD,)))
+            return told
+        if option not in side:
+            return b""
+        side.discard(option)
+        return bytes((IAC, refuse, option))
+
+    def _com_port_elsewhere(self, side: set[int]) -> bool:
+        return COM_PORT in (self._theirs if side is self._ours else self._ours)
+
+    def _answered(self, content: bytes) -> bytes:
+        """The answer to a subnegotiation: each setting is taken and told as taken; 0 asks for the present one."""
+        if len(content) < 2 or content[0] != COM_PORT:
+            return b""
+        command, value = content[1], content[2:]
+        if command == SIGNATURE:
+            return self._say(SIGNATURE, WHO) if not value else b""
+        if command == BAUD_RATE and len(value) == 4:
+            self.baud = int.from_bytes(value, "big") or self.baud
+            return self._say(command, self.baud.to_bytes(4, "big"))
+        if len(value) != 1:
+            return b""
+        if command in self._sizes:
+            self._sizes[command] = value[0] or self._sizes[command]
+            return self._say(command, bytes((self._sizes[command],)))
+        if command == CONTROL:
+            return self._say(command, bytes((self._controlled(value[0]),)))
+        return self._say(command, value) if command in (LINE_STATE_MASK, MODEM_STATE_MASK, PURGE) else b""
+
+    def _controlled(self, value: int) -> int:
+        group = _CONTROL_GROUPS.get(value)
+        if group is not None:
+            self._control[group] = value
+            return value
+        return self._control.get(value, value)
+
+    def _say(self, command: int, value: bytes) -> bytes:
+        return bytes((IAC, SB, COM_PORT, command + ANSWER)) + escaped(value) + bytes((IAC, SE))
+
+
+def _ends_command(command: bytes) -> bool:
+    """Whether the SE at its end follows an IAC that is not itself a doubled byte."""
+    body = command[2:-1]
+    return (len(body) - len(body.rstrip(b"\xff"))) % 2 == 1
+
+
+def escaped(data: bytes) -> bytes:
+    """Data as it travels: a byte 255 is doubled."""
+    return data.replace(b"\xff", b"\xff\xff")
+
+
+class Rfc2217Port:
+    """The port of a twin behind a network serial port."""
+
+    def __init__(self, port: Port, line: TwinLine) -> None:
+        self._port = port
+        self._line = line
+        self._telnet = Telnet(line.baud())
+        self._told = ""
+        """The settings of the last event."""
+
+    @property
+    def broken(self) -> str | None:
+        return self._telnet.broken or self._port.broken
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        plain, answers = self._telnet.receive(data)
+        return answers + escaped(self._port.exchange(plain, now)) if plain and self._passes() else answers
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        sent = self._port.to_send(now)
+        return [(at, escaped(data)) for at, data in sent] if sent and self._passes() else []
+
+    def _passes(self) -> bool:
+        """Whether characters get through with the present settings; an event when they do not fit."""
+        line, telnet = self._line, self._telnet
+        baud = line.baud()
+        if telnet.fits(baud):
+            self._told = ""
+            return True
+        told = f"{telnet.settings} is set by its client, the line has {baud} bit/s 8N1"
+        if told != self._told:
+            self._told = told
+            effect = "no character gets through" if line.is_timed else "served all the same, as line timing is off"
+            line.notice(f"network port: {told}: {effect}")
+        return not line.is_timed
+
+    def deadline(self) -> Nanos | None:
+        return self._port.deadline()
+
+
+class TalkingRfc2217Port(Rfc2217Port):
+    """The same of a port that speaks unasked."""
+
+    def __init__(self, port: TalkingPort, line: TwinLine) -> None:
+        super().__init__(port, line)
+        self._talking = port
+
+    @property
+    def on_output(self) -> Callable[[], None] | None:
+        return self._talking.on_output
+
+    @on_output.setter
+    def on_output(self, told: Callable[[], None] | None) -> None:
+        self._talking.on_output = told
+
+    def close(self) -> None:
+        self._talking.close()
+
+
+def over_network(port: Port, line: TwinLine) -> Port:
+    """``port``, which is on ``line``, as a network serial port."""
+    return TalkingRfc2217Port(port, line) if isinstance(port, TalkingPort) else Rfc2217Port(port, line)

@@ -1,0 +1,98 @@
+"""A real serial port, 8N1."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import cast
+
+import serialx
+
+from steptwin.errors import LineFailure
+from steptwin.live.cell import Cell
+from steptwin.live.links import Feed, Port, where
+
+RETRY_S = 1.0
+"""How often a device that has disappeared is looked for."""
+
+
+class SerialLink:
+    """A serial port that a port answers on.
+
+    When the device disappears (a USB adapter is pulled out) it is looked for until it is back; ``notice`` is called for both.
+    """
+
+    def __init__(self, cell: Cell, device: str, baud: int, make_port: Callable[[], Port], notice: Callable[[str], None]) -> None:
+        self._cell = cell
+        self._device = device
+        self._baud = baud
+        self._make_port = make_port
+        self._notice = notice
+        self._transport: serialx.BaseSerialTransport | None = None
+        self._search: asyncio.Task[None] | None = None
+        self._closing = False
+
+    async def open(self) -> str:
+        """Open the port. Raises `LineFailure` naming it."""
+        loop = asyncio.get_running_loop()
+        try:
+            self._transport, _ = await serialx.create_serial_connection(loop, self._make_line, self._device, self._baud)
+        except (OSError, serialx.SerialException) as error:
+            reason = where(error) if isinstance(error, OSError) else str(error)
+            raise LineFailure(f"cannot open serial port {self._device} at {self._baud} bit/s: {reason}") from error
+        return self._device
+
+    def _make_line(self) -> _Line:
+        return _Line(self._cell, self._make_port(), self._lost)
+
+    def _lost(self, error: Exception | None) -> None:
+        self._transport = None
+        if not self._closing:
+            reason = where(error) if isinstance(error, OSError) else str(error or "closed")
+            self._notice(f"serial port {self._device} is gone ({reason}); it is looked for")
+            self._search = asyncio.get_running_loop().create_task(self._look_for_it())
+
+    async def _look_for_it(self) -> None:
+        while True:
+            await asyncio.sleep(RETRY_S)
+            try:
+                await self.open()
+            except LineFailure:
+                continue
+            self._notice(f"serial port {self._device} is back")
+            return
+
+    async def close(self) -> None:
+        self._closing = True
+        if self._search is not None:
+            self._search.cancel()
+        if self._transport is not None:
+            self._transport.abort()
+
+
+class _Line(asyncio.Protocol):
+    """While the other end does not take what is sent, nothing is read either."""
+
+    def __init__(self, cell: Cell, port: Port, lost: Callable[[Exception | None], None]) -> None:
+        self._cell = cell
+        self._port = port
+        self._lost = lost
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+        self._feed = Feed(self._cell, self._port, self._transport)
+
+    def data_received(self, data: bytes) -> None:
+        self._feed.take(data)
+
+    def pause_writing(self) -> None:
+        self._feed.is_read = False
+        self._transport.pause_reading()
+
+    def resume_writing(self) -> None:
+        self._feed.is_read = True
+        self._transport.resume_reading()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._feed.close()
+        self._lost(exc)

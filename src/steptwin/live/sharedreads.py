@@ -1,0 +1,40 @@
+"""What one client reads at a moment, another need not have computed again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from steptwin.live.cell import Cell
+from steptwin.machine import Nanos
+from steptwin.wire.pdu import READS
+from steptwin.wire.slave import Device
+
+
+class _SharedReads:
+    """A unit whose answers to reads hold until time passes, signals settle or anything but a read is executed."""
+
+    __slots__ = ("_answers", "_cell", "_execute", "_moment")
+
+    def __init__(self, device: Device, cell: Cell) -> None:
+        self._execute = device.execute
+        self._cell = cell
+        self._moment = -1
+        self._answers: dict[bytes, bytes] = {}
+
+    def execute(self, pdu: bytes, now: Nanos) -> bytes:
+        if pdu[0] not in READS:
+            self._moment = -1
+            return self._execute(pdu, now)
+        moment = self._cell.moments
+        if moment != self._moment:
+            self._moment = moment
+            self._answers = {}
+        answer = self._answers.get(pdu)
+        if answer is None:
+            answer = self._answers[pdu] = self._execute(pdu, now)
+        return answer
+
+
+def share_reads(devices: Mapping[int, Device], cell: Cell) -> dict[int, Device]:
+    """The units of a line for clients that a cell serves together. Units must not change each other but by the cell's kernel."""
+    return {unit: _SharedReads(device, cell) for unit, device in devices.items()}

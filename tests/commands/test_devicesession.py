@@ -1,0 +1,111 @@
+"""Sessions with a controller: what each line does, recordings, and where two of them differ. The twin lives in virtual time."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from host_rig import Wire, driver
+
+from steptwin.commands.devicesession import Step, carry_out, carry_out_one, differences, from_text, steps_of, to_text
+from steptwin.errors import Misuse, Refusal
+from steptwin.mic488.registers import register_map
+
+SESSION = """
+set M1_EN=on           # the drive
+set M1_POS_ABS=8
+wait M1
+get M1_POS_ACT M1_STATUS
+raw 03 27 24 00 02
+sleep 0
+"""
+
+
+def recorded(wire: Wire) -> list[Step]:
+    return list(carry_out(driver(wire), steps_of(SESSION, register_map())))
+
+
+def test_a_session() -> None:
+    steps = recorded(Wire())
+    assert [step.line for step in steps][:2] == ["set M1_EN=on", "set M1_POS_ABS=8"]
+    assert [step.result for step in steps] == [
+        {},
+        {},
+        {"M1": {"reason": "target reached", "position": 8.0}},
+        {"M1_POS_ACT": 8.0, "M1_STATUS": 4},
+        {"answer": "03 04 00 00 41 00"},
+        {},
+    ]
+    assert from_text("\n".join(to_text(steps, {"device": "twin"})), "x") == [
+        dataclasses.replace(step, at_s=round(step.at_s, 4)) for step in steps
+    ]
+
+
+def test_a_refusal_is_a_result() -> None:
+    result = carry_out_one(driver(Wire()), "raw 03 75 30 00 02")
+    assert "exception 02" in result["refused"]
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("jump", "expected get NAME"),
+        ("get", "'get': no name"),
+        ("get M1_STOP", "M1_STOP can only be written"),
+        ("set M1_ACC", "expected set NAME=VALUE"),
+        ("set M1_ACC=x", "'set M1_ACC=x': 'x' is no number"),
+        ("set M1_ACC=-5", "M1_ACC = -5 u/s²: permitted > 0"),
+        ("set M1_POS_ABS=nan", "M1_POS_ABS = nan"),
+        ("set M1_STATUS=1", "M1_STATUS can only be read"),
+        ("sleep", "expected seconds"),
+        ("sleep -1", "expected seconds"),
+        ("wait X", "expected axes"),
+        ("wait 7", "expected axes, 1 to 4"),
+        ("raw 0", "hexadecimal"),
+        ("raw 63 00", "raw 63 00"),
+        ("get M1_X", "no register named 'M1_X'"),
+    ],
+)
+def test_what_is_no_step(line: str, text: str) -> None:
+    with pytest.raises(Misuse, match=text):
+        carry_out_one(driver(Wire()), line)
+
+
+def test_a_session_is_read_before_it_is_begun() -> None:
+    for line in ("fly M1", "set M1_ACC=x", "set M1_ACC=0", "get M1_NONE", "raw 99"):
+        with pytest.raises(Misuse, match=f"line 2: '{line}': "):
+            steps_of(f"get M1_ACC\n{line}\n", register_map())
+    with pytest.raises(Misuse, match="there is no step: expected get NAME"):
+        steps_of("# nothing\n", register_map())
+
+
+def test_a_step_that_those_before_it_make_senseless() -> None:
+    steps = carry_out(driver(Wire()), steps_of("set M1_EN=1\nset M1_VEL_ABS=5\nwait 1", register_map()))
+    with pytest.raises(Refusal, match="'wait 1': M1 runs in velocity mode and does not end by itself"):
+        list(steps)
+
+
+def test_two_recordings() -> None:
+    one, wire = recorded(Wire()), Wire()
+    wire.twin.axes[0].set_coordinate(900, wire.now)
+    assert differences(one, recorded(wire)) == []
+    slow = [dataclasses.replace(step, at_s=step.at_s + 2.0 * (n == 4)) for n, step in enumerate(one)]
+    assert differences(one, slow) == []
+    assert [d.what for d in differences(one, slow, time_s=1.0)] == ["time in s"]
+    other = list(one)
+    other[2] = Step("wait M1", 0.0, {"M1": {"reason": "stopped at limit R", "position": 7.99}})
+    other[3] = Step(one[3].line, 0.0, {"M1_STATUS": 4})
+    assert [str(d) for d in differences(one, other)] == [
+        'step 3, wait M1: M1 reason: "target reached" | "stopped at limit R"',
+        "step 3, wait M1: M1 position: 8.0 | 7.99",
+        "step 4, get M1_POS_ACT M1_STATUS: M1_POS_ACT: 8.0 | nothing",
+    ]
+    assert len(differences(one, other, tolerance=0.011)) == 2
+    with pytest.raises(Misuse, match="recordings of different sessions"):
+        differences(one, one[1:])
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"format": "steptwin session 1"}\n{}', "x", '{"format": "steptwin session 1"}\nx'])
+def test_what_is_no_recording(text: str) -> None:
+    with pytest.raises(Misuse, match=r"a.json is no recording"):
+        from_text(text, "a.json")

@@ -1,0 +1,179 @@
+"""What a person types to M1486 chips, and what comes back in words."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from steptwin.commands.m1486_terminal import ChipTerminal, ChipWords, command_of
+from steptwin.drivers import LineLost
+from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.variants import variant
+
+LOST = "no room in the input buffer: a character is lost"
+EMPTY = "7FH  the input buffer is empty"
+
+
+def inverted(text: str) -> bytes:
+    return bytes(~byte & 0xFF for byte in text.encode())
+
+
+@pytest.mark.parametrize(
+    ("typed", "heard", "told"),
+    [
+        (["u1"], b"\x80", ["80H  U1 position, low byte: 128"]),
+        (["u1", "u2"], b"u1\ru2\r\x80\x01", ["80H  U1 position, low byte: 128", "01H  U2 position, middle byte: 1"]),
+        (["U20"], b"U20\rB", ["42H  U20 type letter in ASCII: M1486B"]),
+        (["u20"], b"u", ["75H  U20 type letter in ASCII: 117"]),
+        (["u14"], b"\x89", ["89H  U14 flags 80 to 87: ON 80 83 87"]),
+        (["u18"], b"\xff", ["FFH  U18 functions 48 to 55: ON 48 49 50 51 52 53 54 55"]),
+        (["u15"], b"\x02", ["02H  U15 driver interface: Step & Direction"]),
+        (["u15"], b"\x7f\x02", [EMPTY, "02H  U15 driver interface: Step & Direction"]),
+        (["u1"], b"\x7f", [f"7FH  U1 position, low byte: 127 (or: {EMPTY[5:]})"]),
+        (["v200"], b"v200\r\x7f", [EMPTY]),
+        (["v200"], b"", []),
+        (["r"], b"^^", [f"5EH  {LOST}"] * 2),
+        (
+            ["f64"],
+            inverted("4\r"),
+            [
+                "CBH  '4' inverted: it took one of the last three places of the input buffer",
+                "F2H  CR inverted: it took one of the last three places of the input buffer",
+            ],
+        ),
+        (
+            ["f64"],
+            b"f64" + inverted("4") + b"^",
+            ["CBH  '4' inverted: it took one of the last three places of the input buffer", f"5EH  {LOST}"],
+        ),
+        (["u1"], inverted("1"), ["CEH  U1 position, low byte: 206"]),
+        ([], b"Az\xff\n", ["41H  65, 'A'", "7AH  122, 'z'", "FFH  255", "0AH  10"]),
+    ],
+)
+def test_what_comes_back_in_words(typed: list[str], heard: bytes, told: list[str]) -> None:
+    words = ChipWords()
+    for line in typed:
+        words.typed(line)
+    assert words.heard(heard) == told
+    assert words.refused == sum(LOST in text and "or:" not in text for text in told)
+
+
+def test_an_answer_that_takes_its_time_is_still_known() -> None:
+    words = ChipWords()
+    words.typed("u3")
+    assert words.heard(b"u3\r") == []
+    assert words.is_awaiting
+    assert words.heard(b"\x05") == ["05H  U3 position, high byte: 5"]
+    assert not words.is_awaiting
+
+
+def test_what_is_looked_at_before_it_is_typed() -> None:
+    assert str(command_of("f 12800 ; forward", None)) == "F12800"
+    assert command_of("; a comment", None) is None
+    assert str(command_of("@80", None)) == "@80"
+    for text, kind, why in (("@80", "A", "out of range"), ("v20001", None, "out of range"), ("hello", None, "no command")):
+        with pytest.raises(Misuse, match=why):
+            command_of(text, None if kind is None else variant(kind))
+
+
+class Wire:
+    """The other end in memory: answers by line, and what was written."""
+
+    def __init__(self, **answers: bytes) -> None:
+        self._answers = answers
+        self._ready = threading.Event()
+        self._bytes = b""
+        self.written: list[bytes] = []
+        self.is_lost = self.is_closed = False
+
+    def write(self, data: bytes) -> None:
+        self.written.append(data)
+        self._bytes += self._answers.get(data.decode().strip(), b"")
+        self._ready.set()
+
+    def read(self, timeout_s: float) -> bytes:
+        if self.is_lost:
+            raise LineLost("the cable is out")
+        self._ready.wait(timeout_s)
+        self._ready.clear()
+        data, self._bytes = self._bytes, b""
+        return data
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def test_a_conversation() -> None:
+    wire = Wire(u1=b"\x05", r=b"^^")
+    told: list[str] = []
+    terminal = ChipTerminal(wire, 4800, None, told.append)
+    terminal.type("x7")
+    assert terminal.settle(60.0) == 0
+    terminal.type("u1")
+    assert terminal.settle(60.0) == 0
+    assert told == ["05H  U1 position, low byte: 5"]
+    terminal.type("r")
+    assert terminal.settle(60.0) == 2
+    assert terminal.selected == "7"
+    terminal.type("xg")
+    assert terminal.selected == ""
+    terminal.close()
+    assert wire.is_closed
+    assert wire.written[:3] == [b"x7\r", b"u1\r", b"r\r"]
+
+
+def test_what_is_no_byte_is_refused_and_the_rest_goes_on() -> None:
+    wire = Wire(u1=b"\x05")
+    terminal = ChipTerminal(wire, 4800, None, str)
+    with pytest.raises(Misuse, match=r"^'v€': '€' is no character of one byte$"):
+        terminal.type("v€")
+    terminal.type("u1")
+    assert terminal.settle(60.0) == 0
+    terminal.close()
+    assert wire.written == [b"u1\r"]
+
+
+def test_kill_waits_for_no_eeprom() -> None:
+    """Half a second for each command of an E type (chapter II); K and X take no part in that."""
+    wire = Wire()
+    terminal = ChipTerminal(wire, 4800, variant("E1"), str)
+    for line in ("v200", "a5000", "s200", "k", "x1", "p300"):
+        terminal.type(line)
+    terminal.settle(60.0)
+    terminal.close()
+    assert wire.written[0] in (b"v200\r", b"k\r")
+    assert {wire.written[0], wire.written[1]} == {b"v200\r", b"k\r"}
+    assert wire.written[2:] == [b"a5000\r", b"s200\r", b"x1\r", b"p300\r"]
+
+
+def test_no_answer_and_a_lost_line_are_told() -> None:
+    wire = Wire()
+    terminal = ChipTerminal(wire, 4800, None, str)
+    terminal.type("u1")
+    with pytest.raises(LineFailure, match="no answer to U within"):
+        terminal.settle(0.01)
+    wire.is_lost = True
+    with pytest.raises(LineLost, match="the cable is out"):
+        terminal.settle(60.0)
+    with pytest.raises(LineLost):
+        terminal.type("v200")
+    terminal.close()
+
+
+def test_what_waits_for_an_eeprom_is_not_typed_after_a_suspension() -> None:
+    """R was typed, and half a second later, before its turn came, the program was suspended for an hour."""
+    wire = Wire()
+    away = [0.0]
+    terminal = ChipTerminal(wire, 4800, variant("E1"), str, clock=lambda: time.monotonic() + away[0])
+    for line in ("f640", "r", "x7"):
+        terminal.type(line)
+    away[0] = 3600.0
+    with pytest.raises(LineFailure, match=r"\br: not typed, because the program was suspended for 3600 s"):
+        terminal.settle(7200.0)
+    terminal.type("k")
+    terminal.settle(7200.0)
+    terminal.close()
+    assert b"r\r" not in wire.written
+    assert wire.written[-1] == b"k\r"

@@ -1,0 +1,197 @@
+"""A line between two others: everything passes unchanged, and everything is told."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from steptwin.commands.sniff import Decoder, M1486Decoder, ModbusDecoder, sniff
+from steptwin.drivers.place import parse_place
+from steptwin.errors import LineFailure, Misuse
+from steptwin.wire.slave import Direction
+from steptwin.words.frames import FrameLine
+from steptwin.world.addresses import Address
+
+READ, ANSWER = bytes.fromhex("01 03 27 24 00 02 8E B4"), bytes.fromhex("01 03 04 00 00 41 48 CA 55")
+ANYWHERE = Address("127.0.0.1", 0)
+
+
+async def device(answer: Callable[[bytes], bytes]) -> tuple[asyncio.Server, int]:
+    """Somebody who answers each piece he hears."""
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while data := await reader.read(1000):
+            writer.write(answer(data))
+        writer.close()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    return server, server.sockets[0].getsockname()[1]
+
+
+def told(frames: list[FrameLine]) -> list[str]:
+    return [f"{frame.direction.name} {frame.meaning}" for frame in frames]
+
+
+async def enough(frames: list[FrameLine], count: int) -> None:
+    while len(frames) < count:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+
+
+async def through(scheme: str, decoder: Decoder, answers: dict[bytes, bytes]) -> None:
+    """A client asks through a tap and hears what the device says."""
+    server, port = await device(answers.__getitem__)
+    ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+    place = parse_place(f"{scheme}://127.0.0.1:{port}", 38400)
+    tap = asyncio.create_task(sniff(place, decoder, listen=ANYWHERE, ready=ready.set_result))
+    reader, writer = await asyncio.open_connection("127.0.0.1", int((await ready).rpartition(":")[2]))
+    for asked, answer in answers.items():
+        writer.write(asked)
+        assert await reader.readexactly(len(answer)) == answer
+    writer.close()
+    await writer.wait_closed()
+    tap.cancel()
+    await asyncio.gather(tap, return_exceptions=True)
+    server.close()
+
+
+def test_modbus_passes_and_is_told() -> None:
+    frames: list[FrameLine] = []
+    asyncio.run(through("rtu-tcp", ModbusDecoder(frames.append, "1.70", tcp=False), {READ: ANSWER}))
+    assert told(frames) == ["IN unit 1: read M1_POS_ACT", "OUT unit 1: read M1_POS_ACT = 12.5 u"]
+
+
+def test_modbus_tcp_passes_and_is_told() -> None:
+    frames: list[FrameLine] = []
+    asked, answer = bytes.fromhex("0007 0000 0006 01 03 2724 0002"), bytes.fromhex("0007 0000 0007 01 03 04 0000 4148")
+    asyncio.run(through("tcp", ModbusDecoder(frames.append, "1.70", tcp=True), {asked: answer}))
+    assert told(frames) == ["IN unit 1: read M1_POS_ACT", "OUT unit 1: read M1_POS_ACT = 12.5 u"]
+
+
+def test_the_m1486_passes_and_is_told() -> None:
+    frames: list[FrameLine] = []
+    asyncio.run(through("rtu-tcp", M1486Decoder(frames.append, "A"), {b"U1\r": b"\x2a", b"+100\r": b"\x5e"}))
+    assert [frame.raw for frame in frames] == [b"U1\r", b"\x2a", b"+100\r", b"\x5e"]
+    assert frames[0].meaning == "U1  Upload 1"
+    assert frames[1].meaning.startswith("U1 ")
+    assert frames[1].meaning.endswith(" = 42")
+    assert frames[2].meaning == "+100  Add 100"
+    assert frames[3].meaning == "no room in the input buffer: a character is lost"
+
+
+def decoded(*heard: tuple[str, bytes]) -> list[str]:
+    """What a decoder says of bytes typed (``>``) and come (``<``), with a silence (``.``)."""
+    frames: list[FrameLine] = []
+    decoder = M1486Decoder(frames.append, "A")
+    now = 0
+    for what, data in heard:
+        now += 1_000_000
+        if what == ".":
+            due = decoder.deadline()
+            assert due is not None
+            now = due
+            decoder.expire(now)
+        else:
+            decoder.heard(data, now, Direction.IN if what == ">" else Direction.OUT)
+    return told(frames)
+
+
+def test_the_echo_of_an_m1486_is_told_once_for_a_line_and_is_no_upload() -> None:
+    at_once = decoded((">", b"u16\ru2\r"), ("<", b"u16\r\x01"), ("<", b"u2\r\x32"))
+    assert at_once == [
+        "IN U16  Upload 16",
+        "IN U2  Upload 2",
+        r"OUT echo of 'u16\r'",
+        "OUT U16 production series = 1",
+        r"OUT echo of 'u2\r'",
+        "OUT U2 position, middle byte = 50",
+    ]
+    by_hand = decoded((">", b"u1"), ("<", b"u"), ("<", b"1"), (".", b""), (">", b"6\r"), ("<", b"6\r\x01"))
+    assert by_hand == ["OUT echo of 'u1'", "IN U16  Upload 16", r"OUT echo of '6\r'", "OUT U16 production series = 1"]
+
+
+def test_what_was_typed_before_the_echo_was_on() -> None:
+    assert decoded((">", b"x7\rt41\rv5\r"), ("<", b"v5\r"))[3:] == [r"OUT echo of 'v5\r'"]
+
+
+def test_an_upload_of_an_m1486_that_looks_like_an_echo() -> None:
+    without_echo = decoded((">", b"v100\ru2\r"), ("<", b"v"), (".", b""), (">", b"u3\r"), ("<", b"u"), (".", b""))
+    assert [line.partition("=")[2] for line in without_echo if "= " in line] == [" 118", " 117"]
+    assert decoded((">", b"u2\ru3\r"), ("<", b"u\x07"))[2:] == [
+        "OUT U2 position, middle byte = 117",
+        "OUT U3 position, high byte = 7",
+    ]
+
+
+def test_what_several_chips_of_a_line_echo_at_once() -> None:
+    assert decoded((">", b"urz"), ("<", b"ppz"), (".", b"")) == [
+        "OUT 'p' where 'u' was typed: a garbled echo, or that of several chips at once",
+        "OUT 'p' where 'r' was typed: a garbled echo, or that of several chips at once",
+        "OUT echo of 'z'",
+    ]
+
+
+def test_listening_only() -> None:
+    """Both directions come from one wire, and the end of the line is told."""
+    frames: list[FrameLine] = []
+    master, slave = os.openpty()
+
+    async def main() -> None:
+        place = parse_place(os.ttyname(slave), 38400)
+        decoder = ModbusDecoder(frames.append, "1.70", tcp=False)
+
+        def ready(where: str) -> None:
+            assert where == f"listening on {os.ttyname(slave)}"
+            os.write(master, READ + ANSWER + b"\xff")
+
+        tap = asyncio.create_task(sniff(place, decoder, ready=ready))
+        await enough(frames, 3)
+        os.close(master)
+        with pytest.raises(LineFailure, match="is gone"):
+            await tap
+
+    asyncio.run(main())
+    os.close(slave)
+    assert told(frames)[:2] == ["IN unit 1: read M1_POS_ACT", "OUT unit 1: read M1_POS_ACT = 12.5 u"]
+    assert frames[2].meaning == "no frame: 1 byte"
+
+
+def test_standing_in_a_line_with_a_pty(tmp_path: Path) -> None:
+    frames: list[FrameLine] = []
+
+    async def main() -> None:
+        server, port = await device(lambda data: ANSWER)
+        ready = asyncio.Event()
+        place = parse_place(f"rtu-tcp://127.0.0.1:{port}", 38400)
+        decoder = ModbusDecoder(frames.append, "1.70", tcp=False)
+        tap = asyncio.create_task(sniff(place, decoder, pty=tmp_path / "tty", ready=lambda where: ready.set()))
+        await ready.wait()
+        terminal = os.open(tmp_path / "tty", os.O_RDWR | os.O_NOCTTY)
+        os.write(terminal, READ)
+        await enough(frames, 2)
+        assert await asyncio.to_thread(os.read, terminal, 100) == ANSWER
+        os.close(terminal)
+        tap.cancel()
+        await asyncio.gather(tap, return_exceptions=True)
+        server.close()
+
+    asyncio.run(main())
+    assert not (tmp_path / "tty").exists()
+
+
+def test_a_connection_cannot_be_listened_to() -> None:
+    place = parse_place("tcp://127.0.0.1:1", 38400)
+    with pytest.raises(Misuse, match="stand in it, --listen HOST:PORT"):
+        asyncio.run(sniff(place, ModbusDecoder(print, "1.70", tcp=True)))
+
+
+def test_a_device_that_cannot_be_reached() -> None:
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        place = parse_place(f"rtu-tcp://127.0.0.1:{s.getsockname()[1]}", 38400)
+    with pytest.raises(LineFailure, match="connection refused"):
+        asyncio.run(sniff(place, ModbusDecoder(print, "1.70", tcp=False), listen=ANYWHERE))

@@ -1,0 +1,111 @@
+"""What a driver finds out about a chip in virtual time, and how it switches what a chip has."""
+
+from __future__ import annotations
+
+import pytest
+from chip_rig import ChipWire, chip_driver, chip_line
+
+from steptwin.drivers.m1486 import M1486, NoEcho, WrongType
+from steptwin.drivers.m1486.lines import TALK
+from steptwin.drivers.m1486.talk import SPOILER
+from steptwin.m1486.lines import DUAL_DAC
+
+
+@pytest.mark.parametrize(
+    ("kind", "title"), [("A", "M1486A"), ("B", "M1486B"), ("C", "M1486C"), ("E1", "M1486E1"), ("E2", "M1486E2")]
+)
+def test_the_type_is_found(kind: str, title: str) -> None:
+    chip = chip_driver(ChipWire(kind, interface=DUAL_DAC))
+    status = chip.status()
+    assert (chip.variant.title, status.type, status.interface, status.series) == (title, title, "Dual DAC", 1)
+
+
+@pytest.mark.parametrize("kind", ["B", "E1", "E2"])
+def test_a_chip_that_echoes_already_is_known_again_by_the_next_program(kind: str) -> None:
+    """It does at once what every connection types before its questions; an E type takes half a second for each."""
+    wire = ChipWire(kind, (1,))
+    for _ in range(3):
+        chip = M1486(chip_line(wire), 1)
+        chip.open()
+        assert (chip.variant.name, chip.status().series) == (kind, 1)
+
+
+def test_another_type_than_expected_is_refused() -> None:
+    with pytest.raises(WrongType, match="the chip says it is an M1486B, not M1486A"):
+        chip_driver(ChipWire("B"), variant="A")
+    assert chip_driver(ChipWire("B2x"), variant="B2x").variant.clock == 2
+
+
+def test_reading() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire, steps_per_unit=40.0, unit="mm", origin_u=64_000)
+    wire.chip.drive.set_counter(0x123456, wire.now)
+    wire.chip.unit.variable = 0xABCDEF
+    wire.chip.unit.flags[3] = True
+    assert chip.counter() == 0x123456
+    assert chip.position() == (0x123456 - 64_000) / 64 / 40
+    assert chip.variable() == 0xABCDEF
+    assert [flag for flag, on in chip.flags().items() if on] == [83]
+    assert [number for number, on in chip.functions().items() if on] == [41, *range(48, 56)]
+    wire.chip.set_pin("B2", 0, wire.now)
+    assert chip.inputs(1, 4) == (True, False, True, True)
+
+
+def test_switches() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.set_output(6, False)
+    chip.set_flag(85, True)
+    chip.set_limit(False)
+    assert wire.chip.pins()["B6"] == 0
+    assert chip.flags()[85]
+    assert chip.functions()[42]
+    chip.set_variable(77)
+    assert chip.variable() == 77
+    chip.command("T6")
+    assert wire.chip.pins()["B6"] == 1
+
+
+WAKING = {
+    # Chip, address asked for: what is typed until it is known whether it echoes, with "|" for CR.
+    "alone": ("B", 15, None, "t41|t41|t41|"),
+    "addressed": ("B", 7, 7, "xg|xg|t41|x7|t41|t41|t41|"),
+    "an E type, which is given its time": ("E1", 7, 7, "xg|xg|t41|x7|xg|xg|t41|x7|t41|t41|t41|"),
+    "another chip echoes, this one is not there": (
+        "B", 7, 5, "xg|xg|t41|x5|t41|t41|t41|xg|xg|t41|x5|t41|t41|t41|xg|xg|",
+    ),
+    "nobody is there": ("B", None, 7, "xg|xg|t41|x7|xg|xg|t41|x7|xg|xg|"),
+    "nobody is there, without address": ("B", None, None, "t41|t41|t41|t41|t41|t41|"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WAKING)
+def test_what_is_typed_to_wake_a_chip(case: str) -> None:
+    """Lines that get no echo are given their CR later, so that nothing stands in front of what comes next."""
+    kind, there, asked, expected = WAKING[case]
+    wire = ChipWire(kind, (15 if there is None else there,))
+    wire.severed = there is None
+    chip = M1486(chip_line(wire), asked)
+    if there is not None and asked in (None, there):
+        chip.open()
+    else:
+        with pytest.raises(NoEcho):
+            chip.open()
+    assert b"".join(data for _, data in wire.sent).decode().replace("\r", "|").partition("u20")[0] == expected
+
+
+def test_after_an_ordinary_session_no_letter_is_expected_and_a_stray_one_counts() -> None:
+    """It may be the echo of something that stands in front of the next command now: that is spoilt first."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(microstep=1)
+    chip.move_by(10.0)
+    assert chip.wait().ok
+    chip.status()
+    talk = chip._driver.line.notes[TALK]
+    assert (talk.surplus, talk.owed, talk.dirty) == (0, {}, False)
+    wire.inject(b"B")
+    wire.sleep(0.1)
+    wire.sent.clear()
+    assert chip.counter() == 640
+    assert wire.sent[0][1] == SPOILER

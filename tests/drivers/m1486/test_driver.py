@@ -1,0 +1,480 @@
+"""The driver against chips in virtual time: what it types, how motions end, what it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from chip_rig import ChipWire, chip_driver, chip_line
+
+from steptwin.drivers import Untold
+from steptwin.drivers.m1486 import (
+    M1486,
+    Busy,
+    ChipMoveFailed,
+    ChipReason,
+    ChipSettings,
+    DoubtfulMove,
+    NoEcho,
+    NoRoom,
+    PositionUnknown,
+    Restarted,
+)
+from steptwin.drivers.m1486.sync import download_to
+from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.lines import DUAL_DAC
+from steptwin.machine import SECOND
+
+KNOWN = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 4, "qualification": 1}
+
+
+def typed(wire: ChipWire) -> str:
+    """What was sent, CR as a blank."""
+    return b"".join(data for _, data in wire.sent).decode().replace("\r", " ")
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda c: c.configure(velocity=20_001), "velocity = 20001: M1486B takes 16 to 20 000 step/s"),
+        (lambda c: c.configure(start_stop=15), "start_stop = 15: M1486B takes 16 to 1950 step/s"),
+        (lambda c: c.configure(microstep=3), "microstep = 3: M1486B takes 1, 2, 4, 8, 16, 32, 64"),
+        (lambda c: c.configure(microstep=16, qualification=1), "M16 and Q1 do not go together: with M16 go Q4"),
+        (lambda c: c.move_to(-1.0), "position -1 step is outside 0 to 250000 step"),
+        (lambda c: c.move_by(250_001.0), "distance 250001 step is outside ±250000 step"),
+        (lambda c: c.move_by(0.25), "0.25 step is 16 minimum microsteps and no whole full step"),
+        (lambda c: c.seek(1, 22), "the line to seek = 22: M1486B takes 1 to 21"),
+        (lambda c: c.set_output(22, True), "no line 22"),
+        (lambda c: c.set_function(41, False), "function 41 is what this driver lives by: it stays ON"),
+        (lambda c: c.command("f16000001"), "F16000001 is out of range"),
+        (lambda c: c.command("r"), "'r' is no command to type alone"),
+        (lambda c: c.run_block(["f64", "\\"]), "has no place in a block"),
+        (lambda c: c.run_block(["f64"] * 64), "the block is larger than the command memory of M1486B, 2032 bits"),
+        (lambda c: c.download("v99999\nq"), "program is not sent:"),
+        (lambda c: c.run_block(["f64"], timeout_s=-1.0), "a time to wait of -1 s is outside 0 to 1000000 s"),
+        (lambda c: c.wait(float("nan")), "a time to wait of nan s is outside"),
+        (lambda c: c.uploaded(1, float("inf")), "a time to wait of inf s is outside"),
+        (lambda c: c.start_program(81), "the label = 81"),
+        (lambda c: c.run(0), "direction 0"),
+    ],
+)
+def test_misuse_is_told_before_anything_is_typed(call: object, text: str) -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.sent.clear()
+    with pytest.raises(Misuse) as caught:
+        call(chip)  # type: ignore[operator]
+    assert text in str(caught.value)
+    assert wire.sent == []
+
+
+# ---------------------------------------------------------------------- motion
+
+
+def test_a_move_takes_the_time_it_was_computed_to_take() -> None:
+    wire = ChipWire("B", interface=DUAL_DAC)
+    chip = chip_driver(wire, steps_per_unit=40.0, unit="mm")
+    chip.configure(**KNOWN)
+    wire.sent.clear()
+    chip.move_to(20.0)
+    assert typed(wire).endswith("g51200 r ")
+    expected = ChipSettings(**KNOWN).travel_s(51_200, chip.variant)
+    end = chip.wait()
+    assert str(end) == "the chip: target reached at 20 mm"
+    assert expected is not None
+    train = wire.chip.drive.train.profile
+    assert ((train.end or 0) - train.start) / SECOND == pytest.approx(expected, abs=1e-6)
+    chip.move_by(-7.5)
+    assert chip.wait().position == 12.5
+    assert wire.true() == 12.5 * 40 * 64
+
+
+def test_the_position_is_not_known_while_it_moves_nor_after_a_stop() -> None:
+    """M-28, M-16."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.move_by(5000.0)
+    with pytest.raises(Busy, match="the chip is not done with a move: wait for its end or stop it"):
+        chip.position()
+    chip.stop()
+    assert chip.wait(check=False).reason is ChipReason.STOPPED
+    with pytest.raises(PositionUnknown, match="shows where it was sent, not where it was stopped"):
+        chip.position()
+    with pytest.raises(PositionUnknown):
+        chip.move_to(10.0)
+    place = wire.true()
+    chip.move_by(10.0)
+    assert chip.wait().ok
+    assert wire.true() == place + 640
+    chip.set_position(100.0)
+    assert chip.position() == 100.0
+
+
+def test_a_run_without_end() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.run(-1, velocity=300)
+    wire.sleep(2.0)
+    with pytest.raises(Misuse, match="runs without end: give the time to wait"):
+        chip.wait()
+    assert chip.wait(0.5, check=False).reason is ChipReason.OVERDUE
+    chip.stop()
+    end = chip.wait(check=False)
+    assert end.reason is ChipReason.STOPPED
+    assert end.position == (wire.true() & 0xFFFFFF) / 64
+    assert wire.true() < -500 * 64
+
+
+def test_a_seek() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.at(0.9, lambda: wire.chip.set_pin("B2", 0, wire.now))
+    chip.seek(-1, 2)
+    assert chip.wait().reason is ChipReason.SOUGHT
+    assert -200 * 64 < wire.true() < -100 * 64
+
+
+def test_limit_ends_a_move_early() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.configure(**{**KNOWN, "microstep": 1})
+    chip.move_by(5000.0)
+    wire.at(1.0, lambda: wire.chip.set_pin("LIMIT", 0, wire.now))
+    with pytest.raises(ChipMoveFailed, match=r"ended before its time \(LIMIT, or Kill by somebody\)"):
+        chip.wait()
+    with pytest.raises(PositionUnknown):
+        chip.position()
+    chip.set_limit(False)
+    chip.move_by(-100.0)
+    assert chip.wait().ok
+    chip.set_limit(True)
+    wire.chip.set_pin("LIMIT", 1, wire.now)
+    chip.run(1)
+    wire.at(1.0, lambda: wire.chip.set_pin("LIMIT", 0, wire.now))
+    assert chip.wait(5.0, check=False).reason is ChipReason.LIMIT
+
+
+def test_a_chip_held_by_kill_is_recovered() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.set_function(51, False)
+    chip.run(1)
+    chip.stop()
+    wire.sleep(1.0)
+    with pytest.raises(Busy, match="is held by Kill, for its function 51 is OFF: recover it"):
+        chip.position()
+    chip.recover()
+    assert chip.position() == wire.true() / 64
+
+
+def test_a_move_that_is_late_is_overdue() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.move_by(5000.0)
+    end = chip.wait(1.0, check=False)
+    assert (end.reason, end.position) == (ChipReason.OVERDUE, None)
+    assert chip.wait().reason is ChipReason.TARGET
+
+
+# ---------------------------------------------------------------------- programs
+
+
+def test_a_block_is_done_when_its_last_command_is() -> None:
+    wire = ChipWire("A")
+    chip = chip_driver(wire)
+    begin = wire.now
+    end = chip.run_block(["f640", "r", "w1500", "d", "r", "t3"])
+    assert end.reason is ChipReason.DONE
+    assert wire.now - begin > 1.5 * SECOND
+    assert wire.true() == 0
+    assert [event.text for _, event in wire.happened if event.code == "moves"][1].startswith("moves -640")
+
+
+@pytest.mark.parametrize("kind", ["A", "B"])
+@pytest.mark.parametrize(
+    ("commands", "moved"),
+    [
+        (["f6400", "e"], 0),  # E outside a loop
+        ([":1", "v", "f6400", "r"], 0),  # V1
+        (["f640", "r", ":15", "q", "r"], 640),  # Q15
+    ],
+)
+def test_a_block_that_a_command_of_it_ends_is_not_done(kind: str, commands: list[str], moved: int) -> None:
+    """What the chip was asked meanwhile goes with the block, so it is asked again."""
+    wire = ChipWire(kind)
+    chip = chip_driver(wire)
+    begin = wire.now
+    with pytest.raises(ChipMoveFailed, match=r"cut short .*\(a command was wrong data when it came to be done") as failed:
+        chip.run_block(commands)
+    assert failed.value.end.reason is ChipReason.CUT
+    assert wire.true() == moved
+    assert wire.now - begin < 5 * SECOND
+    assert chip.run_block(["f640", "r"]).ok
+    assert chip.counter() == moved + 640
+
+
+def test_a_block_that_ends_late_is_seen_to_have_ended() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    begin = wire.now
+    with pytest.raises(ChipMoveFailed, match="cut short"):
+        chip.run_block(["w12000", "e"])
+    assert 12 * SECOND < wire.now - begin < 20 * SECOND
+    with pytest.raises(Misuse, match="no program of the chip was started here"):
+        chip.uploaded(1)
+
+
+PROGRAM = "[\n@1\nf640\nr ; to and fro\nw500\nd\nr\nw500\nj1\n]\n"
+
+
+def test_a_file_of_another_kind_is_refused_in_a_few_words() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.sent.clear()
+    with pytest.raises(Misuse, match=r"^notes.txt is not sent:") as refused:
+        chip.download("~\n" * 1000, name="notes.txt")
+    assert str(refused.value).count("error M") == 10
+    assert str(refused.value).endswith("\nand 990 more errors")
+    assert wire.sent == []
+
+
+def test_a_program_is_downloaded_runs_and_is_ended() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    seen: list[tuple[int, int]] = []
+    chip.download(PROGRAM, progress=lambda done, total: seen.append((done, total)))
+    assert seen[-1] == (10, 10)
+    wire.sleep(5.0)
+    assert wire.codes().count("moves") > 5
+    assert chip.is_busy()
+    with pytest.raises(Busy):
+        chip.move_by(1.0)
+    chip.stop_program()
+    count = wire.codes().count("moves")
+    wire.sleep(5.0)
+    assert wire.codes().count("moves") == count
+    assert not wire.moving()
+    chip.start_program(1)
+    wire.sleep(5.0)
+    assert wire.codes().count("moves") > count + 2
+    chip.reset(force=True)
+    assert chip.position() == 0.0
+
+
+def test_what_a_program_uploads_is_read() -> None:
+    """Its position after each move, and every byte there is: 7FH and 7EH are none of function 57 here."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    with pytest.raises(Misuse, match="no program of the chip was started here"):
+        chip.uploaded()
+    chip.download("[\n@1\nf640\nr\nu1\nw300\nj1\n]\n")
+    assert chip.uploaded(3) == bytes((640 * move & 0xFF) for move in (1, 2, 3))
+    wire.sleep(10.0)
+    assert chip.uploaded(2, 0.0) == bytes((640 * move & 0xFF) for move in (4, 5))
+    chip.stop_program()
+    chip.download("[\n:32382\nu4\nu5\n]\n")
+    assert chip.wait().ok
+    with pytest.raises(LineFailure, match="the chip uploaded 2 of 3 bytes within 1 s"):
+        chip.uploaded(3, 1.0)
+    assert chip.uploaded(2) == bytes((0x7E, 0x7E))
+    assert chip.variable() == 0x7E7E
+    with pytest.raises(Misuse, match="0 bytes: at least 1"):
+        chip.uploaded(0)
+
+
+def test_uploads_of_two_programs_cannot_be_told_apart() -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = [M1486(line, 0), M1486(line, 7)]
+    for chip in chips:
+        chip.open()
+        chip.download("[\n@1\nw900\nu1\nj1\n]\n")
+    with pytest.raises(Misuse, match="another chip runs a program too"):
+        chips[0].uploaded()
+    chips[0].stop_program()
+    assert chips[1].uploaded() == b"\0"
+
+
+def test_a_file_for_an_eeprom_is_paced_and_kept() -> None:
+    """Chapter II: half a second for each command, a second to erase."""
+    wire = ChipWire("E1", (3,))
+    chip = chip_driver(wire, 3)
+    assert wire.codes().count("wrong-data") == 0
+    begin = wire.now
+    chip.download(PROGRAM)
+    assert wire.now - begin > (1.0 + 10 * 0.5) * SECOND
+    assert "wrong-data" not in wire.codes()
+    wire.sleep(3.0)
+    wire.chip.power_cycle(wire.now)
+    wire.happened.clear()
+    wire.sleep(3.0)
+    assert "moves" in wire.codes()
+    with pytest.raises(Misuse, match="keeps what stands in"):
+        chip.run_block(["f64"])
+
+
+def test_plain_commands_are_typed_as_the_buffer_takes_them() -> None:
+    """Example 1 of the manual and more moves than the twelve characters of an A hold."""
+    wire = ChipWire("A")
+    chip = chip_driver(wire)
+    answers = chip.download("\\\nf12800\nr\nb6400\nr\nf640\nr\nd\nr\nu2\n")
+    wire.sleep(10.0)
+    assert answers == bytes([6400 >> 8])
+    assert wire.true() == 6400
+    assert "wrong-data" not in wire.codes()
+
+
+@pytest.mark.parametrize(
+    ("program", "steps"),
+    [
+        ("l3\n[\nf640\nr\ne\n]", 30),
+        ("f640\nr\nl3\n[\nf640\nr\n]\nb64\nr\ne", 40 - 3),
+        ("l2\nf640\nr\nm1\nl2\n[\nb64\nr\ne\n]\nt6\ne", 20 - 4),
+        ("@3\n[\nf640\nr\nt80\n]\nb64\nr\ni2l3", 9),
+    ],
+)
+def test_nothing_is_asked_where_a_loop_or_a_jump_comes_by_again(program: str, steps: int) -> None:
+    """A question typed there would be part of it: every turn would upload a byte, and take a place in the memory."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.configure(**KNOWN)  # type: ignore[arg-type]
+    wire.sent.clear()
+    chip.download(program)
+    lines = program.split("\n")
+    begin = next(n for n, line in enumerate(lines) if line[0] in "l@")
+    assert " ".join(lines[begin:]) in typed(wire)
+    assert chip.wait().ok
+    assert wire.true() == steps * 64
+    assert "wrong-data" not in wire.codes()
+
+
+def test_example_6_of_the_manual_needs_both_its_chips() -> None:
+    text = "x0\n:0\n[\nl3\nc1\nt1\n+64\nf\nr\ne\n]\nx7\n[\nf640\nr\n]\n"
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = [M1486(line, 0), M1486(line, 7)]
+    for chip in chips:
+        chip.open()
+    download_to(chips, text)
+    assert [chip.wait().reason for chip in chips] == [ChipReason.DONE] * 2
+    assert (wire.true(0), wire.true(7)) == (64 + 128 + 192, 640)
+    with pytest.raises(Misuse, match="there is no chip 7, which it names"):
+        download_to(chips[:1], text)
+    with pytest.raises(Misuse, match="no X before F64 says which chip it is for"):
+        download_to(chips, "f64\nr\nx0\nr\n")
+    download_to(chips, "f64\nr\nx0\nr\n", first=chips[1])
+    assert [chip.wait().reason for chip in chips] == [ChipReason.DONE] * 2
+    assert (wire.true(0), wire.true(7)) == (2 * 192 + 128 + 64, 704)
+
+
+def test_a_program_is_for_chips_of_one_type() -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = [M1486(line, 0, variant="B"), M1486(line, 7, variant="B2x")]
+    for chip in chips:
+        chip.open()
+    with pytest.raises(Misuse, match="chip 0 is an M1486B, chip 7 an M1486B2x"):
+        download_to(chips, "x0\nr\nx7\nr\n")
+
+
+def test_a_chip_that_has_no_room_refuses_and_the_command_is_named() -> None:
+    """The buffer of an A is full of what another host has typed while it moves."""
+    wire = ChipWire("A")
+    chip = chip_driver(wire)
+    chip.move_by(5000.0)
+    wire._port.receive(b"f640\rf64\r", wire.now)
+    wire.sleep(0.2)
+    with pytest.raises(NoRoom, match=r"'the chip: u20' was refused: the input buffer has no room \(5EH\)"):
+        chip.wait()
+    chip.stop()
+    wire.sleep(1.0)
+    assert chip.counter() >= 0
+
+
+# ---------------------------------------------------------------------- nobody there
+
+
+def test_who_does_not_echo_is_told() -> None:
+    wire = ChipWire("B", (7,))
+    with pytest.raises(NoEcho, match="chip 3 does not echo: it is off, has another address or baud rate"):
+        chip_driver(wire, 3)
+
+
+@pytest.mark.parametrize("call", [lambda c: c.move_to(0.25), lambda c: c.move_by(-0.25), lambda c: c.position()])
+def test_a_chip_that_was_switched_off_is_not_moved_with_what_it_was_set_to(call: Callable[[M1486], object]) -> None:
+    """With M1 it would drop f16 as wrong data, and R would make the default move of a thousand steps."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(microstep=4)
+    chip.set_position(100.0)
+    wire.chip.power_cycle(wire.now)
+    with pytest.raises(Restarted, match="chip 7 was switched off or reset meanwhile"):
+        call(chip)
+    assert wire.true() == 0
+    assert chip.settings == ChipSettings()
+    assert chip.counter() == 0
+    with pytest.raises(PositionUnknown):
+        chip.position()
+
+
+def test_after_a_restart_a_busy_chip_is_not_held_by_an_earlier_kill() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.set_function(51, False)
+    chip.run(1)
+    chip.stop()
+    wire.sleep(1.0)
+    wire.chip.power_cycle(wire.now)
+    with pytest.raises(Restarted):
+        chip.variable()
+    chip.set_function(51, False)
+    chip.run(1)
+    with pytest.raises(Busy, match="chip 7 is not done with a run without end: wait for its end or stop it"):
+        chip.variable()
+
+
+def test_a_chip_that_is_switched_off_between_the_distance_and_the_run_does_not_move() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(microstep=4)
+
+    def cycle(data: bytes) -> None:
+        if data == b"r":
+            wire.before_each = None
+            wire.chip.power_cycle(wire.now)
+
+    wire.before_each = cycle
+    with pytest.raises(Restarted):
+        chip.move_by(0.25)
+    wire.sleep(5.0)
+    assert wire.true() == 0
+
+
+def test_a_cut_line_is_told() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.run(1)
+    wire.severed = True
+    with pytest.raises(Untold, match="chip 7 could not be stopped: it cannot be told, and goes on with what it was told before"):
+        chip.stop()
+    assert chip.wait(1.0, check=False).reason in (ChipReason.COMMUNICATION, ChipReason.STOPPED)
+    wire.severed = False
+    chip.stop()
+    wire.sleep(1.0)
+    assert not wire.moving()
+
+
+def test_a_line_that_is_cut_when_a_move_begins_leaves_it_in_doubt() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+
+    def cut(data: bytes) -> None:
+        wire.severed = wire.severed or (data == b"\r" and wire.sent[-1][1] == b"r")
+
+    wire.before_each = cut
+    with pytest.raises(DoubtfulMove, match="it is not known whether chip 7 has begun a move") as caught:
+        chip.move_by(10.0)
+    assert caught.value.uncertain
+    wire.before_each, wire.severed = None, False
+    wire.sleep(2.0)
+    assert chip.counter() == wire.true() == 0

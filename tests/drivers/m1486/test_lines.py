@@ -1,0 +1,358 @@
+"""Two chips on one line, shared by threads and tasks: each gets its own answers, both move at once, a stop goes first."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+
+import pytest
+from chip_rig import ChipWire, Fault, chip_line, chip_task_line, run_in
+
+from steptwin.drivers import Overtaken
+from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, NoEcho, PositionUnknown, Restarted
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.machine import MILLISECOND, SECOND
+
+KNOWN = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
+
+
+def in_threads(*tasks: Callable[[], object]) -> list[Exception]:
+    """Run them at once; what they raised."""
+    raised: list[Exception] = []
+
+    def guarded(task: Callable[[], object]) -> None:
+        try:
+            task()
+        except (AssertionError, SteptwinError) as error:
+            raised.append(error)
+
+    threads = [threading.Thread(target=guarded, args=(task,)) for task in tasks]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+        assert not thread.is_alive()
+    return raised
+
+
+def test_threads_share_a_line_with_two_chips() -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = {address: M1486(line, address, variant="B") for address in (0, 7)}
+    for address, chip in chips.items():
+        chip.open()
+        wire.chips[address].unit.variable = 1000 + address
+
+    def use(address: int) -> None:
+        chip = chips[address]
+        for number in range(1, 4):
+            assert chip.variable() == 1000 + address
+            chip.move_by(10.0 + address)
+            assert chip.wait().ok
+            assert chip.counter() == 64 * number * (10 + address)
+
+    assert in_threads(lambda: use(0), lambda: use(7)) == []
+    assert (wire.true(0), wire.true(7)) == (64 * 30, 64 * 51)
+
+
+def test_tasks_move_two_chips_at_the_same_time() -> None:
+    """Known settings: each wait leaves the line to the other until its motion is to be over."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_task_line(wire)
+    both = [False]
+
+    async def use(address: int) -> None:
+        chip = AsyncM1486(line, address, variant="B", steps_per_unit=200.0, unit="turn")
+        await chip.open()
+        await chip.configure(**KNOWN)
+        await chip.move_by(10.0)
+        both[0] |= wire.moving(0) and wire.moving(7)
+        end = await chip.wait()
+        assert (end.reason, end.position, end.unit) == (ChipReason.TARGET, 10.0, "turn")
+
+    async def main() -> None:
+        await line.open()
+        await asyncio.gather(use(0), use(7))
+        await line.close()
+
+    begin = wire.now
+    run_in(wire, main())
+    assert both[0]
+    assert wire.now - begin < 2 * 2.2 * SECOND
+    assert (wire.true(0), wire.true(7)) == (128_000, 128_000)
+
+
+def test_a_stop_goes_before_a_wait_that_keeps_the_line() -> None:
+    """While one task waits for chip 0, without knowing how long, another stops chip 7 and then chip 0: 100 ms for both."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_task_line(wire)
+
+    async def main() -> None:
+        await line.open()
+        chip, other = AsyncM1486(line, 0), AsyncM1486(line, 7)
+        await chip.open()
+        await other.open()
+        await other.run(1)
+        await chip.run(1)
+        waiting = asyncio.create_task(chip.wait(60.0, check=False))
+        await asyncio.sleep(1.0)
+        begin = line.now()
+        await other.stop()
+        await chip.stop()
+        assert line.now() - begin < 100 * MILLISECOND
+        end = await waiting
+        assert end.reason is ChipReason.STOPPED
+        assert end.position == wire.true(0) / 64
+        assert not wire.moving(7)
+        assert await other.position() == wire.true(7) / 64
+        await line.close()
+
+    run_in(wire, main())
+
+
+def test_a_move_that_waits_for_the_line_is_not_begun_after_a_stop() -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_task_line(wire)
+
+    async def main() -> None:
+        await line.open()
+        chip = AsyncM1486(line, 7)
+        await chip.open()
+        moving = asyncio.create_task(chip.move_by(100.0))
+        await asyncio.sleep(0.05)  # it reads the counter
+        await chip.stop()
+        with pytest.raises(Overtaken, match="'chip 7: r' was not sent: a stop was given meanwhile"):
+            await moving
+        await line.close()
+
+    run_in(wire, main())
+    assert wire.true(7) == 0
+
+
+def test_a_chip_without_address_is_alone() -> None:
+    line = chip_line(ChipWire("B", (0, 7)))
+    M1486(line, 7)
+    with pytest.raises(Misuse, match="a chip without address has to be the only one on its line"):
+        M1486(line)
+
+
+# ---------------------------------------------------------------------- why each move ended
+
+
+def moving(wire: ChipWire, *steps: float) -> list[M1486]:
+    """Drivers of the chips, each told to move so far."""
+    line = chip_line(wire)
+    chips = [M1486(line, address) for address in wire.chips]
+    for chip in chips:
+        chip.open()
+        chip.configure(**KNOWN)
+    for chip, distance in zip(chips, steps, strict=True):
+        chip.move_by(distance)
+    return chips
+
+
+def limit(wire: ChipWire, address: int) -> Callable[[], None]:
+    return lambda: wire.chips[address].set_pin("LIMIT", 0, wire.now)
+
+
+@pytest.mark.parametrize("kind", ["A", "B"])
+@pytest.mark.parametrize("stopped", [0, 7])
+@pytest.mark.parametrize("after", [0.05, 0.5, 1.2, 1.7])
+def test_each_of_two_moves_says_why_it_ended(kind: str, stopped: int, after: float) -> None:
+    """The same move of both, so that their ends are as close as can be; LIMIT stops one of them."""
+    wire = ChipWire(kind, (0, 7))
+    chips = moving(wire, 2000.0, -2000.0)
+    wire.at(after, limit(wire, stopped))
+    ends = {chip.address: chip.wait(check=False) for chip in chips}
+    assert ends[stopped].reason is ChipReason.EARLY, ends
+    assert ends[7 - stopped].reason is ChipReason.TARGET, ends
+    assert abs(wire.true(7 - stopped)) == 128_000
+    assert chips[0].counter() == 128_000  # M-16: what it was told
+
+
+@pytest.mark.parametrize("after", [0.3, 1.5])
+def test_moves_of_different_length_say_why_they_ended_whoever_is_waited_for_first(after: float) -> None:
+    """The short one ends while the long one is waited for."""
+    wire = ChipWire("B", (1, 2, 3))
+    chips = moving(wire, 4000.0, 1900.0, 1500.0)
+    wire.at(after, limit(wire, 2))
+    ends = [chip.wait(check=False) for chip in chips]
+    assert [end.reason for end in ends] == [ChipReason.TARGET, ChipReason.EARLY, ChipReason.TARGET]
+    with pytest.raises(PositionUnknown):
+        chips[1].position()
+    assert (chips[0].position(), chips[2].position()) == (4000.0, 1500.0)
+
+
+@pytest.mark.parametrize("kind", ["C", "E1"])
+@pytest.mark.parametrize("stopped", [(1, 2, 3), (), (2,), (1, 3)])
+def test_three_at_once(kind: str, stopped: tuple[int, ...]) -> None:
+    """E types take half a second for whatever they are told or asked."""
+    wire = ChipWire(kind, (1, 2, 3))
+    chips = moving(wire, 30_000.0, 30_000.0, 30_000.0)
+    for address in stopped:
+        wire.at(1.0, limit(wire, address))
+    ends = [chip.wait(check=False) for chip in chips]
+    assert [end.reason is ChipReason.EARLY for end in ends] == [address in stopped for address in (1, 2, 3)]
+    assert all(end.reason in (ChipReason.EARLY, ChipReason.TARGET) for end in ends)
+    for address in stopped:
+        wire.chips[address].set_pin("LIMIT", 1, wire.now)
+    for chip in chips:
+        chip.move_by(-10.0)
+    assert [chip.wait().reason for chip in chips] == [ChipReason.TARGET] * 3
+
+
+def test_tasks_that_wait_for_their_chips_are_told_why_each_ended() -> None:
+    """A third chip is used meanwhile: the line is kept from it only where a move is about to end."""
+    wire = ChipWire("B", (0, 7, 9))
+    line = chip_task_line(wire)
+    ends = {}
+    asked = [0]
+
+    async def use(address: int) -> None:
+        chip = AsyncM1486(line, address)
+        await chip.open()
+        await chip.configure(**KNOWN)
+        await chip.move_by(4000.0)
+        ends[address] = await chip.wait(check=False)
+
+    async def ask() -> None:
+        chip = AsyncM1486(line, 9)
+        await chip.open()
+        while len(ends) < 2:
+            assert await chip.counter() == 0
+            asked[0] += 1
+            await asyncio.sleep(0.05)
+
+    async def main() -> None:
+        await line.open()
+        wire.at(2.0, limit(wire, 7))
+        await asyncio.gather(use(0), use(7), ask())
+        await line.close()
+
+    run_in(wire, main())
+    assert (ends[0].reason, ends[7].reason) == (ChipReason.TARGET, ChipReason.EARLY)
+    assert asked[0] > 5
+
+
+@pytest.mark.parametrize("after", [n / 10 for n in range(0, 14, 2)])
+def test_the_end_of_a_block_is_heard_while_the_end_of_a_move_is_watched(after: float) -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_task_line(wire)
+    x, y = (AsyncM1486(line, address, variant="B") for address in (0, 7))
+
+    async def wait() -> ChipReason:
+        return (await x.wait()).reason
+
+    async def block() -> ChipReason:
+        await asyncio.sleep(after)
+        return (await y.run_block(["w100", "f640", "r"])).reason
+
+    async def main() -> tuple[ChipReason, ChipReason]:
+        await x.open()
+        await y.open()
+        await x.configure(**KNOWN)
+        await x.move_by(1000.0)
+        moved, done = await asyncio.gather(wait(), block())
+        return moved, done
+
+    assert run_in(wire, main()) == (ChipReason.TARGET, ChipReason.DONE)
+
+
+def test_a_chip_that_is_late_or_stopped_does_not_hold_up_the_others() -> None:
+    wire = ChipWire("B", (0, 7, 9))
+    chips = moving(wire, 2000.0, 2500.0, 3000.0)
+    wire.at(1.0, limit(wire, 0))
+    wire.sleep(1.2)
+    chips[1].stop()
+    ends = [chip.wait(check=False) for chip in chips]
+    assert [end.reason for end in ends] == [ChipReason.EARLY, ChipReason.STOPPED, ChipReason.TARGET]
+
+
+def test_a_chip_held_by_limit_is_overdue_and_the_other_arrives() -> None:
+    """Function 51 OFF: its program stands still until LIMIT is high again."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    chips = [M1486(line, 0), M1486(line, 7)]
+    for chip in chips:
+        chip.open()
+        chip.configure(**KNOWN)
+    chips[0].set_function(51, False)
+    for chip in chips:
+        chip.move_by(1000.0)
+    wire.at(0.5, limit(wire, 0))
+    assert chips[0].wait(check=False).reason is ChipReason.OVERDUE
+    assert chips[1].wait(check=False).reason is ChipReason.TARGET
+    wire.chips[0].set_pin("LIMIT", 1, wire.now)
+    assert chips[0].counter() == 64_000
+
+
+def test_a_chip_that_is_absent_or_off_makes_no_other_one_restarted() -> None:
+    """Nobody echoes the selection of a chip while the one selected before is not there."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    x, y = M1486(line, 0), M1486(line, 7)
+    x.open()
+    y.open()
+    y.configure(**KNOWN)
+    y.move_by(20.0)
+    y.wait()
+    known = y.settings
+    with pytest.raises(NoEcho, match="chip 5 does not echo"):
+        M1486(line, 5).open()
+    assert y.position() == 20.0
+    x.flags()
+    wire.chips[0].power_off(wire.now)
+    assert y.position() == 20.0
+    with pytest.raises(NoEcho, match="chip 0 does not echo"):
+        x.flags()
+    assert y.position() == 20.0
+    assert y.settings == known
+    wire.chips[0].power_cycle(wire.now)
+    with pytest.raises(Restarted, match="chip 0 was"):
+        x.flags()
+    wire.chips[7].power_cycle(wire.now)
+    with pytest.raises(Restarted, match="chip 7 was"):
+        y.position()
+    assert x.flags() == y.flags()
+
+
+def test_an_answer_that_is_lost_is_asked_for_again() -> None:
+    wire = ChipWire("B", (0, 7))
+    chips = moving(wire, 2000.0, 2000.0)
+    wire.at(2.0, lambda: wire.put(Fault("to host", 0, "drop")))
+    assert [chip.wait().reason for chip in chips] == [ChipReason.TARGET] * 2
+    assert wire.faults[0].met
+    assert [chip.counter() for chip in chips] == [128_000] * 2
+
+
+def test_trouble_with_one_chip_is_told_to_who_waits_for_it() -> None:
+    wire = ChipWire("B", (0, 7))
+    chips = moving(wire, 2000.0, 2000.0)
+    wire.at(1.0, lambda: wire.chips[7].power_cycle(wire.now))
+    assert chips[0].wait().reason is ChipReason.TARGET
+    with pytest.raises(Restarted, match="chip 7 was switched off or reset meanwhile"):
+        chips[1].wait()
+    assert chips[0].counter() == 128_000
+
+
+def test_waiting_for_the_line_is_no_suspension() -> None:
+    """A block of one chip keeps the line for half a minute; the move of another waits for it, and begins."""
+    wire = ChipWire("B", (0, 7))
+    line = chip_task_line(wire)
+    one, two = AsyncM1486(line, 0), AsyncM1486(line, 7)
+
+    async def main() -> None:
+        await one.open()
+        await two.open()
+        await two.configure(microstep=1)
+        block = asyncio.create_task(one.run_block(["f640", "r", "w30000"]))
+        await asyncio.sleep(1.0)
+        began = wire.now
+        await two.move_by(10.0)
+        assert wire.now - began > 25 * SECOND
+        assert (await two.wait()).ok
+        assert (await block).ok
+
+    run_in(wire, main())
+    assert (wire.true(0), wire.true(7)) == (640, 640)

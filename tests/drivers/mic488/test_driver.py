@@ -1,0 +1,273 @@
+"""The controller as a whole: opening, the status in four frames, registers by name and raw, units by GEAR, frames in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from host_rig import Fault, Wire, driver, spindles, thread_line
+
+from steptwin.drivers import Mic488, NoAnswer, NotReady, ProgramState, Reason, Refused, Untold, load_config
+from steptwin.drivers.modbus import Query
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.registermap import DataType
+from steptwin.wire.pdu import Bits, Read, WriteCoil, WriteRegister
+
+CFG = """[Axis0]
+Unit=3
+Gear=100
+Acc=50
+Dec=50
+Vel=25
+[Axis1]
+Unit=2
+Gear=2,5
+"""
+
+
+@pytest.mark.parametrize("firmware", ["1.23", "1.40", "1.70"])
+def test_a_status_takes_four_frames(firmware: str) -> None:
+    wire = Wire(firmware=firmware)
+    mic = driver(wire)
+    mic.enable(1, 2)
+    mic.set_output(3, True)
+    mic.axis(1).move_velocity(5.0)
+    wire.sleep(2.0)
+    wire.twin.set_pin("IN12", 1.0, wire.now)
+    wire.sleep(0.1)
+    wire.sent.clear()
+    status = mic.status()
+    assert len(wire.sent) == 4
+    assert status.velocities == (5.0, 0.0, 0.0, 0.0)
+    assert status.positions[0] == pytest.approx(wire.position() / 100, abs=0.2)
+    assert status.units == ("mm",) * 4
+    assert status.axes == (2, 1, 0, 0)
+    assert [number for number, on in enumerate(status.inputs, start=1) if on] == [12]
+    assert [number for number, on in enumerate(status.outputs, start=1) if on] == [3]
+    assert status.controller == (0 if firmware == "1.70" else None)
+    assert status.program == ProgramState.STOPPED
+
+
+def test_a_hundred_frames_a_second_at_most() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    wire.sent.clear()
+    begin = wire.now
+    for _ in range(50):
+        mic.status()
+    assert len(wire.sent) <= (wire.now - begin) / SECOND * 100 + 1
+
+
+# ---------------------------------------------------------------------- DATA_TYPE
+
+
+def dint(wire: Wire) -> None:
+    wire.twin.data_type = DataType.DINT
+
+
+def test_data_type_is_set_to_real_when_the_driver_opens(caplog: pytest.LogCaptureFixture) -> None:
+    wire = Wire()
+    dint(wire)
+    driver(wire)
+    assert wire.twin.data_type == DataType.REAL
+    assert "unit 1: DATA_TYPE was DINT and is set to REAL" in caplog.text
+
+
+def test_who_only_looks_changes_nothing_and_reads_units_by_gear() -> None:
+    wire = Wire()
+    dint(wire)
+    wire.twin.axes[0].set_coordinate(1234, wire.now)
+    mic = driver(wire, observe=True)
+    assert wire.twin.data_type == DataType.DINT
+    assert mic.get_shown("M1_POS_ACT") == {"M1_POS_ACT": (12.34, "mm")}
+    assert mic.status().positions[0] == 12.34
+    bare = driver(wire, observe=True, config=None)
+    assert bare.get_shown("M1_POS_ACT") == {"M1_POS_ACT": (1234, "imp")}
+    assert bare.status().units[0] == "imp"
+
+
+def test_with_dint_motions_need_gear() -> None:
+    wire = Wire()
+    dint(wire)
+    mic = driver(wire, observe=True)
+    mic.enable()
+    mic.axis(1).move_to(3.0)
+    assert mic.axis(1).wait().position_u == 3.0
+    assert wire.position() == 300
+    bare = driver(wire, observe=True, config=None)
+    with pytest.raises(NotReady, match="M1_POS_ABS takes pulses, and GEAR is not known: give the configuration"):
+        bare.axis(1).move_to(5.0)
+    assert wire.position() == 300
+
+
+def test_gear_and_units_come_from_the_vendors_file(tmp_path: Path) -> None:
+    path = tmp_path / "machine.cfg"
+    path.write_text(CFG)
+    assert load_config(path).axes[1].gear == 2.5
+    mic = driver(Wire(), config=str(path))
+    assert [mic.axis(n).unit for n in (1, 2, 3)] == ["mm", "degree", "imp"]
+    with pytest.raises(Misuse, match=r"cannot read .*none.cfg: No such file"):
+        load_config(tmp_path / "none.cfg")
+    path.write_text("[Axis0]\nGear=much\n")
+    with pytest.raises(Misuse, match="Gear"):
+        driver(Wire(), config=path)
+
+
+# ---------------------------------------------------------------------- several axes
+
+
+def test_axes_begin_together() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    mic.move_together({1: 10.0, 3: 20.0})
+    starts = {axis: wire.twin.axes[axis - 1].profile.start for axis in (1, 3)}
+    assert starts[1] == starts[3]
+    assert {end.position_u for end in mic.wait(1, 3).values()} == {10.0, 20.0}
+    mic.move_together_by({1: 1.0, 3: -1.0})
+    mic.wait()
+    mic.run_together({1: 2.0, 3: -2.0})
+    wire.sleep(1.0)
+    assert mic.status().velocities == (2.0, 0.0, -2.0, 0.0)
+    mic.stop_all()
+    assert not wire.moving(1)
+    assert not wire.moving(3)
+    assert wire.twin.trigger_mode == 0
+    with pytest.raises(Misuse, match="no axis is given to be moved"):
+        mic.move_together({})
+
+
+def test_no_trigger_mode_is_left_when_its_answer_is_lost() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    control = 3 + 2 * 14 + 2
+    wire.put(*(Fault("to master", control + lost, "cut") for lost in range(3)))
+    with pytest.raises(NoAnswer, match="AXIS_CTR_MODE"):
+        mic.move_together({1: 10.0, 3: 20.0})
+    assert wire.twin.trigger_mode == 0
+    assert not wire.moving(1)
+
+
+def test_a_trigger_mode_that_cannot_be_left_is_told() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    back = Query(1, WriteRegister(10004, 0)).rtu_frame
+
+    def cut(frame: bytes) -> None:
+        wire.severed = wire.severed or frame == back
+
+    wire.before_each = cut
+    with pytest.raises(Untold, match=r"^M1 M3 began to move, but AXIS_CTR_MODE may still be TRIGGER.* \(memory: no answer to"):
+        mic.move_together({1: 100.0, 3: 120.0})
+    wire.severed, wire.before_each = False, None
+    assert (wire.twin.trigger_mode, wire.moving(1), wire.moving(3)) == (1, True, True)
+    assert [end.reason for end in mic.wait(1, 3).values()] == [Reason.TARGET] * 2
+    with pytest.raises(NotReady, match="TRIGGER mode"):
+        mic.axis(1).move_to(1.0)
+
+
+def test_one_that_fails_ends_the_waiting_for_all() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    mic.axis(1).move_to(-20.0)
+    mic.axis(2).move_to(200.0)
+    ends = mic.wait(1, 2, check=False)
+    assert [str(end) for end in ends.values()] == ["M1: stopped at limit L at -10 mm", "M2: target reached at 200 mm"]
+
+
+# ---------------------------------------------------------------------- by name and raw
+
+
+def test_registers_by_name() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.set("M2_ACC", 12.5)
+    mic.set("OUT5", 1)
+    mic.set("USER_REGISTER[10]:real", 1.5)
+    mic.set("USER_REGISTER[12]", 7)
+    names = ("M2_ACC", "OUT5", "USER_REGISTER[10]:real", "USER_REGISTER[12]", "m_status")
+    wire.sent.clear()
+    assert mic.get(*names) == dict(zip(names, (12.5, True, 1.5, 7, 0), strict=True))
+    # Control registers; axes; user registers; outputs.
+    assert len(wire.sent) <= 5
+    assert mic.get_shown("M2_ACC", "OUT5") == {"M2_ACC": (12.5, "mm/s²"), "OUT5": (True, "")}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("M1_POS_AKT", 1, "M1_POS_AKT"),
+        ("IN3", 1, "IN3 can only be read"),
+        ("OUT3", 2, r"OUT3 = 2: permitted are 0 \(OFF\) and 1 \(ON\)"),
+        ("PROGRAM_CTRL", 9, "PROGRAM_CTRL = 9: permitted"),
+        ("USER_REGISTER[3]:real", 1, "REALs begin at even registers"),
+        ("USER_REGISTER[9999]", 1, "user register 9999 as WORD is outside 0 to"),
+        ("USER_REGISTER", 1, r"choose one of USER_REGISTER\[0\] to"),
+        ("USER_REGISTER[1]", 70000, "permitted 0…65535"),
+        ("M1_EN[2]", 1, "M1_EN is one value of type BIT"),
+        ("?", 1, "is no name of a value"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_it_is_sent(name: str, value: float, text: str) -> None:
+    wire = Wire()
+    mic = driver(wire)
+    wire.sent.clear()
+    with pytest.raises(Misuse, match=text):
+        mic.set(name, value)
+    assert [frame[1] for _, frame in wire.sent] in ([], [3])
+
+
+def test_raw_access() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    wire.twin.user[5] = 77
+    assert mic.registers(5, 2) == (77, 0)
+    assert mic.request(WriteCoil(6001, True)) == WriteCoil(6001, True)
+    assert mic.request(Read(1, 6000, 3)) == Bits(1, b"\2")
+    with pytest.raises(Refused, match=r"unit 1: read .*was refused: it does not have this register.*exception 02") as caught:
+        mic.registers(9000, 2)
+    assert caught.value.code == 2
+
+
+def test_the_program() -> None:
+    mic = driver(Wire())
+    mic.program.select(2, 1)
+    assert mic.get("PROG_BANK_SEL", "POS_BANK_SEL") == {"PROG_BANK_SEL": 2, "POS_BANK_SEL": 1}
+    assert mic.program.state() is ProgramState.STOPPED
+    mic.program.stop()
+    with pytest.raises(Misuse, match="PROG_BANK_SEL = 99"):
+        mic.program.select(99)
+
+
+# ---------------------------------------------------------------------- frames in words
+
+
+@pytest.mark.parametrize("tcp", [False, True])
+def test_every_frame_is_logged_in_words(tcp: bool) -> None:
+    log: list[str] = []
+    wire = Wire(tcp=tcp)
+    mic = driver(wire, log=log)
+    mic.enable(1)
+    mic.axis(1).move_to(12.0)
+    mic.axis(1).position()
+    assert len(log) == 2 * len(wire.sent)
+    text = "\n".join(log)
+    assert "unit 1: write M1_POS_ABS = 12 mm" in text
+    assert "unit 1: write M_ENABLE = M1" in text or "unit 1: write M_ENABLE" in text
+    assert "M1_POS_ACT = " in text
+
+
+def test_who_is_what() -> None:
+    mic = driver(Wire())
+    assert repr(mic) == "<Mic488 unit 1 on memory, firmware 1.70>"
+    assert (mic.place, mic.unit, mic.firmware, mic.config) == ("memory", 1, "1.70", spindles())
+    with pytest.raises(Misuse, match="unit 0 is outside 1 to 247"):
+        Mic488(thread_line(Wire()), 0)
+    with pytest.raises(Misuse, match="a time-out of 0 s is outside"):
+        Mic488(thread_line(Wire()), timeout_s=0.0)
+    assert driver(Wire(config=ControllerConfig()), config=None).config is None

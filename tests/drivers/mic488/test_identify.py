@@ -1,0 +1,104 @@
+"""Who answers: the firmware by its addresses, controllers by their units, and what is none."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+
+import pytest
+from host_rig import Wire, thread_line
+
+from steptwin.drivers import Mic488, NoAnswer, NoMic488
+from steptwin.drivers.blocking import finish
+from steptwin.drivers.mic488.identify import SCAN_NS, Found, scan
+from steptwin.errors import LineFailure
+from steptwin.machine import SECOND
+from steptwin.wire import rtu
+
+
+def opened(wire: Wire, **options: object) -> Mic488:
+    mic = Mic488(thread_line(wire), **options)  # type: ignore[arg-type]
+    mic.open()
+    return mic
+
+
+@pytest.mark.parametrize(("firmware", "found"), [("1.23", "1.23"), ("1.40", "1.70"), ("1.70", "1.70")])
+def test_the_firmware_is_found_by_its_addresses(firmware: str, found: str) -> None:
+    """1.40 has the addresses of 1.70, and no read tells them apart."""
+    assert opened(Wire(firmware=firmware)).firmware == found
+
+
+def test_the_firmware_may_be_given() -> None:
+    wire = Wire(firmware="1.40")
+    mic = opened(wire, firmware="1.40")
+    assert mic.firmware == "1.40"
+    assert len(wire.sent) == 1
+
+
+def answering(wire: Wire, answer: Callable[[bytes], bytes | None]) -> None:
+    """Somebody else is at the other end of the wire."""
+    wire.severed = True
+
+    def reply(frame: bytes) -> None:
+        pdu = answer(frame[1:-2])
+        if pdu is not None:
+            wire.inject(rtu.encode_frame(frame[0], pdu), after=wire.latency)
+
+    wire.before_each = reply
+
+
+def words_of(request: bytes, word: int) -> bytes:
+    count = struct.unpack(">H", request[3:5])[0]
+    return bytes((3, 2 * count)) + word.to_bytes(2, "big") * count
+
+
+def test_silent_where_another_refuses_is_found_too() -> None:
+    """A real controller may not answer at addresses it does not have."""
+    wire = Wire()
+    answering(wire, lambda request: words_of(request, 0) if request[1:3] < (2000).to_bytes(2, "big") else None)
+    mic = Mic488(thread_line(wire))
+    mic.open()
+    assert mic.firmware == "1.23"
+
+
+def test_somebody_else_is_named() -> None:
+    wire = Wire()
+    answering(wire, lambda request: words_of(request, 0x7777))
+    with pytest.raises(NoMic488, match=r"unit 1 answers, but has not the registers of a MIC488 \(implausible values\)"):
+        opened(wire)
+    wire = Wire()
+    answering(wire, lambda request: bytes((request[0] | 0x80, 1)))
+    with pytest.raises(NoMic488, match="it does not have this function"):
+        opened(wire)
+
+
+def test_nobody_is_not_waited_for_long() -> None:
+    wire = Wire()
+    wire.severed = True
+    begin = wire.now
+    with pytest.raises(NoAnswer, match="read the control registers of firmware"):
+        opened(wire)
+    assert wire.now - begin < 2 * SECOND
+
+
+def test_scanning_finds_who_is_there() -> None:
+    wire = Wire(units=(2, 5), firmware="1.23")
+    asked: list[int] = []
+    begin = wire.now
+    assert finish(scan(thread_line(wire), range(1, 9), progress=asked.append)) == [Found(2, "1.23"), Found(5, "1.23")]
+    assert asked == list(range(1, 9))
+    assert wire.now - begin < 8 * (SCAN_NS + SECOND // 10)
+
+
+def test_scanning_tells_who_is_no_mic488() -> None:
+    wire = Wire()
+    answering(wire, lambda request: bytes((request[0] | 0x80, 1)))
+    assert finish(scan(thread_line(wire), [7])) == [Found(7, None)]
+
+
+def test_scanning_a_port_that_is_gone_ends() -> None:
+    wire = Wire()
+    line = thread_line(wire)
+    wire.gone = "unplugged"
+    with pytest.raises(LineFailure, match="unplugged"):
+        finish(scan(line, [1, 2]))

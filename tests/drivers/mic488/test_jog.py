@@ -1,0 +1,280 @@
+"""The dead-man's switch: held, it runs evenly; whatever else happens, the axis comes to rest within its reach."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+from host_rig import Fault, Wire, async_driver, driver, run_virtual, task_line
+
+from steptwin.drivers import Mic488, NotReady, Reason, Untold
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.mic488.registers import register_map
+from steptwin.wire import pdu
+
+REACH = 5.0 * 0.4 + 5.0**2 / (2 * 50.0)
+"""mm that 5 mm/s go in 0.4 s and then braking with 50 mm/s²."""
+
+
+def ready() -> tuple[Wire, Mic488]:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    return wire, mic
+
+
+def speed(wire: Wire) -> float:
+    return wire.twin.axes[0].profile.velocity(wire.now) / 100
+
+
+@pytest.mark.parametrize("velocity", [5.0, -0.4])
+def test_held_it_runs_evenly_and_released_it_ramps_down(velocity: float) -> None:
+    wire, mic = ready()
+    with mic.axis(1).jog(velocity) as jog:
+        assert jog.hold()
+        for _ in range(20):
+            assert jog.hold()
+            assert speed(wire) == pytest.approx(velocity)
+    assert jog.end is not None
+    assert (jog.end.ok, str(jog.end)) == (True, "M1: released")
+    assert mic.axis(1).wait().ok
+    assert not wire.moving()
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}
+
+
+def test_not_held_any_more_it_stops_by_itself_within_its_reach() -> None:
+    """The process was killed: nothing is sent after some moment, whatever moment that is."""
+    for holds in range(4):
+        wire, mic = ready()
+        jog = mic.axis(1).jog(5.0)
+        jog.__enter__()
+        for _ in range(holds):
+            assert jog.hold()
+        held = wire.position()
+        assert jog.reach_u == pytest.approx(REACH)
+        wire.rest()
+        assert not wire.moving()
+        assert 0 < wire.position() - held <= REACH * 100 + 1
+
+
+def test_a_killed_jog_leaves_an_axis_slower_and_the_next_one_tells() -> None:
+    wire, mic = ready()
+    mic.axis(1).jog(5.0).__enter__()
+    wire.rest()
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 5.0}
+    with pytest.raises(
+        NotReady, match=r"a jog of M1 at 10 mm/s is faster than its VMAX, 5 mm/s \(which a program that was killed"
+    ):
+        mic.axis(1).jog(10.0).__enter__()
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 5.0}
+    assert not wire.moving()
+    mic.axis(1).set_ramp(velocity=10.1)
+    with mic.axis(1).jog(-10.1) as jog:
+        assert jog.hold()
+
+
+def test_a_program_that_was_away_does_not_find_it_running_on() -> None:
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        wire.sleep(5.0)
+        stood = wire.position()
+        assert not jog.hold()
+        assert jog.end is not None
+        assert jog.end.reason is Reason.NOT_HELD
+        assert not jog.hold()
+        wire.rest()
+    assert wire.position() == stood
+
+
+def test_a_cut_line_is_told_as_what_it_is() -> None:
+    """The controller cannot be told; the driver says so, and how far the axis goes at most."""
+    wire, mic = ready()
+    jog = mic.axis(1).jog(5.0)
+    jog.__enter__()
+    assert jog.hold()
+    held = wire.position()
+    wire.severed = True
+    with pytest.raises(Untold) as caught:  # noqa: PT012
+        while jog.hold():
+            pass
+    text = str(caught.value)
+    assert text.startswith("M1 cannot be held any more: the controller cannot be told (memory: no answer to")
+    assert f"It stops by itself, at most {REACH:g} mm after it was held last, 0." in text
+    assert jog.end is not None
+    assert jog.end.reason is Reason.COMMUNICATION
+    wire.rest()
+    assert not wire.moving()
+    assert wire.position() - held <= REACH * 100 + 1
+
+
+def test_a_line_cut_before_the_release_is_told_too() -> None:
+    wire, mic = ready()
+
+    def cut() -> None:
+        with mic.axis(1).jog(5.0) as jog:
+            jog.hold()
+            wire.severed = True
+
+    with pytest.raises(Untold, match=r"M1 cannot be told to stop: the controller cannot be told .* It stops by itself, at most"):
+        cut()
+    wire.rest()
+    assert not wire.moving()
+
+
+def test_one_lost_frame_is_not_felt() -> None:
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        for number in range(30):
+            wire.put(Fault("to master" if number % 2 else "to twin", number, "drop"))
+            assert jog.hold()
+            if number:
+                assert speed(wire) == pytest.approx(5.0)
+
+
+def test_a_limit_ends_it() -> None:
+    wire, mic = ready()
+    with mic.axis(1).jog(-20.0) as jog:
+        while jog.hold():
+            pass
+    assert jog.end is not None
+    assert jog.end.reason is Reason.LIMIT_L
+    assert str(jog.end) == "M1: stopped at limit L"
+    assert wire.position() == -1000
+
+
+@pytest.mark.parametrize(
+    ("stop", "reason"), [(lambda m: m.axis(1).stop(), Reason.STOPPED), (lambda m: m.disable(1), Reason.STOPPED)]
+)
+def test_a_stop_ends_it_for_good(stop: Callable[[Mic488], None], reason: Reason) -> None:
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        jog.hold()
+        stop(mic)
+        stood = wire.position()
+        assert not jog.hold()
+    assert jog.end is not None
+    assert jog.end.reason in (reason, Reason.DISABLED)
+    wire.rest()
+    assert wire.position() == stood
+
+
+def test_a_stop_between_two_tasks() -> None:
+    """One task holds, another stops: after the stop nothing is renewed."""
+    wire = Wire()
+
+    async def main() -> None:
+        async with async_driver(task_line(wire), wire) as mic:
+            await mic.enable(1)
+
+            async def hold() -> None:
+                async with mic.axis(1).jog(5.0) as jog:
+                    while await jog.hold():
+                        pass
+                assert jog.end is not None
+                assert jog.end.reason is Reason.STOPPED
+
+            for delay in range(0, 400, 7):
+                task = asyncio.create_task(hold())
+                await asyncio.sleep(0.2 + delay / 1000)
+                await mic.axis(1).stop()
+                assert not wire.moving()
+                await task
+                assert not wire.moving()
+
+    run_virtual(wire, main())
+
+
+def test_somebody_else_is_noticed() -> None:
+    wire, mic = ready()
+    with pytest.raises(NotReady, match="M1 is not jogged any more"), mic.axis(1).jog(5.0) as jog:  # noqa: PT012
+        jog.hold()
+        mic.set("AXIS_CTR_MODE", 1)
+        jog.hold()
+    mic.set("AXIS_CTR_MODE", 0)
+    wire.rest()
+    assert not wire.moving()
+
+
+def test_what_is_no_jog() -> None:
+    _, mic = ready()
+    with pytest.raises(Misuse, match="a jog of M1 at 0 mm/s does not move"):
+        mic.axis(1).jog(0.0)
+    with pytest.raises(Misuse, match=r"a hold time of 3 s is outside 0.2 to 2 s"):
+        mic.axis(1).jog(1.0, hold_s=3.0)
+    with pytest.raises(Misuse, match="a jog is held inside its with block"):
+        mic.axis(1).jog(1.0).hold()
+    mic.axis(1).disable()
+    with pytest.raises(NotReady, match="M1 of unit 1 is switched off"), mic.axis(1).jog(1.0):
+        pass
+
+
+def test_the_hold_time_is_a_choice() -> None:
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0, hold_s=1.0) as jog:
+        assert jog.reach_u == pytest.approx(5.25)
+        before = wire.now
+        jog.hold()
+        assert wire.now - before == pytest.approx(SECOND // 4, abs=50 * MILLISECOND)
+
+
+MAP = register_map("1.70")
+
+
+def by_another_master(wire: Wire, request: pdu.Request) -> None:
+    wire.twin.execute(pdu.encode_request(request), wire.now)
+
+
+def jog_moves(wire: Wire) -> int:
+    """How many times a jog told the axis to move on."""
+    head = pdu.encode_request(pdu.WriteRegisters(MAP.of("POS_REL", 1).address, (0, 0)))[:3]
+    return sum(frame[1:].startswith(head) for _, frame in wire.sent)
+
+
+STOPS: dict[str, tuple[pdu.Request, Reason]] = {
+    "M1_STOP": (pdu.WriteCoil(MAP.of("STOP", 1).address, True), Reason.STOPPED),
+    "M_STOP": (pdu.WriteRegister(MAP.of("M_STOP").address, 1), Reason.STOPPED),
+    "M1_EN": (pdu.WriteCoil(MAP.of("EN", 1).address, False), Reason.DISABLED),
+    "M1_VEL_ABS, still braking": (pdu.WriteRegisters(MAP.of("VEL_ABS", 1).address, (0, 0)), Reason.DIVERTED),
+    "M1_HOME": (pdu.WriteRegisters(MAP.of("HOME", 1).address, (0, 0x40A0)), Reason.DIVERTED),
+}
+
+
+@pytest.mark.parametrize("stop", STOPS)
+def test_what_another_master_tells_the_axis_ends_the_jog_and_nothing_more_is_sent(stop: str) -> None:
+    request, reason = STOPS[stop]
+    wire, mic = ready()
+    mic.axis(1).set_ramp(dec=10.0)  # braking takes half a second
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        assert jog_moves(wire) == 2
+        wire.sleep(0.09)
+        by_another_master(wire, request)
+        assert not jog.hold()
+        assert not jog.hold()
+        assert jog.end is not None
+        assert jog.end.reason is reason
+    assert jog_moves(wire) == 2
+    if reason is not Reason.DIVERTED:
+        stood = wire.position()
+        wire.rest(10.0)
+        assert wire.position() == stood
+
+
+def test_a_program_that_is_suspended_while_it_reads_the_status_does_not_move_the_axis_again() -> None:
+    """The answer says that the axis moves; it is seconds old when the program goes on."""
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        wire.before_read = lambda: wire.sleep(5.0)
+        assert not jog.hold()
+        wire.before_read = None
+        stood = wire.position()
+        assert str(jog.end).startswith("M1: not held (5.")
+        assert not jog.hold()
+    assert jog_moves(wire) == 2
+    wire.rest(10.0)
+    assert (wire.moving(), wire.position()) == (False, stood)
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}

@@ -1,0 +1,74 @@
+"""Listening in on Modbus: which frame asks and which answers, and what is neither."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.drivers.mic488.frames import FrameWords, Heard
+from steptwin.drivers.mic488.listening import RtuListener, TcpListener
+from steptwin.machine import MILLISECOND
+from steptwin.wire import mbap
+from steptwin.wire.slave import Direction
+
+READ, ANSWER = bytes.fromhex("01 03 27 24 00 02 8E B4"), bytes.fromhex("01 03 04 00 00 41 48 CA 55")
+WRITE = bytes.fromhex("01 05 17 71 00 00 98 65")
+
+
+def listener() -> tuple[RtuListener, list[Heard]]:
+    words = FrameWords()
+    heard: list[Heard] = []
+    words.sinks.append(heard.append)
+    return RtuListener(words), heard
+
+
+def meanings(heard: list[Heard]) -> list[str]:
+    return [f"{'?' if h.direction is None else '→' if h.direction is Direction.IN else '←'} {h.meaning}" for h in heard]
+
+
+@pytest.mark.parametrize("size", [1, 3, 100])
+def test_questions_and_answers_of_one_wire(size: int) -> None:
+    ear, heard = listener()
+    stream = READ + ANSWER + WRITE + WRITE
+    for at in range(0, len(stream), size):
+        ear.heard(stream[at : at + size], at * MILLISECOND)
+    assert meanings(heard) == [
+        "→ unit 1: read M1_POS_ACT",
+        "← unit 1: read M1_POS_ACT = 12.5 u",
+        "→ unit 1: write OUT2 = OFF",
+        "← unit 1: wrote OUT2 = OFF",
+    ]
+
+
+def test_rubbish_is_counted() -> None:
+    ear, heard = listener()
+    ear.heard(b"\xff\xfe\xfd" + READ, 0)
+    assert meanings(heard)[0] == "→ unit 1: read M1_POS_ACT"
+    assert "? no frame: 3 bytes" in meanings(heard)
+    assert str(heard[-1]) == "    0.000000 s  ? no frame: 3 bytes"
+
+
+def test_the_beginning_of_a_frame_that_never_ends_is_told_with_the_next() -> None:
+    ear, heard = listener()
+    ear.heard(READ[:5], 0)
+    while (due := ear.deadline()) is not None:
+        ear.expire(due)
+    ear.heard(READ, 500 * MILLISECOND)
+    assert meanings(heard) == ["→ unit 1: read M1_POS_ACT", "? no frame: 5 bytes"]
+
+
+def test_both_directions_of_modbus_tcp() -> None:
+    words = FrameWords(tcp=True)
+    heard: list[Heard] = []
+    words.sinks.append(heard.append)
+    ear = TcpListener(words)
+    for byte in mbap.encode_frame(7, 1, READ[1:-2]):
+        ear.heard(bytes((byte,)), 1, Direction.IN)
+    ear.heard(mbap.encode_frame(7, 1, ANSWER[1:-2]), 2, Direction.OUT)
+    ear.heard(b"GET / HTTP/1.0\r\n\r\n", 3, Direction.IN)
+    ear.heard(mbap.encode_frame(8, 1, READ[1:-2]), 4, Direction.IN)
+    assert meanings(heard) == [
+        "→ unit 1: read M1_POS_ACT",
+        "← unit 1: read M1_POS_ACT = 12.5 u",
+        "? no frame",
+        "→ unit 1: read M1_POS_ACT",
+    ]

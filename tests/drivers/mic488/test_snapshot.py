@@ -1,0 +1,114 @@
+"""Everything the registers hold, kept and put back."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from host_rig import Wire, driver
+
+from steptwin.drivers import Mic488, NotReady, Snapshot
+from steptwin.errors import Misuse
+
+
+def changed(mic: Mic488) -> None:
+    mic.axis(2).set_ramp(acc=7.0)
+    mic.axis(1).set_position(55.0)
+    mic.set_output(4, True)
+    mic.user.words.write_many(100, [1, 2, 3])
+
+
+def test_putting_back_writes_what_differs_and_nothing_else() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    kept = mic.take_snapshot()
+    changed(mic)
+    wire.sent.clear()
+    planned = [str(change) for change in mic.restore_snapshot(kept, dry_run=True)]
+    assert planned == [
+        "M2_ACC: 7 → 50",
+        "USER_REGISTER[100]: 1 → 0",
+        "USER_REGISTER[101]: 2 → 0",
+        "USER_REGISTER[102]: 3 → 0",
+    ]
+    assert {frame[1] for _, frame in wire.sent} <= {1, 2, 3}
+    assert [str(change) for change in mic.restore_snapshot(kept)] == planned
+    assert mic.get("M2_ACC", "USER_REGISTER[101]", "M1_POS_ACT", "OUT4") == {
+        "M2_ACC": 50.0,
+        "USER_REGISTER[101]": 0,
+        "M1_POS_ACT": 55.0,
+        "OUT4": True,
+    }
+    assert {str(change) for change in mic.restore_snapshot(kept, counters=True, outputs=True)} == {
+        "M1_POS_ACT: 55 → 0",
+        "OUT4: ON → OFF",
+    }
+    assert mic.restore_snapshot(kept, counters=True, outputs=True) == []
+
+
+def test_nothing_in_it_moves() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    kept = mic.take_snapshot()
+    other = Wire()
+    fresh = driver(other)
+    fresh.restore_snapshot(kept, counters=True, outputs=True)
+    other.rest()
+    assert [axis.status for axis in other.twin.axes] == [0, 0, 0, 0]
+    assert not [name for name in kept.values if name.endswith(("POS_ABS", "POS_REL", "HOME", "_EN", "STOP", "PROGRAM_CTRL"))]
+
+
+def test_nothing_is_put_back_while_something_moves() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    kept = mic.take_snapshot()
+    mic.axis(2).move_velocity(5.0)
+    with pytest.raises(NotReady, match=r"nothing is restored while axes move: M2 \("):
+        mic.restore_snapshot(kept)
+
+
+def test_snapshots_are_text() -> None:
+    mic = driver(Wire())
+    changed(mic)
+    kept = mic.take_snapshot()
+    assert Snapshot.from_json(kept.to_json()) == kept
+    assert kept.user[100:] == (1, 2, 3)
+    for text in ("", "[]", "{}", '{"format": "something"}'):
+        with pytest.raises(Misuse, match=r"no snapshot|the format is"):
+            Snapshot.from_json(text)
+    with pytest.raises(Misuse, match=r"the snapshot is of firmware 1.70, this controller has 1.23"):
+        driver(Wire(firmware="1.23")).restore_snapshot(kept)
+
+
+@pytest.mark.parametrize(
+    ("what", "value", "text"),
+    [
+        ("M1_ACC", "x", 'the snapshot says M1_ACC = "x": expected a number'),
+        ("M1_ACC", None, "the snapshot says M1_ACC = null: expected a number"),
+        ("user", ["7"], r'the snapshot says USER_REGISTER\[0\] = "7": expected a number'),
+        ("user", [1.5], r"the snapshot says USER_REGISTER\[0\] = 1.5: expected a number"),
+        ("M1_ACC", -5, "M1_ACC = -5 u/s²: permitted > 0"),
+        ("M1_ACC", float("nan"), "M1_ACC = nan u/s²: permitted > 0"),
+        ("M1_NONE", 5, "no register named 'M1_NONE'"),
+        ("user", [0, 70000], r"USER_REGISTER\[1\] = 70000: permitted 0…65535"),
+        ("user", [7] * 3001, "the snapshot has 3001 user registers, this controller 2000"),
+    ],
+)
+@pytest.mark.parametrize("dry_run", [True, False])
+def test_a_value_that_is_not_taken_is_found_before_anything_is_written(
+    what: str, value: object, text: str, dry_run: bool
+) -> None:
+    wire = Wire()
+    mic = driver(wire)
+    data = json.loads(mic.take_snapshot().to_json())
+    data["values"]["M4_ACC"] = 7.0
+    if what == "user":
+        data["user_registers"] = value
+    else:
+        data["values"][what] = value
+    wire.sent.clear()
+    with pytest.raises(Misuse, match=text):
+        mic.restore_snapshot(Snapshot.from_json(json.dumps(data)), dry_run=dry_run)
+    assert {frame[1] for _, frame in wire.sent} <= {1, 2, 3}

@@ -1,0 +1,411 @@
+"""Lines shared by threads and by tasks: nobody gets another's answer, a stop goes first, a lost connection is found again."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from host_rig import INTERVAL, MemoryEndpoint, Wire, async_driver, driver, run_virtual, task_line, thread_line
+
+from steptwin.drivers import LineLost, Mic488, NoAnswer, Overtaken, Untold
+from steptwin.drivers.blocking import finish
+from steptwin.drivers.exchange import Job
+from steptwin.drivers.modbus import Query, words
+from steptwin.drivers.permission import Permission
+from steptwin.errors import LineFailure, Misuse, SteptwinError
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.wire.pdu import Read, WriteCoil
+
+TIMEOUT = 300 * MILLISECOND
+M1_STOP = WriteCoil(2004, True)
+
+
+def fill(wire: Wire) -> None:
+    for number in range(500):
+        wire.twin.user[number] = number
+
+
+# ---------------------------------------------------------------------- threads
+
+
+def in_threads(*tasks: Callable[[], object]) -> list[Exception]:
+    """Run them at once; what they raised."""
+    raised: list[Exception] = []
+
+    def guarded(task: Callable[[], object]) -> None:
+        try:
+            task()
+        except (AssertionError, SteptwinError) as error:
+            raised.append(error)
+
+    threads = [threading.Thread(target=guarded, args=(task,)) for task in tasks]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+        assert not thread.is_alive()
+    return raised
+
+
+def test_threads_share_a_line_and_each_gets_its_own_answers() -> None:
+    wire = Wire()
+    fill(wire)
+    mic = driver(wire)
+    counts = [0] * 4
+
+    def read(start: int) -> None:
+        for number in range(start, 400, 4):
+            assert mic.registers(number, 2) == (number, number + 1)
+            counts[start] += 1
+
+    assert in_threads(*(lambda start=start: read(start) for start in range(4))) == []
+    assert counts == [100] * 4
+
+
+def test_frames_are_paced_however_many_threads_ask() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    assert in_threads(*(lambda: [mic.positions() for _ in range(20)] for _ in range(4))) == []
+    moments = [moment for moment, _ in wire.sent]
+    assert len(moments) > 80
+    assert min(b - a for a, b in pairwise(moments)) >= INTERVAL
+
+
+def test_a_stop_from_another_thread_goes_before_whatever_waits() -> None:
+    """While a thread waits for its answer, others come to wait in a known order; the stop comes last and goes first."""
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    engine = mic._driver.line._engine  # type: ignore[attr-defined]
+    heard, go_on = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        if not engine.in_flight:  # the pause after the frame before
+            return
+        wire.before_read = None
+        heard.set()
+        assert go_on.wait(60)
+
+    def come(task: Callable[[], object], ready: Callable[[], object]) -> threading.Thread:
+        thread = threading.Thread(target=task)
+        thread.start()
+        deadline = time.monotonic() + 60.0
+        while not ready():
+            assert time.monotonic() < deadline, "it does not come to wait"
+            time.sleep(0.001)
+        return thread
+
+    wire.before_read = hold
+    wire.sent.clear()
+    threads = [come(lambda: mic.registers(7, 1), heard.is_set)]
+    for number in range(1, 6):
+        threads.append(come(lambda number=number: mic.registers(number, 1), lambda n=number: len(engine._waiting) == n))  # noqa: PERF401
+    threads.append(come(mic.axis(1).stop, lambda: engine._urgent))
+    go_on.set()
+    for thread in threads:
+        thread.join(60)
+    assert [frame[1:4].hex() for _, frame in wire.sent] == ["030007", "0507d4", *(f"03000{n}" for n in range(1, 6))]
+
+
+def test_a_waiting_motion_is_not_begun_after_a_stop() -> None:
+    """Submitted by hand, so that the order is certain: a read, a motion guarded as drivers guard it, a stop."""
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    line = thread_line(wire)
+    finish(line.open())
+    stopped = [False]
+    engine = line._engine
+    permission = Permission(wire.clock, TIMEOUT, lambda: stopped[0])
+    motion: Job[Query, bytes] = Job(Query(1, WriteCoil(2008, True)), TIMEOUT, most=3, permission=permission)
+    engine.submit(motion)
+    stopped[0] = True
+    finish(line.exchange(Job(Query(1, M1_STOP), TIMEOUT, urgent=True)))
+    finish(line.exchange(Job(Query(1, Read(3, 0, 1)), TIMEOUT)))
+    with pytest.raises(Overtaken):
+        motion.result()
+    assert [frame[:4].hex() for _, frame in wire.sent[-2:]] == ["010507d4", "01030000"]
+    assert not wire.moving()
+
+
+def test_an_interrupted_call_leaves_the_line_usable() -> None:
+    wire = Wire()
+    fill(wire)
+    mic = driver(wire)
+
+    def interrupt(data: bytes) -> None:
+        wire.before_each = None
+        raise KeyboardInterrupt
+
+    wire.before_each = interrupt
+    with pytest.raises(KeyboardInterrupt):
+        mic.registers(5, 1)
+    assert mic.registers(8, 1) == (8,)
+
+
+def test_a_closed_line_is_not_used() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    finish(mic._driver.line.close())
+    with pytest.raises(Misuse, match="the line memory is closed"):
+        mic.positions()
+    finish(mic._driver.line.open())
+    assert mic.positions() == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_lost_port_is_opened_again_by_the_next_call() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    assert wire.opened == 1
+    wire.gone = "serial port memory is gone: unplugged"
+    with pytest.raises(LineLost, match="cannot open memory"):
+        mic.positions()
+    wire.gone = None
+    assert mic.positions() == (0.0, 0.0, 0.0, 0.0)
+    assert wire.opened == 2
+
+
+def test_a_port_that_goes_during_a_read_is_opened_again_at_once() -> None:
+    wire = Wire()
+    mic = driver(wire)
+
+    def unplug(data: bytes) -> None:
+        wire.before_each = None
+        raise LineLost("unplugged")
+
+    wire.before_each = unplug
+    assert mic.positions() == (0.0, 0.0, 0.0, 0.0)
+    assert wire.opened == 2
+
+
+def test_a_motion_that_may_not_be_repeated_is_in_doubt_when_the_port_goes() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+
+    def unplug(data: bytes) -> None:
+        if data[1] == 16:
+            wire.before_each = None
+            raise LineLost("unplugged")
+
+    wire.before_each = unplug
+    with pytest.raises(LineLost, match="it is not known whether 'unit 1: write M1_POS_REL = 3 mm' was carried out") as caught:
+        mic.axis(1).move_by(3.0)
+    assert caught.value.uncertain
+
+
+def test_nobody_there_says_so() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    wire.severed = True
+    with pytest.raises(NoAnswer) as caught:
+        mic.positions()
+    assert str(caught.value) == (
+        "memory: no answer to 'unit 1: read M1_POS_ACT … M4_POS_ACT' within 0.3 s, tried 3 times; nothing was received"
+    )
+
+
+def test_what_cannot_be_told_to_stop_is_said() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    mic.axis(1).move_velocity(5.0)
+    wire.severed = True
+    for stop in (mic.axis(1).stop, mic.stop_all, mic.axis(1).disable, mic.program.stop):
+        with pytest.raises(Untold, match=r"could not be (stopped|switched off): the controller cannot be told, and goes on"):
+            stop()
+    wire.severed = False
+    mic.stop_all()
+    assert not wire.moving()
+
+
+# ---------------------------------------------------------------------- tasks
+
+
+def test_tasks_share_a_line_and_each_gets_its_own_answers() -> None:
+    wire = Wire()
+    fill(wire)
+
+    async def main() -> None:
+        async with async_driver(task_line(wire), wire) as mic:
+
+            async def read(start: int) -> None:
+                for number in range(start, 400, 20):
+                    assert await mic.registers(number, 2) == (number, number + 1)
+
+            await asyncio.gather(*(read(start) for start in range(20)))
+
+    run_virtual(wire, main())
+
+
+def test_a_stop_waits_for_one_exchange_and_the_pace_at_most() -> None:
+    """Twenty tasks keep the line full. From the call of stop to the frame on the line passes less than 10 ms and an exchange."""
+    wire = Wire(latency=3 * MILLISECOND)
+    line = task_line(wire)
+    waits: list[int] = []
+
+    async def main() -> None:
+        async with async_driver(line, wire) as mic:
+            await mic.enable()
+
+            async def poll() -> None:
+                while True:
+                    await mic.status()
+
+            async def move() -> None:
+                while True:
+                    await mic.axis(2).move_to(1.0)
+                    await mic.axis(2).move_to(-1.0)
+
+            others = [asyncio.create_task(poll()) for _ in range(16)] + [asyncio.create_task(move()) for _ in range(4)]
+            for number in range(20):
+                await mic.axis(1).move_velocity(5.0)
+                await asyncio.sleep(0.0137 * (number % 7))
+                asked = line.now()
+                await mic.axis(1).stop()
+                waits.append(
+                    next(at for at, frame in wire.sent if at >= asked and frame[1:4] == bytes.fromhex("05 07 D4")) - asked
+                )
+                assert not wire.moving()
+            for task in others:
+                task.cancel()
+            await asyncio.gather(*others, return_exceptions=True)
+
+    run_virtual(wire, main())
+    exchange = 2 * wire.latency + MILLISECOND
+    assert len(waits) == 20
+    assert max(waits) <= INTERVAL + exchange
+    # Everybody else waited for twenty exchanges.
+    assert max(waits) < 20 * INTERVAL / 10
+
+
+def test_a_motion_called_before_a_stop_does_not_begin_after_it() -> None:
+    wire = Wire()
+    line = task_line(wire)
+
+    async def main() -> None:
+        async with async_driver(line, wire) as mic:
+            await mic.enable()
+            motion = asyncio.create_task(mic.axis(1).move_to(5.0))
+            other = asyncio.create_task(mic.axis(2).move_to(5.0))
+            await asyncio.sleep(0)  # both have asked for the control registers
+            await mic.axis(1).stop()
+            with pytest.raises(Overtaken, match="M1_POS_ABS = 5 mm' was not sent: a stop was given meanwhile"):
+                await motion
+            await other
+
+    run_virtual(wire, main())
+    wire.rest()
+    assert (wire.position(1), wire.position(2)) == (0, 500)
+
+
+def test_a_cancelled_task_leaves_the_line_usable() -> None:
+    wire = Wire()
+    fill(wire)
+
+    async def main() -> None:
+        async with async_driver(task_line(wire, interval=0), wire) as mic:
+            running, waiting = (asyncio.create_task(mic.registers(n, 1)) for n in (1, 2))
+            await asyncio.sleep(0.0002)
+            running.cancel()
+            waiting.cancel()
+            assert await mic.registers(3, 1) == (3,)
+            assert [frame[2:4] for _, frame in wire.sent[-2:]] == [b"\0\1", b"\0\3"]
+
+    run_virtual(wire, main())
+
+
+def test_a_lost_connection_is_made_again_for_those_who_wait() -> None:
+    wire = Wire(tcp=True)
+    fill(wire)
+    line = task_line(wire)
+
+    async def main() -> None:
+        async with async_driver(line, wire) as mic:
+            reads = [asyncio.create_task(mic.registers(n, 1)) for n in range(5)]
+            await asyncio.sleep(0.0002)
+            endpoint = line._endpoint
+            assert isinstance(endpoint, MemoryEndpoint)
+            assert endpoint.transport is not None
+            endpoint.transport.lose(ConnectionResetError(104, "Connection reset by peer"))
+            assert await asyncio.gather(*reads) == [(n,) for n in range(5)]
+
+    run_virtual(wire, main())
+    assert wire.opened == 2
+
+
+def test_a_connection_that_cannot_be_made_again_is_told_to_all_who_wait() -> None:
+    wire = Wire(tcp=True)
+    line = task_line(wire)
+
+    async def main() -> None:
+        async with async_driver(line, wire) as mic:
+            reads = [asyncio.create_task(mic.registers(n, 1)) for n in range(3)]
+            await asyncio.sleep(0.0002)
+            wire.gone = "refused"
+            endpoint = line._endpoint
+            assert isinstance(endpoint, MemoryEndpoint)
+            assert endpoint.transport is not None
+            endpoint.transport.lose()
+            errors = await asyncio.gather(*reads, return_exceptions=True)
+            assert [str(error) for error in errors] == ["cannot open memory: refused"] * 3
+            wire.gone = None
+            assert await mic.registers(9, 1) == (0,)
+
+    run_virtual(wire, main())
+
+
+def test_what_is_no_modbus_ends_the_connection_and_a_new_one_serves() -> None:
+    wire = Wire(tcp=True)
+    line = task_line(wire)
+
+    async def main() -> None:
+        async with async_driver(line, wire) as mic:
+            wire.inject(b"HTTP/1.0 400 Bad Request\r\n")
+            assert await mic.registers(0, 1) == (0,)
+
+    run_virtual(wire, main())
+    assert wire.opened == 2
+
+
+def test_closing_tells_those_who_wait() -> None:
+    wire = Wire()
+    line = task_line(wire)
+
+    async def main() -> None:
+        mic = async_driver(line, wire)
+        await mic.open()
+        read = asyncio.create_task(mic.registers(0, 1))
+        await asyncio.sleep(0.0002)
+        await line.close()
+        with pytest.raises(LineLost, match="the line memory was closed"):
+            await read
+        with pytest.raises(Misuse, match="closed"):
+            await mic.registers(0, 1)
+
+    run_virtual(wire, main())
+
+
+def test_a_blocking_driver_on_an_event_loop_is_refused() -> None:
+    wire = Wire()
+    with pytest.raises(RuntimeError, match="use the asynchronous driver"):
+        finish(asyncio.sleep(0))
+    assert isinstance(driver(wire), Mic488)
+
+
+def test_the_answers_of_two_units_are_kept_apart() -> None:
+    wire = Wire(units=(1, 2))
+    wire.twins[1].user[0], wire.twins[2].user[0] = 11, 22
+    line = thread_line(wire)
+    one, two = (Mic488(line, unit, firmware="1.70") for unit in (1, 2))
+    assert [(one.registers(0, 1), two.registers(0, 1)) for _ in range(3)] == [((11,), (22,))] * 3
+    # Each has its own pace: frames to different units follow each other closely.
+    moments = [at for at, _ in wire.sent]
+    assert moments[-1] - moments[0] < 5 * INTERVAL - 5 * MILLISECOND
+    assert words(b"\3\2\0\1") == (1,)
+    assert SECOND // INTERVAL == 100
+    assert issubclass(NoAnswer, LineFailure)

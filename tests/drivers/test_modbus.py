@@ -1,0 +1,358 @@
+"""RTU and TCP as a master hears them. Frames are those of the manuals where they have them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from steptwin.drivers.exchange import LineLost, More
+from steptwin.drivers.modbus import LATE_NS, NOISE_NS, QUIET_NS, Query, RtuMaster, TcpMaster, bits, check_unit, words
+from steptwin.errors import Misuse
+from steptwin.machine import MICROSECOND
+from steptwin.wire import mbap, rtu
+from steptwin.wire.line import SerialLine
+from steptwin.wire.pdu import (
+    ModbusException,
+    Read,
+    Registers,
+    WriteCoil,
+    WriteRegister,
+    WriteRegisters,
+    encode_response,
+)
+from steptwin.wire.slave import Direction
+
+POSITION = Read(3, 10020, 2)
+INPUTS = Read(2, 5000, 8)
+GOLDEN = {
+    "01 02 13 88 00 08 FD 62": INPUTS,
+    "01 05 17 71 00 00 98 65": WriteCoil(6001, False),
+    "01 03 27 24 00 02 8E B4": POSITION,
+}
+
+
+def registers(*values: int, unit: int = 1) -> bytes:
+    return rtu.encode_frame(unit, encode_response(Registers(values)))
+
+
+def exception(function: int, code: int) -> bytes:
+    return rtu.encode_frame(1, bytes((function | 0x80, code)))
+
+
+def asked(request: Read | WriteCoil | WriteRegister | WriteRegisters = POSITION) -> RtuMaster:
+    master = RtuMaster()
+    master.start(Query(1, request), 0, urgent=False)
+    return master
+
+
+# ---------------------------------------------------------------------- RTU
+
+
+@pytest.mark.parametrize(("frame", "request_"), GOLDEN.items())
+def test_golden_requests(frame: str, request_: Read | WriteCoil) -> None:
+    assert RtuMaster().start(Query(1, request_), 0, urgent=False) == bytes.fromhex(frame)
+
+
+ANSWERS = [
+    (POSITION, registers(0, 0x4148), bytes.fromhex("03 04 00 00 41 48")),
+    (INPUTS, rtu.encode_frame(1, b"\2\1\5"), b"\2\1\5"),
+    (WriteCoil(6001, False), bytes.fromhex("01 05 17 71 00 00 98 65"), bytes.fromhex("05 17 71 00 00")),
+    (WriteRegister(10014, 3), rtu.encode_frame(1, bytes.fromhex("06 27 1E 00 03")), bytes.fromhex("06 27 1E 00 03")),
+    (WriteRegisters(10084, (0, 0x4148)), rtu.encode_frame(1, bytes.fromhex("10 27 64 00 02")), bytes.fromhex("10 27 64 00 02")),
+]
+
+
+@pytest.mark.parametrize(("request_", "frame", "pdu"), ANSWERS)
+def test_an_answer_whole_byte_by_byte_and_behind_rubbish(request_: Read, frame: bytes, pdu: bytes) -> None:
+    assert asked(request_).receive(frame, 1) == pdu
+    master = asked(request_)
+    assert [master.receive(bytes((byte,)), 1) for byte in frame] == [None] * (len(frame) - 1) + [pdu]
+    for rubbish in (b"\0", b"\1", b"\1\3", b"\1\x83\2", bytes(range(40))):
+        assert asked(request_).receive(rubbish + frame, 1) == pdu
+
+
+@pytest.mark.parametrize(("request_", "frame", "pdu"), ANSWERS)
+def test_a_wrong_byte_anywhere_is_no_answer(request_: Read, frame: bytes, pdu: bytes) -> None:
+    for place in range(len(frame)):
+        for flip in (0x01, 0x80):
+            wrong = frame[:place] + bytes((frame[place] ^ flip,)) + frame[place + 1 :]
+            assert asked(request_).receive(wrong, 1) is None
+        assert asked(request_).receive(frame[:place] + frame[place + 1 :], 1) is None
+
+
+def test_an_exception_is_raised_with_its_code() -> None:
+    with pytest.raises(ModbusException) as caught:
+        asked().receive(exception(3, 2), 1)
+    assert (caught.value.function, caught.value.code) == (3, 2)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        registers(1, 2, unit=2),
+        registers(1, 2, 3),
+        registers(1),
+        rtu.encode_frame(1, b"\4\4\0\0\0\0"),
+        exception(6, 2),
+        rtu.encode_frame(1, bytes.fromhex("06 27 1E 00 03")),
+    ],
+    ids=["another unit", "longer", "shorter", "another function", "exception to another function", "a write"],
+)
+def test_what_answers_something_else_is_passed_over(other: bytes) -> None:
+    master = asked()
+    assert master.receive(other, 1) is None
+    assert master.receive(registers(7, 8), 2) == bytes.fromhex("03 04 00 07 00 08")
+
+
+def test_a_write_is_answered_by_its_own_echo_only() -> None:
+    assert asked(WriteRegister(10014, 3)).receive(rtu.encode_frame(1, bytes.fromhex("06 27 1E 00 01")), 1) is None
+    assert asked(WriteRegisters(10084, (0, 1))).receive(rtu.encode_frame(1, bytes.fromhex("10 27 66 00 02")), 1) is None
+
+
+# ---------------------------------------------------------------------- late answers
+
+
+def late(master: RtuMaster, request: Read = POSITION) -> Query:
+    """An exchange whose answer has not come in time."""
+    query = Query(1, request)
+    master.start(query, 0, urgent=False)
+    master.abandon(1000)
+    return query
+
+
+def test_a_request_that_a_late_answer_could_seem_to_answer_is_preceded_by_a_marker() -> None:
+    master = RtuMaster()
+    late(master)
+    other = Query(1, Read(3, 10022, 2))
+    marker = master.start(other, 2000, urgent=False)
+    assert marker == rtu.encode_frame(1, bytes.fromhex("03 00 00 00 01"))
+    assert master.receive(registers(1, 2), 3000) is None  # the late answer
+    assert master.receive(exception(3, 2), 3000) is None  # or a late refusal
+    assert master.receive(registers(9), 4000) == More(other.rtu_frame, may_wait=True)
+    assert master.receive(registers(3, 4), 5000) == bytes.fromhex("03 04 00 03 00 04")
+    # In step again: the next one needs no marker.
+    assert master.start(Query(1, POSITION), 6000, urgent=False) == Query(1, POSITION).rtu_frame
+
+
+def test_markers_differ_from_everything_owed() -> None:
+    master = RtuMaster()
+    late(master)
+    late(master, Read(3, 0, 1))
+    marker = master.start(Query(1, Read(3, 10022, 2)), 2000, urgent=False)
+    assert marker == rtu.encode_frame(1, bytes.fromhex("03 00 00 00 03"))  # answers of 1 and 2 registers are owed
+
+
+def test_a_repeated_request_needs_no_marker_but_leaves_an_answer_owed() -> None:
+    master = RtuMaster()
+    query = late(master)
+    assert master.start(query, 2000, urgent=False) == query.rtu_frame
+    assert master.receive(registers(1, 2), 3000) is not None
+    assert master.start(Query(1, Read(3, 10022, 2)), 4000, urgent=False) != Query(1, Read(3, 10022, 2)).rtu_frame
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [INPUTS, WriteRegister(10016, 15)],
+)
+def test_another_function_cannot_be_confused_and_its_answer_settles_everything(request_: Read) -> None:
+    master = RtuMaster()
+    late(master)
+    query = Query(1, request_)
+    assert master.start(query, 2000, urgent=False) == query.rtu_frame
+    answer = rtu.encode_frame(1, b"\2\1\5") if request_ is INPUTS else query.rtu_frame
+    assert master.receive(registers(1, 2) + answer, 3000) == answer[1:-2]
+    assert master.start(Query(1, Read(3, 10022, 2)), 4000, urgent=False) == Query(1, Read(3, 10022, 2)).rtu_frame
+
+
+def test_another_unit_cannot_be_confused() -> None:
+    master = RtuMaster()
+    late(master)
+    query = Query(2, POSITION)
+    assert master.start(query, 2000, urgent=False) == query.rtu_frame
+
+
+def test_a_stop_waits_for_no_marker() -> None:
+    master = RtuMaster()
+    write = Query(1, WriteCoil(2000, True))
+    master.start(write, 0, urgent=False)
+    master.abandon(1000)
+    stop = Query(1, WriteCoil(2004, True))
+    assert master.start(stop, 2000, urgent=True) == stop.rtu_frame
+    assert master.receive(write.rtu_frame, 3000) is None
+    assert master.receive(stop.rtu_frame, 3000) == stop.pdu
+
+
+def test_an_owed_answer_is_not_waited_for_for_ever() -> None:
+    master = RtuMaster()
+    late(master)
+    other = Query(1, Read(3, 10022, 2))
+    assert master.start(other, 1000 + LATE_NS, urgent=False) == other.rtu_frame
+
+
+def test_a_new_connection_owes_nothing() -> None:
+    master = RtuMaster()
+    late(master)
+    master.reset()
+    other = Query(1, Read(3, 10022, 2))
+    assert master.start(other, 2000, urgent=False) == other.rtu_frame
+    assert master.free_ns == 0
+
+
+def test_after_a_failure_the_line_has_to_be_silent_but_noise_does_not_keep_it_for_ever() -> None:
+    master = RtuMaster()
+    late(master)
+    assert master.free_ns == 1000 + QUIET_NS
+    now = 1000
+    while now < 1000 + NOISE_NS:
+        master.stray(b"\x55", now)
+        assert now < master.free_ns <= 1000 + NOISE_NS
+        now += QUIET_NS // 2
+    master.stray(b"\x55", now)
+    assert master.free_ns == 1000 + NOISE_NS
+
+
+def test_what_was_heard_of_an_answer_is_told() -> None:
+    master = asked()
+    master.receive(b"\1\3\4", 1)
+    assert master.abandon(2) == b"\1\3\4"
+
+
+# ---------------------------------------------------------------------- echo, timing, observers
+
+
+def test_an_adapter_that_echoes_is_noticed_at_the_first_read() -> None:
+    master = asked()
+    sent = Query(1, POSITION).rtu_frame
+    assert master.receive(sent, 1) is None
+    assert master.receive(registers(1, 2), 1) == bytes.fromhex("03 04 00 01 00 02")
+    assert master.echo
+    # From then on the echo of a write is not taken for its answer.
+    stop = Query(1, WriteCoil(2004, True))
+    master.start(stop, 2, urgent=True)
+    assert master.receive(stop.rtu_frame[:5], 3) is None
+    assert master.receive(stop.rtu_frame[5:], 3) is None
+    assert master.receive(stop.rtu_frame, 4) == stop.pdu
+
+
+def test_without_echo_the_answer_of_a_write_is_its_answer() -> None:
+    master = asked(WriteCoil(2004, True))
+    assert master.receive(Query(1, WriteCoil(2004, True)).rtu_frame, 1) is not None
+    assert not master.echo
+
+
+@pytest.mark.parametrize(("baud", "gap"), [(9600, 3_645_834), (38400, 1750 * MICROSECOND)])
+def test_real_lines_have_a_gap_before_a_frame_and_time_for_its_characters(baud: int, gap: int) -> None:
+    master = RtuMaster(SerialLine(baud))
+    query = Query(1, Read(3, 10020, 16))
+    assert master.allowance_ns(query) == SerialLine(baud).duration(8 + 37)
+    master.start(query, 0, urgent=False)
+    master.receive(registers(*range(16)), 1000)
+    assert master.free_ns == pytest.approx(1000 + gap, abs=1)
+
+
+def test_every_frame_is_shown_to_the_observer() -> None:
+    seen: list[tuple[Direction, bytes]] = []
+    master = RtuMaster(on_frame=lambda now, direction, raw: seen.append((direction, raw)))
+    query = Query(1, POSITION)
+    master.start(query, 0, urgent=False)
+    master.receive(b"\xff" + registers(1, 2), 1)
+    master.start(query, 2, urgent=False)
+    master.receive(b"\1\3", 3)
+    master.abandon(4)
+    assert seen == [
+        (Direction.IN, query.rtu_frame),
+        (Direction.OUT, registers(1, 2)),
+        (Direction.IN, query.rtu_frame),
+        (Direction.OUT, b"\1\3"),
+    ]
+
+
+# ---------------------------------------------------------------------- TCP
+
+
+def answered(number: int, pdu: str, unit: int = 1) -> bytes:
+    return mbap.encode_frame(number, unit, bytes.fromhex(pdu))
+
+
+@pytest.fixture
+def tcp() -> Callable[[Read], TcpMaster]:
+    def make(request: Read = POSITION) -> TcpMaster:
+        master = TcpMaster("tcp://h:502")
+        assert master.start(Query(1, request), 0, urgent=False) == bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 02")
+        return master
+
+    return make
+
+
+def test_tcp_whole_and_byte_by_byte(tcp: Callable[..., TcpMaster]) -> None:
+    frame, pdu = answered(1, "03 04 00 01 00 02"), bytes.fromhex("03 04 00 01 00 02")
+    assert tcp().receive(frame, 1) == pdu
+    master = tcp()
+    assert [master.receive(bytes((byte,)), 1) for byte in frame] == [None] * (len(frame) - 1) + [pdu]
+
+
+def test_tcp_late_answers_and_those_of_others_are_passed_over(tcp: Callable[..., TcpMaster]) -> None:
+    master = tcp()
+    master.abandon(1)
+    master.start(Query(1, POSITION), 2, urgent=False)
+    assert master.receive(answered(1, "03 04 00 01 00 02"), 3) is None
+    assert master.receive(other := answered(2, "03 04 00 01 00 02", unit=7), 3) is None
+    assert master.abandon(4) == other
+    master.start(Query(1, POSITION), 5, urgent=False)
+    assert master.receive(answered(3, "03 04 00 03 00 04"), 6) == bytes.fromhex("03 04 00 03 00 04")
+
+
+def test_tcp_refusals(tcp: Callable[..., TcpMaster]) -> None:
+    with pytest.raises(ModbusException) as refused:
+        tcp().receive(answered(1, "83 02"), 1)
+    assert (refused.value.function, refused.value.code) == (3, 2)
+
+
+NO_ANSWERS = ["03 02 00 01", "83", "83 02 00", "86 02", "06 27 24 00 02", "04 04 00 01 00 02", "0D 00", "03"]
+
+
+@pytest.mark.parametrize("pdu", NO_ANSWERS)
+def test_tcp_what_answers_something_else_is_passed_over_and_told(tcp: Callable[..., TcpMaster], pdu: str) -> None:
+    master = tcp()
+    assert master.receive(answered(1, pdu), 1) is None
+    assert master.receive(answered(1, "03 04 00 01 00 02"), 2) == bytes.fromhex("03 04 00 01 00 02")
+    master = tcp()
+    assert master.receive(answered(1, pdu), 1) is None
+    assert master.abandon(2) == answered(1, pdu)
+    master.start(Query(1, POSITION), 3, urgent=False)
+    assert master.abandon(4) == b""
+
+
+def test_tcp_what_is_no_modbus_breaks_the_connection(tcp: Callable[..., TcpMaster]) -> None:
+    for meanwhile in (False, True):
+        master = tcp()
+        if meanwhile:
+            master.abandon(1)
+        with pytest.raises(LineLost, match=r"^tcp://h:502: what came is no Modbus TCP \(MBAP protocol"):
+            (master.stray if meanwhile else master.receive)(b"SSH-2.0-OpenSSH\r\n", 1)
+        master.reset()
+        assert master.receive(b"", 2) is None
+
+
+def test_tcp_numbers_wrap_round() -> None:
+    master = TcpMaster()
+    query = Query(1, POSITION)
+    for _ in range(0xFFFF):
+        master.start(query, 0, urgent=False)
+    assert master.start(query, 0, urgent=False)[:2] == b"\0\0"
+
+
+# ---------------------------------------------------------------------- odds and ends
+
+
+def test_content_of_answers() -> None:
+    assert words(bytes.fromhex("03 04 00 01 FF FF")) == (1, 0xFFFF)
+    assert bits(b"\1\1\5", 3) == [True, False, True]
+
+
+def test_units() -> None:
+    check_unit(255, tcp=True)
+    for unit, tcp in ((0, False), (248, False), (256, True), (-1, True)):
+        with pytest.raises(Misuse, match=f"unit {unit} is outside"):
+            check_unit(unit, tcp=tcp)

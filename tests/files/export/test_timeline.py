@@ -1,0 +1,176 @@
+from __future__ import annotations
+
+import io
+import json
+import random
+import re
+import shutil
+import subprocess
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from trace_rig import Run
+
+from steptwin.files.export import axis_views, write_trace
+from steptwin.files.export.progress import silent
+from steptwin.files.export.recording import profile_of, sort_out
+from steptwin.files.export.timeline import write_timeline
+from steptwin.files.world import World
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import MotionState, plan_position
+from steptwin.motion.divisions import StepTrain
+from steptwin.motion.paths import Circular, circle
+from steptwin.motion.pulses import step_times
+from steptwin.world.trace import Record, Trace
+
+WORLDS = Path(__file__).parents[3] / "examples" / "worlds"
+
+
+def page_of(trace: Trace, views: Any = None, until: Nanos | None = None, begin: Nanos = 0) -> str:
+    file = io.StringIO()
+    write_timeline(sort_out(trace, views or {}, begin, until), file, silent)
+    return file.getvalue()
+
+
+def data_of(page: str) -> dict[str, Any]:
+    (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    return json.loads(text)
+
+
+class Pieces:
+    """The cubics of an axis as the page takes them."""
+
+    def __init__(self, numbers: list[float]) -> None:
+        self.pieces = [numbers[i : i + 8] for i in range(0, len(numbers), 8)]
+
+    def at(self, t: Nanos) -> list[float]:
+        return [piece for piece in self.pieces if piece[0] <= t][-1]
+
+    def position(self, t: Nanos) -> float:
+        begin, c0, c1, c2, c3, *_ = self.at(t)
+        u = (t - begin) / SECOND
+        return c0 + u * (c1 + u * (c2 + u * c3))
+
+
+@pytest.mark.parametrize(("name", "begin"), [("mic488", 0), ("mic488", 9_060_000_000), ("m1486", 0), ("m1486", 412_345_678)])
+def test_the_cubics_of_a_page_are_the_motion(name: str, begin: Nanos, request: pytest.FixtureRequest) -> None:
+    run: Run = request.getfixturevalue(name)
+    data = data_of(page_of(run.trace, run.views, run.until, begin))
+    assert data["span"] == run.until - begin
+    chance = random.Random(3)
+    tracks = sort_out(run.trace, run.views, begin, run.until).axes
+    assert len(data["axes"]) == len(tracks) > 0
+    for axis, track in zip(data["axes"], tracks, strict=True):
+        pieces = Pieces(axis["pieces"])
+        for now in [chance.randrange(begin, run.until) for _ in range(300)] + [t for t in track.times if t >= begin]:
+            plan = track.plan(now)
+            profile = profile_of(plan)
+            assert pieces.position(now - begin) == pytest.approx(profile.position(max(now, profile.start)), abs=2e-5)
+        for piece in pieces.pieces:
+            now = begin + int(piece[0])
+            plan = track.plan(now)
+            assert piece[5] == plan.count(max(now, profile_of(plan).start))
+            if isinstance(plan, StepTrain) and piece[6]:
+                assert piece[7] == plan.division(now).grid
+
+
+def test_pulses_can_be_found_from_the_pieces(m1486: Run) -> None:
+    """What the page does: pulse k of a piece is where its cubic is k grids beyond its count."""
+    (axis,) = data_of(page_of(m1486.trace, m1486.views, m1486.until + SECOND))["axes"]
+    pieces = Pieces(axis["pieces"]).pieces
+    given = 0
+    for piece, following in pairwise(pieces):
+        direction, grid = int(piece[6]), int(piece[7])
+        ways = (following[5] - piece[5]) * direction / grid
+        assert ways == round(ways) >= 0
+        given += round(ways)
+    plans = [(record.time, record.value) for record in m1486.trace.plans()]
+    ends = [time for time, _ in plans[1:]] + [m1486.until]
+    pulses = [step_times(plan, a, b) for (a, plan), b in zip(plans, ends, strict=True) if isinstance(plan, StepTrain)]
+    assert given == sum(map(len, pulses)) > 10_000
+
+
+def test_arcs_are_followed_closely() -> None:
+    arc = circle(5000.0, 0.0, 5000.0, 4.0)
+    course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
+    profile = course.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
+    trace = Trace()
+    trace.add(Record(0, "a", "plan", "1", profile))
+    (axis,) = data_of(page_of(trace))["axes"]
+    pieces = Pieces(axis["pieces"])
+    assert profile.end is not None
+    for n in range(1000):
+        now = profile.end * n // 1000
+        assert pieces.position(now) == pytest.approx(profile.position(now), abs=0.02)
+
+
+def test_a_page_of_many_machines_stays_small() -> None:
+    trace = Trace()
+    moves = 20
+    for n in range(100):
+        for move in range(moves):
+            for axis in "1234":
+                plan = plan_position(MotionState(move * SECOND, 0, 0.0, 0.0), 100 * move, 5000.0, 5000.0, 1000.0)
+                trace.add(Record(move * SECOND, f"m{n}", "plan", axis, plan))
+    page = page_of(trace)
+    data = data_of(page)
+    assert (len(data["machines"]), len(data["axes"])) == (100, 400)
+    empty = len(page_of(Trace(), until=SECOND))
+    # A move is three segments and a rest, each of eight numbers.
+    assert (len(page) - empty) / (400 * moves) < 4 * 60
+
+
+def test_the_page_needs_nothing_from_outside(mic488: Run) -> None:
+    page = page_of(mic488.trace, mic488.views, mic488.until)
+    assert not re.search(r"https?:|//[\w-]+\.\w|src=|@import|url\(|<link|<iframe", page)
+    assert "default-src 'none'" in page
+    assert not re.search(r"/\*\w+\*/", page)
+
+
+def test_texts_cannot_break_out_of_the_page() -> None:
+    trace = Trace(["</title><b>"])
+    evil = "</script><script>alert(1)</script><!-- /*data*/ \u2028"
+    trace.add(Record(1, "</title><b>", "event", "x", evil))
+    page = page_of(trace, until=SECOND)
+    assert page.count("</script>") == 2
+    assert "<b>" not in page
+    assert data_of(page)["marks"] == [[1, "</title><b>", "event", "x", evil]]
+
+
+def test_every_record_that_is_no_track_is_a_mark(mic488: Run) -> None:
+    marks = data_of(page_of(mic488.trace, mic488.views, mic488.until))["marks"]
+    assert len(marks) == len(list(mic488.trace.of("frame", "event", "input", "statement", "fault")))
+    assert [text for _, _, kind, _, text in marks if kind == "event"][-1] == "M3 stopped by KR"
+    trace = Trace()
+    trace.add(Record(1, "a", "statement", "main", 12))
+    trace.add(Record(2, "a", "frame", "tcp-1/in", bytes(100)))
+    statement, frame = data_of(page_of(trace))["marks"]
+    assert statement == [1, "a", "statement", "main", "line 12"]
+    assert frame[4].endswith("00 … 100 bytes")
+
+
+def shown(page: Path) -> str:
+    """The page as a browser has it after its scripts have run. The test is skipped where there is no browser."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no browser is installed (chromium)")
+    options = ["--headless", "--disable-gpu", "--no-sandbox", "--virtual-time-budget=3000", "--window-size=1300,1000"]
+    profile = f"--user-data-dir={page.parent / 'browser'}"
+    ran = subprocess.run(
+        [browser, *options, profile, "--dump-dom", page.as_uri()], capture_output=True, text=True, check=True, timeout=100
+    )
+    return ran.stdout
+
+
+def test_lanes_in_a_browser(tmp_path: Path) -> None:
+    """Axes that never move share a row; commanded and true position share a lane; an axis that has homed shows its count too."""
+    world = World.load(WORLDS / "feeder.toml")
+    world.run(for_=8)
+    page = tmp_path / "t.html"
+    write_trace(world.trace, page, views=axis_views(world.machines, world.axes))
+    lanes = re.findall(r'class="name"[^>]*>([^<]*)<', shown(page))
+    assert lanes[:3] == ["table", "M1 position, x true", "M1 since power-on"]
+    assert lanes[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
+    assert not [name for name in lanes if name.startswith("M2 ")]

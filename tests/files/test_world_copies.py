@@ -1,0 +1,122 @@
+"""Worlds that are branched, pickled, started with other values, and given faults from Python."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.files.session import load, save, session_of
+from steptwin.files.world import World
+from steptwin.world import script as do
+from steptwin.world import tomlplaces
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+
+
+def a_while() -> do.Steps:
+    yield do.Wait(10**9)
+    yield do.Note("a second later")
+
+
+def running() -> World:
+    """In the middle of things."""
+    world = World.load(EXAMPLES / "feeder.toml", seed=4)
+    world.fault("delay unit=1 link=script for_ms=40 nth=3")
+    world.script(a_while)
+    world.at(2.0, do.Set((("table", "IN9", 1.0),)))
+    world.press("start", 1.0)
+    world.run(for_=0.7)
+    return world
+
+
+@pytest.mark.parametrize("twice", [lambda world: pickle.loads(pickle.dumps(world)), copy.deepcopy, World.branch])
+def test_a_copy_goes_on_as_the_world_does(twice: Any) -> None:
+    world = running()
+    other = twice(world)
+    assert other is not world
+    assert (other.now, other.spec.seed) == (world.now, 4)
+    for one in (world, other):
+        one.run(for_=6)
+    assert other.trace.digest() == world.trace.digest()
+    assert list(other.trace) == list(world.trace)
+    assert session_of(other) == session_of(world)
+
+
+def test_a_snapshot_can_be_pickled() -> None:
+    world = running()
+    snapshot = pickle.loads(pickle.dumps(world.snapshot()))
+    world.run(for_=3)
+    end = world.trace.digest()
+    world.restore(snapshot)
+    world.run(for_=3)
+    assert world.trace.digest() == end
+
+
+def test_without_a_trace_a_world_has_no_past_to_pickle() -> None:
+    world = World.load(EXAMPLES / "feeder.toml", keep_trace=False)
+    world.run(for_=1)
+    with pytest.raises(Misuse, match="keeps no trace cannot be pickled"):
+        pickle.dumps(world)
+    world.branch().run(for_=1)
+
+
+def test_a_branch_reads_no_toml(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = running()
+    monkeypatch.setattr(tomlplaces, "find_places", None)
+    monkeypatch.setattr("steptwin.world.reader.find_places", None)
+    assert world.branch().now == world.now
+
+
+def test_faults_from_python_are_in_the_session(tmp_path: Path) -> None:
+    world = World.load(EXAMPLES / "feeder.toml")
+    assert world.fault("lost-steps machine=table axis=1 pulses=64 at_s=0.5") == "lost-steps"
+    busy = world.fault("busy unit=1 link=script name=later")
+    world.run(for_=1)
+    world.clear_fault(busy)
+    world.run(for_=1)
+    with pytest.raises(Misuse, match="no fault 'later'"):
+        world.clear_fault(busy)
+    with pytest.raises(Misuse, match="axis = 9"):
+        world.fault("stall machine=table axis=9")
+    session = session_of(world)
+    save(session, tmp_path / "s.json")
+    assert load(tmp_path / "s.json").replay().trace.digest() == session.digest
+    assert len(session.inputs) == 3
+
+
+def test_values_of_a_description_can_be_replaced(tmp_path: Path) -> None:
+    overrides = {"axis.x.pitch": 10.0, "mic488.table.M1.acc": 500.0, "axis.0.start": 60.0, "world.name": "other"}
+    world = World.load(EXAMPLES / "feeder.toml", overrides=overrides)
+    assert (world.axis["x"].position, world.spec.name) == (60.0, "other")
+    assert world.mic488["table"].device.config.axes[0].acc == 500.0
+    assert world.plan.axes["x"].spec.pitch == 10.0
+    world.run(for_=1)
+    save(session_of(world), tmp_path / "s.json")
+    session = load(tmp_path / "s.json")
+    assert session.overrides == overrides
+    assert session.replay().trace.digest() == session.digest
+    assert pickle.loads(pickle.dumps(world)).spec.overrides == overrides
+    with pytest.raises(Misuse, match="another world"):
+        World.load(EXAMPLES / "feeder.toml").restore(world.snapshot())
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("axis.y.pitch", 1.0, "override 'axis.y.pitch': there is no 'y'"),
+        ("axs.x.pitch", 1.0, "there is no 'axs'; did you mean 'axis'?"),
+        ("axis.x.pitsch", 1.0, r"error D004: \[axis\] has no 'pitsch'; did you mean 'pitch'?"),
+        ("axis.x.pitch", -1, r"error D003: \[axis\]: pitch: -1: permitted are numbers above 0"),
+        ("seed", 1, "expected TABLE.KEY or TABLE.NAME.KEY"),
+        ("axis.x", 1, "expected TABLE.KEY or TABLE.NAME.KEY"),
+        ("axis.x.pitch.y", 1, "there is no 'pitch'|expected TABLE.KEY"),
+    ],
+)
+def test_what_cannot_be_replaced(key: str, value: object, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        World.load(EXAMPLES / "feeder.toml", overrides={key: value})

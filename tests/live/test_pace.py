@@ -1,0 +1,377 @@
+"""The time of a live world in somebody's hands, in virtual time: what is done to it is seen by nobody inside."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from steptwin.commands.up_world import LiveWorld, PlacePort, UpOptions, up
+from steptwin.errors import Misuse
+from steptwin.files.session import load, session_of
+from steptwin.files.world import World
+from steptwin.live import pace as pacing
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.links import Feed
+from steptwin.live.pace import Pace
+from steptwin.live.world_control import WorldControl
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.wire.crc import with_crc
+
+Run = Callable[..., Any]
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+READ_POSITION = bytes.fromhex("01 03 27 24 00 02 8e b4")
+CLOCKLESS = """
+    [[mic488]]
+    name = "a"
+    [[script]]
+    name = "ticks"
+    repeat = 1000
+    steps = [{ wait = "1 s" }, { note = "tick" }]
+    [[event]]
+    when = "a.IN1"
+    steps = [{ set = { "a.IN2" = 1 } }]
+"""
+
+
+@pytest.fixture(autouse=True)
+def steps_have_one_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However slow this machine is now."""
+    monkeypatch.setattr(pacing, "PART_S", 3600.0)
+
+
+class Rig:
+    """A live world in the virtual time of the loop; ``do`` is what the control endpoint does."""
+
+    def __init__(self, world: World, speed: float = 1.0, *, has_clients: bool = True) -> None:
+        loop = asyncio.get_running_loop()
+        self.live = LiveWorld(world)
+        self.world = world
+        self.cell = Cell(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND), begin=world.now))
+        self.lags: list[Nanos] = []
+        self.cell.on_lag = self.lags.append
+        self.told: list[str] = []
+        self.pace = Pace(self.live, self.cell, self.told.append, has_clients=has_clients)
+        self._handlers = {**WorldControl(self.cell, self.live).handlers(), **self.pace.handlers()}
+        self.pace.begin(speed)
+
+    def do(self, what: str, **request: object) -> Any:
+        return self._handlers[what](request)
+
+    def close(self) -> World:
+        self.cell.enter()
+        self.cell.close()
+        self.pace.close()
+        return self.world
+
+
+def feeder() -> World:
+    return World.load(EXAMPLES / "feeder.toml")
+
+
+def the_same_again(world: World) -> bool:
+    session = session_of(world)
+    again = session.replay()
+    return again.trace.digest() == session.digest and list(again.trace) == list(world.trace)
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    deeds=st.lists(
+        st.one_of(
+            st.tuples(st.just("wall"), st.integers(1, 900)),
+            st.tuples(st.just("pause"), st.none()),
+            st.tuples(st.just("resume"), st.sampled_from([None, "0.1", "1", "50"])),
+            st.tuples(st.just("step"), st.sampled_from([0, 1, MILLISECOND, 2 * SECOND, None])),
+            st.tuples(st.just("until"), st.sampled_from(["x.position < 110", "table.M1.moving", "drum.counter > 100"])),
+            st.tuples(st.just("client"), st.sampled_from(["bus", "chips"])),
+            st.tuples(st.just("pin"), st.sampled_from(["table.IN8", "table.IN9", "START"])),
+        ),
+        max_size=16,
+    )
+)
+def test_whatever_is_done_to_the_pace_a_session_replays(run: Run, deeds: list[tuple[str, Any]]) -> None:
+    async def scene() -> World:
+        rig = Rig(feeder())
+        ports = {"bus": PlacePort(rig.live, "bus", "tcp-1", "rtu"), "chips": PlacePort(rig.live, "chips", "raw-1", "raw")}
+        for number, (what, how) in enumerate(deeds):
+            before = rig.live.now
+            if what == "wall":
+                await asyncio.sleep(how / 1000)
+            elif what == "step":
+                while "to_ns" in (answer := rig.do("step", **({} if how is None else {"for_ns": how}))):
+                    pass
+                assert how is None or answer["time_ns"] - before >= how
+            elif what == "until":
+                rig.do("step", until=how, for_ns=3 * SECOND)
+            elif what == "client":
+                ports[how].exchange({"bus": READ_POSITION, "chips": b"x3\rf640\rr\r"}[how], rig.cell.enter())
+                rig.cell.leave()
+            elif what == "pin":
+                rig.do("pin", set={how: number % 2})
+            else:
+                rig.do(what, **({} if how is None else {"speed": how}))
+        return rig.close()
+
+    assert the_same_again(run(scene()))
+
+
+def test_a_world_stands_while_it_is_paused_and_goes_on_from_there(run: Run) -> None:
+    async def scene() -> None:
+        rig = Rig(feeder(), 2.0)
+        await asyncio.sleep(1.5)
+        assert rig.do("pause") == {"world": "bar feeder", "time_ns": 3 * SECOND, "time_s": 3.0, "paused": True, "speed": 2.0}
+        await asyncio.sleep(100)
+        assert rig.do("pause")["time_ns"] == 3 * SECOND
+        assert rig.do("state", unit="table")["time_s"] == 3.0
+        assert rig.do("resume")["paused"] is False
+        await asyncio.sleep(1)
+        assert rig.do("resume", speed="10") == {**rig.do("resume"), "time_s": 5.0, "speed": 10.0}
+        await asyncio.sleep(1)
+        assert rig.do("pause")["time_s"] == 15.0
+        assert rig.lags == []
+        assert [line.split(maxsplit=3)[3] for line in rig.told] == [
+            "time goes on, 2 virtual seconds a second",
+            "time stands",
+            "time goes on, 2 virtual seconds a second",
+            "time goes on, 10 virtual seconds a second",
+            "time stands",
+        ]
+        assert the_same_again(rig.close())
+
+    run(scene())
+
+
+def test_what_was_planned_before_a_pause_comes_after_it(run: Run) -> None:
+    async def scene() -> None:
+        rig = Rig(World.from_toml(CLOCKLESS))
+        ticks: list[tuple[float, Nanos]] = []
+        loop = asyncio.get_running_loop()
+        rig.world.trace.watchers.append(lambda record: ticks.append((round(loop.time(), 6), record.time)))
+        await asyncio.sleep(0.5)
+        rig.do("pause")
+        await asyncio.sleep(5)
+        rig.do("resume", speed="0.5")
+        await asyncio.sleep(3.5)
+        rig.close()
+        assert ticks == [(6.5, SECOND), (8.5, 2 * SECOND)]
+        assert rig.lags == []
+
+    run(scene())
+
+
+def test_steps_end_at_a_time_a_condition_or_what_happens_next(run: Run) -> None:
+    async def scene() -> None:
+        rig = Rig(feeder(), 0.0)
+        assert rig.do("step", for_ns=250)["time_ns"] == 250
+        crossing = World.load(EXAMPLES / "feeder.toml")
+        crossing.run(until="x.position < 100")
+        answer = rig.do("step", until="x.position < 100")
+        assert (answer["time_ns"], answer["came"]) == (crossing.now, True)
+        assert rig.do("step", until="x.position < 100")["time_ns"] == crossing.now
+        vain = rig.do("step", until="x.position > 300", for_ns=MILLISECOND)
+        assert (vain["time_ns"], vain["came"]) == (crossing.now + MILLISECOND, False)
+        rig.do("step", until="drum.moving")
+        happened = rig.do("step", for_ns=SECOND)["happened"]
+        assert [line.split(maxsplit=3)[2:] for line in happened] == [["table", "start: released"], ["drum", "stands at 12800"]]
+        twin = rig.world.branch()
+        answer = rig.do("step")
+        assert answer["time_ns"] == twin.step()
+        assert [line.split(maxsplit=3)[2:] for line in answer["happened"]] == [["table", "AIN1: 4.382"]]
+        await asyncio.sleep(10)
+        assert rig.do("pause")["time_ns"] == twin.now
+        assert rig.lags == []
+        assert the_same_again(rig.close())
+
+    run(scene())
+
+
+def test_a_long_step_is_taken_in_parts(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pacing, "PART_S", 0.0)
+
+    async def scene() -> None:
+        rig = Rig(feeder(), 0.0)
+        answer = rig.do("step", for_ns=20 * SECOND)
+        parts = 1
+        while "to_ns" in answer:
+            assert answer["time_ns"] < answer["to_ns"] == 20 * SECOND
+            answer = rig.do("step", to_ns=answer["to_ns"])
+            parts += 1
+        assert parts > 10
+        assert answer["time_ns"] == 20 * SECOND
+        whole = feeder()
+        whole.run(for_=20)
+        assert session_of(rig.close()).digest == session_of(whole).digest
+
+    run(scene())
+
+
+def test_where_nothing_happens_any_more_a_step_says_so(run: Run) -> None:
+    async def scene() -> None:
+        rig = Rig(World.from_toml('[[mic488]]\nname = "a"\n'), 0.0)
+        assert [rig.do("step")["idle"] for _ in range(2)] == [True, True]
+        assert rig.do("step", for_ns=5)["idle"] is False
+        rig.close()
+
+    run(scene())
+
+
+def test_a_script_that_stops_the_run_ends_a_step_and_the_command(run: Run) -> None:
+    async def scene() -> None:
+        world = World.from_toml('[[mic488]]\nname = "a"\n[[event]]\nat = 1\nsteps = [{ stop = "enough" }]\n')
+        rig = Rig(world, 0.0)
+        ended: list[Nanos] = []
+        rig.live.on_stop = lambda: ended.append(world.now)
+        answer = rig.do("step", for_ns=5 * SECOND)
+        assert (answer["time_s"], answer["stopped"]) == (1.0, "enough")
+        assert set(ended) == {SECOND}
+        rig.close()
+
+    run(scene())
+
+
+class Client:
+    def __init__(self) -> None:
+        self.heard = b""
+
+    def write(self, data: bytes) -> None:
+        self.heard += data
+
+
+ANSWER = with_crc(bytes.fromhex("01 03 04 00 00 43 16"))
+
+
+@pytest.mark.parametrize("timing", ["real", "off"])
+@pytest.mark.parametrize("kind", ["tcp", "rtu"])
+def test_a_standing_world_answers_what_takes_no_time(run: Run, timing: str, kind: str) -> None:
+    """With real timing a request is on its way until time goes on."""
+    world = World.from_toml((EXAMPLES / "feeder.toml").read_text().replace('timing = "real"', f'timing = "{timing}"'))
+    request, answer = READ_POSITION, ANSWER
+    if kind == "tcp":
+        request, answer = bytes.fromhex("00 07 00 00 00 06") + request[:-2], bytes.fromhex("00 07 00 00 00 07") + answer[:-2]
+
+    async def scene() -> None:
+        rig = Rig(world, 0.0)
+        assert "to_ns" not in rig.do("step", for_ns=20 * SECOND)
+        client = Client()
+        feed = Feed(rig.cell, PlacePort(rig.live, "bus", f"{kind}-1", kind), client)
+        feed.take(request)
+        await asyncio.sleep(100)
+        assert client.heard == (b"" if timing == "real" else answer)
+        rig.do("step", for_ns=20 * MILLISECOND)
+        await asyncio.sleep(0)
+        assert client.heard == answer
+        feed.close()
+        assert the_same_again(rig.close())
+
+    run(scene())
+
+
+def test_what_a_hand_does_to_a_standing_world_leads_to_something_at_that_moment(run: Run, tmp_path: Path) -> None:
+    async def scene() -> None:
+        rig = Rig(World.from_toml(CLOCKLESS), 0.0)
+        rig.do("step", for_ns=SECOND)
+        rig.do("pin", set={"a.IN1": 1})
+        assert rig.do("pin")["a.IN2"] == 1.0
+        answer = rig.do("save", file=str(tmp_path / "s.json"))
+        assert (answer["time_ns"], answer["inputs"]) == (SECOND, 1)
+        session = load(tmp_path / "s.json")
+        assert session.replay().trace.digest() == answer["digest"] == session.digest
+        rig.do("pin", set={"a.IN3": 1})
+        rig.do("step", for_ns=5 * SECOND)
+        assert rig.do("pause")["time_ns"] == 6 * SECOND
+        assert rig.lags == []
+        assert the_same_again(rig.close())
+
+    run(scene())
+
+
+def test_without_a_clock_a_world_can_be_paused_and_slowed_down_too(run: Run) -> None:
+    async def scene() -> None:
+        rig = Rig(World.from_toml(CLOCKLESS), has_clients=False)
+        await asyncio.sleep(0.5)
+        assert rig.do("resume", speed="max")["speed"] == "max"
+        for _ in range(12):
+            await asyncio.sleep(0)
+        assert rig.live.now >= 100 * SECOND
+        stood = rig.do("pause")["time_ns"]
+        await asyncio.sleep(1)
+        assert rig.do("resume", speed="1")["time_ns"] == stood
+        await asyncio.sleep(1)
+        assert rig.do("pause")["time_ns"] == stood + SECOND
+        assert the_same_again(rig.close())
+
+    run(scene())
+
+
+@pytest.mark.parametrize(
+    ("what", "request_", "message"),
+    [
+        ("resume", {"speed": "max"}, "has lines with clients outside, which need a clock"),
+        ("resume", {"speed": "0"}, "--speed 0: permitted are 0.001 to 1000, and 'max'"),
+        ("resume", {"speed": "nan"}, "--speed nan: permitted"),
+        ("step", {"for_ns": -1}, "for_ns = -1: permitted are whole nanoseconds from 0 to"),
+        ("step", {"until": "nothing > 3"}, "nothing is called 'nothing'"),
+        ("save", {}, "file = None: must be the absolute path of a file"),
+        ("save", {"file": "s.json"}, "file = 's.json': must be the absolute path"),
+        ("save", {"file": "/tmp/no session"}, "a session is called NAME.json"),
+        ("save", {"file": "/nowhere/at/all/s.json"}, "cannot write /nowhere/at/all/s.json: there is no folder /nowhere/at/all"),
+    ],
+)
+def test_what_cannot_be_done_is_told_and_changes_nothing(run: Run, what: str, request_: dict[str, Any], message: str) -> None:
+    async def scene() -> None:
+        rig = Rig(feeder())
+        with pytest.raises(Misuse, match=message):
+            rig.do(what, **request_)
+        assert (rig.pace.speed, rig.cell.clock.speed) == (1.0, 1.0)
+        await asyncio.sleep(1)
+        rig.do("resume")
+        assert rig.close().now == SECOND
+
+    run(scene())
+
+
+def test_a_session_goes_on_live_without_those_who_were_there(run: Run, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    description = (
+        CLOCKLESS.replace('name = "a"', 'name = "a"\nline = "bus"', 1)
+        + '[[line]]\nname = "bus"\nkind = "modbus"\n[[event]]\nat = 5\nsteps = [{ stop = "enough" }]\n'
+    )
+
+    async def scene() -> None:
+        rig = Rig(World.from_toml(description), 0.0)
+        rig.do("step", for_ns=2 * SECOND)
+        PlacePort(rig.live, "bus", "tcp-1", "tcp").exchange(b"\0", rig.cell.enter())
+        rig.do("save", file=str(tmp_path / "s.json"))
+        rig.close()
+
+    run(scene())
+    options = UpOptions(world=tmp_path / "s.json", speed="max", session=tmp_path / "end.json")
+    assert up(options)
+    assert "5.000 s, 2 inputs, ended by: enough" in capfd.readouterr().out
+    session = load(tmp_path / "end.json")
+    assert [type(given.what).__name__ for given in session.inputs] == ["Bytes", "Leave"]
+    assert session.replay().trace.digest() == session.digest
+    assert up(UpOptions(world=tmp_path / "s.json", moment=SECOND, speed="max", session=tmp_path / "end.json"))
+    assert load(tmp_path / "end.json").inputs == ()
+
+
+def test_what_a_script_stopped_goes_on_from_its_session(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    world, first, second = tmp_path / "w.toml", tmp_path / "1.json", tmp_path / "2.json"
+    steps = '[{ wait = "1 s" }, { stop = "here" }, { note = "on" }, { wait = "1 s" }, { stop = "there" }]'
+    world.write_text(f'[[mic488]]\nname = "a"\n[[script]]\nname = "s"\nsteps = {steps}\n')
+    assert up(UpOptions(world=world, seed=5, speed="1000", session=first))
+    assert "1.000 s, 0 inputs, ended by: here" in capfd.readouterr().out
+    assert up(UpOptions(world=first, speed="1000", session=second))
+    told = capfd.readouterr().out
+    assert "note: on" in told
+    assert "2.000 s, 0 inputs, ended by: there" in told
+    session = load(second)
+    assert session.seed == 5
+    assert session.replay().trace.digest() == session.digest
