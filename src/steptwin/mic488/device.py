@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import MILLISECOND, Edge, Nanos
 from steptwin.mic488.axis import Axis
+from steptwin.mic488.behaviour import MOTIONS
 from steptwin.mic488.config import ANALOG_INPUTS, ControllerConfig
 from steptwin.mic488.encoder import Coupling, Motion
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
@@ -193,7 +194,7 @@ class Mic488(Stateful):
         """MIC-27; axes, inputs and outputs are in that state already."""
         self.data_type = 0
         self.trigger_mode = 0
-        self.triggered = {"VEL_ABS": 0, "VEL_REL": 0, "POS_ABS": 0, "POS_REL": 0}
+        self.triggered = dict.fromkeys(MOTIONS, 0)
         self.jog_speed_u = self.config.axes[0].vel
         self.user = array("H", bytes(2 * self.firmware.user_registers))
         self.written: dict[tuple[str, int | None], float] = {}

@@ -8,20 +8,16 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
-from steptwin.machine import Nanos
-from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, saturated_dint, saturated_real, swap_bytes, wrapped_dint
+from steptwin.mic488.behaviour import BEHAVIOUR, Getter
+from steptwin.mic488.encoding import saturated_dint, saturated_real, swap_bytes
 from steptwin.mic488.registermap import FUNCTION_SPACES, LAST_ADDRESS, DataType, Piece, Register, RegisterMap, Space, Type
 from steptwin.mic488.registers import AXES
 from steptwin.wire.pdu import ILLEGAL_DATA_ADDRESS, ModbusException, Read, pack_bits
 
 if TYPE_CHECKING:
-    from steptwin.mic488.axis import Axis
     from steptwin.mic488.device import Mic488
-
-Getter: TypeAlias = "Callable[[Any, Nanos], float]"
-"""Of the controller or of an axis, and a moment: the number that travels."""
 
 
 class Source(NamedTuple):
@@ -66,10 +62,8 @@ def _off(device: Mic488) -> bool:
 
 def _bit(register: Register) -> Callable[[Mic488], bool]:
     key, number = (register.key, register.index), (register.index or 1) - 1
-    if register.key == "OUT":
-        return lambda device: device.outputs[number]
-    if register.key == "IN":
-        return lambda device: device.inputs.filtered[number]
+    if register.reads:
+        return BEHAVIOUR[register.key].read(number)
     return lambda device: bool(device.written.get(key))
 
 
@@ -136,11 +130,11 @@ def _user_word(address: int) -> Getter:
 def _source(register: Register, data_type: DataType) -> Source:
     if 3 not in register.reads:
         return Source(DEVICE, _last_written(register, data_type))
+    behaviour = BEHAVIOUR[register.key]
     if register.axis is None:
-        return Source(DEVICE, _OF_DEVICE[register.key])
-    if register.type is not Type.VALUE:
-        return Source(register.axis - 1, _OF_AXIS[register.key])
-    return Source(register.axis - 1, (_IN_UNITS if data_type is DataType.REAL else _IN_PULSES)[register.key])
+        return Source(DEVICE, behaviour.read)
+    in_pulses = register.type is Type.VALUE and data_type is DataType.DINT
+    return Source(register.axis - 1, behaviour.read_p if in_pulses else behaviour.read)
 
 
 def _last_written(register: Register, data_type: DataType) -> Getter:
@@ -151,55 +145,3 @@ def _last_written(register: Register, data_type: DataType) -> Getter:
     if data_type is DataType.DINT:
         return lambda device, now: round(device.written.get(key, 0))
     return lambda device, now: device.written.get(key, 0) / device.axes[number].gear
-
-
-_OF_DEVICE: dict[str, Getter] = {
-    "DATA_TYPE": lambda device, now: device.data_type,
-    "PROG_BANK_SEL": lambda device, now: device.program.program_bank,
-    "POS_BANK_SEL": lambda device, now: device.program.position_bank,
-    "PROGRAM_CTRL": lambda device, now: device.program.state,
-    "AXIS_CTR_MODE": lambda device, now: device.trigger_mode,
-    "AXIS_VEL_ABS_TRIG": lambda device, now: device.triggered["VEL_ABS"],
-    "AXIS_VEL_REL_TRIG": lambda device, now: device.triggered["VEL_REL"],
-    "AXIS_POS_ABS_TRIG": lambda device, now: device.triggered["POS_ABS"],
-    "AXIS_POS_REL_TRIG": lambda device, now: device.triggered["POS_REL"],
-    "M_ALL_STATUS": lambda device, now: 0,
-    "M_STATUS": lambda device, now: device.status(),
-}
-
-_OF_AXIS: dict[str, Getter] = {
-    "STATUS": lambda axis, now: axis.status,
-    "ENC_IMP": lambda axis, now: axis.encoder_counts(now),
-}
-
-
-def _position_u(axis: Axis, now: Nanos) -> float:
-    # What masters poll most: `Axis.coordinate_p` written out.
-    coordinate = axis.profile.count(now) + axis.offset_p
-    if not DINT_MIN <= coordinate <= DINT_MAX:
-        coordinate = wrapped_dint(coordinate)
-    return coordinate / axis.gear
-
-
-# MIC-17: stored in pulses, shown according to DATA_TYPE.
-_IN_UNITS: dict[str, Getter] = {
-    "POS_ACT": _position_u,
-    "VEL_ACT": lambda axis, now: axis.profile.velocity(now) / axis.gear,
-    "ACC": lambda axis, now: axis.acc_p / axis.gear,
-    "DEC": lambda axis, now: axis.dec_p / axis.gear,
-    "VMAX": lambda axis, now: axis.vmax_p / axis.gear,
-    "ENC_XPOS": lambda axis, now: axis.encoder.pulses(axis.encoder_counts(now)) / axis.gear,
-    "POSLIM_L": lambda axis, now: axis.limit_l_p / axis.gear,
-    "POSLIM_R": lambda axis, now: axis.limit_r_p / axis.gear,
-}
-_IN_PULSES: dict[str, Getter] = {
-    "POS_ACT": lambda axis, now: axis.coordinate_p(now),
-    "VEL_ACT": lambda axis, now: round(axis.profile.velocity(now)),
-    # MIC-42: what is read can be written back, and 0 may not be written (MIC-7).
-    "ACC": lambda axis, now: max(1, round(axis.acc_p)),
-    "DEC": lambda axis, now: max(1, round(axis.dec_p)),
-    "VMAX": lambda axis, now: max(1, round(axis.vmax_p)),
-    "ENC_XPOS": lambda axis, now: round(axis.encoder.pulses(axis.encoder_counts(now))),
-    "POSLIM_L": lambda axis, now: axis.limit_l_p,
-    "POSLIM_R": lambda axis, now: axis.limit_r_p,
-}

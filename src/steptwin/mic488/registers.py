@@ -1,7 +1,8 @@
 """The register table of the MIC488: coils, inputs and holding registers of firmware 1.23, 1.40 and 1.70.
 
 Source: tables 3.1 and 3.2 of the register manuals 1.23 and 1.70. Everything that talks about registers — decoding, drivers,
-panels, reference pages — is a projection of `ROWS`; adding a register is adding a row.
+panels, reference pages — is a projection of `ROWS`. A new register is a new row here and its entry in
+`steptwin.mic488.behaviour`.
 Control registers are given relative to the firmware's control base, everything else by its absolute address.
 """
 

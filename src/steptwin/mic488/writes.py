@@ -7,12 +7,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from steptwin.machine import Nanos
+from steptwin.mic488.behaviour import BEHAVIOUR, Action, AxisAction
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, swap_bytes
 from steptwin.mic488.registermap import DataType, Kind, Register, RegisterMap, Space, Type
-from steptwin.mic488.registers import axes_of_mask
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.wire.pdu import (
-    DEVICE_FAILURE,
     ILLEGAL_DATA_ADDRESS,
     ILLEGAL_DATA_VALUE,
     WRITE_MULTIPLE_REGISTERS,
@@ -25,15 +24,10 @@ from steptwin.wire.pdu import (
 )
 
 if TYPE_CHECKING:
-    from steptwin.mic488.axis import Axis
     from steptwin.mic488.device import Mic488
 
 Check: TypeAlias = "Callable[[Mic488, float], float | None]"
 """The value as it travelled → what is stored (pulses for REAL/DINT registers), None when it may not be written."""
-Action: TypeAlias = "Callable[[Mic488, float, Nanos], None]"
-AxisAction: TypeAlias = "Callable[[Axis, float, Nanos], None]"
-CoilAction: TypeAlias = "Callable[[Mic488, int, bool, Nanos], None]"
-"""Takes the number of the axis or output, from 0."""
 
 
 # ---------------------------------------------------------------------- function 05
@@ -44,7 +38,7 @@ def compile_coil(registers: RegisterMap, request: WriteCoil, pdu: bytes, *, leni
     register = registers.find(Space.COIL, request.address)
     if register is None or WRITE_SINGLE_COIL not in register.accepts:
         raise ModbusException(WRITE_SINGLE_COIL, ILLEGAL_DATA_ADDRESS)
-    action, number, on = _COILS[register.key], (register.index or 1) - 1, request.on
+    action, number, on = BEHAVIOUR[register.key].write, (register.index or 1) - 1, request.on
     key = (register.key, register.index)
     is_output = register.key == "OUT"
 
@@ -137,7 +131,7 @@ class _ControlPlan:
         self._layout = struct.Struct("<" + layout)
         self._steps = [(register, _check(register, data_type), _action(register)) for register in chosen]
         self._lenient = lenient
-        self._quiet = all(register.key in _QUIET for register in chosen)
+        self._quiet = all(BEHAVIOUR[register.key].quiet for register in chosen)
         self.head = _head(function)
         self.length = self.head + self._layout.size
 
@@ -202,195 +196,23 @@ def _rate_p(pulses: float) -> float | None:
     return float(pulses) if LEAST <= pulses <= MOST else None
 
 
-def axes_chosen(device: Mic488, mask: float) -> list[Axis]:
-    """The axes of a mask register (MIC-25)."""
-    return [device.axes[number - 1] for number in axes_of_mask(int(mask))]
-
-
-# ---------------------------------------------------------------------- what coils do
-
-
-def _enable(device: Mic488, number: int, on: bool, now: Nanos) -> None:
-    axis = device.axes[number]
-    if on:
-        axis.enable(now)
-    else:
-        axis.disable(now)
-
-
-def _stop(device: Mic488, number: int, on: bool, now: Nanos) -> None:
-    if on:
-        device.axes[number].stop(now)
-
-
-def _jog(direction: int) -> CoilAction:
-    def jog(device: Mic488, number: int, on: bool, now: Nanos) -> None:
-        axis = device.axes[number]
-        axis.jog(direction, on, device.jog_speed_u * axis.gear, now)
-
-    return jog
-
-
-def _load(device: Mic488, number: int, on: bool, now: Nanos) -> None:
-    if on:
-        device.load_memory()
-
-
-def _save(device: Mic488, number: int, on: bool, now: Nanos) -> None:
-    if on:
-        try:
-            device.save_memory()
-        except OSError as error:
-            device.event("memory-failure", str(error))
-            raise ModbusException(WRITE_SINGLE_COIL, DEVICE_FAILURE) from error
-
-
-def _zero(device: Mic488, number: int, on: bool, now: Nanos) -> None:
-    if on:
-        device.zero_memory()
-
-
-_COILS: dict[str, CoilAction] = {
-    "EN": _enable,
-    "STOP": _stop,
-    "JOG_PLUS": _jog(+1),
-    "JOG_MINUS": _jog(-1),
-    "USER_REG_READ": _load,
-    "USER_REG_SAVE": _save,
-    "USER_REG_ZERO": _zero,
-    "OUT": lambda device, number, on, now: device.set_output(number, on),
-}
-
-
-# ---------------------------------------------------------------------- what registers of the controller do
-
-_QUIET = frozenset({"DATA_TYPE", "PROG_BANK_SEL", "POS_BANK_SEL", "AXIS_CTR_MODE", "JOG_SPEED", "ACC", "DEC", "VMAX"})
-"""Registers that only keep a value: nothing happens earlier or later for it."""
-
-
-def _data_type(device: Mic488, value: float, now: Nanos) -> None:
-    """MIC-17: only the representation changes."""
-    device.data_type = int(value)
-
-
-def _program_bank(device: Mic488, value: float, now: Nanos) -> None:
-    device.program.program_bank = int(value)
-
-
-def _position_bank(device: Mic488, value: float, now: Nanos) -> None:
-    device.program.position_bank = int(value)
-
-
-def _mode(device: Mic488, value: float, now: Nanos) -> None:
-    device.trigger_mode = int(value)
-
-
-def _jog_speed(device: Mic488, value: float, now: Nanos) -> None:
-    device.jog_speed_u = float(value)
-
-
-def _trigger(kind: str) -> Action:
-    def trigger(device: Mic488, value: float, now: Nanos) -> None:
-        """MIC-16: starts the chosen axes that have a stored value, and uses it up, unless values are kept."""
-        device.triggered[kind] = int(value)
-        if not device.trigger_mode:
-            return
-        for axis in axes_chosen(device, value):
-            stored = axis.pending.get(kind) if device.config.trigger_keeps else axis.pending.pop(kind, None)
-            if stored is None:
-                device.axis_event(axis.number, "trigger-empty", f"trigger of M{axis.number} without a new value of {kind}")
-            else:
-                _MOTIONS[kind](axis, stored, now)
-
-    return trigger
-
-
-def _drives(action: Callable[[Axis, Nanos], None]) -> Action:
-    def act(device: Mic488, value: float, now: Nanos) -> None:
-        for axis in axes_chosen(device, value):
-            action(axis, now)
-
-    return act
-
-
-_DEVICE_ACTIONS: dict[str, Action] = {
-    "DATA_TYPE": _data_type,
-    "PROG_BANK_SEL": _program_bank,
-    "POS_BANK_SEL": _position_bank,
-    "PROGRAM_CTRL": lambda device, value, now: device.program.command(int(value), now),
-    "AXIS_CTR_MODE": _mode,
-    "AXIS_VEL_ABS_TRIG": _trigger("VEL_ABS"),
-    "AXIS_VEL_REL_TRIG": _trigger("VEL_REL"),
-    "AXIS_POS_ABS_TRIG": _trigger("POS_ABS"),
-    "AXIS_POS_REL_TRIG": _trigger("POS_REL"),
-    "M_ENABLE": _drives(lambda axis, now: axis.enable(now)),
-    "M_DISABLE": _drives(lambda axis, now: axis.disable(now)),
-    "M_STOP": _drives(lambda axis, now: axis.stop(now)),
-    "JOG_SPEED": _jog_speed,
-}
-
-
-# ---------------------------------------------------------------------- what registers of an axis do, in pulses
-
-_MOTIONS: dict[str, AxisAction] = {
-    "VEL_ABS": lambda axis, value, now: axis.move_velocity(value, now),
-    "VEL_REL": lambda axis, value, now: axis.change_velocity(value, now),
-    "POS_ABS": lambda axis, value, now: axis.move_to(int(value), now),
-    "POS_REL": lambda axis, value, now: axis.move_by(int(value), now),
-}
-
-
-def _acc(axis: Axis, value: float, now: Nanos) -> None:
-    axis.acc_p = value
-
-
-def _dec(axis: Axis, value: float, now: Nanos) -> None:
-    axis.dec_p = value
-
-
-def _vmax(axis: Axis, value: float, now: Nanos) -> None:
-    axis.vmax_p = value
-
-
-def _encoder(axis: Axis, value: float, now: Nanos) -> None:
-    axis.encoder.set_counter(int(value), axis.shaft(now))
-
-
-def _encoder_position(axis: Axis, value: float, now: Nanos) -> None:
-    _encoder(axis, round(axis.encoder.counts(value)), now)
-
-
-_AXIS_ACTIONS: dict[str, AxisAction] = {
-    "POS_ACT": lambda axis, value, now: axis.set_coordinate(int(value), now),
-    "ACC": _acc,
-    "DEC": _dec,
-    "VMAX": _vmax,
-    "HOME": lambda axis, value, now: axis.home(value, now),
-    "ENC_IMP": _encoder,
-    "ENC_XPOS": _encoder_position,
-    "POSLIM_L": lambda axis, value, now: axis.set_limits(now, left_p=int(value)),
-    "POSLIM_R": lambda axis, value, now: axis.set_limits(now, right_p=int(value)),
-}
-
-
 def _action(register: Register) -> Action:
+    behaviour = BEHAVIOUR[register.key]
+    act = behaviour.write
     if register.axis is None:
-        return _DEVICE_ACTIONS[register.key]
+        return act
     number = register.axis - 1
-    if register.key in _MOTIONS:
-        return _motion(register.key, number)
-    act = _AXIS_ACTIONS[register.key]
+    if behaviour.waits:
+        return _motion(act, register.key, number)
     return lambda device, value, now: act(device.axes[number], value, now)
 
 
-def _motion(kind: str, number: int) -> Action:
-    move = _MOTIONS[kind]
-
+def _motion(move: AxisAction, key: str, number: int) -> Action:
     def command(device: Mic488, value: float, now: Nanos) -> None:
         """DIRECT: at once. TRIGGER: kept for the trigger register (MIC-16)."""
         axis = device.axes[number]
         if device.trigger_mode:
-            axis.pending[kind] = value
+            axis.pending[key] = value
         else:
             move(axis, value, now)
 

@@ -1,0 +1,68 @@
+"""The register table and what its rows do are one set."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from steptwin.mic488.behaviour import BEHAVIOUR, Behaviour, Bit, OfAxis, OfDevice, checked
+from steptwin.mic488.registermap import Row, Type
+from steptwin.mic488.registers import ROWS
+from steptwin.tables import IncompleteTable
+
+_OF_KEY = {row.key: row for row in ROWS}
+
+
+def _row(of: str, **changes: Any) -> Row:
+    return replace(_OF_KEY[of], key="NEW", name="NEW{n}", **changes)
+
+
+def _read(*_: object) -> Any: ...
+
+
+def _write(*_: object) -> None: ...
+
+
+@pytest.mark.parametrize(
+    ("row", "behaviour", "message"),
+    [
+        (_row("ACC"), None, "register NEW lacks its behaviour"),
+        (None, OfDevice(_read), "behaviour of NEW: there is no such register"),
+        (_row("EN"), OfAxis(write=_write), "register NEW needs the behaviour Bit, not OfAxis"),
+        (_row("ACC"), OfDevice(_read, _write), "register NEW needs the behaviour OfAxis, not OfDevice"),
+        (_row("DATA_TYPE"), OfAxis(_read, write=_write), "register NEW needs the behaviour OfDevice, not OfAxis"),
+        (_row("IN"), Bit(), "register NEW (BIT, reads (2,), writes ()) lacks its read"),
+        (_row("OUT"), Bit(_read), "register NEW (BIT, reads (1,), writes (5,)) lacks its write"),
+        (_row("DATA_TYPE"), OfDevice(_read), "register NEW (WORD, reads (3,), writes (6,)) lacks its write"),
+        (_row("DATA_TYPE"), OfDevice(write=_write), "register NEW (WORD, reads (3,), writes (6,)) lacks its read"),
+        (_row("STATUS"), OfAxis(), "register NEW (WORD, reads (3,), writes ()) lacks its read"),
+        (_row("ACC"), OfAxis(_read, write=_write), "register NEW (REAL/DINT, reads (3,), writes (16,)) lacks its read_p"),
+        (_row("ACC"), OfAxis(_read, _read), "register NEW (REAL/DINT, reads (3,), writes (16,)) lacks its write"),
+        (
+            _row("STATUS"),
+            OfAxis(_read, write=_write),
+            "register NEW (WORD, reads (3,), writes ()) has a write that its row does not permit",
+        ),
+        (
+            _row("HOME"),
+            OfAxis(_read, write=_write),
+            "register NEW (REAL/DINT, reads (), writes (16,)) has a read that its row does not permit",
+        ),
+        (
+            _row("ENC_IMP"),
+            OfAxis(_read, _read, _write),
+            "register NEW (DINT, reads (3,), writes (16,)) has a read_p that its row does not permit",
+        ),
+    ],
+)
+def test_a_register_without_what_it_does_is_refused(row: Row | None, behaviour: Behaviour | None, message: str) -> None:
+    rows = ROWS if row is None else (*ROWS, row)
+    with pytest.raises(IncompleteTable) as caught:
+        checked(rows, BEHAVIOUR if behaviour is None else {**BEHAVIOUR, "NEW": behaviour})
+    assert str(caught.value) == message
+
+
+def test_memory_needs_no_behaviour() -> None:
+    assert checked([row for row in ROWS if row.type is Type.MEMORY], {}) == {}
