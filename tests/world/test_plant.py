@@ -1,0 +1,199 @@
+"""Worlds without files: machines that share nothing, stops and wires between them, snapshots."""
+
+from __future__ import annotations
+
+from textwrap import dedent
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from small_world import SMALL, moved, small
+
+from steptwin.errors import Misuse
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.world import script as do
+from steptwin.world.script import Steps
+
+
+def test_machines_that_share_nothing_are_advanced_when_somebody_looks() -> None:
+    world = small()
+    assert [list(kernel.machines) for kernel in world.kernels] == [["a", "b"], ["c"]]
+    world.at(3.0, do.Set((("a", "IN5", 1.0),)))
+    world.advance(5 * SECOND)
+    assert [kernel.now for kernel in world.kernels] == [3 * SECOND, 0]
+    assert world.mic488["c"].status == 0
+    assert [kernel.now for kernel in world.kernels] == [3 * SECOND, 5 * SECOND]
+
+
+def test_an_edge_of_an_input_is_told_once() -> None:
+    world = World.from_toml("""
+        [[m1486]]
+        name = "d"
+        [[mic488]]
+        name = "t"
+        [[wire]]
+        from = "t.OUT1"
+        to = "d.B2"
+    """)
+    world.run(for_=1)
+    begin = world.now
+    world.m1486["d"].set_pin("B1", 0)
+    world.m1486["d"].set_pin("BR0", 0)
+    world.mic488["t"].write("OUT1", 1)
+    world.run(for_=1)
+    world.mic488["t"].write("OUT1", 0)
+    world.m1486["d"].set_pin("B1", 1)
+    world.m1486["d"].set_pin("LIMIT", 0)
+    world.run(for_=1)
+    edges = [(edge.subject, edge.value, edge.time - begin) for edge in world.trace.edges("d") if edge.time >= begin]
+    assert sorted(edges) == [
+        ("B1", 0.0, 0), ("B1", 1.0, SECOND), ("B2", 0.0, SECOND), ("B2", 1.0, 0), ("B5", 0.0, 0), ("LIMIT", 0.0, SECOND)
+    ]  # fmt: skip
+
+
+def test_a_delayed_wire_and_a_button() -> None:
+    world = small()
+    world.mic488["a"].write("OUT1", 1)
+    world.run(for_="19 ms")
+    assert world.mic488["b"].pins["IN3"] == 0.0
+    world.run(for_="1 ms")
+    assert world.mic488["b"].pins["IN3"] == 1.0
+    world.press("go", "50 ms")
+    assert world.mic488["b"].pins["IN4"] == 1.0
+    world.run(for_="1 s")
+    assert world.mic488["b"].pins["IN4"] == 0.0
+
+
+def test_a_snapshot_of_another_world_is_refused() -> None:
+    snapshot = small().snapshot()
+    small().restore(snapshot)
+    other = small('[[axis.switch]]\nabove = 100.0\nto = "a.IN2"\n')
+    with pytest.raises(Misuse, match="the snapshot is of another world"):
+        other.restore(snapshot)
+    with pytest.raises(Misuse, match="the snapshot is of another world"):
+        World.from_toml("[[mic488]]\nname = 'a'\n").restore(World.from_toml("[[m1486]]\nname = 'a'\n").snapshot())
+
+
+def test_a_snapshot_is_gone_back_to_with_its_scripts() -> None:
+    world = small(
+        '[[script]]\nname = "s"\nsteps = [{ write = { "a.M1_EN" = 1 } }, { repeat = 9, steps = ['
+        '{ write = { "a.M1_POS_REL" = 7.0 } }, { until = "idle" }, { wait = "300 ms" }, { write = { "a.M1_POS_REL" = -6.0 } }, '
+        '{ until = "idle" }] }]\n'
+    )
+    world.run(for_=2.9)
+    snapshot = world.snapshot()
+    before = (world.trace.digest(), world.axis["x"].position)
+    world.run(for_=10)
+    after = (world.trace.digest(), world.axis["x"].position)
+    world.restore(snapshot)
+    assert (world.trace.digest(), world.axis["x"].position) == before
+    world.run(for_=10)
+    assert (world.trace.digest(), world.axis["x"].position) == after
+
+
+def test_python_operators_are_brought_back_by_what_they_were_sent() -> None:
+    def operator() -> Steps:
+        for target in (5.0, 15.0, 25.0):
+            position = yield do.Read("x.position")
+            yield do.Write((("a", "M1_EN", 1.0), ("a", "M1_POS_ABS", target + position / 100)))
+            yield do.Until("idle")
+
+    world = small()
+    world.script(operator)
+    world.run(for_=1.0)
+    snapshot = world.snapshot()
+    world.run(for_=20)
+    digest = world.trace.digest()
+    other = world.branch()
+    world.restore(snapshot)
+    world.run(for_=20)
+    assert world.trace.digest() == other.trace.digest() == digest
+
+
+MOVES = st.lists(
+    st.tuples(
+        st.sampled_from("abc"), st.sampled_from(["POS_ABS", "POS_REL", "VEL_ABS"]), st.integers(-80, 80), st.integers(0, 2000)
+    ),
+    max_size=8,
+)
+
+
+PARTS = st.lists(
+    st.sampled_from(
+        [
+            '[[wire]]\nfrom = "a.OUT2"\nto = "c.IN7"\ninverted = true\n',
+            '[[wire]]\nfrom = "c.M1_EN"\nto = "b.IN5"\ndelay = "3 ms"\n',
+            '[[axis]]\nname = "y"\ndrive = "b.M1"\nbacklash = 3.0\ntravel = [-50.0, 60.0]\npulses_per_unit = 1.0\n',
+            (
+                '[[axis]]\nname = "z"\ndrive = "c.M1"\npulses_per_unit = 1.0\ninverted = true\n'
+                '[[axis.switch]]\nposition = 10.0\nwidth = 5.0\nto = "c.IN2"\nbounce = "4 ms"\n'
+            ),
+            '[[source]]\nto = "b.AIN1"\nkind = "sine"\nvalue = 5.0\namplitude = 3.0\n',
+            '[[event]]\nwhen = "x.position > 60"\nsteps = [{ press = "go", for = "100 ms" }, { write = { "a.OUT1" = 1 } }]\n',
+            '[[event]]\nevery = "700 ms"\nsteps = [{ write = { "b.M1_EN" = 1, "b.M1_POS_REL" = 13.0 } }]\n',
+        ]
+    ),
+    unique=True,
+)
+
+
+def acted(world: World, moves: list) -> World:
+    for name, register, value, pause in moves:
+        world.mic488[name].write("M1_EN", 1)
+        world.mic488[name].write(f"M1_{register}", float(value))
+        world.run(for_=pause / 1000)
+    return world
+
+
+@settings(max_examples=15, deadline=None)
+@given(parts=PARTS, moves=MOVES, cuts=st.lists(st.integers(1, 3000), max_size=4))
+def test_random_worlds_do_the_same_again_in_pieces_and_from_a_snapshot(parts: list[str], moves: list, cuts: list[int]) -> None:
+    text = dedent(SMALL) + "".join(parts)
+    first = acted(World.from_toml(text), moves)
+    snapshot = first.snapshot()
+    first.run(for_=12)
+    second = acted(World.from_toml(text), moves)
+    for cut in cuts:
+        second.run(for_=cut / 1000)
+        second.restore(second.snapshot())
+        second.settle_all()
+    second.run(until=first.time)
+    assert second.trace.digest() == first.trace.digest()
+    third = first.branch(snapshot)
+    third.run(for_=12)
+    assert third.trace.digest() == first.trace.digest()
+    assert list(third.trace) == list(first.trace)
+
+
+def test_a_step_that_goes_back_in_time_goes_on_from_there() -> None:
+    """What a script does after it has restored a snapshot is what the restored script does."""
+    world = small()
+    went_back: list[float] = []
+
+    def go_back() -> None:
+        if not went_back:
+            went_back.append(world.time)
+            world.restore(before)
+
+    def operator() -> Steps:
+        yield do.Wait(SECOND)
+        yield do.Call(go_back)
+        yield do.Note("after it")
+
+    world.script(operator)
+    world.run(until=0.5)
+    before = world.snapshot()
+    world.run(until=1)
+    assert went_back == [1.0]
+    world.run(until=3)
+    assert [(record.time, record.value) for record in world.trace.events("world")] == [(SECOND, "after it")]
+    assert world.scripts == []
+
+
+def test_a_move_into_a_stop_loses_what_the_stop_holds() -> None:
+    world = moved(small(), 60.0)
+    world.run(for_="10 s")
+    assert world.mic488["a"].axis[1].position == 60.0
+    assert (world.axis["x"].position, world.axis["x"].lost) == (101.0, 900)
+    assert world.mic488["a"].axis[1].encoder < 60 * 100 * 400 // 3200  # the default encoder sits on the motor

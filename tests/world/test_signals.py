@@ -1,0 +1,189 @@
+"""Signals of conditions and scripts: their values, when they change by themselves, and which names there are."""
+
+from __future__ import annotations
+
+import pytest
+from small_world import small
+
+from steptwin.errors import Misuse
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.world.signals import Idle, SignalOf, find_signal
+
+CHIP = """
+    [[m1486]]
+    name = "d"
+"""
+
+
+def moving() -> World:
+    """M1 of a: 25 mm with 100 mm/s² and 40 mm/s: ramps of 0.4 s and 8 mm, 9 mm between them in 0.225 s. x goes from 50 mm on."""
+    world = small(CHIP)
+    axis = world.mic488["a"].axis[1]
+    axis.enable()
+    axis.move_to(25.0)
+    return world
+
+
+def ramp(t: float) -> tuple[float, float]:
+    """Position and velocity of that move."""
+    if t < 0.4:
+        return 50.0 * t * t, 100.0 * t
+    if t < 0.625:
+        return 8.0 + 40.0 * (t - 0.4), 40.0
+    if t < 1.025:
+        return 25.0 - 50.0 * (1.025 - t) ** 2, 100.0 * (1.025 - t)
+    return 25.0, 0.0
+
+
+@pytest.mark.parametrize("t", [0.0, 0.2, 0.5, 0.9, 1.2])
+def test_signals_of_an_axis_go_as_its_profile(t: float) -> None:
+    world = moving()
+    world.run(for_=t)
+    position, velocity = ramp(t)
+    read = {q: world.read(f"a.M1.{q}") for q in ("position", "velocity", "encoder", "moving", "enabled", "status")}
+    assert read["position"] == pytest.approx(position, abs=0.011)
+    assert read["velocity"] == pytest.approx(velocity, abs=1e-6)
+    assert read["encoder"] == world.mic488["a"].axis[1].encoder
+    assert (read["moving"], read["enabled"]) == (float(t < 1.025), 1.0)
+    assert read["status"] == float(world.mic488["a"].axis[1].status)
+    assert world.read("x.position") == pytest.approx(50.0 + position, abs=0.011)
+    assert world.read("time") == t
+
+
+def test_turns_are_the_ends_of_segments_that_are_still_to_come() -> None:
+    world = moving()
+    world.run(for_=0.5)
+    for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "a.M1.encoder"):
+        signal = find_signal(world.plan, name)
+        assert signal.continuous, name
+        assert list(signal.turns(world.now)) == pytest.approx([0.625 * SECOND, 1.025 * SECOND], abs=2), name
+        assert list(signal.turns(0)) == pytest.approx([0.4 * SECOND, 0.625 * SECOND, 1.025 * SECOND], abs=2), name
+        (first, *_) = signal.turns(world.now)
+        assert first not in signal.turns(first), "a turn at the moment itself is not to come"
+    for name in ("x.position", "x.lost", "x.stalled"):
+        turns = list(find_signal(world.plan, name).turns(world.now))
+        assert turns == sorted(set(turns)), name
+        assert turns[:1] == pytest.approx([0.625 * SECOND], abs=2), name
+    for name in ("a.M1.status", "a.M1.enabled", "a.status", "a.program", "a.IN1", "d.variable", "d.moving", "go.pressed"):
+        signal = find_signal(world.plan, name)
+        assert (signal.continuous, list(signal.turns(0)), signal.version()) == (False, [], None), name
+    time = find_signal(world.plan, "time")
+    assert (time.continuous, list(time.turns(0)), time.bring(0), time.version()) == (True, [], (), "time")
+
+
+def test_an_endless_motion_has_no_last_turn() -> None:
+    world = small()
+    world.mic488["a"].write("M1_EN", 1)
+    world.mic488["a"].write("M1_VEL_ABS", -40.0)
+    assert list(find_signal(world.plan, "a.M1.position").turns(0)) == pytest.approx([0.4 * SECOND], abs=2)
+
+
+def test_a_version_changes_with_the_plan_and_with_the_coordinate() -> None:
+    world = moving()
+    signals = {name: find_signal(world.plan, name) for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "x.position")}
+    before = {name: signal.version() for name, signal in signals.items()}
+    world.run(for_=0.1)
+    assert {name: signal.version() for name, signal in signals.items()} == before
+    world.mic488["a"].axis[1].move_to(3.0)
+    world.run(for_=0)
+    after = {name: signal.version() for name, signal in signals.items()}
+    assert all(after[name] != before[name] for name in signals), after
+    world.run(until="idle")
+    still = signals["a.M1.position"].version()
+    world.mic488["a"].write("M1_POS_ACT", 7.0)
+    assert signals["a.M1.position"].version() != still
+
+
+def test_a_chip_has_signals_of_its_own() -> None:
+    """12800 minimum microsteps forward; the coordinate counter and the user variable go with them."""
+    world = World.from_toml('[[line]]\nname = "bus"\nkind = "m1486"\n[[m1486]]\nname = "d"\nline = "bus"\naddress = 3\n')
+    chip = world.m1486["d"].chip
+    names = ("position", "velocity", "counter", "moving", "variable")
+    start = {name: world.read(f"d.{name}") for name in names}
+    assert start == {"position": 0.0, "velocity": 0.0, "counter": 0.0, "moving": 0.0, "variable": float(chip.unit.variable)}
+    idle = world.read("idle")
+    world.line["bus"].send(b"x3\rf12800\rr\r")
+    signals = {name: find_signal(world.plan, f"d.{name}") for name in names}
+    versions = {name: signals[name].version() for name in ("position", "velocity")}
+    world.run(for_=0.05)
+    now = world.now
+    assert (idle, world.read("idle"), world.read("d.moving")) == (1.0, 0.0, 1.0)
+    assert world.read("d.velocity") == chip.drive.profile.velocity(now) > 0.0
+    assert 0.0 < world.read("d.position") < 12800.0
+    turns = [chip.drive.profile.start + int(end) for end in chip.drive.profile.ends]
+    for name in ("position", "velocity", "counter"):
+        assert signals[name].continuous, name
+        assert list(signals[name].turns(0)) == turns, name
+        assert list(signals[name].turns(turns[-1] - 1)) == turns[-1:], name
+    for name, version in versions.items():
+        assert signals[name].version() == chip.drive.revision != version, name
+    world.run(until="idle")
+    assert (world.read("d.position"), world.read("d.counter"), world.read("d.moving")) == (12800.0, 12800.0, 0.0)
+    assert (world.read("d.b1"), world.read("d.B1")) == (1.0, 1.0)
+
+
+def test_controllers_have_status_program_and_pins() -> None:
+    world = small()
+    assert (world.read("a.status"), world.read("a.program"), world.read("a.IN1")) == (0.0, 0.0, 0.0)
+    world.mic488["a"].write("OUT1", 1)
+    assert (world.read("a.OUT1"), world.read("a.out1")) == (1.0, 1.0)
+    world.press("go")
+    assert (world.read("go.pressed"), world.read("b.in4")) == (1.0, 1.0)
+    world.release("go")
+    assert world.read("go.pressed") == 0.0
+
+
+def test_to_bring_a_signal_is_to_bring_its_kernel() -> None:
+    world = small()
+    signal = find_signal(world.plan, "c.status")
+    assert isinstance(signal, SignalOf)
+    assert signal.bring(SECOND) == (world.plan.kernel_of["c"],)
+    assert [kernel.now for kernel in world.kernels] == [0, SECOND]
+
+
+def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
+    world = moving()
+    idle = find_signal(world.plan, "idle")
+    assert isinstance(idle, Idle)
+    assert (idle.continuous, list(idle.turns(0)), idle.version()) == (False, [], None)
+    assert idle.bring(world.now) == (world.plan.kernel_of["a"],)
+    assert idle.value(world.now) == 0.0
+    assert [kernel.now for kernel in world.kernels] == [0, 0, 0]
+    world.run(for_=1.1)
+    assert idle.bring(world.now) == tuple(world.kernels)
+    assert idle.value(world.now) == 1.0
+    assert [kernel.now for kernel in world.kernels] == [world.now] * 3
+    world.mic488["c"].axis[1].enable()
+    world.mic488["c"].axis[1].move_to(100.0)
+    assert idle.bring(world.now) == (world.plan.kernel_of["c"],)
+    assert world.read("idle") == 0.0
+
+
+def test_a_program_and_a_line_keep_a_world_busy() -> None:
+    line = World.from_toml('[[line]]\nname = "bus"\ntiming = "real"\n[[mic488]]\nname = "a"\nline = "bus"\n')
+    line.line["bus"].send(bytes.fromhex("01 03 27 24 00 02 8e b4"))
+    assert line.read("idle") == 0.0
+    line.run(for_=1)
+    assert line.read("idle") == 1.0
+    program = World.from_toml('[[mic488]]\nname = "a"\nprogram = "p"\nstart = true\n', {"p": b"L:\nDELAY 10\nJUMP L\n"})
+    assert (program.read("idle"), program.read("a.program")) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("a.M1.positon", r"no signal 'a\.M1\.positon' \(did you mean 'position'\?\); there are status, enabled, moving, position, velocity, encoder$"),  # noqa: E501
+        ("a.M1.xyz", r"no signal 'a\.M1\.xyz'; there are status, enabled, moving, position, velocity, encoder$"),
+        ("a.M5.position", r"no signal 'a\.M5\.position'; there are status, program, M1\.position and so on, and pins$"),
+        ("a.M1", r"no signal 'a\.M1'; there are status, program, M1\.position and so on, and pins$"),
+        ("d.status", r"no signal 'd\.status'; there are position, velocity, counter, moving, variable, and pins$"),
+        ("x.speed", r"no signal 'x\.speed'; there are position, lost, stalled$"),
+        ("go.pressd", r"no signal 'go\.pressd' \(did you mean 'pressed'\?\); there are pressed$"),
+        ("tim", r"no signal 'tim': nothing is called 'tim' \(did you mean 'time'\?\); there are a, b, c, d, x, go, time, idle$"),
+        ("qqqq.status", r"no signal 'qqqq\.status': nothing is called 'qqqq'; there are a, b, c, d, x, go, time, idle$"),
+    ],
+)  # fmt: skip
+def test_a_name_that_is_no_signal_is_refused_with_those_that_are(name: str, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        find_signal(small(CHIP).plan, name)
