@@ -42,6 +42,44 @@ def test_a_complete_table_is_read_only() -> None:
             "steptwin.mic488.device",
             "register NEW lacks its behaviour",
         ),
+        (
+            "import steptwin.wbc.statements as t; t.STATEMENTS['NEW'] = t.StatementRow('NEW', (), '')",
+            "steptwin.wbc.resolve",
+            "statement NEW lacks its step",
+        ),
+        (
+            "import steptwin.wbc.statements as t; del t.STATEMENTS['WAIT']",
+            "steptwin.wbc.resolve",
+            "step of WAIT: there is no such statement",
+        ),
+        ("import steptwin.wbc.steps as t; t.STEPS += (t.Step,)", "steptwin.wbc.compile", "step Step lacks its sources"),
+        (
+            "import steptwin.wbc.steps as t; t.STEPS = t.STEPS[1:]",
+            "steptwin.wbc.flow",
+            "successors of Set: there is no such step",
+        ),
+        (
+            "import steptwin.wbc.usage, steptwin.wbc.steps as t; t.STEPS += (t.Step,)",
+            "steptwin.wbc.compile",
+            "step Step lacks its code",
+        ),
+        (
+            "import steptwin.wbc.registers as t; t.ROWS['NEW'] = t.ROWS['OUT']",
+            "steptwin.mic488.program_registers",
+            "register NEW lacks its access",
+        ),
+        *(
+            (f"import steptwin.wbc.statements as t; {change}", "steptwin.mic488.program_motion", message)
+            for change, message in (
+                ("t.MOTIONS |= {'NEW'}", "motion statement NEW lacks its move"),
+                ("t.HALTS -= {'STOP'}", "action of STOP: there is no such statement that halts"),
+                ("t.ROW_MOTIONS |= {'NEW'}", "statement with a row NEW lacks its path"),
+                ("t.OPERATORS['**'] = 'power'", "operator ** lacks its operation"),
+                ("t.COMPARISONS['<>'] = 'other'", "comparison <> lacks its test"),
+                ("t.FUNCTIONS['EXP'] = t.FUNCTIONS['SIN']", "function EXP lacks its calculation"),
+                ("del t.FUNCTIONS['SIN']", "calculation of SIN: there is no such function"),
+            )
+        ),
     ],
 )
 def test_a_row_alone_is_refused_at_import(adding_a_row: str, module: str, message: str) -> None:

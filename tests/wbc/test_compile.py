@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import pytest
@@ -9,18 +10,35 @@ from mic488_rig import Rig
 from wbc_rig import loaded
 
 from steptwin.mic488.program_registers import ACCESS
+from steptwin.tables import IncompleteTable
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import check
 from steptwin.wbc.compile import compile_program
+from steptwin.wbc.controller import Access, complete_access
 from steptwin.wbc.positions import parse_positions
-from steptwin.wbc.registers import REGISTERS
+from steptwin.wbc.registers import REAL, REGISTERS, ROWS, RegisterRow
 from steptwin.wbc.statements import STATEMENTS
 
+_NEW = RegisterRow("NEW", 0, REAL, REAL, "")
+_READABLE, _WRITABLE = Access(lambda number: lambda c, at: 0.0), ACCESS["OUT"]
 
-def test_the_controller_gives_every_register_and_takes_those_that_can_be_written() -> None:
-    assert set(ACCESS) == {row.key for row in REGISTERS}
-    for row in REGISTERS:
-        assert (ACCESS[row.key].write is None) is (row.writes is None)
+
+@pytest.mark.parametrize(
+    ("row", "access", "message"),
+    [
+        (_NEW, None, "register NEW lacks its access"),
+        (None, _WRITABLE, "access of NEW: there is no such register"),
+        (_NEW, _READABLE, "register NEW (RW) lacks its write"),
+        (replace(_NEW, writes=None), _WRITABLE, "register NEW (R) has a write that its row does not permit"),
+    ],
+)
+def test_a_register_of_the_language_that_no_controller_gives_is_refused(
+    row: RegisterRow | None, access: Access | None, message: str
+) -> None:
+    rows = ROWS if row is None else {**ROWS, "NEW": row}
+    with pytest.raises(IncompleteTable) as caught:
+        complete_access(rows, ACCESS if access is None else {**ACCESS, "NEW": access})
+    assert str(caught.value) == message
 
 
 def test_every_statement_of_the_table_can_be_executed() -> None:

@@ -5,7 +5,7 @@ Suffixes as in `steptwin.mic488.axis`; ``w`` positions along a path, in configur
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
@@ -16,8 +16,10 @@ from steptwin.mic488.status import LIMIT, Status
 from steptwin.motion.paths import Arc, Circular, Straight, arc_between, circle
 from steptwin.motion.planner import MotionState, plan_position
 from steptwin.motion.trig import length
+from steptwin.tables import complete
 from steptwin.wbc.paths import row_problem
 from steptwin.wbc.real import ProgramFault, real_text
+from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS
 
 if TYPE_CHECKING:
     from steptwin.mic488.device import Mic488
@@ -33,28 +35,31 @@ DEGREES_PER_QUARTER = 90.0
 
 def move(axis: Axis, keyword: str, value_u: float, now: Nanos) -> None:
     """HOME, VABS, VREL, PABS, PREL."""
-    what = f"{keyword} M{axis.number}"
-    if keyword == "PABS":
-        axis.move_to(position_p(axis, value_u, what), now)
-    elif keyword == "PREL":
-        axis.move_by(position_p(axis, value_u, what), now)
-    else:
-        _VELOCITIES[keyword](axis, value_u * axis.gear, now)
+    _MOVES[keyword](axis, value_u, now)
 
 
-_VELOCITIES: dict[str, Callable[[Axis, float, Nanos], None]] = {
-    "HOME": Axis.home,
-    "VABS": Axis.move_velocity,
-    "VREL": Axis.change_velocity,
-}
+_MOVES: Mapping[str, Callable[[Axis, float, Nanos], None]] = complete(
+    "motion statement",
+    MOTIONS,
+    "move",
+    {
+        "HOME": lambda axis, value_u, now: axis.home(value_u * axis.gear, now),
+        "VABS": lambda axis, value_u, now: axis.move_velocity(value_u * axis.gear, now),
+        "VREL": lambda axis, value_u, now: axis.change_velocity(value_u * axis.gear, now),
+        "PABS": lambda axis, value_u, now: axis.move_to(position_p(axis, value_u, f"PABS M{axis.number}"), now),
+        "PREL": lambda axis, value_u, now: axis.move_by(position_p(axis, value_u, f"PREL M{axis.number}"), now),
+    },
+)
 
 
 def halt(axis: Axis, keyword: str, now: Nanos) -> None:
     """BRAKE, STOP."""
-    if keyword == "BRAKE":
-        axis.brake(now)
-    else:
-        axis.stop(now)
+    _HALTS[keyword](axis, now)
+
+
+_HALTS: Mapping[str, Callable[[Axis, Nanos], None]] = complete(
+    "statement that halts", HALTS, "action", {"BRAKE": Axis.brake, "STOP": Axis.stop}
+)
 
 
 _IN_MOTION = (Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION)
@@ -242,10 +247,15 @@ def _given(value: float | None) -> float:
     return value
 
 
-_PATHS: dict[str, Callable[[_Plane, Row], None]] = {
-    "MOVELIN": _line,
-    "MOVELIN_REL": _line_by,
-    "MOVETOCIRC": _to_circle,
-    "DOCIRC": _do_circle,
-    "DOARC": _do_arc,
-}
+_PATHS: Mapping[str, Callable[[_Plane, Row], None]] = complete(
+    "statement with a row",
+    ROW_MOTIONS - {"MOVEPTP"},
+    "path",
+    {
+        "MOVELIN": _line,
+        "MOVELIN_REL": _line_by,
+        "MOVETOCIRC": _to_circle,
+        "DOCIRC": _do_circle,
+        "DOARC": _do_arc,
+    },
+)

@@ -17,12 +17,12 @@ from steptwin.mic488.status import Status
 from steptwin.motion.paths import ArcProfile
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.state import Stateful
-from steptwin.wbc.controller import FOREVER, Access, Reader, Tendency, Writer
+from steptwin.wbc.controller import FOREVER, Access, Reader, Tendency, Writer, complete_access
 from steptwin.wbc.events import BY_REGISTER, EVENTS, INPUTS
 from steptwin.wbc.machine import HORIZON
 from steptwin.wbc.positions import PARAMETERS
 from steptwin.wbc.real import ProgramFault, real, real_text
-from steptwin.wbc.registers import TIMER
+from steptwin.wbc.registers import ROWS, TIMER
 
 if TYPE_CHECKING:
     from steptwin.mic488.config import ControllerConfig
@@ -397,7 +397,8 @@ def _status(control: ProgramControl, at: Nanos) -> float:
 _LIMIT_L = _axis_reader(lambda axis, at: axis.limit_l_p / axis.gear)
 _LIMIT_R = _axis_reader(lambda axis, at: axis.limit_r_p / axis.gear)
 
-ACCESS: Mapping[str, Access] = MappingProxyType(
+ACCESS: Mapping[str, Access] = complete_access(
+    ROWS,
     {
         "OUT": Access(_out, _set_out, quiet=False),
         "OUTPUTS": _single(lambda control, at: _bits(control.device.outputs), _set_outs, quiet=False),
@@ -449,6 +450,6 @@ ACCESS: Mapping[str, Access] = MappingProxyType(
         "$I": _user(_WORD),
         "$D": _user(_DINT),
         "$R": _user(_REAL),
-    }
+    },
 )
 """By family in upper case."""

@@ -12,11 +12,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.tables import complete
 from steptwin.wbc import steps as s
 from steptwin.wbc.controller import Access, Reader, Tendency
 from steptwin.wbc.events import EVENTS
 from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, real, real_text
 from steptwin.wbc.registers import REAL, REAL_MAX, RegisterRow
+from steptwin.wbc.statements import COMPARISONS as SIGNS
 from steptwin.wbc.usage import sources
 
 if TYPE_CHECKING:
@@ -72,7 +74,7 @@ class _Compiler:
         self._constants: dict[float, int] = {}
 
     def code(self) -> Code:
-        made = [self._step(number, step) for number, step in enumerate(self._executable.steps)]
+        made = [_CODES[type(step)](self, step, number) for number, step in enumerate(self._executable.steps)]
         made.append(_end(len(made)))
         watches = [tuple(self._watches(step)) for step in self._executable.steps]
         entries = {
@@ -81,55 +83,6 @@ class _Compiler:
             if isinstance(step, s.Entry)
         }
         return Code(tuple(made), (*watches, ()), self._cells, entries)
-
-    def _step(self, number: int, step: s.Step) -> StepCode:
-        following = number + 1
-        match step:
-            case s.Set():
-                return self._set(step, following)
-            case s.If():
-                return self._branch(step.condition, following, step.otherwise)
-            case s.While():
-                return self._branch(step.condition, following, step.close + 1)
-            case s.Else():
-                return _goes_to(step.close)
-            case s.EndWhile():
-                return _goes_to(step.open)
-            case s.EndIf() | s.Entry():
-                return _goes_to(following)
-            case s.Wait():
-                return _wait(self._test(step.condition), number)
-            case s.WaitPos():
-                return _wait_for_rest(number)
-            case s.Delay():
-                return _delay(self._value(step.seconds), following)
-            case s.Jump():
-                return _jump(step.target, following)
-            case s.Return():
-                return _return
-            case s.End():
-                return _end(number)
-            case s.ProgReset():
-                return _reset
-            case _:
-                return self._act(step, following)
-
-    def _act(self, step: s.Step, following: int) -> StepCode:
-        """Statements that do something to the controller."""
-        match step:
-            case s.Motion(keyword=keyword, axis=axis):
-                value = self._value(step.value)
-                return _acting(lambda m, cells: m.present().motion(keyword, axis, value(m, cells)), following)
-            case s.Halt(keyword=keyword, axis=axis):
-                return _acting(lambda m, cells: m.present().halt(keyword, axis), following)
-            case s.RowMotion(keyword=keyword):
-                row = self._value(step.row)
-                return _acting(lambda m, cells: m.present().row_motion(keyword, row(m, cells)), following)
-            case s.Pulse(output=output):
-                seconds = self._value(step.seconds)
-                return _acting(lambda m, cells: m.present().pulse(output, duration(seconds(m, cells))), following)
-            case _:
-                return _illegal
 
     # -- values
 
@@ -149,7 +102,7 @@ class _Compiler:
     def _reader(self, register: s.Register) -> Reader:
         return self._registers[register.row.key].read(register.number)
 
-    def _value(self, source: s.Source) -> Value:
+    def value(self, source: s.Source) -> Value:
         if isinstance(source, s.Register):
             read = self._reader(source)
             return lambda m, cells: read(m.controller, m.now)
@@ -159,32 +112,32 @@ class _Compiler:
     def _calculated(self, value: s.Source | s.Operation | s.Function) -> Value:
         if isinstance(value, s.Operation):
             apply = OPERATIONS[value.operator]
-            left, right = self._value(value.left), self._value(value.right)
+            left, right = self.value(value.left), self.value(value.right)
             return lambda m, cells: apply(left(m, cells), right(m, cells))
         if isinstance(value, s.Function):
             function = FUNCTIONS[value.name]
-            arguments = [self._value(argument) for argument in value.arguments]
+            arguments = [self.value(argument) for argument in value.arguments]
             if len(arguments) == 1:
                 only = arguments[0]
                 return lambda m, cells: function(only(m, cells))
             return lambda m, cells: function(*[argument(m, cells) for argument in arguments])
-        return self._value(value)
+        return self.value(value)
 
-    def _test(self, condition: s.Comparison) -> Callable[[Machine, Cells], bool]:
+    def test(self, condition: s.Comparison) -> Callable[[Machine, Cells], bool]:
         holds = COMPARISONS[condition.sign]
-        left, right = self._value(condition.left), self._value(condition.right)
+        left, right = self.value(condition.left), self.value(condition.right)
         return lambda m, cells: holds(left(m, cells), right(m, cells))
 
     # -- branches and assignments; what only concerns cells is written out, for compute loops consist of it
 
-    def _branch(self, condition: s.Comparison, inside: int, outside: int) -> StepCode:
+    def branch(self, condition: s.Comparison, inside: int, outside: int) -> StepCode:
         a, b = self._cell(condition.left), self._cell(condition.right)
         if a is not None and b is not None:
             return _BRANCHES[condition.sign](a, b, inside, outside)
-        test = self._test(condition)
+        test = self.test(condition)
         return lambda m, cells: inside if test(m, cells) else outside
 
-    def _set(self, step: s.Set, following: int) -> StepCode:
+    def assign(self, step: s.Set, following: int) -> StepCode:
         if isinstance(step.target, s.Register):
             calculated = isinstance(step.value, s.Operation | s.Function)
             return self._set_register(step.target, self._calculated(step.value), following, calculated=calculated)
@@ -342,13 +295,18 @@ def _product(target: int, a: int, b: int, following: int) -> StepCode:
 
 _ARITHMETIC: Mapping[str, Callable[[int, int, int, int], StepCode]] = {"+": _sum, "-": _difference, "*": _product}
 
-_BRANCHES: Mapping[str, Callable[[int, int, int, int], StepCode]] = {
-    "=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] == cells[b] else outside,
-    "<": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] < cells[b] else outside,
-    ">": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] > cells[b] else outside,
-    "<=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] <= cells[b] else outside,
-    ">=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] >= cells[b] else outside,
-}
+_BRANCHES: Mapping[str, Callable[[int, int, int, int], StepCode]] = complete(
+    "comparison",
+    SIGNS,
+    "branch",
+    {
+        "=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] == cells[b] else outside,
+        "<": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] < cells[b] else outside,
+        ">": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] > cells[b] else outside,
+        "<=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] <= cells[b] else outside,
+        ">=": lambda a, b, inside, outside: lambda m, cells: inside if cells[a] >= cells[b] else outside,
+    },
+)
 
 
 def _wait(holds: Callable[[Machine, Cells], bool], number: int) -> StepCode:
@@ -433,3 +391,52 @@ def _acting(act: Callable[[Machine, Cells], None], following: int) -> StepCode:
         return around
 
     return step
+
+
+def _motion(compiler: _Compiler, step: s.Motion, number: int) -> StepCode:
+    keyword, axis, value = step.keyword, step.axis, compiler.value(step.value)
+    return _acting(lambda m, cells: m.present().motion(keyword, axis, value(m, cells)), number + 1)
+
+
+def _halt(compiler: _Compiler, step: s.Halt, number: int) -> StepCode:
+    keyword, axis = step.keyword, step.axis
+    return _acting(lambda m, cells: m.present().halt(keyword, axis), number + 1)
+
+
+def _row_motion(compiler: _Compiler, step: s.RowMotion, number: int) -> StepCode:
+    keyword, row = step.keyword, compiler.value(step.row)
+    return _acting(lambda m, cells: m.present().row_motion(keyword, row(m, cells)), number + 1)
+
+
+def _pulse(compiler: _Compiler, step: s.Pulse, number: int) -> StepCode:
+    output, seconds = step.output, compiler.value(step.seconds)
+    return _acting(lambda m, cells: m.present().pulse(output, duration(seconds(m, cells))), number + 1)
+
+
+_CODES: Mapping[type[s.Step], Callable[[_Compiler, Any, int], StepCode]] = complete(
+    "step",
+    s.STEPS,
+    "code",
+    {
+        s.Set: lambda c, step, number: c.assign(step, number + 1),
+        s.If: lambda c, step, number: c.branch(step.condition, number + 1, step.otherwise),
+        s.Else: lambda c, step, number: _goes_to(step.close),
+        s.EndIf: lambda c, step, number: _goes_to(number + 1),
+        s.While: lambda c, step, number: c.branch(step.condition, number + 1, step.close + 1),
+        s.EndWhile: lambda c, step, number: _goes_to(step.open),
+        s.Wait: lambda c, step, number: _wait(c.test(step.condition), number),
+        s.WaitPos: lambda c, step, number: _wait_for_rest(number),
+        s.Delay: lambda c, step, number: _delay(c.value(step.seconds), number + 1),
+        s.Jump: lambda c, step, number: _jump(step.target, number + 1),
+        s.Return: lambda c, step, number: _return,
+        s.End: lambda c, step, number: _end(number),
+        s.ProgReset: lambda c, step, number: _reset,
+        s.Motion: _motion,
+        s.Halt: _halt,
+        s.RowMotion: _row_motion,
+        s.Pulse: _pulse,
+        s.Entry: lambda c, step, number: _goes_to(number + 1),
+        s.Illegal: lambda c, step, number: _illegal,
+    },
+)
+"""The code of a step by its class: compiler, step, its number."""

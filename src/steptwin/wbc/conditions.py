@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
+from steptwin.tables import complete
+from steptwin.wbc.real import COMPARISONS
 from steptwin.wbc.registers import Domain
 from steptwin.wbc.steps import Comparison, Literal, Register, Source
 
-_MIRRORED = {"=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
-
-
-def compare(left: float, sign: str, right: float) -> bool:
-    """The comparison WBC writes with ``sign``."""
-    if sign == "=":
-        return left == right
-    if sign == "<":
-        return left < right
-    if sign == ">":
-        return left > right
-    return left <= right if sign == "<=" else left >= right
+_MIRRORED = complete("comparison", COMPARISONS, "mirror image", {"=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="})
 
 
 def outcome(condition: Comparison) -> bool | None:
@@ -24,7 +15,7 @@ def outcome(condition: Comparison) -> bool | None:
     left, sign, right = condition.left, condition.sign, condition.right
     if isinstance(left, Literal):
         if isinstance(right, Literal):
-            return compare(left.value, sign, right.value)
+            return COMPARISONS[sign](left.value, right.value)
         left, sign, right = right, _MIRRORED[sign], left
     domain = _domain(left)
     if domain is None or not isinstance(right, Literal):
@@ -32,7 +23,7 @@ def outcome(condition: Comparison) -> bool | None:
     value = right.value
     if sign == "=":
         return None if domain.has(value) and not (domain.whole and value != int(value)) else False
-    at_low, at_high = compare(domain.low, sign, value), compare(domain.high, sign, value)
+    at_low, at_high = COMPARISONS[sign](domain.low, value), COMPARISONS[sign](domain.high, value)
     return at_low if at_low == at_high else None
 
 

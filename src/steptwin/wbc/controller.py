@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
 from steptwin.machine import Nanos
+from steptwin.tables import IncompleteTable, complete
+from steptwin.wbc.registers import RegisterRow
 
 Reader: TypeAlias = Callable[[Any, Nanos], float]
 """(controller, moment) → REAL. Also right for moments to come, as long as nothing happens."""
@@ -33,6 +35,18 @@ class Access:
     write: Callable[[int], Writer] | None = None
     tendency: Callable[[int], Tendency] | None = None
     quiet: bool = True
+
+
+def complete_access(rows: Mapping[str, RegisterRow], given: Mapping[str, Access]) -> Mapping[str, Access]:
+    """``given``, read-only, by family in upper case. `IncompleteTable` for a register of the language without its access, an
+    access without its register, and one that can be written where the register cannot or the other way round."""
+    found = complete("register", rows, "access", given)
+    for key, access in found.items():
+        row = rows[key]
+        if (access.write is None) is not (row.writes is None):
+            problem = "lacks its write" if access.write is None else "has a write that its row does not permit"
+            raise IncompleteTable(f"register {key} ({row.access}) {problem}")
+    return found
 
 
 class Controller(Protocol):

@@ -7,10 +7,12 @@ in time linear in the number of steps.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
@@ -33,21 +35,31 @@ def flow_of(executable: s.Executable) -> Flow:
 
 def _after(number: int, step: s.Step) -> tuple[int, ...]:
     """Where a step goes on. For JUMP: the next line, which it reaches only when its target can return."""
-    match step:
-        case s.If() | s.While():
-            failed = step.otherwise if isinstance(step, s.If) else step.close + 1
-            known = outcome(step.condition)
-            if known is None:
-                return number + 1, failed
-            return (number + 1,) if known else (failed,)
-        case s.Else(close=close):
-            return (close,)
-        case s.EndWhile(open=opened):
-            return (opened,)
-        case s.Return() | s.End() | s.ProgReset():
-            return ()
-        case _:
-            return (number + 1,)
+    return _AFTER[type(step)](number, step)
+
+
+def _branch(number: int, step: s.If | s.While) -> tuple[int, ...]:
+    failed = step.otherwise if isinstance(step, s.If) else step.close + 1
+    known = outcome(step.condition)
+    if known is None:
+        return number + 1, failed
+    return (number + 1,) if known else (failed,)
+
+
+_AFTER: Mapping[type[s.Step], Callable[[int, Any], tuple[int, ...]]] = complete(
+    "step",
+    s.STEPS,
+    "successors",
+    {
+        **dict.fromkeys((s.If, s.While), _branch),
+        s.Else: lambda number, step: (step.close,),
+        s.EndWhile: lambda number, step: (step.open,),
+        **dict.fromkeys((s.Return, s.End, s.ProgReset), lambda number, step: ()),
+        **dict.fromkeys((s.Set, s.EndIf, s.Wait, s.WaitPos, s.Delay, s.Jump), lambda number, step: (number + 1,)),
+        **dict.fromkeys((s.Motion, s.Halt, s.RowMotion, s.Pulse), lambda number, step: (number + 1,)),
+        **dict.fromkeys((s.Entry, s.Illegal), lambda number, step: (number + 1,)),
+    },
+)
 
 
 def _returns(steps: tuple[s.Step, ...], after: list[tuple[int, ...]]) -> list[bool]:

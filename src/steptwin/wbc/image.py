@@ -7,6 +7,7 @@ their CRC. Little-endian, except the axis mask of a row and both CRCs.
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 
 from steptwin.diagnostics import Diagnostic
 from steptwin.wbc import findings as f
@@ -164,18 +165,23 @@ class _Record:
             case s.Motion(keyword="HOME", axis=axis, value=value):
                 return bytes((HOME, DRIVE, axis)) + self._value(value)
             case s.Motion(keyword=keyword, axis=axis, value=value):
-                return bytes((self._infer(keyword, INFERRED_MOTIONS[keyword]), DRIVE, axis)) + self._value(value)
+                return bytes((self._inferred(keyword, INFERRED_MOTIONS), DRIVE, axis)) + self._value(value)
             case s.Halt(keyword=keyword, axis=axis):
-                return bytes((self._infer(keyword, INFERRED_HALTS[keyword]), DRIVE, axis))
+                return bytes((self._inferred(keyword, INFERRED_HALTS), DRIVE, axis))
             case s.RowMotion(keyword="MOVEPTP", row=row):
                 return bytes((MOVEPTP,)) + self._value(row)
             case s.RowMotion(keyword=keyword, row=row):
-                return bytes((self._infer(keyword, INFERRED_ROW_MOTIONS[keyword]),)) + self._value(row)
+                return bytes((self._inferred(keyword, INFERRED_ROW_MOTIONS),)) + self._value(row)
             case s.ProgReset():
                 return bytes((self._infer("PROGRESET", INFERRED_PROGRESET),))
             case _:
                 name = type(step).__name__.upper()
                 raise _NotEncodable(name if name in STATEMENTS else f"the step {name}")
+
+    def _inferred(self, keyword: str, codes: Mapping[str, int]) -> int:
+        if keyword not in codes:
+            raise _NotEncodable(keyword)
+        return self._infer(keyword, codes[keyword])
 
     def _infer(self, name: str, code: int) -> int:
         self.inferred.append(name)

@@ -12,7 +12,11 @@ from collections.abc import Callable, Mapping
 from math import fmod, sqrt
 
 from steptwin.motion.trig import arccosine, arcsine, cosine, sine
+from steptwin.tables import complete
 from steptwin.wbc.registers import DINT, REAL_MAX
+from steptwin.wbc.statements import COMPARISONS as SIGNS
+from steptwin.wbc.statements import FUNCTIONS as FUNCTION_ROWS
+from steptwin.wbc.statements import OPERATORS
 
 QUARTER_DEG = 90.0
 _single = struct.Struct("<f")
@@ -74,27 +78,37 @@ def _shift(value: float, by: float) -> int:
     return shifted - (1 << 32) if shifted & 0x8000_0000 else shifted
 
 
-OPERATIONS: Mapping[str, Callable[[float, float], float]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": _quotient,
-    "%": _remainder,
-    "&": lambda a, b: whole(a) & whole(b),
-    "|": lambda a, b: whole(a) | whole(b),
-    "&&": lambda a, b: 1.0 if whole(a) and whole(b) else 0.0,
-    "||": lambda a, b: 1.0 if whole(a) or whole(b) else 0.0,
-    "<<": _shift,
-    ">>": lambda a, b: _shift(a, -whole(b)),
-}
+OPERATIONS: Mapping[str, Callable[[float, float], float]] = complete(
+    "operator",
+    OPERATORS,
+    "operation",
+    {
+        "+": operator.add,
+        "-": operator.sub,
+        "*": operator.mul,
+        "/": _quotient,
+        "%": _remainder,
+        "&": lambda a, b: whole(a) & whole(b),
+        "|": lambda a, b: whole(a) | whole(b),
+        "&&": lambda a, b: 1.0 if whole(a) and whole(b) else 0.0,
+        "||": lambda a, b: 1.0 if whole(a) or whole(b) else 0.0,
+        "<<": _shift,
+        ">>": lambda a, b: _shift(a, -whole(b)),
+    },
+)
 
-COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
-    "=": operator.eq,
-    "<": operator.lt,
-    ">": operator.gt,
-    "<=": operator.le,
-    ">=": operator.ge,
-}
+COMPARISONS: Mapping[str, Callable[[float, float], bool]] = complete(
+    "comparison",
+    SIGNS,
+    "test",
+    {
+        "=": operator.eq,
+        "<": operator.lt,
+        ">": operator.gt,
+        "<=": operator.le,
+        ">=": operator.ge,
+    },
+)
 
 
 def _quarters(degrees: float) -> float:
@@ -135,14 +149,19 @@ def _root(x: float) -> float:
     return sqrt(x)
 
 
-FUNCTIONS: Mapping[str, Callable[..., float]] = {
-    "SIN": lambda degrees: sine(_quarters(degrees)),
-    "COS": lambda degrees: cosine(_quarters(degrees)),
-    "TG": _tangent,
-    "CTG": _cotangent,
-    "ASIN": _arcsine,
-    "ACOS": _arccosine,
-    "SQRT": _root,
-    "MIN": min,
-    "MAX": max,
-}
+FUNCTIONS: Mapping[str, Callable[..., float]] = complete(
+    "function",
+    FUNCTION_ROWS,
+    "calculation",
+    {
+        "SIN": lambda degrees: sine(_quarters(degrees)),
+        "COS": lambda degrees: cosine(_quarters(degrees)),
+        "TG": _tangent,
+        "CTG": _cotangent,
+        "ASIN": _arcsine,
+        "ACOS": _arccosine,
+        "SQRT": _root,
+        "MIN": min,
+        "MAX": max,
+    },
+)

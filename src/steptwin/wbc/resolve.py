@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from steptwin.diagnostics import Diagnostic, Severity
+from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.blocks import BlockMatcher, Blocks
@@ -40,7 +42,6 @@ from steptwin.wbc.tree import (
 SHORTEST_DELAY_S = 0.01
 _LOOKS_LIKE_MS = 100
 """Seconds from which on a time is doubted."""
-_ALONE = {"ENDIF": s.EndIf, "RETURN": s.Return, "END": s.End, "PROGRESET": s.ProgReset, "WAITPOS": s.WaitPos}
 _BRANCHING = frozenset({"IF", "ELSE", IF_UNKNOWN, "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
 
 
@@ -75,10 +76,11 @@ class _Resolver:
         self._unchecked = False
         self._told_unchecked = False
         self._writes_row_0 = False
+        self._blocks = Blocks()
 
     def resolution(self) -> Resolution:
-        blocks = self._outline()
-        steps = tuple(self._step(number, statement, blocks) for number, statement in enumerate(self._lines))
+        self._blocks = self._outline()
+        steps = tuple(self._step(number, statement) for number, statement in enumerate(self._lines))
         executable = s.Executable(
             steps, tuple(name.text for name in self._scope.variables.values()), self._labels, self._entries, self._records
         )
@@ -174,14 +176,14 @@ class _Resolver:
 
     # -- second pass: the steps
 
-    def _step(self, number: int, statement: Statement, blocks: Blocks) -> s.Step:
+    def _step(self, number: int, statement: Statement) -> s.Step:
         start, end = statement.start, statement.end
         made: s.Step | None = None
         keyword: str | None = None
         if isinstance(statement, Assign):
             made, keyword = self._assign(statement), SET
         elif isinstance(statement, Command):
-            made, keyword = self._command(number, statement, blocks), statement.keyword
+            made, keyword = self._command(number, statement), statement.keyword
         elif isinstance(statement, Label):
             event, hard = BY_LABEL[statement.name.key]
             made = s.Entry(start, end, event, hard)
@@ -247,60 +249,44 @@ class _Resolver:
             return None
         return s.Comparison(left, node.comparison, right)
 
-    def _command(self, number: int, statement: Command, blocks: Blocks) -> s.Step | None:
+    def _command(self, number: int, statement: Command) -> s.Step | None:
         keyword = statement.keyword
         row = STATEMENTS[keyword]
         if not self._dialect.has(row.since):
             hint = f"checked for {self._dialect.firmware}"
             self._say(f.NOT_IN_FIRMWARE.at(statement, f"{keyword} needs firmware {row.since}", hint))
-        if keyword in _ALONE:
-            return _ALONE[keyword](statement.start, statement.end)
-        if keyword in MOTIONS:
-            return self._motion(statement)
-        if keyword in HALTS:
-            axis = self._axis(statement)
-            return None if axis is None else s.Halt(statement.start, statement.end, keyword, axis)
-        if keyword in ROW_MOTIONS:
-            return self._row_motion(statement)
-        match keyword:
-            case "WAIT":
-                condition = self._comparison(statement.operands[0])
-                return None if condition is None else s.Wait(statement.start, statement.end, condition)
-            case "DELAY":
-                return self._delay(statement)
-            case "JUMP":
-                return self._jump(statement)
-            case "PULSE":
-                return self._pulse(statement)
-            case _:
-                return self._block(number, statement, blocks)
+        return _STEPS[keyword](self, number, statement)
 
-    def _block(self, number: int, statement: Command, blocks: Blocks) -> s.Step | None:
-        start, end = statement.start, statement.end
-        if statement.keyword == "ENDWHILE":
-            return self._end_while(number, statement, blocks)
-        close = blocks.close.get(number)
-        if statement.keyword == "ELSE":
-            return None if close is None else s.Else(start, end, close)
-        condition = self._comparison(statement.operands[0])
+    def _if(self, number: int, statement: Command) -> s.Step | None:
+        condition, close = self._comparison(statement.operands[0]), self._blocks.close.get(number)
         if condition is None or close is None:
             return None
-        if statement.keyword == "WHILE":
-            return s.While(start, end, condition, close)
-        return s.If(start, end, condition, blocks.middle.get(number), close)
+        return s.If(statement.start, statement.end, condition, self._blocks.middle.get(number), close)
 
-    def _end_while(self, number: int, statement: Command, blocks: Blocks) -> s.Step | None:
-        opened = blocks.open.get(number)
+    def _else(self, number: int, statement: Command) -> s.Step | None:
+        close = self._blocks.close.get(number)
+        return None if close is None else s.Else(statement.start, statement.end, close)
+
+    def _while(self, number: int, statement: Command) -> s.Step | None:
+        condition, close = self._comparison(statement.operands[0]), self._blocks.close.get(number)
+        return None if condition is None or close is None else s.While(statement.start, statement.end, condition, close)
+
+    def _end_while(self, number: int, statement: Command) -> s.Step | None:
+        opened = self._blocks.open.get(number)
         opening = None if opened is None else self._lines[opened]
         if opened is None or not isinstance(opening, Command):
             return None
         # The names of this condition were judged at the WHILE.
-        heard = len(self._diagnostics)
+        judged = len(self._diagnostics)
         condition = self._comparison(opening.operands[0])
-        del self._diagnostics[heard:]
+        del self._diagnostics[judged:]
         return None if condition is None else s.EndWhile(statement.start, statement.end, condition, opened)
 
-    def _delay(self, statement: Command) -> s.Step | None:
+    def _wait(self, number: int, statement: Command) -> s.Step | None:
+        condition = self._comparison(statement.operands[0])
+        return None if condition is None else s.Wait(statement.start, statement.end, condition)
+
+    def _delay(self, number: int, statement: Command) -> s.Step | None:
         seconds = self._value(statement.operands[0])
         if isinstance(seconds, s.Literal) and seconds.value < SHORTEST_DELAY_S:
             message = f"DELAY {seconds.value:g} waits {SHORTEST_DELAY_S:g} s"
@@ -319,7 +305,7 @@ class _Resolver:
         hint = f"the time is in seconds: {seconds.value:.10g} ms are {milliseconds}"
         self._say(f.LONG_TIME.at(operand, message, hint, fix=fix))
 
-    def _jump(self, statement: Command) -> s.Step | None:
+    def _jump(self, number: int, statement: Command) -> s.Step | None:
         name = statement.operands[0]
         if not isinstance(name, Name):
             return None
@@ -332,7 +318,7 @@ class _Resolver:
             self._say(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
         return None
 
-    def _motion(self, statement: Command) -> s.Step | None:
+    def _motion(self, number: int, statement: Command) -> s.Step | None:
         axis = self._axis(statement)
         operand = statement.operands[1]
         value = self._value(operand)
@@ -342,6 +328,10 @@ class _Resolver:
             hint = "negative homes to KL, positive to KR"
             self._say(f.OUT_OF_RANGE.at(operand, "HOME needs a velocity other than 0", hint))
         return s.Motion(statement.start, statement.end, statement.keyword, axis, value)
+
+    def _halt(self, number: int, statement: Command) -> s.Step | None:
+        axis = self._axis(statement)
+        return None if axis is None else s.Halt(statement.start, statement.end, statement.keyword, axis)
 
     def _axis(self, statement: Command) -> int | None:
         """The drive a statement names, from 1."""
@@ -358,7 +348,7 @@ class _Resolver:
             self._say(finding.at(name, message, f"write {STATEMENTS[statement.keyword].usage}, M1…M4"))
         return None
 
-    def _pulse(self, statement: Command) -> s.Step | None:
+    def _pulse(self, number: int, statement: Command) -> s.Step | None:
         name, operand = statement.operands
         seconds = self._value(operand)
         register = self._scope.register(name) if isinstance(name, Name) else None
@@ -373,7 +363,7 @@ class _Resolver:
 
     # -- rows of the position table
 
-    def _row_motion(self, statement: Command) -> s.Step | None:
+    def _row_motion(self, number: int, statement: Command) -> s.Step | None:
         operand = statement.operands[0]
         row = self._position(operand) if isinstance(operand, Position) else self._value(operand, is_row=True)
         if row is None:
@@ -433,6 +423,37 @@ class _Resolver:
 
     def _say(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)
+
+
+def _alone(step: type[s.Step]) -> Callable[[_Resolver, int, Command], s.Step]:
+    """Of a statement without operands."""
+    return lambda resolver, number, statement: step(statement.start, statement.end)
+
+
+_STEPS: Mapping[str, Callable[[_Resolver, int, Command], s.Step | None]] = complete(
+    "statement",
+    STATEMENTS,
+    "step",
+    {
+        "IF": _Resolver._if,
+        "ELSE": _Resolver._else,
+        "ENDIF": _alone(s.EndIf),
+        "WHILE": _Resolver._while,
+        "ENDWHILE": _Resolver._end_while,
+        "WAIT": _Resolver._wait,
+        "DELAY": _Resolver._delay,
+        "JUMP": _Resolver._jump,
+        "RETURN": _alone(s.Return),
+        "END": _alone(s.End),
+        "PROGRESET": _alone(s.ProgReset),
+        **dict.fromkeys(MOTIONS, _Resolver._motion),
+        **dict.fromkeys(HALTS, _Resolver._halt),
+        **dict.fromkeys(ROW_MOTIONS, _Resolver._row_motion),
+        "WAITPOS": _alone(s.WaitPos),
+        "PULSE": _Resolver._pulse,
+    },
+)
+"""The step of a statement by its keyword: resolver, number of the step, statement. None: something in it is wrong."""
 
 
 def _rows(count: int) -> str:

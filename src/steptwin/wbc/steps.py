@@ -206,6 +206,12 @@ class Illegal(Step):
     opaque: bool
 
 
+STEPS: tuple[type[Step], ...] = tuple(
+    found for found in list(globals().values()) if isinstance(found, type) and issubclass(found, Step) and found is not Step
+)
+"""Every class of step; each needs its code, what it reads, and where it goes on."""
+
+
 @dataclass(frozen=True, slots=True)
 class Executable:
     """``variables`` in the order of their indices; ``labels`` by name in upper case; ``entries`` steps of interrupt labels;

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
+from typing import Any
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
@@ -36,26 +38,36 @@ class Setup:
     most_speed_p: float = inf
 
 
-def sources(step: s.Step) -> Iterator[s.Source]:
+def sources(step: s.Step) -> Iterable[s.Source]:
     """Everything a step reads."""
-    match step:
-        case s.Set(value=value):
-            if isinstance(value, s.Operation):
-                yield value.left
-                yield value.right
-            elif isinstance(value, s.Function):
-                yield from value.arguments
-            else:
-                yield value
-        case s.If() | s.While() | s.Wait():
-            yield step.condition.left
-            yield step.condition.right
-        case s.Motion(value=value):
-            yield value
-        case s.Delay(seconds=seconds) | s.Pulse(seconds=seconds):
-            yield seconds
-        case s.RowMotion(row=row):
-            yield row
+    return _SOURCES[type(step)](step)
+
+
+def _of_value(step: s.Set) -> tuple[s.Source, ...]:
+    value = step.value
+    if isinstance(value, s.Operation):
+        return value.left, value.right
+    return value.arguments if isinstance(value, s.Function) else (value,)
+
+
+def _of_condition(step: s.If | s.While | s.Wait) -> tuple[s.Source, ...]:
+    return step.condition.left, step.condition.right
+
+
+_SOURCES: Mapping[type[s.Step], Callable[[Any], tuple[s.Source, ...]]] = complete(
+    "step",
+    s.STEPS,
+    "sources",
+    {
+        s.Set: _of_value,
+        **dict.fromkeys((s.If, s.While, s.Wait), _of_condition),
+        s.Motion: lambda step: (step.value,),
+        **dict.fromkeys((s.Delay, s.Pulse), lambda step: (step.seconds,)),
+        s.RowMotion: lambda step: (step.row,),
+        **dict.fromkeys((s.Else, s.EndIf, s.EndWhile, s.Jump, s.Return, s.End, s.ProgReset), lambda step: ()),
+        **dict.fromkeys((s.Halt, s.WaitPos, s.Entry, s.Illegal), lambda step: ()),
+    },
+)
 
 
 def endless_waits(executable: s.Executable) -> list[Diagnostic]:
