@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from textual.events import Key
 from textual.pilot import Pilot
 from textual.widgets import DataTable, Input, RichLog, Static
 
+from steptwin.drivers import stale
+from steptwin.drivers.stale import QUIET_S
 from steptwin.mic488.status import Status
 from steptwin.monitor import session
 from steptwin.monitor.app import HELP, Monitor
@@ -21,6 +24,12 @@ from steptwin.testing import Mic488Rig
 PROGRAMS = Path(__file__).parents[2] / "examples" / "mic488"
 HELD_S = 0.05
 """A terminal repeats a key more often than this."""
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However slow this process is, it was not suspended."""
+    monkeypatch.setattr(stale, "SUSPENDED_S", 60.0)
 
 
 class Screen:
@@ -331,3 +340,31 @@ def test_a_controller_that_comes_back_with_another_firmware_is_shown_with_its_ma
             await screen.until(lambda: screen.cell("registers", position, "value") == "0", "and its registers")
 
     asyncio.run(main())
+
+
+def test_keys_that_piled_up_during_a_suspension_move_nothing_except_to_stop(
+    mic488: Mic488Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario(screen: Screen) -> None:
+        await screen.press("e")
+        await screen.until(lambda: screen.cell("axes", "1", "drive") == "on", "the drive is on")
+        await screen.press("m")
+        await screen.until(lambda: screen.is_asking and isinstance(screen.app.focused, Input), "a value is asked for")
+        mic488.driver.axis(1).move_to(200.0)
+        monkeypatch.setattr(stale, "SUSPENDED_S", 0.5)
+        time.sleep(1.0)  # noqa: ASYNC251  (the process stands, as it does when it is suspended)
+        for key in ("1", "0", "enter", "left", "left"):
+            screen.app.post_message(Key(key, key if len(key) == 1 else None))
+        await screen.until(lambda: screen.text("said").startswith("the monitor was suspended"), "the suspension is told")
+        monkeypatch.setattr(stale, "SUSPENDED_S", 60.0)
+        assert screen.app.query_one("#ask", Input).value == ""
+        assert mic488.axis(1).velocity > 0.0
+        await screen.press("space")
+        await screen.until(lambda: mic488.axis(1).velocity == 0.0, "the stop is not ignored")
+        there = mic488.axis(1).position
+        await asyncio.sleep(2 * QUIET_S)
+        assert mic488.axis(1).position == there
+        await screen.press("left")
+        await screen.until(lambda: mic488.axis(1).position < there, "a fresh key moves")
+
+    run(mic488, scenario)

@@ -14,6 +14,7 @@ import typer
 from steptwin.cli.chip import chip_address
 from steptwin.cli.device import Device, LogFrames, complain, opened, shown
 from steptwin.cli.terminal_chip import chip_terminal
+from steptwin.cli.typedlines import typed_lines
 from steptwin.errors import Misuse, SteptwinError
 
 if TYPE_CHECKING:
@@ -42,15 +43,9 @@ def terminal(device: Device = None, log_frames: LogFrames = False) -> None:
         if interactive:
             complain(f"{mic.place}, unit {mic.unit}, firmware {mic.firmware}; 'help' helps, Ctrl-D ends")
             _complete(mic)
-        while True:
+        for line in typed_lines(lambda: f"{mic.unit}> ", lambda line: line == "stop"):
             try:
-                line = input(f"{mic.unit}> " if interactive else "").partition("#")[0].strip()
-            except (EOFError, KeyboardInterrupt):
-                break
-            if line in ("quit", "exit"):
-                break
-            try:
-                _answer(mic, line)
+                _answer(mic, line.partition("#")[0].strip())
             except SteptwinError as error:
                 complain(str(error))
                 if not interactive:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from steptwin.cli.device import complain, number_of
+from steptwin.cli.typedlines import typed_lines
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 
 if TYPE_CHECKING:
@@ -37,7 +38,9 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
 
     kind = None if address.variant is None else variant(address.variant)
     interactive = sys.stdin.isatty()
-    prompt = ""
+
+    def prompt() -> str:
+        return f"{connection.selected or 'all'}> "
 
     def tell(text: str) -> None:
         if not interactive:
@@ -46,7 +49,7 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
         import readline
 
         # It comes while somebody types: above his line, which is written anew.
-        sys.stdout.write(f"\r\x1b[K{text}\n{prompt}{readline.get_line_buffer()}")
+        sys.stdout.write(f"\r\x1b[K{text}\n{prompt()}{readline.get_line_buffer()}")
         sys.stdout.flush()
 
     connection = _Connection(address, kind, tell, log_frames=log_frames)
@@ -55,14 +58,7 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
             with _told():
                 connection.verified()
             complain(f"M1486 on {address.place}; 'help' helps, k stops the motor, Ctrl-D ends")
-        while True:
-            prompt = f"{connection.selected or 'all'}> " if interactive else ""
-            try:
-                line = input(prompt).strip()
-            except (EOFError, KeyboardInterrupt):
-                break
-            if line in ("quit", "exit"):
-                break
+        for line in typed_lines(prompt, lambda line: line.upper().startswith("K")):
             try:
                 _answer(connection, line, kind, log_frames=log_frames, waits=not interactive)
             except KeyboardInterrupt:

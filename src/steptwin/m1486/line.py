@@ -114,7 +114,7 @@ class SerialChain(Stateful):
 
 
 class LinePort:
-    """One program's place on the line; a `steptwin.machine.WirePort` that a link of the runtime serves.
+    """One program's place on the line; a `steptwin.machine.WirePort` that a link serves.
 
     ``on_output`` is called when there is something to fetch that nobody asked for.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from typing import ClassVar
 
@@ -9,11 +10,13 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
+from textual.events import Event, InputEvent, Key, Paste
 from textual.widget import Widget
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, TabbedContent, TabPane, Tabs
 
 from steptwin.drivers.mic488.frames import Heard
 from steptwin.drivers.mic488.values import value_of
+from steptwin.drivers.stale import BEAT_S, StaleInput
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.registermap import DataType, Register, Type
@@ -25,6 +28,7 @@ from steptwin.wire.slave import Direction
 NOTHING = "–"
 PROGRAM_STATES = ("stopped", "running", "paused")
 FRAMES_KEPT = 500
+STOP_KEYS = ("space", "escape")
 
 HELP = """\
 [b]SPACE or ESC  stop all axes at once; a running program is paused[/b]
@@ -66,7 +70,7 @@ class Monitor(App[None]):
     Screen { layers: base above; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("space,escape", "stop", "STOP", key_display="SPACE/ESC", priority=True),
+        Binding(",".join(STOP_KEYS), "stop", "STOP", key_display="SPACE/ESC", priority=True),
         Binding("e", "enable", "Drive on/off"),
         Binding("m", "ask_motion('move')", "Move to"),
         Binding("b", "ask_motion('by')", "Move by", show=False),
@@ -93,6 +97,7 @@ class Monitor(App[None]):
         self._page = 0
         self._firmware = session.mic.firmware
         self._shows_reads = False
+        self._stale = StaleInput()
         self._began: Nanos | None = None
         self._before: Widget | None = None
         self._answer: Callable[[str], Awaitable[object]] | None = None
@@ -131,6 +136,7 @@ class Monitor(App[None]):
         self._fill_groups()
         axes.focus()
         self.run_worker(self.session.run(), name="session", exit_on_error=True)
+        self.run_worker(self._beat(), name="beat", exit_on_error=True)
 
     def _fill_groups(self) -> None:
         tabs = self.query_one("#groups", Tabs)
@@ -138,6 +144,20 @@ class Monitor(App[None]):
             for name in (*self._groups, USER):
                 tabs.add_tab(name)
         self._fill_registers()
+
+    # ------------------------------------------------------------------ input
+
+    async def _beat(self) -> None:
+        while True:
+            self._stale.beat()
+            await asyncio.sleep(BEAT_S)
+
+    async def on_event(self, event: Event) -> None:
+        is_input = isinstance(event, InputEvent | Paste) and not event.is_forwarded
+        if is_input and not (isinstance(event, Key) and event.key in STOP_KEYS) and self._stale.is_stale():
+            self._say("the monitor was suspended: what was typed meanwhile is ignored, except SPACE and ESC", bad=True)
+            return
+        await super().on_event(event)
 
     # ------------------------------------------------------------------ what was found
 
