@@ -116,7 +116,7 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
     ]
     assert scan(places[0]).stdout.splitlines()[1] == f"{places[0]}  4800  chip B  M1486B"
     alone = scan(str(controller.pty), "--kind", "m1486")
-    assert (alone.returncode, alone.stderr) == (1, f"nobody answers on {controller.pty}\n")
+    assert (alone.returncode, alone.stderr) == (1, f"no device responded on {controller.pty}\n")
     assert scan(places[2], "--kind", "mic488", "--units", "1").returncode == 0
 
 

@@ -267,7 +267,7 @@ def test_scanning(twin: Any, shell: Shell) -> None:
     ]
     assert shell("scan", tcp, "--units", "1").split() == [tcp, "unit", "1", "MIC488,", "firmware", "1.70"]
     shell("scan", tcp, "--units", "2,3")
-    assert (shell.code, shell.errors) == (1, f"nobody answers on {tcp}\n")
+    assert (shell.code, shell.errors) == (1, f"no device responded on {tcp}\n")
     shell("scan", "/dev/none")
     assert (shell.code, "cannot open serial port /dev/none" in shell.errors) == (1, True)
     for units in ("0", "5-2", "x", "1-300"):

@@ -6,9 +6,11 @@ import subprocess
 import sys
 
 import pytest
+from typer.core import TyperGroup
+from typer.main import get_command
 
 from steptwin import __version__
-from steptwin.cli import main
+from steptwin.cli import GROUPS, app, main
 
 
 def steptwin(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -45,3 +47,32 @@ def test_choices_that_are_none(
         main()
     told = capsys.readouterr().err
     assert (ended.value.code, message in told, "Value error" in told) == (2, True, False), told
+
+
+def help_of(*arguments: str) -> str:
+    shown = steptwin(*arguments, "-h")
+    assert shown.returncode == 0, shown.stderr
+    return shown.stdout
+
+
+def test_every_command_is_in_one_group_of_the_help_with_its_whole_summary() -> None:
+    named = [name for group in GROUPS.values() for name in group]
+    command = get_command(app)
+    assert isinstance(command, TyperGroup)
+    assert sorted(named) == sorted({*named}) == sorted(command.commands)
+    shown = help_of()
+    assert [line[:-1] for line in shown.splitlines() if line.endswith(":") and not line.startswith(" ")] == ["Options", *GROUPS]
+    assert "..." not in shown.partition("Options:")[2]
+
+
+@pytest.mark.parametrize("arguments", [("serve",), ("serve", "mic488"), ("run",), ("get",), ("move",), ("up",)])
+def test_help_names_values_and_no_python_types(arguments: tuple[str, ...]) -> None:
+    shown = help_of(*arguments)
+    assert "<" not in shown, shown
+    assert "-h, --help" in shown
+
+
+def test_a_missing_argument_is_named() -> None:
+    wrong = steptwin("run")
+    assert wrong.returncode == 2
+    assert "Missing argument 'file'" in wrong.stderr

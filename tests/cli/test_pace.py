@@ -43,12 +43,12 @@ def invoke(*arguments: str) -> str:
 
 
 def test_a_running_world_in_somebodys_hands(up: Up) -> None:
-    assert invoke("step") == "    0.002083 s  table      M1_EN: 1\nbar feeder stands at 0.002083334 s\n"
-    assert invoke("step", "2s") == "bar feeder stands at 2.002083334 s\n"
+    assert invoke("step") == "    0.002083 s  table      M1_EN: 1\nbar feeder paused at 0.002083334 s\n"
+    assert invoke("step", "2s") == "bar feeder paused at 2.002083334 s\n"
     invoke("pin", "table.IN8=1")
     told = invoke("step", "--until", "start.pressed", "1min").splitlines()
     assert told[0].endswith("table      M1 is at its home position")
-    assert told[-1].startswith("bar feeder stands at 6.06")
+    assert told[-1].startswith("bar feeder paused at 6.06")
     assert "warning: x.position > 300 did not come true\n" in invoke("step", "1ms", "--until", "x.position > 300")
 
     told = invoke("save", "now.json").splitlines()
@@ -63,7 +63,7 @@ def test_a_running_world_in_somebodys_hands(up: Up) -> None:
     assert invoke("resume", "--speed", "50").endswith(" s, 50 virtual seconds a second\n")
     stood = json.loads(invoke("pause", "--json"))
     assert (stood["paused"], stood["speed"]) == (True, 50.0)
-    assert invoke("pause") == f"bar feeder stands at {stood['time_s']:.9f} s\n"
+    assert invoke("pause") == f"bar feeder paused at {stood['time_s']:.9f} s\n"
 
     up.send_signal(signal.SIGINT)
     told = (up.stdout or sys.stdin).read().splitlines()

@@ -65,7 +65,7 @@ def test_what_happens_and_when(run: Run) -> None:
         "position 0, true position 0 (0 full steps)",
         "  sent 00 42",
     ]
-    assert re.fullmatch(r"2\.001000 s of virtual time in \d+\.\d{3} s: [\d,]+ times as fast as life", last)
+    assert re.fullmatch(r"2\.001000 s of virtual time in \d+\.\d{3} s: [\d,]+ times faster than real time", last)
 
 
 def test_a_run_that_is_ended_says_where_it_stands(run: Run) -> None:

@@ -40,7 +40,7 @@ def test_a_replay_that_differs_says_so(tmp_path: Path) -> None:
     session = tmp_path / "session.json"
     data = json.loads(session.read_text())
     session.write_text(json.dumps(data | {"digest": "0" * 32}))
-    assert "another thing happened" in invoke("replay", str(session), code=1)
+    assert "the run differs from the recorded one" in invoke("replay", str(session), code=1)
 
 
 def test_run_ends_on_a_condition_and_tells_it_as_json() -> None:
@@ -125,7 +125,7 @@ def test_a_session_that_goes_on_otherwise_says_so(tmp_path: Path) -> None:
     session = tmp_path / "s.json"
     invoke("run", str(FEEDER), "--for", "2s", "--session", str(session))
     session.write_text(json.dumps(json.loads(session.read_text()) | {"digest": "0" * 32}))
-    assert "another thing happened than then" in invoke("run", str(session), "--for", "1s")
+    assert "the replay differs from the run recorded" in invoke("run", str(session), "--for", "1s")
 
 
 def test_another_seed_is_another_chance_and_stays_with_the_session(tmp_path: Path) -> None:

@@ -6,10 +6,11 @@ Exit codes: 0 done, 1 not done (a check found something, a peer refused, a line 
 from __future__ import annotations
 
 import sys
+from functools import partial
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperGroup, TyperOption
 
 from steptwin import __version__
 from steptwin.cli import (
@@ -40,14 +41,50 @@ from steptwin.cli import (
 )
 from steptwin.errors import Misuse, SteptwinError
 
+GROUPS = {
+    "Twins": ("serve", "up", "state", "pin", "encoder", "power-cycle", "fault", "pause", "step", "resume", "save"),
+    "Programs and runs": ("check", "fmt", "build", "decompile", "run", "replay", "export"),
+    "Devices and twins": (
+        "ports", "scan", "info", "get", "set", "watch", "enable", "disable", "home", "move", "jog", "stop", "send", "terminal",
+        "monitor", "sniff", "record", "diff",
+    ),
+    "Reference": ("registers", "commands"),
+}  # fmt: skip
+"""The commands as ``--help`` lists them."""
+LONGEST_SUMMARY = 200
+
+VALUE_NAMES = {"str": "TEXT", "list[str]": "TEXT", "int": "N", "float": "NUMBER", "path": "PATH", "list[path]": "PATH"}
+"""What help shows as the value of an option, where typer would show a Python type."""
+
+
+def _constant(text: str, ctx: Any) -> str:
+    return text
+
 
 class _Commands(TyperGroup):
-    """typer checks choices with a validator whose name it puts before the message."""
+    """Help in groups, with names of values instead of Python types; messages without the name of a validator."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        command = super().get_command(ctx, cmd_name)
+        for parameter in getattr(command, "params", ()):
+            shown = parameter.display_type(ctx).strip("<>") if isinstance(parameter, TyperOption) else ""
+            parameter.display_type = partial(_constant, VALUE_NAMES.get(shown, shown))
+        return command
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        names = self.list_commands(ctx)
+        for title, group in GROUPS.items() if ctx.parent is None else (("Commands", tuple(names)),):
+            rows = [(name, self.commands[name].get_short_help_str(LONGEST_SUMMARY)) for name in group if name in names]
+            with formatter.section(title):
+                formatter.write_dl(rows)
 
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
+            if type(error) is not typer.BadParameter:  # a missing parameter
+                raise
+            # typer checks choices with a validator whose name it puts before the message.
             message = error.message.removeprefix("Value error, ")
             raise typer.BadParameter(message, error.ctx, error.param, error.param_hint) from None
 
@@ -59,8 +96,9 @@ app = typer.Typer(
     add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(serve.app, name="serve")
+app.add_typer(serve.app, name="serve", cls=_Commands)
 app.command()(registers.registers)
 app.command()(commands.commands)
 app.command()(check.check)

@@ -50,7 +50,7 @@ def commands(
     ] = None,
     form: Annotated[Format, typer.Option("--format", help="How to print it.")] = Format.TEXT,
 ) -> None:
-    """Show the commands of a controller, their arguments and effect, and what the checker can say."""
+    """Show the statements or commands of a controller, their arguments and effects, and all findings of the checker."""
     if device is Device.MIC488:
         if variant is not None:
             raise Misuse("--variant is for the M1486 only")

@@ -34,7 +34,7 @@ def fault(
     twin: Twin = None,
     json: Json = False,
 ) -> None:
-    """Let something go wrong with a running twin, or show what is set to go wrong."""
+    """Set, clear or show the faults of a running twin."""
     if kinds:
         show(sections(), form)
         return
@@ -55,7 +55,7 @@ def fault(
     elif there:
         width = max(len(active["name"]) for active in there)
         for active in there:
-            typer.echo(f"{active['name']:<{width}}  {active['fault']}  (happened {active['happened']} times)")
+            typer.echo(f"{active['name']:<{width}}  {active['fault']}  (occurred {_times(active['happened'])})")
     else:
         typer.echo("no faults")
 
@@ -92,3 +92,7 @@ def _else(parameter: Parameter) -> str:
     """What holds where it is not given."""
     default = parameter.default
     return parameter.otherwise or (f"{default:g}" if isinstance(default, float) else f"{default}")
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

@@ -21,7 +21,7 @@ def monitor(
     ] = None,
     hz: Annotated[float, typer.Option(help="How often a second it is looked at, up to 10.")] = 5.0,
 ) -> None:
-    """Watch a MIC488 and work its axes and registers, with the keyboard. Space or Esc stops. ? shows the keys."""
+    """Show the axes, registers and frames of a MIC488, and operate it with the keyboard. Space or Esc stops. ? shows the keys."""
     from steptwin.monitor import monitor as show
 
     show(device, hz)

@@ -226,7 +226,7 @@ def jog(
     json: Json = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Run an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself."""
+    """Jog an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself."""
     values = tied([velocity])
     ((axis, speed),) = values.items()
     if seconds is None and not sys.stdin.isatty():

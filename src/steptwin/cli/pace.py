@@ -1,6 +1,6 @@
 """``steptwin pause``, ``step``, ``resume``, ``save``: the time of a running world.
 
-From Python: `steptwin.files.world.World`, whose time stands whenever it is not told to run, and `steptwin.files.session`.
+From Python: `steptwin.World`, which advances only when told to, and `steptwin.files.session`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from steptwin.cli.twin import Json, Twin
 
 
 def pause(twin: Twin = None, json: Json = False) -> None:
-    """Let the time of a running world stand."""
+    """Pause a running world."""
     _tell(_ask(twin, {"do": "pause"}), json)
 
 
@@ -23,7 +23,7 @@ def resume(
     twin: Twin = None,
     json: Json = False,
 ) -> None:
-    """Let the time of a running world go on, or change its speed."""
+    """Continue a paused world, or change its speed."""
     _tell(_ask(twin, {"do": "resume", "speed": speed}), json)
 
 
@@ -37,7 +37,7 @@ def step(
     twin: Twin = None,
     json: Json = False,
 ) -> None:
-    """Let a running world go on for a time, as fast as it can, and stand there; shows what happens on the way."""
+    """Advance a world by a time, to a condition or to its next event, show what happened, and pause."""
     from steptwin.files.timedinputs import parse_duration
 
     request: dict[str, object] = {"do": "step", "until": until}
@@ -66,7 +66,7 @@ def save(
     twin: Twin = None,
     json: Json = False,
 ) -> None:
-    """Write a session of a running world up to now: for 'steptwin replay', and for 'run' and 'up' to go on from."""
+    """Save the session of a running world, to replay it or to continue from it with 'run' and 'up'."""
     from steptwin.files.beginning import check_session_target
 
     check_session_target(file)
@@ -88,13 +88,13 @@ def _tell(there: dict[str, Any], json: bool) -> None:
 
         typer.echo(json_.dumps(there, indent=2))
         return
-    how, speed = ("stands", "") if there["paused"] else ("goes on", _how_fast(there["speed"]))
+    how, speed = ("paused", "") if there["paused"] else ("running", _how_fast(there["speed"]))
     if there.get("stopped") is not None:
-        how, speed = "has ended", f" by: {there['stopped']}"
+        how, speed = "ended", f" by: {there['stopped']}"
     typer.echo(f"{there['world']} {how} at {there['time_s']:.9f} s{speed}")
 
 
 def _how_fast(speed: float | str) -> str:
     if speed == "max":
-        return ", as fast as it can"
+        return ", as fast as possible"
     return "" if speed == 1 else f", {speed:g} virtual seconds a second"

@@ -25,7 +25,7 @@ def record(
     device: Device = None,
     log_frames: LogFrames = False,
 ) -> None:
-    """Carry a session out on a controller and keep what came of it. On Ctrl-C and on failures all axes are stopped.
+    """Run a list of requests on a controller and record the answers. On Ctrl-C and on failures all axes are stopped.
 
     All lines are checked before the first is carried out.
     """

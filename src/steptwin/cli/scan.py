@@ -78,7 +78,7 @@ def scan(
     elif rows:
         typer.echo(table([(r["address"], f"{r['baud'] or ''}", _which(r), r["what"]) for r in rows]))
     if not rows:
-        complain(f"nobody answers on {', '.join(wanted) or 'any port: there is none'}")
+        complain(f"no device responded on {', '.join(wanted) or 'any port: there is none'}")
         raise typer.Exit(1)
 
 

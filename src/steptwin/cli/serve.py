@@ -41,16 +41,18 @@ def mic488(
     pty: Annotated[Path | None, typer.Option(help="Modbus RTU on a pseudo terminal; PATH becomes a link to it.")] = None,
     serial: Annotated[str | None, typer.Option(help="Modbus RTU on a real serial port, 8N1.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate. Default: that of the configuration, or 38400.")] = None,
-    tcp: Annotated[str | None, typer.Option(help="Modbus TCP on HOST:PORT; port 0 takes a free one.")] = None,
-    rtu_tcp: Annotated[str | None, typer.Option(help="RTU frames over TCP on HOST:PORT.")] = None,
-    rfc2217: Annotated[str | None, typer.Option(help="A network serial port (RFC 2217) with Modbus RTU on HOST:PORT.")] = None,
+    tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="Modbus TCP; port 0 takes a free one.")] = None,
+    rtu_tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="RTU frames over TCP.")] = None,
+    rfc2217: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="A network serial port (RFC 2217) with Modbus RTU.")
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="The vendor tool's .cfg file.")] = None,
     program: Annotated[
         list[str] | None, typer.Option(help="WBC program (.prg) for a bank: BANK=FILE; repeatable. FILE alone is for bank 0.")
     ] = None,
     positions: Annotated[list[str] | None, typer.Option(help="Position table (.csv) for a bank: BANK=FILE; repeatable.")] = None,
     vision: Annotated[
-        str | None, typer.Option(help="Records of a vision system ('N1 X12.5 Y-3 A90' and a line end) on HOST:PORT.")
+        str | None, typer.Option(metavar="HOST:PORT", help="Records of a vision system ('N1 X12.5 Y-3 A90' and a line end).")
     ] = None,
     statement_time: Annotated[
         str, typer.Option(metavar="TIME", help="What one statement of a program takes; 0 for none.")
@@ -141,8 +143,10 @@ def m1486(
     pty: Annotated[Path | None, typer.Option(help="The line on a pseudo terminal; PATH becomes a link to it.")] = None,
     serial: Annotated[str | None, typer.Option(help="The line on a real serial port, 8N1.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate the BR pins choose. Default: the highest of the type.")] = None,
-    tcp: Annotated[str | None, typer.Option(help="The line as raw TCP on HOST:PORT; port 0 takes a free one.")] = None,
-    rfc2217: Annotated[str | None, typer.Option(help="The line as a network serial port (RFC 2217) on HOST:PORT.")] = None,
+    tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="The line as raw TCP; port 0 takes a free one.")] = None,
+    rfc2217: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="The line as a network serial port (RFC 2217).")
+    ] = None,
     state: Annotated[
         Path | None, typer.Option(help="Directory of the EEPROMs of E types. Without it they end with the twin.")
     ] = None,

@@ -26,7 +26,9 @@ class Language(enum.StrEnum):
 
 def sniff(
     address: Annotated[str, typer.Argument(metavar="ADDRESS", help="The line, or the device to pass everything on to.")],
-    listen: Annotated[str | None, typer.Option(help="Stand in the line: programs connect to HOST:PORT instead.")] = None,
+    listen: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Relay: programs connect here instead of to the device.")
+    ] = None,
     pty: Annotated[Path | None, typer.Option(help="Stand in the line: programs open the pseudo terminal PATH instead.")] = None,
     language: Annotated[Language, typer.Option(help="What is spoken.")] = Language.MODBUS,
     baud: Annotated[int, typer.Option(help="Baud rate of a serial port.")] = 38400,
@@ -34,9 +36,9 @@ def sniff(
     variant: Annotated[str, typer.Option(help="Type of the M1486.", autocompletion=completion.variants)] = "A",
     json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each frame.")] = False,
 ) -> None:
-    """Put a line between two others into words.
+    """Log the traffic between a master and a device in words.
 
-    Without --listen and --pty it only listens: on RS-485 it hears both. With one of them it stands between a program and the
+    Without --listen and --pty it only listens: on RS-485 it receives both. With one of them it stands between a program and the
     device and passes everything on, so it works on RS-232, on Modbus TCP and for the M1486 too.
     """
     import asyncio

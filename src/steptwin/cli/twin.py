@@ -1,4 +1,4 @@
-"""``steptwin pin``, ``encoder``, ``power-cycle``, ``state``: a hand at a served twin."""
+"""``steptwin pin``, ``encoder``, ``power-cycle``, ``state``: the inputs, power and state of a running twin."""
 
 from __future__ import annotations
 

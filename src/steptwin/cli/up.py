@@ -48,9 +48,9 @@ def up(
     keys: Annotated[bool, typer.Option("--keys", help="Show what a description may say.")] = False,
     form: Annotated[Format, typer.Option("--format", help="How to print the keys.")] = Format.TEXT,
 ) -> None:
-    """Run a world until Ctrl-C, or until a script of its own stops it, with its lines open to other programs.
+    """Run a world in real time until Ctrl-C or until one of its scripts stops it; other programs connect to its lines.
 
-    'steptwin pause', 'step', 'resume' and 'save' take its time in hand.
+    'steptwin pause', 'step', 'resume' and 'save' control its time.
     """
     if keys:
         show(sections(), form)

@@ -175,7 +175,8 @@ class _Lines:
             say(f"{bench.untyped} lines of the file were not taken: there was no room for them")
         if outcome.ending.why == "limit":
             say("ended by the limit of time: --for takes a longer one")
-        say(f"{outcome.virtual_s:.6f} s of virtual time in {outcome.wall_s:.3f} s: {outcome.ratio:,.0f} times as fast as life")
+        faster = f"{outcome.ratio:,.0f} times faster than real time"
+        say(f"{outcome.virtual_s:.6f} s of virtual time in {outcome.wall_s:.3f} s: {faster}")
 
 
 def _position(chip: M1486, now: Nanos) -> str:

@@ -144,7 +144,7 @@ def _say_lines(bench: Bench, outcome: Outcome, say: Say) -> None:
     on = [name for name, level in shown["pins"].items() if level and not name.startswith("AIN")]
     say(f"  on: {', '.join(on) or 'nothing'}")
     virtual_s, wall_s = outcome.virtual_s, outcome.wall_s
-    say(f"{virtual_s:.6f} s of virtual time in {wall_s:.3f} s: {outcome.ratio:,.0f} times as fast as life")
+    say(f"{virtual_s:.6f} s of virtual time in {wall_s:.3f} s: {outcome.ratio:,.0f} times faster than real time")
 
 
 def _line(bench: Bench, happening: Happening) -> str:

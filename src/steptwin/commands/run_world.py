@@ -241,5 +241,7 @@ def replay(path: Path, trace: Path | None, say: Say, warn: Say) -> bool:
     if digest == session.digest:
         say(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")
         return True
-    warn(f"{path}: another thing happened: digest {digest}, the session has {session.digest} (steptwin {session.version})")
+    warn(
+        f"{path}: the run differs from the recorded one: digest {digest}, recorded {session.digest} (steptwin {session.version})"
+    )
     return False

@@ -323,7 +323,7 @@ def bits(answer: bytes, count: int) -> list[bool]:
 
 
 def check_unit(unit: int, *, tcp: bool) -> None:
-    """`Misuse` for a unit nobody answers for."""
+    """`Misuse` for a unit that sends no answers."""
     least, most = (0, 255) if tcp else (1, rtu.MAX_UNIT)
     if not least <= unit <= most:
         raise Misuse(f"unit {unit} is outside {least} to {most}")

@@ -126,7 +126,7 @@ class TcpEndpoint:
         return transport
 
     def _failed(self, error: OSError) -> LineLost:
-        why = f"nobody answers within {CONNECT_S:g} s" if isinstance(error, TimeoutError) else reason(error)
+        why = f"no answer within {CONNECT_S:g} s" if isinstance(error, TimeoutError) else reason(error)
         return LineLost(f"cannot connect to {self}: {why}")
 
 

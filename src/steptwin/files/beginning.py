@@ -54,7 +54,9 @@ def begin_world(
     session = sessions.load(path)
     world = session.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
     if moment is None and world.trace.digest() != session.digest:
-        warn(f"{path}: another thing happened than then (steptwin {session.version}): it goes on from what happens now")
+        warn(
+            f"{path}: the replay differs from the run recorded with steptwin {session.version}; the world goes on from the replay"
+        )
     world.go_on()
     return world
 

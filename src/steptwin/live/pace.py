@@ -102,7 +102,7 @@ class Pace:
     @property
     def _how(self) -> str:
         if self.speed == inf:
-            return " as fast as it can"
+            return " as fast as possible"
         return "" if self.speed == 1.0 else f", {self.speed:g} virtual seconds a second"
 
     def _say(self, text: str) -> None:

@@ -117,7 +117,7 @@ class M1486Line:
         """An event in words; the chip is named where there are several."""
         return f"chip {chip_name(self.chips[unit].address)}: {event.text}" if len(self.chips) > 1 else event.text
 
-    # ------------------------------------------------------------------ what a hand at the machine does
+    # ------------------------------------------------------------------ control requests
 
     def handlers(self, cell: Cell) -> dict[str, Callable[[Mapping[str, Any]], object]]:
         """Requests of the control endpoint; ``unit``, an address, chooses the chip where there are several.

@@ -147,7 +147,7 @@ class Mic488Line:
             raise Misuse("a vision system belongs to one controller: serve a single unit")
         return next(iter(self.devices.values()))
 
-    # ------------------------------------------------------------------ what a hand at the machine does
+    # ------------------------------------------------------------------ control requests
 
     def handlers(self, cell: Cell) -> dict[str, Callable[[Mapping[str, Any]], object]]:
         """Requests of the control endpoint; ``unit`` chooses the controller where there are several."""

@@ -170,7 +170,7 @@ class M1486Rig(LineRig[M1486Line]):
             pytest.fail(f"after {within_s:g} s only {len(received)} of {count} characters: {received.hex(' ') or 'none'}")
         return bytes(received)
 
-    # ------------------------------------------------------------------ a hand at the machine
+    # ------------------------------------------------------------------ inputs, faults, power
 
     def call(self, act: Callable[[M1486, Nanos], T]) -> T:
         """Do anything with the twin at the present moment; it is not to be kept. The twin's."""

@@ -179,7 +179,7 @@ class Mic488Rig(LineRig[Mic488Line]):
         endpoint = MemoryEndpoint(time, self._port, "the MIC488")
         return joined_driver(endpoint, time, options.unit, framed=options.link == "tcp", firmware=firmware, config=config)
 
-    # ------------------------------------------------------------------ a hand at the machine
+    # ------------------------------------------------------------------ inputs, faults, power
 
     def call(self, act: Callable[[Twin, Nanos], T]) -> T:
         """Do anything with the twin at the present moment; it is not to be kept. The twin's."""

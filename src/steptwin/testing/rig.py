@@ -87,7 +87,7 @@ class Rig:
 
     def later(self, seconds: float, act: Callable[[], object]) -> None:
         """Let something happen by itself in so many seconds of the twin, while a program waits: ``later(0.5, lambda:
-        rig.set_pin("IN5", 1))``. ``act`` is a hand at the machine and must not use drivers. The twin's."""
+        rig.set_pin("IN5", 1))``. ``act`` acts on the twin itself and must not use drivers. The twin's."""
         __tracebackhide__ = True
         if isinstance(self._time, WallTime):
             self.twin_only("later()")
@@ -169,7 +169,7 @@ class LineRig(Rig, Generic[L]):
             self.twin_only(what)
         return self._at_present(lambda now: act(line, now))
 
-    # ------------------------------------------------------------------ a hand at the machine
+    # ------------------------------------------------------------------ inputs, faults, power
 
     @property
     def pins(self) -> Mapping[str, float]:

@@ -179,7 +179,7 @@ class WorldRig(Rig):
                 self._channels[line] = parse_place(address, 4800).endpoint.open()
         return self._channels[line]
 
-    # ------------------------------------------------------------------ a hand at the machine
+    # ------------------------------------------------------------------ inputs, faults, power
 
     def call(self, act: Callable[[World], T]) -> T:
         """Do anything with the world at the present moment; it is not to be kept. The twin's."""
