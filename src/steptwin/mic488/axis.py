@@ -476,8 +476,8 @@ class Axis(Stateful):
 
     def input_changed(self, number: int, active: bool, now: Nanos) -> None:
         """Input ``number`` (from 0) changed after polarity, before the filter."""
-        if self.homing.leg != Homing.NONE and self.homing.input_changed(self, number, active, now):
-            return
+        if self.homing.leg != Homing.NONE:
+            self.homing.input_changed(self, number, active, now)
         if number in (self.config.in_kl, self.config.in_kr):
             self._guard_switches(now)
 

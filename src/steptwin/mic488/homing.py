@@ -64,17 +64,14 @@ class Homing(Stateful):
         else:
             axis.run(velocity_p, Status.HOMING, now)
 
-    def input_changed(self, axis: Axis, number: int, active: bool, now: Nanos) -> bool:
-        """True when the change belonged to the homing."""
+    def input_changed(self, axis: Axis, number: int, active: bool, now: Nanos) -> None:
+        """A leg ends at the sensor, where its signal ends, or at channel C."""
         if self.leg == Homing.TO_SENSOR and number == self.sensor and active:
             self._at_sensor(axis, now)
         elif (self.leg == Homing.OFF_SENSOR and number == self.sensor and not active) or (
             self.leg == Homing.TO_INDEX and number == index_input(axis.number - 1) and active
         ):
             axis.homed(now)
-        else:
-            return False
-        return True
 
     def stop_reached(self, axis: Axis, now: Nanos) -> None:
         """HOME3: the mechanical stop; back to channel C."""

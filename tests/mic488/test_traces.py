@@ -1,0 +1,23 @@
+"""What axes do with sequences of commands, event by event: golden/traces.txt.
+
+The rules behind it have their own tests; here whole sequences are compared, so that no value of a motion changes unnoticed.
+Regenerate with ``PYTHONPATH=tests/support python tests/mic488/test_traces.py`` and read the diff.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from golden_trace import Case, cases, regenerate
+
+GOLDEN = Path(__file__).parent / "golden" / "traces.txt"
+
+
+@pytest.mark.parametrize("case", cases(GOLDEN), ids=lambda case: case.name)
+def test_traces_are_the_reviewed_ones(case: Case) -> None:
+    assert case.trace().splitlines() == case.expected.splitlines()
+
+
+if __name__ == "__main__":
+    regenerate(GOLDEN)
