@@ -2,49 +2,16 @@
 
 from __future__ import annotations
 
-import pytest
+from driven import changes, pulse_by_pulse
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.machine import SECOND, Nanos
-from steptwin.motion import MotionState, Profile, plan_position, plan_velocity
+from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import Microstepping, step_train
-from steptwin.world.course import Build, Course, Plan, Standing, plan_of
-from steptwin.world.kernel import Kernel
-from steptwin.world.mechanics import Mechanism
+from steptwin.world.course import Build, Course, Standing
 
 END = 20 * SECOND
-
-
-def changes(plan: Plan, after: Nanos, until: Nanos) -> list[tuple[Nanos, int]]:
-    """(moment, count) of every pulse, found by asking for the next one."""
-    found = []
-    now = after
-    while True:
-        here = plan.count(now)
-        ahead = [t for c in (here - 1, here + 1) if (t := plan.pulse_time(c, now)) is not None]
-        if not ahead or min(ahead) > until:
-            return found
-        now = min(ahead)
-        found.append((now, plan.count(now)))
-
-
-def pulse_by_pulse(build: Build, plan: Plan, standing: Standing, begin: Nanos, until: Nanos) -> list[tuple[Nanos, int, int]]:
-    """(moment, rotor, load) after every pulse: each pushes the rotor, stops hold it, it pushes the load."""
-    rotor, load = standing[:2]
-    count = plan.count(begin)
-    low = None if build.low is None else build.low - build.play
-    way = [(begin, rotor, load)]
-    for moment, new in changes(plan, begin, until):
-        rotor += (new - count) * build.sign
-        count = new
-        if low is not None:
-            rotor = max(rotor, low)
-        if build.high is not None:
-            rotor = min(rotor, build.high)
-        load = min(max(load, rotor), rotor + build.play)
-        way.append((moment, rotor, load))
-    return way
 
 
 def pressed(build: Build, profile: Profile, until: Nanos) -> list[tuple[Nanos, int, int]]:
@@ -199,80 +166,3 @@ def test_the_division_of_an_m1486_is_seen() -> None:
     course = Course(Build(high=300), train, 0, Standing(0, 0))
     assert course.reaches(100, 0, 1) == train.pulse_time(128, 0)
     assert course.at(10 * SECOND).load == 300
-
-
-class Motor:
-    """A machine whose only axis goes where the test says."""
-
-    def __init__(self) -> None:
-        self.now = 0
-        self.profile = plan_velocity(MotionState(0, 0, 0.0, 0.0), 0.0, 1.0, 1.0)
-        self.revision = 0
-        self.changed = lambda: None
-
-    @property
-    def axes(self) -> tuple[Motor, ...]:
-        return (self,)
-
-    def advance(self, now: Nanos) -> None:
-        self.now = now
-
-    def deadline(self) -> None:
-        return None
-
-    def set_pin(self, pin: str, value: float, now: Nanos) -> None:
-        raise AssertionError(pin)
-
-    def pins(self) -> dict[str, float]:
-        return {}
-
-    def take_edges(self) -> list:
-        return []
-
-    def go(self, target: int, now: Nanos) -> None:
-        self.profile = plan_position(MotionState.of(self.profile, now), target, 500.0, 500.0, 200.0)
-        self.revision += 1
-        self.changed()
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    moves=st.lists(st.tuples(st.integers(-200, 200), st.integers(1, 2 * SECOND)), min_size=1, max_size=6),
-    play=st.integers(0, 9),
-    stops=st.booleans(),
-)
-def test_a_mechanism_follows_replaced_plans_as_a_simulation_does(moves: list[tuple[int, Nanos]], play: int, stops: bool) -> None:
-    kernel, motor = Kernel(), Motor()
-    kernel.add("m", motor)
-    build = Build(zero=5, low=-90 if stops else None, high=110 if stops else None, play=play)
-    mechanism = Mechanism(kernel, "m", 1, build)
-    kernel.add_part(mechanism)
-    standing, now = Standing(5, 5), 0
-    for target, pause in moves:
-        motor.go(target, now)
-        kernel.settle()
-        way = pulse_by_pulse(build, plan_of(motor), standing, now, now + pause)
-        now += pause
-        kernel.advance(now)
-        motor.advance(now)
-        standing = Standing(*way[-1][1:])
-        assert mechanism.at(now)[:2] == standing[:2]
-
-
-def test_steps_taken_away_are_lost_until_the_end() -> None:
-    kernel, motor = Kernel(), Motor()
-    kernel.add("m", motor)
-    mechanism = Mechanism(kernel, "m", 1, Build())
-    kernel.add_part(mechanism)
-    motor.go(100, 0)
-    kernel.advance(20 * SECOND)
-    mechanism.lose(7, 20 * SECOND)
-    assert (mechanism.place(20 * SECOND), mechanism.lost(20 * SECOND)) == (93, 7)
-    mechanism.block(True, 20 * SECOND)
-    motor.go(150, 20 * SECOND)
-    kernel.advance(40 * SECOND)
-    assert (mechanism.place(40 * SECOND), mechanism.lost(40 * SECOND)) == (93, 57)
-    mechanism.block(False, 40 * SECOND)
-    motor.go(100, 40 * SECOND)
-    kernel.advance(60 * SECOND)
-    assert mechanism.place(60 * SECOND) == pytest.approx(43)

@@ -5,12 +5,24 @@ from __future__ import annotations
 from textwrap import dedent
 
 import pytest
+from driven import Driven, pulse_by_pulse
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mic488_rig import controller
 
+from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import SECOND
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.mic488.device import Mic488
 from steptwin.mic488.status import Status
+from steptwin.motion import MotionState, plan_position
 from steptwin.world import script as do
+from steptwin.world.course import Build, Carried, Standing, plan_of
 from steptwin.world.faults import read
+from steptwin.world.kernel import Kernel
+from steptwin.world.mechanics import EncoderBuild, Mechanism
+from steptwin.world.motor import Motor
+from steptwin.world.trace import Record
 
 AXIS = """
     [[mic488]]
@@ -208,3 +220,213 @@ def test_a_correction_follows_an_encoder_that_has_slipped() -> None:
     world.run(until="m.M1.status == 4", for_=20)
     assert axis.position == pytest.approx(50.0, abs=0.01)
     assert world.axis["x"].position == pytest.approx(69.0, abs=0.02)
+
+
+# ---------------------------------------------------------------------- a mechanism by itself
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    moves=st.lists(st.tuples(st.integers(-200, 200), st.integers(1, 2 * SECOND)), min_size=1, max_size=6),
+    play=st.integers(0, 9),
+    stops=st.booleans(),
+)
+def test_a_mechanism_follows_replaced_plans_as_a_simulation_does(moves: list[tuple[int, Nanos]], play: int, stops: bool) -> None:
+    kernel, motor = Kernel(), Driven()
+    kernel.add("m", motor)
+    build = Build(zero=5, low=-90 if stops else None, high=110 if stops else None, play=play)
+    mechanism = Mechanism(kernel, "m", 1, build)
+    kernel.add_part(mechanism)
+    standing, now = Standing(5, 5), 0
+    for target, pause in moves:
+        motor.go(target, now)
+        kernel.settle()
+        way = pulse_by_pulse(build, plan_of(motor), standing, now, now + pause)
+        now += pause
+        kernel.advance(now)
+        motor.advance(now)
+        standing = Standing(*way[-1][1:])
+        assert mechanism.at(now)[:2] == standing[:2]
+
+
+def test_steps_taken_away_are_lost_until_the_end() -> None:
+    kernel, motor = Kernel(), Driven()
+    kernel.add("m", motor)
+    mechanism = Mechanism(kernel, "m", 1, Build())
+    kernel.add_part(mechanism)
+    motor.go(100, 0)
+    kernel.advance(20 * SECOND)
+    mechanism.lose(7, 20 * SECOND)
+    assert (mechanism.place(20 * SECOND), mechanism.lost(20 * SECOND)) == (93, 7)
+    mechanism.block(True, 20 * SECOND)
+    motor.go(150, 20 * SECOND)
+    kernel.advance(40 * SECOND)
+    assert (mechanism.place(40 * SECOND), mechanism.lost(40 * SECOND)) == (93, 57)
+    mechanism.block(False, 40 * SECOND)
+    motor.go(100, 40 * SECOND)
+    kernel.advance(60 * SECOND)
+    assert mechanism.place(60 * SECOND) == pytest.approx(43)
+
+
+def rigged(build: Build, **options: object) -> tuple[Kernel, Driven, Mechanism, list[Record]]:
+    told: list[Record] = []
+    kernel, drive = Kernel(record=told.append), Driven()
+    kernel.add("m", drive)
+    mechanism = Mechanism(kernel, "m", 1, build, "x")
+    kernel.add_part(mechanism)
+    return kernel, drive, mechanism, told
+
+
+@pytest.mark.parametrize(("zero", "is_within"), [(-11, False), (-10, True), (20, True), (21, False)])
+def test_an_axis_begins_within_its_stops(zero: int, is_within: bool) -> None:
+    build = Build(zero=zero, low=-10, high=20)
+    if is_within:
+        assert rigged(build)[2].at(0) == Standing(zero, zero)
+        return
+    with pytest.raises(Misuse, match=f"m axis 1 stands at {zero} imp, outside its hard stops -10 to 20 imp"):
+        rigged(build)
+
+
+def test_what_is_ideal_has_no_deadline_and_no_stops_either() -> None:
+    kernel, drive, mechanism, told = rigged(Build(sign=-1, zero=7))
+    drive.go(100, 0)
+    kernel.advance(20 * SECOND)
+    assert (mechanism.at(kernel.now), mechanism.lost(kernel.now), mechanism.deadline()) == (Standing(-93, -93), 0, None)
+    assert [record.kind for record in told] == ["plan"]
+
+
+@pytest.mark.parametrize("taken", [7, -7, 400, -400])
+def test_pulses_are_taken_away_as_far_as_stops_permit(taken: int) -> None:
+    """Stops at -30 and 120 and 5 pulses of play: the rotor goes from -35 to 120. The load is at the rotor or up to 5 above."""
+    kernel, drive, mechanism, _ = rigged(Build(low=-30, high=120, play=5))
+    drive.go(100, 0)
+    kernel.advance(20 * SECOND)
+    assert mechanism.at(kernel.now) == Standing(100, 100)
+    mechanism.lose(taken, kernel.now)
+    rotor = min(max(100 - taken, -35), 120)
+    load = min(max(100, rotor), rotor + 5)
+    assert mechanism.at(kernel.now)[:2] == (rotor, load)
+    assert mechanism.lost(kernel.now) == 100 - rotor
+    assert kernel.stale, "what stands on the load looks again"
+    drive.go(60, kernel.now)
+    kernel.advance(40 * SECOND)
+    assert mechanism.at(kernel.now).rotor == min(max(rotor - 40, -35), 120)
+
+
+def test_an_ideal_axis_that_lost_pulses_keeps_the_loss_through_a_snapshot_and_a_counter_from_0() -> None:
+    kernel, drive, mechanism, _ = rigged(Build())
+    drive.go(100, 0)
+    kernel.advance(20 * SECOND)
+    mechanism.lose(7, kernel.now)
+    kernel.settle()
+    state = mechanism.copy_state()
+    mechanism.lose(3, kernel.now)
+    mechanism.set_state(state)
+    assert mechanism.lost(kernel.now) == 7
+    drive.go(50, kernel.now)
+    kernel.settle()
+    later = mechanism.copy_state()
+    kernel.advance(40 * SECOND)
+    assert (mechanism.place(kernel.now), mechanism.lost(kernel.now)) == (43, 7)
+    mechanism.set_state(later)
+    assert mechanism.place(40 * SECOND) == 43
+    # A drive that is switched off counts from 0 again: the load stays where it is.
+    drive.profile, drive.revision = plan_position(MotionState(40 * SECOND, 0, 0.0, 0.0), 0, 1.0, 1.0, 1.0), drive.revision + 1
+    assert mechanism.at(40 * SECOND)[:2] == (43, 43)
+
+
+def test_the_trace_is_told_where_the_load_is_only_when_it_does_not_go_with_its_drive() -> None:
+    """Stop at 55: 45 of 100 pulses are lost there. On the way back the load is 45 behind."""
+    kernel, drive, _, told = rigged(Build(high=55))
+    drive.go(100, 0)
+    kernel.advance(10 * SECOND)
+    drive.go(70, 10 * SECOND)
+    kernel.advance(20 * SECOND)
+    loads = [record for record in told if record.kind == "load"]
+    assert [(record.machine, record.subject) for record in loads] == [("m", "1")] * len(loads)
+    met = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 500.0, 500.0, 200.0)
+    held = met.pulse_time(56, 0)
+    assert held is not None
+    first = loads[0].value
+    assert first == (Carried(0, True, 0), Carried(held, False, 55), Carried(met.end or 0, True, -45))
+    assert all(carried == Carried(10 * SECOND, True, -45) for record in loads[1:] for carried in record.value)  # type: ignore[attr-defined]
+
+
+def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_caught() -> None:
+    """Nothing is left above 100 pulses/s: lost 0.2 s after the start with 500 pulses/s², caught at rest. Full steps of 16."""
+    build = Build(period_p=64, motor=Motor(((0.0, 1.0), (100.0, 1.0)), 0.0, 0.0, 0.0, None))
+    kernel, drive, mechanism, told = rigged(build)
+    assert mechanism.deadline() is None
+    drive.go(200, 0)
+    kernel.settle()
+    assert mechanism.deadline() == pytest.approx(0.2 * SECOND, abs=1000)
+    assert kernel.deadline() == mechanism.deadline()
+    kernel.advance(SECOND // 2)
+    end = drive.profile.end
+    assert mechanism.deadline() == end
+    assert (mechanism.at(kernel.now).stalled, mechanism.at(kernel.now).rotor) == (True, 10)
+    kernel.advance(5 * SECOND)
+    assert mechanism.deadline() is None
+    behind = 200 - mechanism.place(kernel.now)
+    assert behind == 192, "the multiple of 64 nearest to 190"
+    events = [(record.time, record.subject, record.value) for record in told if record.kind == "event"]
+    assert [event[1:] for event in events] == [("stall", "x loses the field"), ("stall", "x is caught, 192 pulses behind")]
+    assert [event[0] for event in events] == pytest.approx([0.2 * SECOND, end], abs=1000)
+    assert mechanism.lost(kernel.now) == 192
+
+
+def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
+    build = Build(period_p=64, motor=Motor(((0.0, 1.0), (1000.0, 1.0)), 0.0, 0.0, 0.0, None))
+    kernel, drive, mechanism, _ = rigged(build)
+    mechanism.block(True, 0)
+    drive.go(200, 0)
+    kernel.advance(5 * SECOND)
+    assert (mechanism.place(kernel.now), mechanism.lost(kernel.now)) == (0, 200)
+    version = mechanism.version()
+    mechanism.block(False, kernel.now)
+    assert mechanism.version() != version
+    kernel.advance(6 * SECOND)
+    assert mechanism.at(kernel.now) == Standing(8, 8, behind=192)
+
+
+def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None:
+    """The encoder of another controller: it is looked at while it turns, and at rest not at all."""
+    told: list[Record] = []
+    kernel, drive = Kernel(record=told.append), Driven()
+    other = Mic488(controller())
+    kernel.add("m", drive)
+    kernel.add("other", other)
+    mechanism = Mechanism(kernel, "m", 1, Build())
+    kernel.add_part(mechanism)
+    mechanism.fit(EncoderBuild(other, 2, counts=-3, pulses=2), 0)
+    assert mechanism.deadline() is None
+    drive.go(100, 0)
+    kernel.settle()
+    assert mechanism.deadline() == 10 * MILLISECOND
+    kernel.advance(10 * MILLISECOND)
+    assert mechanism.deadline() == 20 * MILLISECOND
+    kernel.advance(20 * SECOND)
+    assert mechanism.deadline() is None
+    assert other.axes[1].encoder_counts(20 * SECOND) == -150
+    assert other.axes[0].encoder_counts(20 * SECOND) == 0
+    mechanism.slip(5, 20 * SECOND)
+    assert (other.axes[1].encoder_counts(20 * SECOND), kernel.stale) == (-145, True)
+
+
+@pytest.mark.parametrize(("on_load", "counts"), [(False, [0, 100, 60]), (True, [0, 100, 65])])
+def test_an_encoder_sits_on_the_rotor_or_on_the_load(on_load: bool, counts: list[int]) -> None:
+    """One count a pulse, 5 pulses of play."""
+    kernel, drive = Kernel(), Driven()
+    other = Mic488(controller())
+    kernel.add("m", drive)
+    kernel.add("other", other)
+    mechanism = Mechanism(kernel, "m", 1, Build(sign=-1, zero=500, play=5))
+    kernel.add_part(mechanism)
+    mechanism.fit(EncoderBuild(other, 1, on_load, 1), 0)
+    found = [other.axes[0].encoder_counts(0)]
+    for target, now in ((-100, 0), (-60, 20 * SECOND)):
+        drive.go(target, now)
+        kernel.advance(now + 20 * SECOND)
+        found.append(-other.axes[0].encoder_counts(kernel.now))
+    assert mechanism.at(kernel.now)[:2] == (560, 565)
+    assert found == counts

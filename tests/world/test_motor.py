@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import inf, pi
+from math import cos, inf, pi, sin
 
 import pytest
 from hypothesis import example, given, settings
@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
+from steptwin.motion.paths import Circular
 from steptwin.motion.ramps import SpeedCurve, plan_endless
 from steptwin.world.course import Build, Course, Standing
 from steptwin.world.motor import Motor, _first_below_0, _first_not_below_0
@@ -311,3 +312,104 @@ def test_the_first_moment_at_which_nothing_is_below_0_is_that_of_a_dense_scan(pa
         assert found <= up
         assert least(found) > -1e-6
         assert all(least(u) <= 1e-6 for u in scan if u < found)
+
+
+# ---------------------------------------------------------------------- along an arc
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    radius=st.integers(2000, 20_000),
+    speed=st.floats(5000.0, 30_000.0),
+    inertia=st.floats(1e-7, 2e-5),
+    friction=st.floats(0.0, 0.2),
+    load=st.floats(-0.2, 0.2),
+    start=st.floats(100.0, 30_000.0),
+    sign=st.sampled_from([1, -1]),
+    part=st.floats(0.0, 0.9),
+)
+@example(radius=8000, speed=20_000.0, inertia=1e-5, friction=0.1, load=0.1, start=9000.0, sign=-1, part=0.3)
+def test_along_an_arc_it_is_looked_every_millisecond(  # noqa: PLR0917
+    radius: int, speed: float, inertia: float, friction: float, load: float, start: float, sign: int, part: float
+) -> None:
+    """x = R cos φ with φ = w / R: velocity and acceleration by the derivatives of that, at whole milliseconds of a segment."""
+    way = plan_position(MotionState(0, 0, 0.0, 0.0), round(2 * pi * radius), 40_000.0, 40_000.0, speed)
+    profile = Circular(-radius, radius, 0.0, 4.0 / round(2 * pi * radius)).profile(way, 0, 0)
+    drive = Motor(LINEAR, inertia, friction, load, start)
+    scale = 2 * pi / round(2 * pi * radius)
+    begin = 0.0
+    for s in profile.segments:
+        first = begin + part * (s.end_s - begin)
+        lost = caught = None
+        is_close = False
+        for n in range(int((s.end_s - first) / 0.001) + 1):
+            t = first + n * 0.001
+            w, dw, ddw = s.way.position(t), s.way.velocity(t), 2 * s.way.c2
+            velocity = -radius * sin(scale * w) * scale * dw
+            acceleration = -radius * scale * (cos(scale * w) * scale * dw * dw + sin(scale * w) * ddw)
+            need = abs(inertia * sign * acceleration + friction * sign * s.direction + load)
+            torque = at_speed(LINEAR, abs(velocity))
+            # At the ends of a segment the difference from which the acceleration comes reaches beyond it.
+            is_close |= abs(need - torque) < 2e-3 or abs(abs(velocity) - start) < 1.0
+            if lost is None and need > torque:
+                lost = t
+            if caught is None and need <= torque and abs(velocity) <= start:
+                caught = t
+        if not is_close:
+            assert drive.loses(s, first, s.end_s, sign) == lost
+            assert drive.catches(s, first, s.end_s, sign) == caught
+        begin = s.end_s
+
+
+def test_a_motor_on_an_arc_loses_the_field_where_the_curve_is_too_tight() -> None:
+    """R = 8000 at 20 000 pulses/s: 50 000 pulses/s² where the axis turns; 1 N·m is there at any speed."""
+    way = plan_position(MotionState(0, 0, 0.0, 0.0), 50_265, 20_000.0, 20_000.0, 20_000.0)
+    profile = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(way, 0, 0)
+    for need, follows in ((0.99, True), (1.01, False)):
+        build = Build(period_p=64, motor=Motor(((0.0, 1.0), (32_000.0, 1.0)), need / 50_000.0, 0.0, 0.0, 20_000.0))
+        course = Course(build, profile, 0, Standing(0, 0))
+        assert (course.next_stall(0) is None) is follows, need
+        assert (course.at(1000 * SECOND) == Standing(0, 0)) is follows or course.at(1000 * SECOND).behind % 64 == 0
+
+
+# ---------------------------------------------------------------------- motions without end
+
+
+@pytest.mark.parametrize(
+    ("speed", "start", "lost", "caught"),
+    [
+        (15_999.0, 16_000.0, None, 0.5),
+        (16_001.0, 16_000.0, 0.5, None),
+        (8000.0, 7999.0, None, None),
+        (8000.0, 8000.0, None, 0.5),
+    ],
+)
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_steady_motion_is_followed_or_not_from_its_beginning(
+    speed: float, start: float, lost: float | None, caught: float | None, direction: int
+) -> None:
+    """Friction of 0.6 N·m; the curve has that at 16 000 pulses/s. Above the start speed nothing is caught."""
+    plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), direction * speed, 1e9, 1e9)
+    steady = plan.segments[-1]
+    assert steady.end_s == inf
+    drive = motor(friction=0.6, start=start)
+    assert drive.loses(steady, 0.5, inf, direction) == lost
+    assert drive.catches(steady, 0.5, inf, direction) == caught
+
+
+@pytest.mark.parametrize(("jump", "follows"), [(2000.0, True), (-2000.0, True), (2001.0, False), (-2001.0, False)])
+def test_a_jump_of_the_speed_is_followed_up_to_the_start_speed(jump: float, follows: bool) -> None:
+    assert motor(start=2000.0).follows(jump) is follows
+    assert motor().follows(jump)
+
+
+def test_a_rotor_that_would_be_caught_and_lost_at_once_stays_lost() -> None:
+    """Friction takes all there is at any speed: what is caught at rest in a turn is lost in the same moment."""
+    build = Build(period_p=64, motor=motor(((0.0, 0.5), (32_000.0, 0.5)), inertia=1e-9, friction=0.6))
+    plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 5000.0, 1000.0, 1000.0)
+    turned = plan_velocity(MotionState.of(plan, SECOND), -5000.0, 1000.0, 1000.0)
+    course = Course(build, turned, SECOND, Standing(0, 0, stalled=True))
+    for moment in (SECOND, 2 * SECOND, 3 * SECOND, 9 * SECOND):
+        assert course.at(moment).stalled, moment
+        assert course.at(moment).rotor == 0
+    assert [piece.begin for piece in course.pieces] == sorted({piece.begin for piece in course.pieces})

@@ -6,6 +6,7 @@ import pytest
 from small_world import moved, small
 
 from steptwin.errors import Misuse
+from steptwin.files.world import World
 from steptwin.mic488.status import Status
 
 
@@ -34,3 +35,74 @@ def test_positions_are_those_of_register_and_mechanics() -> None:
     axis = world.mic488["a"].axis[1]
     assert (axis.position, axis.velocity, axis.status, axis.unit) == (25.0, 0.0, Status.REACHED, "mm")
     assert (world.axis["x"].position, world.axis["x"].lost) == (75.0, 0)
+
+
+def test_an_axis_in_motion() -> None:
+    """Of a move of 25 mm with 100 mm/s²: 2 mm after 0.2 s, at 20 mm/s."""
+    world = moved(small(), 25.0)
+    axis, x = world.mic488["a"].axis[1], world.axis["x"]
+    assert (axis.number, axis.enabled, world.mic488["a"].axis[2].enabled) == (1, True, False)
+    world.run(for_=0.2)
+    assert (axis.position, axis.velocity, axis.moving) == (pytest.approx(2.0, abs=0.011), pytest.approx(20.0), True)
+    assert (x.position, x.rotor, x.unit, x.stalled) == (pytest.approx(52.0, abs=0.011), x.position, "mm", False)
+    assert world.mic488["a"].status == int(world.mic488["a"].device.status())
+    assert axis.encoder == int(round(axis.position * 100) * 400 / 3200)
+    axis.stop()
+    assert (axis.velocity, axis.moving) == (0.0, False)
+    axis.move_by(-1.0)
+    here = axis.position
+    world.run(until="idle")
+    assert axis.position == pytest.approx(here - 1.0, abs=1e-9)
+    axis.home(-20.0)
+    world.run(until="idle and time > 3", for_=30)
+    assert axis.status is Status.REACHED
+
+
+def test_rotor_and_load_differ_by_the_play() -> None:
+    world = World.from_toml(
+        '[[mic488]]\nname = "a"\n[mic488.M1]\nunit = "mm"\ngear = 100.0\n[[axis]]\nname = "x"\ndrive = "a.M1"\nbacklash = 0.5\n'
+    )
+    moved(world, 5.0).run(until="idle")
+    assert (world.axis["x"].position, world.axis["x"].rotor) == (5.0, 5.0)
+    world.mic488["a"].axis[1].move_to(2.0)
+    world.run(until="idle")
+    assert (world.axis["x"].position, world.axis["x"].rotor) == (2.5, 2.0)
+
+
+def test_a_chip_and_what_it_is_told() -> None:
+    world = World.from_toml('[[line]]\nname = "bus"\nkind = "m1486"\n[[m1486]]\nname = "d"\nline = "bus"\naddress = 3\n')
+    chip = world.m1486["d"]
+    assert (chip.name, chip.position, chip.counter, chip.moving) == ("d", 0, 0, False)
+    world.line["bus"].send(b"x3\rf12800\rr\r")
+    world.run(for_=0.05)
+    assert chip.moving
+    world.run(until="idle")
+    assert (chip.position, chip.counter, chip.moving) == (12800, 12800, False)
+    chip.set_pin("b3", 0)
+    assert chip.pins["B3"] == 0.0
+    chip.power_cycle()
+    assert (chip.counter, chip.position) == (0, 12800)
+    world.line["bus"].send(b"x3\ru20\r")
+    world.run(for_=1)
+    assert world.line["bus"].received()[-1:] == b"B"
+    assert world.line["bus"].received() == b""
+
+
+def test_a_line_has_a_place_for_each_program() -> None:
+    world = World.from_toml('[[line]]\nname = "bus"\n[[mic488]]\nname = "a"\nline = "bus"\n')
+    request = bytes.fromhex("01 03 27 24 00 02 8e b4")
+    world.line["bus"].send(request, "plc")
+    assert len(world.line["bus"].received("plc")) == 9
+    assert world.line["bus"].received() == world.line["bus"].received("plc") == b""
+    assert (len(world.line), [*world.line], "bus" in world.line) == (1, ["bus"], True)
+
+
+def test_a_controller_is_switched_off_and_on() -> None:
+    world = moved(small(), 10.0)
+    world.run(for_=0.3)
+    world.mic488["a"].power_cycle()
+    axis = world.mic488["a"].axis[1]
+    assert (axis.enabled, axis.moving, axis.position) == (False, False, 0.0)
+    assert world.mic488["a"].program.name == "STOPPED" or world.mic488["a"].program == 0
+    world.mic488["a"].set_pin("in7", 1)
+    assert world.mic488["a"].pins["IN7"] == 1.0
