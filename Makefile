@@ -53,7 +53,7 @@ imports: $(DEV_STAMP)  ## Check that imports go down only and that pure packages
 bench: $(DEV_STAMP)  ## Measure requests per second and latencies against other servers
 	$(BIN)/python -m bench $(ARGS)
 
-mutants: $(DEV_STAMP)  ## Try whether the tests notice small mistakes in the core (ARGS="-n 60 --seed 1 wire motion")
+mutants: $(DEV_STAMP)  ## Try whether the tests notice small mistakes in the core (ARGS="-n 300 --seed 1 wire motion")
 	$(BIN)/python -m mutants $(ARGS)
 
 docs: $(DEV_STAMP)  ## Build the documentation into build/docs

@@ -1,31 +1,40 @@
 """``make mutants``: small mistakes put into the core, one at a time; do the tests notice?
 
-A random sample, as many of each kind of mistake. For each of them the tests of the module run first, then those of its package,
-then those of the whole core, until one fails. Results are written after each mutation to ``build/mutants/results.md``. Survivors
-that change nothing a test could see are listed in ``mutants/equivalent.toml``, with the reason.
+A random sample. For each mutation the tests run that execute its lines, the fastest first, until one fails: those of the mirrored
+folder, then others. Results are written after each mutation to ``build/mutants/results.md``. Survivors that change nothing a test
+could see are listed in ``mutants/equivalent.toml``, with the reason.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import queue
 import random
 import signal
 import sys
 import tempfile
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from pathlib import Path
+from typing import TypeVar
 
 from mutants.mutations import Mutation, compiles, mutations
-from mutants.trial import CORE, Tree, limit_s
+from mutants.reach import CORE, Reach, digest, folders
+from mutants.trial import Tree
+
+T = TypeVar("T")
 
 ROOT = Path(__file__).parent.parent
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
-RESULTS = ROOT / "build/mutants/results.md"
-COLUMNS = ("file", "folder", "core", "time", "equivalent", "survived")
+BUILD = ROOT / "build/mutants"
+RESULTS = BUILD / "results.md"
+COLUMNS = ("folder", "others", "equivalent", "survived")
 
 
 @dataclass(frozen=True)
@@ -39,23 +48,15 @@ class Mutant:
         return f"{self.module}:{self.mutation.line(self.source)}: {self.mutation.kind}\n    - {before}\n    + {after}"
 
 
-def sample(tree: Tree, packages: list[str], seed: int) -> Iterator[Mutant]:
-    """All mutants in random order, the kinds of mistakes in turn."""
-    kinds: dict[str, list[Mutant]] = {}
-    for module in tree.modules(packages):
-        source = (tree.path / module).read_text()
-        for mutation in mutations(source):
-            kinds.setdefault(mutation.kind, []).append(Mutant(module, mutation, source))
-    chance = random.Random(seed)
-    for mutants in kinds.values():
-        chance.shuffle(mutants)
-    while any(kinds.values()):
-        for name in sorted(kinds):
-            while kinds[name]:
-                mutant = kinds[name].pop()
-                if compiles(mutant.mutation.apply(mutant.source)):
-                    yield mutant
-                    break
+def sample(root: Path, packages: list[str], seed: int) -> Iterator[Mutant]:
+    """All mutants of these packages in random order."""
+    mutants = []
+    for name in packages:
+        for path in sorted((root / "src/steptwin" / name).rglob("*.py")):
+            source = path.read_text()
+            mutants += [Mutant(path.relative_to(root), mutation, source) for mutation in mutations(source)]
+    random.Random(seed).shuffle(mutants)
+    return (mutant for mutant in mutants if compiles(mutant.mutation.apply(mutant.source)))
 
 
 def equivalents() -> set[tuple[str, str, str]]:
@@ -64,16 +65,13 @@ def equivalents() -> set[tuple[str, str, str]]:
     return {(entry["module"], entry["before"], entry["after"]) for entry in listed}
 
 
-def outcome(tree: Tree, mutant: Mutant, durations: dict[str, float], known: set[tuple[str, str, str]]) -> str:
-    """Which stage failed, or one of the other `COLUMNS`."""
-    if (str(mutant.module), *mutant.mutation.lines(mutant.source)) in known:
-        return "equivalent"
+def outcome(tree: Tree, reach: Reach, mutant: Mutant) -> str:
+    """The stage in which a test failed, or ``survived``."""
+    first = mutant.mutation.line(mutant.source)
+    last = first + mutant.source.count("\n", mutant.mutation.start, mutant.mutation.end)
     with tree.changed(mutant.module, mutant.mutation.apply(mutant.source)):
-        for name, arguments in tree.stages(mutant.module):
-            passed = tree.passes(arguments, limit_s(arguments, durations))
-            if passed is None:
-                return "time"
-            if not passed:
+        for name, seconds in reach.stages(mutant.module, first, last):
+            if not tree.passes(seconds):
                 return name
     return "survived"
 
@@ -84,10 +82,7 @@ def report(results: list[tuple[Mutant, str]], seed: int) -> str:
     for mutant, found in results:
         for name in (str(mutant.module.relative_to("src/steptwin")), f"**{mutant.module.parts[2]}**", "**all**"):
             modules.setdefault(name, Counter())[found] += 1
-    lines = [
-        f"{len(results)} mutations, seed {seed}. Killed by the mirrored file, its folder, the other folders of the core, or the"
-    ]
-    lines += ["limits of time and memory.", ""]
+    lines = [f"{len(results)} mutations, seed {seed}. Noticed by tests of the mirrored folder or by others.", ""]
     lines += [f"| module | {' | '.join(COLUMNS)} |", f"|---|{'---|' * len(COLUMNS)}"]
     for name in sorted(modules):
         lines.append(f"| {name} | {' | '.join(str(modules[name][column] or '') for column in COLUMNS)} |")
@@ -95,29 +90,91 @@ def report(results: list[tuple[Mutant, str]], seed: int) -> str:
     return "\n".join(lines)
 
 
+class Workers:
+    """Several trees, each with its thread."""
+
+    def __init__(self, trees: list[Tree]) -> None:
+        self._trees = trees
+        self._free: queue.SimpleQueue[Tree] = queue.SimpleQueue()
+        for tree in trees:
+            self._free.put(tree)
+        self._pool = ThreadPoolExecutor(len(trees))
+
+    def each(self, tasks: Iterable[Callable[[Tree], T]]) -> Iterator[T]:
+        """The results in the order in which they come."""
+        futures: list[Future[T]] = [self._pool.submit(self._do, task) for task in tasks]
+        return (future.result() for future in as_completed(futures))
+
+    def end(self) -> None:
+        """End the tests that run."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for tree in self._trees:
+            tree.end()
+
+    def _do(self, task: Callable[[Tree], T]) -> T:
+        tree = self._free.get()
+        try:
+            return task(tree)
+        finally:
+            self._free.put(tree)
+
+
+def recorded(workers: Workers, root: Path, packages: list[str]) -> Reach:
+    """What the tests execute; recorded where sources or tests have changed since the last time."""
+    records = {folder: BUILD / f"{Path(folder).name}-{digest(root, folder)}.json" for folder in folders(root, packages)}
+    missing = [folder for folder, file in records.items() if not file.exists()]
+    for folder in missing:
+        for old in BUILD.glob(f"{Path(folder).name}-*.json"):
+            old.unlink()
+    tasks = [partial(_recorded, folder, records[folder]) for folder in missing]
+    for number, (folder, passed) in enumerate(workers.each(tasks), 1):
+        if not passed:
+            sys.exit(f"mutants: {folder} fails without any mutation")
+        print(f"recorded {folder} ({number}/{len(missing)})", flush=True)
+    return Reach(root, records)
+
+
+def _recorded(folder: str, file: Path, tree: Tree) -> tuple[str, bool]:
+    return folder, tree.record(folder, file)
+
+
+def _tried(reach: Reach, known: set[tuple[str, str, str]], mutant: Mutant, tree: Tree) -> tuple[Mutant, str]:
+    if (str(mutant.module), *mutant.mutation.lines(mutant.source)) in known:
+        return mutant, "equivalent"
+    return mutant, outcome(tree, reach, mutant)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="make mutants", description="Mutation testing of the core.")
     parser.add_argument("-n", type=int, default=60, metavar="N", help="number of mutations (default: 60)")
     parser.add_argument("--seed", type=int, default=1, help="random seed of the sample (default: 1)")
+    parser.add_argument(
+        "-j", type=int, default=os.cpu_count() or 1, metavar="JOBS", help="how many at the same time (default: all cores)"
+    )
     parser.add_argument("packages", nargs="*", metavar="PACKAGE", help=f"packages to mutate (default: {' '.join(CORE)})")
     options = parser.parse_args()
     if unknown := set(options.packages) - set(CORE):
         parser.error(f"no package of the core: {', '.join(sorted(unknown))}; they are {', '.join(CORE)}")
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the pytest that runs is ended, too
-    os.nice(19)
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    known = equivalents()
-    RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    if options.j < 1:
+        parser.error(f"-j {options.j}: 1 or more")
+    packages = options.packages or list(CORE)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the tests that run are ended, too
+    os.nice(5)
+    BUILD.mkdir(parents=True, exist_ok=True)
     results: list[tuple[Mutant, str]] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:
-        tree = Tree(ROOT, Path(directory))
-        durations = tree.durations(list(CORE))
-        for mutant in sample(tree, options.packages or list(CORE), options.seed):
-            if len(results) == options.n:
-                break
-            results.append((mutant, outcome(tree, mutant, durations, known)))
-            print(f"{len(results)}/{options.n} {results[-1][1]}: {mutant}", flush=True)
-            RESULTS.write_text(report(results, options.seed))
+        base, *trees = (Tree(ROOT, Path(directory, str(number))) for number in range(options.j + 1))
+        workers = Workers(trees)
+        try:
+            reach = recorded(workers, base.path, packages)
+            mutants = islice(sample(base.path, packages, options.seed), options.n)
+            tasks = [partial(_tried, reach, equivalents(), mutant) for mutant in mutants]
+            for result in workers.each(tasks):
+                results.append(result)
+                print(f"{len(results)}/{len(tasks)} {result[1]}: {result[0]}", flush=True)
+                RESULTS.write_text(report(results, options.seed))
+        finally:
+            workers.end()
     print(f"wrote {RESULTS}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import resource
 import shutil
@@ -14,24 +15,37 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "drivers")
-"""Packages that are mutated; tests/<package> mirrors each of them."""
+import pytest
 
+RECORD = "MUTANTS_RECORD"
+"""The environment variable that names the file of `mutants.record`: ``{"seconds": {test: s}, "lines": {module: {line:
+[test]}}}``; tests of lines are numbers in the order of ``seconds``, and -1 is what ran before the first test."""
+CHOICE = "MUTANTS_CHOICE"
+"""The environment variable that names the file for `mutants.choice`: node ids in order, each with the seconds it may take."""
 PYTEST = (sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider")
 MEMORY_BYTES = 4 * 2**30
 START_S = 20.0
-"""For interpreter and collection, on a busy machine."""
-SLOWER = 4.0
-"""A stage that takes this many times as long as without a mutation is ended and counts as failed."""
+"""For interpreter and collection, or for a short test, on a busy machine."""
+SLOWER = 5.0
+"""What takes this many times as long as without a mutation is ended and counts as failed."""
+RECORD_S = 1800.0
 
 
 class Tree:
-    """A copy of the files under version control, with the changes that are in the working tree."""
+    """A copy of the working tree, without what git ignores."""
 
     def __init__(self, root: Path, directory: Path) -> None:
         self.path = directory / "tree"
         self._run = directory / "run"
-        listed = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, text=True, check=True).stdout
+        self._process: subprocess.Popen[bytes] | None = None
+        self._ended = False
+        listed = subprocess.run(
+            ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+            cwd=root,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
         for name in filter(None, listed.split("\0")):
             if (root / name).is_file():
                 (self.path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -39,12 +53,6 @@ class Tree:
         self._run.mkdir(mode=0o700)
         # Compiled files are recognized by the second in which the source was changed: each change gets a second of its own.
         self._changed_s = int(time.time()) - 10_000_000
-
-    def modules(self, packages: list[str]) -> list[Path]:
-        """Paths of the modules in these packages, relative to the tree."""
-        return [
-            path.relative_to(self.path) for name in packages for path in sorted((self.path / "src/steptwin" / name).rglob("*.py"))
-        ]
 
     @contextmanager
     def changed(self, module: Path, source: str) -> Generator[None]:
@@ -61,31 +69,36 @@ class Tree:
         self._changed_s += 1
         os.utime(path, (self._changed_s, self._changed_s))
 
-    def stages(self, module: Path) -> list[tuple[str, list[str]]]:
-        """Names and arguments of pytest: the file that mirrors the module, the rest of its folder, the rest of the core."""
-        package, *inner = module.relative_to("src/steptwin").parts
-        mirrored = Path("tests", package, *inner[:-1], f"test_{inner[-1]}")
-        stages = []
-        folder = [f"tests/{package}"]
-        if (self.path / mirrored).exists():
-            stages.append(("file", [str(mirrored)]))
-            folder.append(f"--ignore={mirrored}")
-        rest = [f"tests/{name}" for name in CORE if name != package]
-        return [*stages, ("folder", folder), ("core", rest)]
+    def passes(self, seconds: dict[str, float]) -> bool:
+        """Run these tests in this order up to the first failure; they take so many seconds without a mutation."""
+        choice = self._run / "choice.json"
+        choice.write_text(json.dumps({test: START_S + SLOWER * taken for test, taken in seconds.items()}))
+        files = {test.partition("::")[0]: None for test in seconds}
+        return self._pytest(["-p", "mutants.choice", *files], {CHOICE: str(choice)}, START_S + SLOWER * sum(seconds.values()))
 
-    def passes(self, arguments: list[str], limit_s: float) -> bool | None:
-        """Run pytest up to the first failure; None if it had to be ended."""
+    def record(self, folder: str, file: Path) -> bool:
+        """Write what the tests of a folder execute, as described in `mutants.record`; False if one of them fails."""
+        return self._pytest(["-p", "mutants.record", "-o", f"timeout={RECORD_S}", folder], {RECORD: str(file)}, RECORD_S)
+
+    def end(self) -> None:
+        """End the tests that run, and let no others begin."""
+        self._ended = True
+        self._kill()
+
+    def _pytest(self, arguments: list[str], environment: dict[str, str], limit_s: float) -> bool:
+        if self._ended:
+            return False
         temporary = self._run / "tmp"
-        environment = {
-            **os.environ,
-            "PYTHONPATH": str(self.path / "src"),
-            "HYPOTHESIS_PROFILE": "unshrunk",
-            "XDG_RUNTIME_DIR": str(self._run),
-        }
-        process = subprocess.Popen(
+        self._process = subprocess.Popen(
             [*PYTEST, f"--basetemp={temporary}", *arguments],
             cwd=self.path,
-            env=environment,
+            env={
+                **os.environ,
+                "PYTHONPATH": str(self.path / "src"),
+                "HYPOTHESIS_PROFILE": "unshrunk",
+                "XDG_RUNTIME_DIR": str(self._run),
+                **environment,
+            },
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -93,30 +106,18 @@ class Tree:
             preexec_fn=_limit_memory,  # noqa: PLW1509
         )
         try:
-            return process.wait(limit_s) == 0
+            return self._process.wait(limit_s) in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
         except subprocess.TimeoutExpired:
-            return None
+            return False
         finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            self._kill()
             shutil.rmtree(temporary, ignore_errors=True)
 
-    def durations(self, packages: list[str]) -> dict[str, float]:
-        """Seconds that the tests of each package take without a mutation; ends the program if one of them fails."""
-        seconds = {}
-        for name in packages:
-            begin = time.monotonic()
-            if self.passes([f"tests/{name}"], 1800.0) is not True:
-                sys.exit(f"mutants: tests/{name} fails without any mutation")
-            seconds[name] = time.monotonic() - begin
-        return seconds
-
-
-def limit_s(arguments: list[str], durations: dict[str, float]) -> float:
-    """What a stage may take, from the durations of the packages it tests."""
-    tested = {Path(argument).parts[1] for argument in arguments if not argument.startswith("-")}
-    return START_S + SLOWER * sum(durations[name] for name in tested)
+    def _kill(self) -> None:
+        if self._process is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
 
 
 def _limit_memory() -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import textwrap
 from pathlib import Path
 
 import pytest
-from mutants.__main__ import CORE, equivalents
+from mutants.__main__ import equivalents
 from mutants.mutations import compiles, mutations
+from mutants.reach import CORE, Reach, digest, folders, imported_files
+from mutants.trial import Tree
 
 ROOT = Path(__file__).parent.parent
 
@@ -74,3 +78,75 @@ def test_mutants_said_to_be_equivalent_are_still_possible() -> None:
         if (before, after) not in {mutation.lines(source) for mutation in mutations(source)}:
             stale.append(f"{module}: {before}")
     assert stale == []
+
+
+FILES = {
+    "pyproject.toml": "",
+    "src/steptwin/__init__.py": "",
+    "src/steptwin/pytest_plugin.py": "",
+    "src/steptwin/wire/__init__.py": "",
+    "src/steptwin/wire/sums.py": """
+        LIMIT = 3
+        def total(a, b):
+            if a > LIMIT:
+                return never(
+                    a
+                )
+            return (
+                a + b
+            )
+    """,
+    "src/steptwin/world/use.py": "def use():\n    from steptwin.wire.sums import total\n    return total(1, 2)\n",
+    "tests/conftest.py": "",
+    "tests/wire/test_sums.py": """
+        from steptwin.wire.sums import total
+        def test_nothing(): pass
+        def test_total(): assert total(1, 2) == 3
+    """,
+    "tests/world/test_use.py": "from steptwin.world.use import use\ndef test_use(): assert use() == 3\n",
+}
+SUMS = Path("src/steptwin/wire/sums.py")
+IN_WIRE, IN_WORLD = "tests/wire/test_sums.py::test_total", "tests/world/test_use.py::test_use"
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Tree:
+    project = tmp_path / "project"
+    for name, text in FILES.items():
+        (project / name).parent.mkdir(parents=True, exist_ok=True)
+        (project / name).write_text(textwrap.dedent(text).lstrip())
+    for name in ("__init__", "trial", "record", "choice"):
+        (project / "mutants").mkdir(exist_ok=True)
+        (project / f"mutants/{name}.py").write_text((ROOT / f"mutants/{name}.py").read_text())
+    subprocess.run(["git", "init", "-q"], cwd=project, check=True)
+    return Tree(project, tmp_path / "copy")
+
+
+def test_tests_that_execute_a_line_are_run_for_it(tree: Tree, tmp_path: Path) -> None:
+    records = {folder: tmp_path / f"{Path(folder).name}.json" for folder in folders(tree.path, ["wire"])}
+    assert list(records) == ["tests/wire", "tests/world"]
+    assert [tree.record(folder, file) for folder, file in records.items()] == [True, True]
+    reach = Reach(tree.path, records)
+
+    def stages(line: int) -> list[tuple[str, list[str]]]:
+        return [(name, sorted(seconds)) for name, seconds in reach.stages(SUMS, line, line)]
+
+    everything = [("folder", ["tests/wire/test_sums.py::test_nothing", IN_WIRE]), ("others", [IN_WORLD])]
+    assert stages(1) == everything, "executed on import"
+    assert stages(2) == everything, "executed on import"
+    assert stages(4) == stages(5) == stages(6) == [], "executed by no test"
+    assert stages(3) == everything, "by few tests"
+    assert stages(9) == everything, "a bracket is executed with its statement"
+
+    with tree.changed(SUMS, (tree.path / SUMS).read_text().replace("a + b", "a - b")):
+        assert not tree.passes({IN_WIRE: 0.1})
+        assert not tree.passes({IN_WORLD: 0.1})
+    assert tree.passes({IN_WIRE: 0.1, IN_WORLD: 0.1})
+
+
+def test_a_record_is_valid_until_something_changes_that_its_tests_import(tree: Tree) -> None:
+    before = [digest(tree.path, folder) for folder in ("tests/wire", "tests/world")]
+    (tree.path / "src/steptwin/world/use.py").write_text("def use():\n    return 3\n")
+    imported_files.cache_clear()
+    after = [digest(tree.path, folder) for folder in ("tests/wire", "tests/world")]
+    assert [before[0] == after[0], before[1] == after[1]] == [True, False]
