@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from soak import scaled
 
-from steptwin.commands import up_world
-from steptwin.commands.up_world import LiveWorld, PlacePort
 from steptwin.errors import Misuse
 from steptwin.files.session import load, save
 from steptwin.files.world import World
+from steptwin.live import world as live_world_module
+from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import MILLISECOND
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes
@@ -92,7 +92,7 @@ def test_answers_that_scripts_do_not_fetch_are_dropped() -> None:
 
 
 def test_a_recorded_session_ends_where_it_is_full(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(up_world, "MOST_INPUTS", 300)
+    monkeypatch.setattr(live_world_module, "MOST_INPUTS", 300)
     told: list[str] = []
     live = live_world(keep_inputs=True)
     live = LiveWorld(live.world, told.append)
@@ -108,7 +108,7 @@ def test_a_recorded_session_ends_where_it_is_full(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_recorded_session_is_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(up_world, "MOST_INPUT_BYTES", 10_000)
+    monkeypatch.setattr(live_world_module, "MOST_INPUT_BYTES", 10_000)
     live = live_world(keep_inputs=True)
     for _ in range(40):
         live.outside(Bytes("chips", "raw-1", "raw", b" " * 1000))

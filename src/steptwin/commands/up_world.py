@@ -73,6 +73,8 @@ def up(options: UpOptions) -> bool:
         allow_outside=options.allow_outside,
     )
     _send_away(world)
+    if options.session is None and options.trace is None:
+        world.stop_recording()
     set_faults(world, options.faults)
     outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
     if speed == inf and outside:
@@ -101,6 +103,7 @@ async def _serve(options: UpOptions, world: World, speed: float, name: str, *, h
         stack.callback(output.close)
         live = LiveWorld(world, output.line)
         server = Server(Cell(live, Clock(begin=world.now)), output.line)
+        live.share_reads(server.cell)
         pace = Pace(live, server.cell, output.line, has_clients=has_clients)
         live.on_stop = server.end
         begun = False
@@ -146,7 +149,8 @@ def _keep(options: UpOptions, live: LiveWorld, output: Output) -> None:
                 failures.append(str(error))
     ended = "" if world.stopped is None else f", ended by: {world.stopped}"
     inputs = f", {len(live.session().inputs)} inputs" if options.session is not None else ""
-    output.line(f"{world.time:.3f} s{inputs}{ended}, digest {world.trace.digest()}")
+    digest = f", digest {world.trace.digest()}" if world.trace.is_recorded else ""
+    output.line(f"{world.time:.3f} s{inputs}{ended}{digest}")
     if failures:
         raise Misuse("\n".join(failures))
 

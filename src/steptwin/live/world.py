@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from heapq import heappop, heappush
 
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.world import World
+from steptwin.live.cell import Cell
+from steptwin.live.sharedreads import share_reads
 from steptwin.machine import Nanos
 from steptwin.world.actions import Bytes, Leave, Outside
-from steptwin.world.lines import Place
+from steptwin.world.kernel import Kernel
+from steptwin.world.lines import ModbusLine, Place
 
 MOST_INPUTS = 200_000
 MOST_INPUT_BYTES = 16 << 20
@@ -25,23 +29,39 @@ class LiveWorld:
         self._recorded_bytes = sum(_size(given.what) for given in world.inputs)
         self._full: sessions.Session | None = None
         self.stale = True
-        """Something was done to it since somebody asked for the deadline."""
+        """Something has happened since the deadline was found last, or may have: it has to be found anew."""
+        self._next: Nanos | None = None
+        """The deadline that was found last."""
+        self._dues = _Dues(world.kernels)
+        world.watch_kernels(self._changed)
         self.on_stop: Callable[[], None] | None = None
-        """Told when a script has stopped it: nothing happens by itself from then on."""
+        """Called when a script has stopped it: nothing happens by itself from then on."""
 
     @property
     def now(self) -> Nanos:
         return self.world.now
 
+    def share_reads(self, cell: Cell) -> None:
+        """From now on clients that ``cell`` serves at one moment share what they read."""
+        for line in self.world.lines.values():
+            if isinstance(line, ModbusLine):
+                line.served = share_reads(line.devices, cell)
+
+    # ------------------------------------------------------------------ what comes from outside
+
     def outside(self, what: Outside) -> None:
         """Do something from outside at the present moment, recorded where a session was asked for. Raises `Misuse`."""
+        self.make_room(what)
+        self.world.outside(what)
+
+    def make_room(self, what: Outside) -> None:
+        """End the session where it has no room for one more input."""
         world = self.world
         if world.keeps_inputs:
             if len(world.inputs) >= MOST_INPUTS or self._recorded_bytes >= MOST_INPUT_BYTES:
                 self._end_session()
             else:
                 self._recorded_bytes += _size(what)
-        world.outside(what)
 
     def _end_session(self) -> None:
         world = self.world
@@ -58,30 +78,71 @@ class LiveWorld:
             raise Misuse("this world records no session: start it with --session FILE")
         return sessions.session_of(self.world)
 
+    # ------------------------------------------------------------------ time
+
+    def _changed(self, kernel: Kernel) -> None:
+        self.stale = True
+        self._dues.changed[kernel] = None
+
     def advance(self, now: Nanos) -> None:
         world = self.world
+        if not self.stale and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
+            world.pass_time(now)
+            return
         while (due := self._due()) is not None and due <= now:
             world.advance(due)
             if world.stopped is not None:
                 break
-            for kernel in world.kernels:
-                at = kernel.deadline()
-                if at is not None and at <= due:
-                    kernel.advance(due)
+            self._dues.advance(due)
+        self.stale = True
         world.advance(now)
         if world.stopped is not None and self.on_stop is not None:
             self.on_stop()
 
     def deadline(self) -> Nanos | None:
+        self._next = self._due()
         self.stale = False
-        return self._due()
+        return self._next
 
     def _due(self) -> Nanos | None:
         if self.world.stopped is not None:
             return None
-        dues = [due for kernel in self.world.kernels if (due := kernel.deadline()) is not None]
-        own = self.world.next()
-        return min(dues if own is None else [*dues, own], default=None)
+        due, own = self._dues.first(), self.world.next()
+        return due if own is None else own if due is None else min(due, own)
+
+
+class _Dues:
+    """When something is due next in any of many kernels, without a look at each of them.
+
+    ``changed`` are those in which something has happened since.
+    """
+
+    def __init__(self, kernels: list[Kernel]) -> None:
+        self.changed = dict.fromkeys(kernels)
+        self._order = {kernel: i for i, kernel in enumerate(kernels)}
+        self._due_of: dict[Kernel, Nanos] = {}
+        self._queue: list[tuple[Nanos, int, Kernel]] = []
+
+    def first(self) -> Nanos | None:
+        while self.changed:
+            kernel, _ = self.changed.popitem()
+            due = kernel.deadline()  # signals may settle: it has changed again then
+            if due is None:
+                self._due_of.pop(kernel, None)
+            elif self._due_of.get(kernel) != due:
+                self._due_of[kernel] = due
+                heappush(self._queue, (due, self._order[kernel], kernel))
+        queue = self._queue
+        while queue and self._due_of.get(queue[0][2]) != queue[0][0]:
+            heappop(queue)
+        return queue[0][0] if queue else None
+
+    def advance(self, now: Nanos) -> None:
+        """Advance the kernels in which something is due by ``now``, in their order."""
+        while (due := self.first()) is not None and due <= now:
+            kernel = self._queue[0][2]
+            kernel.advance(now)
+            self.changed[kernel] = None
 
 
 def _size(what: Outside) -> int:
@@ -89,19 +150,21 @@ def _size(what: Outside) -> int:
 
 
 class PlacePort:
-    """A place on a line for a program outside."""
-
-    broken: str | None = None
+    """A place on a line for a program outside, which talks to the port of the line directly."""
 
     def __init__(self, live: LiveWorld, line: str, place: str, kind: str) -> None:
+        world = live.world
         self._live = live
-        self._line = line
+        self._line = world.lines[line]
+        self._kernel = world.plan.kernel_of[line]
+        self._places = self._line.places
         self._name = place
         self._kind = kind
+        self.broken: str | None = None
         self.on_output: Callable[[], None] | None = None
 
-    def _place(self) -> Place:
-        place = self._live.world.lines[self._line].connect(self._name, self._kind)
+    def _connected(self) -> Place:
+        place = self._line.connect(self._name, self._kind)
         place.on_output = self._came
         return place
 
@@ -110,22 +173,42 @@ class PlacePort:
             self.on_output()
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        place = self._place()
-        place.on_output = None  # what comes at once is given back at once
-        self._live.outside(Bytes(self._line, self._name, self._kind, data))
-        self._live.stale = True
-        answer = b"".join(piece for _, piece in place.take(now))
-        place.on_output = self._came
+        live, kernel = self._live, self._kernel
+        world = live.world
+        now = world.now  # a world that was stopped stands
+        if world.keeps_inputs:
+            live.make_room(Bytes(self._line.name, self._name, self._kind, data))
+        if kernel.now != now or kernel.stale:
+            kernel.advance(now)
+        place = self._places.get(self._name)
+        if place is None or place.on_output is None:
+            place = self._connected()
+        answer = self._line.exchange(self._name, place, data, now)
+        if world.keeps_inputs:
+            world.note(Bytes(self._line.name, self._name, self._kind, data))
+        if kernel.stale or place.received:
+            answer = self._with_the_rest(place, answer, now)
         self.broken = place.port.broken
         return answer
 
+    def _with_the_rest(self, place: Place, answer: bytes, now: Nanos) -> bytes:
+        """The answer between what came before and what has come with it."""
+        before = place.take(now)
+        place.on_output = None  # what comes at once is given back at once
+        if self._kernel.stale:
+            self._kernel.settle()
+        place.on_output = self._came
+        return b"".join([*(piece for _, piece in before), answer, *(piece for _, piece in place.take(now))])
+
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        self._live.world.touch(self._line)
-        return self._place().take(now)
+        now = self._live.world.now
+        self._kernel.advance(now)
+        place = self._places.get(self._name)
+        return [] if place is None else place.take(now)
 
     def deadline(self) -> Nanos | None:
-        """Nothing to be asked for: ``on_output`` tells when there is something."""
+        """Nothing to be asked for: ``on_output`` is called when there is something."""
         return None
 
     def close(self) -> None:
-        self._live.outside(Leave(self._line, self._name))
+        self._live.outside(Leave(self._line.name, self._name))

@@ -6,7 +6,7 @@ the cost of a world grows with the number of its events only.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from heapq import heapify, heappop, heappush
 from itertools import count
 
@@ -101,9 +101,11 @@ class Agenda:
 class Watchers:
     """Which scripts depend on which kernels, and which kernels have changed since the last `take`."""
 
-    __slots__ = ("_again", "_changed", "_scripts")
+    __slots__ = ("_again", "_changed", "_scripts", "_watch")
 
     def __init__(self) -> None:
+        self._watch: Callable[[Kernel], None] | None = None
+        """Called with every kernel that has changed, also those on which no script depends."""
         self._scripts: dict[Kernel, dict[int, Script]] = {}
         self._changed: dict[Kernel, None] = {}
         self._again: dict[int, Script] = {}
@@ -117,7 +119,7 @@ class Watchers:
             del scripts[script.number]
             if not scripts:
                 del self._scripts[kernel]
-                kernel.on_change = None
+                kernel.on_change = self._watch
         script.kernels = kernels
         for kernel in kernels:
             self._scripts.setdefault(kernel, {})[script.number] = script
@@ -126,6 +128,15 @@ class Watchers:
     def change(self, kernel: Kernel) -> None:
         """Scripts that depend on ``kernel`` have to be evaluated."""
         self._changed[kernel] = None
+        if self._watch is not None:
+            self._watch(kernel)
+
+    def watch_all(self, kernels: Iterable[Kernel], watch: Callable[[Kernel], None]) -> None:
+        """Call ``watch`` with every one of these kernels that has changed."""
+        self._watch = watch
+        for kernel in kernels:
+            if kernel not in self._scripts:
+                kernel.on_change = watch
 
     def again(self, script: Script) -> None:
         """A script was evaluated and has to wait on."""

@@ -17,7 +17,7 @@ from steptwin.mic488.device import Mic488, pause_observer
 from steptwin.state import Plain, Stateful
 from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Direction, RtuSlavePort, TcpSlavePort
+from steptwin.wire.slave import Device, Direction, RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
 from steptwin.world.faults import Line as FaultLine
@@ -38,14 +38,16 @@ MOST_RECEIVED = 1 << 16
 class Place(Stateful):
     """Where one program is connected. ``received`` is what has come and was not fetched, with its moments."""
 
-    __slots__ = ("inner", "kind", "on_output", "port", "received")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"inner", "kind", "on_output", "port"})
+    __slots__ = ("inner", "kind", "on_output", "port", "received", "talks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"inner", "kind", "on_output", "port", "talks"})
 
-    def __init__(self, kind: str, port: FaultyPort, inner: Any) -> None:
+    def __init__(self, kind: str, port: FaultyPort, inner: Any, *, talks: bool) -> None:
         self.kind = kind
         self.port = port
         self.inner = inner
         """The port behind the faults of the line."""
+        self.talks = talks
+        """Whether the port may send without having been asked."""
         self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
         self.on_output: Callable[[], None] | None = None
 
@@ -60,8 +62,8 @@ class Place(Stateful):
 class Line(Stateful):
     """Base of the lines; a part of its kernel."""
 
-    __slots__ = ("_faults", "_kernel", "_record", "name", "places")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_kernel", "_record", "name", "places"})
+    __slots__ = ("_busy", "_faults", "_kernel", "_record", "name", "places")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_busy", "_faults", "_kernel", "_record", "name", "places"})
 
     kinds: ClassVar[tuple[str, ...]]
     """Kinds of places; the first is that of scripts."""
@@ -73,6 +75,8 @@ class Line(Stateful):
         self._faults = faults
         self.name = name
         self.places: dict[str, Place] = {}
+        self._busy: dict[str, Place] = {}
+        """Places at which something may come without being asked for, or is due later."""
 
     # ------------------------------------------------------------------ what kinds of lines have of their own
 
@@ -104,6 +108,7 @@ class Line(Stateful):
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
             port.on_output = self._kernel.mark
+            is_busy = True
         else:
             faulty = FaultyPort(
                 port,
@@ -114,19 +119,32 @@ class Line(Stateful):
                 units=self.units,
                 line_name=self.name,
             )
-        found = self.places[place] = Place(kind, faulty, port)
+            is_busy = False
+        found = self.places[place] = Place(kind, faulty, port, talks=is_busy)
+        if is_busy:
+            self._busy[place] = found
         return found
 
     def leave(self, place: str) -> None:
         """The program has gone."""
         found = self.places.pop(place, None)
+        self._busy.pop(place, None)
         if found is not None:
             found.port.close()
 
-    def receive(self, place: str, data: bytes, now: Nanos) -> None:
-        """Bytes of the program at ``place``; the kernel is at ``now``."""
-        found = self.connect(place)
+    def exchange(self, place: str, found: Place, data: bytes, now: Nanos) -> bytes:
+        """Give bytes of the program at ``place``, which is connected as ``found``; the kernel is at ``now``. Returns what is
+        answered at once; what is answered later is in `Place.received` then."""
         answer = found.port.exchange(data, now)
+        if place in self._busy or found.port.deadline() is not None:
+            self._busy[place] = found
+            self._kernel.mark()
+        return answer
+
+    def receive(self, place: str, data: bytes, now: Nanos) -> None:
+        """Bytes of the program at ``place``, with all answers in `Place.received`; the kernel is at ``now``."""
+        found = self.connect(place)
+        answer = self.exchange(place, found, data, now)
         if answer:
             self._came(place, found, [(now, answer)])
         self._kernel.mark()
@@ -139,14 +157,20 @@ class Line(Stateful):
     # ------------------------------------------------------------------ time
 
     def look(self, now: Nanos) -> None:
-        for name, place in self.places.items():
+        for name, place in tuple(self._busy.items()):
             pieces = place.port.to_send(now)
             if pieces:
                 self._came(name, place, pieces)
+            if not place.talks and place.port.deadline() is None:
+                self._busy.pop(name, None)
 
     def deadline(self) -> Nanos | None:
-        dues = [due for place in self.places.values() if (due := place.port.deadline()) is not None]
+        dues = [due for place in self._busy.values() if (due := place.port.deadline()) is not None]
         return min(dues, default=None)
+
+    def stop_recording(self) -> None:
+        """Record no frames from now on."""
+        self._record = None
 
     def _tell(self, now: Nanos, place: str, direction: Direction, data: bytes) -> None:
         if self._record is not None:
@@ -172,6 +196,7 @@ class Line(Stateful):
             place.set_state(state)
             place.port.set_state(faulty)
             self._set_port_state(place, port_state)
+        self._busy = dict(self.places)
 
     def _port_state(self, place: Place) -> Plain:
         return place.inner.copy_state()
@@ -183,8 +208,8 @@ class Line(Stateful):
 class ModbusLine(Line):
     """Controllers with different units on one line. With ``timing`` requests take the time of a wire and of the controllers."""
 
-    __slots__ = ("_timed", "devices", "master")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"devices"}) | Line.FIXED
+    __slots__ = ("_timed", "devices", "master", "served")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"devices", "served"}) | Line.FIXED
 
     kinds = ("rtu", "tcp")
     fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"rtu": FaultLine.RTU, "tcp": FaultLine.TCP}
@@ -201,6 +226,8 @@ class ModbusLine(Line):
     ) -> None:
         super().__init__(kernel, name, record, faults)
         self.devices = devices
+        self.served: Mapping[int, Device] = devices
+        """What executes the requests of programs outside without line timing; ports that are made from now on use it."""
         self._timed: tuple[TimedUnits, Gateway] | None = None
         if timing is not None:
             units = TimedUnits(devices, timing)
@@ -230,14 +257,16 @@ class ModbusLine(Line):
         return tuple(self.devices)
 
     def _port(self, place: str, kind: str) -> Any:
-        def observe(now: Nanos, direction: Direction, data: bytes) -> None:
+        def tell(now: Nanos, direction: Direction, data: bytes) -> None:
             self._tell(now, place, direction, data)
 
+        observe = None if self._record is None else tell
         on_pause = pause_observer(self.devices)
         if self._timed is None:
             if kind == "tcp":
-                return TcpSlavePort(self.devices, on_frame=observe)
-            return RtuSlavePort(self.devices, on_frame=observe, on_pause=on_pause)
+                return TcpSlavePort(self.served, on_frame=observe)
+            devices = self.devices if place == SCRIPTS else self.served
+            return RtuSlavePort(devices, on_frame=observe, on_pause=on_pause)
         units, gateway = self._timed
         if kind == "tcp":
             return TcpGatewayPort(gateway, on_frame=observe)
@@ -270,9 +299,9 @@ class ChipLine(Line):
     def _port(self, place: str, kind: str) -> Any:
         return self.chain.port()
 
-    def receive(self, place: str, data: bytes, now: Nanos) -> None:
+    def exchange(self, place: str, found: Place, data: bytes, now: Nanos) -> bytes:
         self._tell(now, place, Direction.IN, data)
-        super().receive(place, data, now)
+        return super().exchange(place, found, data, now)
 
     def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
         if place == SCRIPTS:  # output is recorded here; scripts do not read it

@@ -217,6 +217,10 @@ class Plant:
         """Do something from outside at the present moment, and keep it for a replay. A `Misuse` changes nothing."""
         check_step(self, what)
         self.perform(what)
+        self.note(what)
+
+    def note(self, what: Outside) -> None:
+        """Keep what was done from outside at the present moment, where inputs are kept."""
         if self.keeps_inputs:
             self.inputs.append(Given(self.now, what, self._is_settled))
         self._is_settled = False
@@ -305,6 +309,23 @@ class Plant:
         self._is_settled = True
         if self.stopped is None:
             self.now = now
+
+    def pass_time(self, now: Nanos) -> None:
+        """As `advance`, for a caller who knows that nothing is due by ``now``."""
+        self.now = now
+        self._is_settled = True
+
+    def watch_kernels(self, watch: Callable[[Kernel], None]) -> None:
+        """Call ``watch`` from now on with every kernel in which something has happened, as `Kernel.on_change`."""
+        self._scripts.watch_kernels(self.kernels, watch)
+
+    def stop_recording(self) -> None:
+        """Record nothing from now on: no trace, digest or session. Watchers of the trace are called, but not with frames."""
+        self.keeps_inputs = False
+        self.inputs.clear()
+        self.trace.stop()
+        for line in self.lines.values():
+            line.stop_recording()
 
     def settle_all(self) -> None:
         """Bring every kernel to the present."""

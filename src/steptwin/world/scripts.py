@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,6 +11,7 @@ from steptwin.machine import Nanos
 from steptwin.world import script as do
 from steptwin.world.actions import Outside, master_of
 from steptwin.world.agenda import Agenda, Watchers
+from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
 from steptwin.world.running import Asked, Script, ScriptState, Waiting
 
@@ -37,6 +38,10 @@ class Scripts:
         self._scripts: dict[int, Script] = {}
         self._own, self._guests = Agenda(), Agenda()
         self._watchers = Watchers()
+
+    def watch_kernels(self, kernels: Iterable[Kernel], watch: Callable[[Kernel], None]) -> None:
+        """Call ``watch`` from now on with every kernel that has changed."""
+        self._watchers.watch_all(kernels, watch)
 
     def __iter__(self) -> Iterator[Script]:
         """Those that have not ended, in their order."""

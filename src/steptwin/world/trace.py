@@ -55,6 +55,8 @@ class Trace:
 
     def __init__(self, machines: Iterable[str] = (), *, keep: bool = True) -> None:
         self.is_kept = keep
+        self.is_recorded = True
+        """Whether there is a digest."""
         self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
         self.watchers: list[Recorder] = []
         """Told of every record as it is taken."""
@@ -77,7 +79,7 @@ class Trace:
         stream.count += 1
         if self.is_kept:
             stream.records.append(record)
-        else:
+        elif self.is_recorded:
             stream.hash.update(encode(record))
         for watcher in self.watchers:
             watcher(record)
@@ -125,6 +127,12 @@ class Trace:
     def faults(self, machine: str | None = None) -> Iterator[Record]:
         return self.of("fault", machine=machine)
 
+    def stop(self) -> None:
+        """Have no records and no digest from now on; only `watchers` are called."""
+        self.is_kept = self.is_recorded = False
+        for stream in self._streams.values():
+            stream.records.clear()
+
     def mark(self) -> Mark:
         """The past, for `rewind`."""
         return Mark(tuple((name, stream.mark()) for name, stream in self._streams.items()))
@@ -140,8 +148,10 @@ class Trace:
     def digest(self) -> str:
         """What two runs of the same world share, on any machine and Python version: 32 hexadecimal digits.
 
-        A digest of the machines' digests: their merged order follows from their times.
+        A digest of the machines' digests: their merged order follows from their times. Raises `Misuse` where nothing is recorded.
         """
+        if not self.is_recorded:
+            raise Misuse("nothing is recorded of this world: it has no digest")
         whole = blake2b(digest_size=DIGEST_BYTES)
         for name, stream in self._streams.items():
             if stream.count:

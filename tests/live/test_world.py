@@ -1,0 +1,180 @@
+"""A world in real time: what a request costs, and what is recorded of it."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections import Counter
+from collections.abc import Callable
+from types import FrameType
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.files.world import World
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.descriptors import descriptors
+from steptwin.live.links import Feed
+from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.mic488.config import ControllerConfig
+from steptwin.served.mic488 import Mic488Line
+from steptwin.world import script as do
+
+LINE = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "twin"\nline = "bus"\n'
+READ = bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 0a")
+MORE_CALLS = 8
+"""Of a read through a world: the world around the kernel, the place, its line."""
+
+
+class Client:
+    def __init__(self) -> None:
+        self.heard = b""
+
+    def write(self, data: bytes) -> None:
+        self.heard += data
+
+
+def calls(work: Callable[[], object]) -> Counter[str]:
+    """The Python functions that are called meanwhile, by name."""
+    found: Counter[str] = Counter()
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event == "call":
+            found[frame.f_code.co_qualname] += 1
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        work()
+    finally:
+        sys.setprofile(before)
+    return found
+
+
+def test_a_read_through_a_world_takes_few_more_calls_than_one_of_a_served_controller() -> None:
+    async def run() -> None:
+        world = World.from_toml(LINE)
+        world.stop_recording()
+        live = LiveWorld(world)
+        cell = Cell(live, Clock())
+        live.share_reads(cell)
+        line = Mic488Line(ControllerConfig(), [1], "1.70")
+        served = Cell(line.kernel, Clock())
+        line.share_reads(served)
+        clients = Client(), Client()
+        feeds = Feed(served, line.tcp_port(), clients[0]), Feed(cell, PlacePort(live, "bus", "tcp-1", "tcp"), clients[1])
+        for one, feed in zip((served, cell), feeds, strict=True):
+            one.start()
+            feed.take(READ)  # connects
+        few, many = (calls(lambda feed=feed: feed.take(READ)) for feed in feeds)
+        assert clients[0].heard == clients[1].heard != b""
+        assert many.total() <= few.total() + MORE_CALLS, many - few
+        for one in (served, cell):
+            one.close()
+
+    asyncio.run(run())
+
+
+def test_a_request_visits_no_other_kernel() -> None:
+    controllers = "".join(f'[[mic488]]\nname = "other-{i}"\n' for i in range(20))
+    live = LiveWorld(World.from_toml(LINE + controllers))
+    port = PlacePort(live, "bus", "tcp-1", "tcp")
+    live.deadline()
+
+    def read() -> None:
+        live.advance(live.now + MILLISECOND)
+        port.exchange(READ, live.now)
+        live.deadline()
+
+    read()
+    found = calls(read)
+    assert found["Mic488.execute"] == 1
+    assert found["Kernel.deadline"] + found["Kernel.advance"] < 5, found
+
+
+def test_what_is_due_in_many_kernels_is_done_when_it_is_due() -> None:
+    """Outputs that a script sets run along wires with delays, each in a kernel of its own."""
+    pairs = "".join(
+        f'[[mic488]]\nname = "a{i}"\n[[wire]]\nfrom = "a{i}.OUT1"\nto = "a{i}.IN1"\ndelay = "{7 + 5 * i % 11} ms"\n'
+        for i in range(8)
+    )
+    steps = ", ".join(f'{{ write = {{ "a{i}.OUT1" = 1 }} }}' for i in range(8))
+    text = pairs + f'[[script]]\nname = "s"\nat = "3 ms"\nsteps = [{steps}]\n'
+    alone, kept_up = World.from_toml(text), World.from_toml(text)
+    live = LiveWorld(kept_up)
+    moments = []
+    while (due := live.deadline()) is not None and due < 100 * MILLISECOND:
+        live.advance(due)
+        moments.append(due)
+    live.advance(100 * MILLISECOND)
+    kept_up.settle_all()
+    alone.run(for_="100 ms")
+    assert list(alone.trace) == list(kept_up.trace)
+    edges = {record.time for record in alone.trace.edges() if record.time}
+    assert len(edges) > 5
+    assert edges <= set(moments)
+
+
+def test_without_a_recording_watchers_see_events_and_nothing_is_kept() -> None:
+    world = World.from_toml(LINE + '[[event]]\nat = "1 ms"\nsteps = [{ note = "now" }]\n')
+    world.stop_recording()
+    seen: list[str] = []
+    world.trace.watchers.append(lambda record: seen.append(record.kind))
+    live = LiveWorld(world)
+    PlacePort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
+    live.advance(2 * MILLISECOND)
+    assert "event" in seen
+    assert "frame" not in seen
+    assert (list(world.trace), world.inputs) == ([], [])
+    with pytest.raises(Misuse, match="nothing is recorded of this world: it has no digest"):
+        world.trace.digest()
+
+
+def test_clients_that_are_served_together_share_what_they_read() -> None:
+    async def run() -> None:
+        world = World.from_toml(LINE)
+        live = LiveWorld(world)
+        cell = Cell(live, Clock(wall_ns=lambda: 0))
+        live.share_reads(cell)
+        clients = [Client() for _ in range(3)]
+        feeds = [Feed(cell, PlacePort(live, "bus", f"tcp-{i}", "tcp"), client) for i, client in enumerate(clients)]
+        cell.start()
+        descriptors().batch = 7
+        assert calls(lambda: [feed.take(READ) for feed in feeds])["Mic488.execute"] == 1
+        write = bytes.fromhex("00 01 00 00 00 06 01 05 17 70 ff 00")
+        # A write of one may change what the next one reads; the first read is still that of all.
+        assert calls(lambda: [feed.take(request) for feed in feeds for request in (READ, write)])["Mic488.execute"] == 5
+        assert len({client.heard for client in clients}) == 1
+        descriptors().batch = 0
+        cell.close()
+
+    asyncio.run(run())
+
+
+def test_reads_of_scripts_are_not_shared() -> None:
+    """Scripts read at many moments while a cell brings the world to one."""
+
+    async def run() -> None:
+        world = World.from_toml(LINE)
+        live = LiveWorld(world)
+        wall = [0]
+        cell = Cell(live, Clock(wall_ns=lambda: wall[0]))
+        live.share_reads(cell)
+        answers: list[bytes | None] = []
+
+        def operator() -> do.Steps:
+            request = do.Request("bus", 1, bytes.fromhex("02 1388 0001"), SECOND)
+            answers.append((yield request))
+            yield do.Set((("twin", "IN1", 1.0),))
+            yield do.Wait(100 * MILLISECOND)
+            answers.append((yield request))
+
+        world.script(operator)
+        wall[0] = SECOND
+        cell.enter()
+        cell.close()
+        assert answers == [bytes.fromhex("02 01 00"), bytes.fromhex("02 01 01")]
+
+    asyncio.run(run())
