@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.wire.crc import crc16, is_intact, with_crc
+from steptwin.wire.crc import crc16, is_intact, table_crc16, with_crc
 from steptwin.wire.pdu import Request
 
 
@@ -23,7 +23,7 @@ def test_catalogue_check_value() -> None:
 
 @given(st.binary(max_size=300))
 def test_equals_the_definition(data: bytes) -> None:
-    assert crc16(data) == bitwise_crc(data)
+    assert crc16(data) == table_crc16(data) == bitwise_crc(data)
 
 
 def test_golden_frames_are_intact(golden: tuple[bytes, Request]) -> None:

@@ -79,8 +79,8 @@ def set_(
     if chip is not None:
         set_values(chip, changes, log_frames=log_frames)
         return
-    from steptwin.drivers.mic488.values import encoded, named
     from steptwin.mic488.registermap import DataType
+    from steptwin.mic488.values import encoded, named
 
     given = [_change(change) for change in changes]
     with opened(device, log_frames=log_frames) as mic:
@@ -146,7 +146,7 @@ def _change(text: str) -> tuple[str, str, str]:
 
 def value_of(register: Register, value: str, whole: str) -> float:
     """A value as typed: a number, ON or OFF, or the text of an enumerated value. Raises `Misuse` naming ``whole``."""
-    from steptwin.drivers.mic488 import values
+    from steptwin.mic488 import values
 
     try:
         return values.value_of(register, value)

@@ -20,10 +20,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from steptwin.drivers import Mic488
-from steptwin.drivers.mic488.values import encoded, named, plan, value_of
 from steptwin.errors import Misuse, Refusal
 from steptwin.mic488.registermap import DataType, RegisterMap
 from steptwin.mic488.registers import register_map
+from steptwin.mic488.values import encoded, named, plan, value_of
 from steptwin.wire import pdu
 
 FORM = "expected get NAME..., set NAME=VALUE, sleep SECONDS, wait AXIS... or raw HEX"

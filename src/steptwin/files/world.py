@@ -13,7 +13,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeAlias
 
-from steptwin.drivers.mic488.values import encoded, named
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import Progress, silent
 from steptwin.files.textfiles import read_text
@@ -21,15 +20,13 @@ from steptwin.inputfiles import read_bytes, shown
 from steptwin.m1486.chip import M1486
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488
-from steptwin.mic488.registermap import DataType
-from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, Request, WriteRegisters, encode_request
 from steptwin.world import script as do
 from steptwin.world.description import describe, read_world
 from steptwin.world.durations import duration
 from steptwin.world.faults import Fault
 from steptwin.world.faults import read as read_fault
 from steptwin.world.overrides import NO_OVERRIDES, Overrides
-from steptwin.world.plant import Plant, PlantSnapshot, Values
+from steptwin.world.plant import Plant, PlantSnapshot
 from steptwin.world.running import Script
 from steptwin.world.spec import WorldSpec
 from steptwin.world.views import AxisView, LineView, M1486View, Mic488View, Views
@@ -62,7 +59,7 @@ class World(Plant):
         keep_trace: bool = True,
         keep_inputs: bool = True,
     ) -> None:
-        super().__init__(spec, files or {}, encode_write, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        super().__init__(spec, files or {}, keep_trace=keep_trace, keep_inputs=keep_inputs)
         machines = self.machines
         self.mic488: Views[Mic488View] = Views(
             self, "MIC488", {name: Mic488View(self, name, m) for name, m in machines.items() if isinstance(m, Mic488)}
@@ -254,24 +251,3 @@ def _steps(reaction: Reaction) -> tuple[do.Step, ...]:
     if isinstance(reaction, tuple):
         return reaction
     return (do.Call(partial(reaction)),) if callable(reaction) else (reaction,)
-
-
-def encode_write(device: Mic488, values: Values) -> tuple[bytes, ...]:
-    """The requests that write registers by name; neighbours go together. Raises `Misuse` for what one does not take."""
-    requests: list[Request] = []
-    for register, value in values:
-        item = named(device.registers, register)
-        axis = item.register.axis
-        unit = "u" if axis is None else device.config.axes[axis - 1].unit_name
-        request = encoded(item, value, DataType(device.data_type), unit)
-        last = requests[-1] if requests else None
-        if (
-            isinstance(request, WriteRegisters)
-            and isinstance(last, WriteRegisters)
-            and last.address + len(last.values) == request.address
-            and len(last.values) + len(request.values) <= MAX_WRITTEN_REGISTERS
-        ):
-            requests[-1] = WriteRegisters(last.address, (*last.values, *request.values))
-        else:
-            requests.append(request)
-    return tuple(map(encode_request, requests))

@@ -15,12 +15,12 @@ from textual.widget import Widget
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, TabbedContent, TabPane, Tabs
 
 from steptwin.drivers.mic488.frames import Heard
-from steptwin.drivers.mic488.values import value_of
 from steptwin.drivers.stale import BEAT_S, StaleInput
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.registermap import DataType, Register, Type
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
+from steptwin.mic488.values import value_of
 from steptwin.monitor.groups import USER, USER_SHOWN, groups_of, permitted, shown
 from steptwin.monitor.session import Picture, Session
 from steptwin.wire.slave import Direction

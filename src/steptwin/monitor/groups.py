@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.drivers.mic488.values import Value
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type
+from steptwin.mic488.values import Value
 
 AXES = "M"
 CONTROLLER, INPUTS, OUTPUTS, USER = "Controller", "Inputs", "Outputs", "User"

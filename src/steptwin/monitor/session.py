@@ -11,10 +11,10 @@ from steptwin.drivers import AsyncJog, AsyncMic488, Mic488Status
 from steptwin.drivers.address import DEFAULT, parse_device
 from steptwin.drivers.mic488.frames import Heard
 from steptwin.drivers.mic488.program import ProgramState
-from steptwin.drivers.mic488.values import Value
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import register_map
+from steptwin.mic488.values import Value
 
 AGAIN_S = 1.0
 """A controller that does not answer is tried again after this time."""

@@ -2,9 +2,31 @@
 
 from __future__ import annotations
 
-from fastcrc.crc16 import modbus as crc16
+__all__ = ["crc16", "is_intact", "table_crc16", "with_crc"]
 
-__all__ = ["crc16", "is_intact", "with_crc"]
+
+def _remainder(value: int) -> int:
+    """Of one byte: polynomial A001 (reflected 8005)."""
+    for _ in range(8):
+        value = value >> 1 ^ 0xA001 if value & 1 else value >> 1
+    return value
+
+
+_REMAINDERS = tuple(map(_remainder, range(256)))
+
+
+def table_crc16(data: bytes | bytearray) -> int:
+    """The CRC of ``data``, without a compiled library."""
+    crc = 0xFFFF
+    for byte in data:
+        crc = crc >> 8 ^ _REMAINDERS[(crc ^ byte) & 0xFF]
+    return crc
+
+
+try:
+    from fastcrc.crc16 import modbus as crc16
+except ImportError:  # where there are no compiled wheels, as in a browser
+    crc16 = table_crc16
 
 
 def with_crc(body: bytes) -> bytes:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from operator import itemgetter
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.m1486.chip import M1486
@@ -37,14 +37,11 @@ from steptwin.world.scripts import MOST_STEPS_PER_INSTANT, Scripts, ScriptsState
 from steptwin.world.signals import Idle, SignalOf, find_signal
 from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.trace import Mark, Record, Trace
+from steptwin.world.writes import Values, encode_write
 
 WORLD = "world"
 """What happens to no machine happens to the world."""
 
-Values: TypeAlias = tuple[tuple[str, float], ...]
-"""Registers by name, and what they are to take."""
-Encode: TypeAlias = Callable[[Mic488, Values], tuple[bytes, ...]]
-"""The PDUs of the requests that write registers by name, in order; as few as may be."""
 MOST_REMEMBERED = 10_000
 """Requests, signals and conditions are remembered, for scripts use the same again and again; not more of each than these."""
 
@@ -78,11 +75,9 @@ class PlantSnapshot:
 
 
 class Plant:
-    """A world without files and clocks. ``encode`` makes the requests of `Write` steps."""
+    """A world without files and clocks."""
 
-    def __init__(
-        self, spec: WorldSpec, files: Files, encode: Encode, *, keep_trace: bool = True, keep_inputs: bool = True
-    ) -> None:
+    def __init__(self, spec: WorldSpec, files: Files, *, keep_trace: bool = True, keep_inputs: bool = True) -> None:
         names = [*(m.name for m in (*spec.mic488, *spec.m1486)), *(line.name for line in spec.lines), WORLD]
         self.spec = spec
         self.files = files
@@ -101,7 +96,6 @@ class Plant:
         """Everything from outside so far, where it is kept."""
         self._is_settled = False
         """Whether the scripts of the description have done what they had to do since the last of that."""
-        self.encode = encode
         self._encoded: dict[object, tuple[bytes, ...]] = {}
         self._signals: dict[str, SignalOf | Idle] = {}
         self._conditions: dict[str, Condition] = {}
@@ -256,7 +250,7 @@ class Plant:
         if found is None:
             if len(self._encoded) >= MOST_REMEMBERED:
                 self._encoded.clear()
-            found = self._encoded[key] = self.encode(device, values)
+            found = self._encoded[key] = encode_write(device, values)
         return found
 
     def button(self, name: str) -> tuple[Button, Kernel]:

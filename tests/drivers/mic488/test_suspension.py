@@ -12,9 +12,9 @@ from suspension import AT_THE_LAST_MOMENT, Suspension
 
 from steptwin.drivers import AsyncMic488
 from steptwin.drivers.blocking import finish
-from steptwin.drivers.mic488.values import moves
 from steptwin.errors import SteptwinError
 from steptwin.mic488.registers import register_map
+from steptwin.mic488.values import moves
 from steptwin.wire import pdu
 
 RACE_P = 2

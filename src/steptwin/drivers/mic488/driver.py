@@ -18,7 +18,6 @@ from steptwin.drivers.mic488.motion import Kind, MoveEnd
 from steptwin.drivers.mic488.program import AsyncProgram
 from steptwin.drivers.mic488.unit import Unit, axis_mask, check_axis
 from steptwin.drivers.mic488.user import AsyncUserRegisters
-from steptwin.drivers.mic488.values import Value, named
 from steptwin.drivers.mic488.waiting import wait_for
 from steptwin.drivers.modbus import Query, check_unit, words
 from steptwin.errors import Misuse
@@ -28,6 +27,7 @@ from steptwin.mic488.config import ControllerConfig, read_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.registermap import DataType, Effect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
+from steptwin.mic488.values import Value, named
 from steptwin.wire import pdu
 
 TIMEOUT_S = 0.3

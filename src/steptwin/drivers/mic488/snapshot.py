@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from steptwin.drivers.mic488.failures import NotReady
 from steptwin.drivers.mic488.motion import MOVING, status_text
 from steptwin.drivers.mic488.unit import Unit
-from steptwin.drivers.mic488.values import Item, Value, View, encoded
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import DataType, Effect, Register, Type
+from steptwin.mic488.values import Item, Value, View, encoded
 
 FORMAT = "steptwin MIC488 snapshot 1"
 _COUNTERS = ("POS_ACT", "ENC_IMP", "ENC_XPOS")

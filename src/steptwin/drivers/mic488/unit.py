@@ -13,7 +13,6 @@ from steptwin.drivers.exchange import Job, SentLate
 from steptwin.drivers.line import Line
 from steptwin.drivers.mic488.failures import NotReady, Refused, untold
 from steptwin.drivers.mic488.frames import FrameWords
-from steptwin.drivers.mic488.values import Block, Item, Value, View, encoded, moves, plan, repeatable, user_item
 from steptwin.drivers.modbus import Query, bits, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
@@ -23,6 +22,7 @@ from steptwin.mic488.describe import Scale, Wording
 from steptwin.mic488.registermap import DataType, RegisterMap, Type
 from steptwin.mic488.registers import AXES
 from steptwin.mic488.status import Status
+from steptwin.mic488.values import Block, Item, Value, View, encoded, moves, plan, repeatable, user_item
 from steptwin.wire import pdu
 
 QUERIES_KEPT = 256

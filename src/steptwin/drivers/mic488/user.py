@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Generic, TypeVar, cast
 
 from steptwin.drivers.mic488.unit import Unit
-from steptwin.drivers.mic488.values import View
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.mic488.values import View
 
 Number = TypeVar("Number", int, float)
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.drivers.mic488.values import Item, named, plan, repeatable, value_of
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import DataType, Space, Type
 from steptwin.mic488.registers import register_map
+from steptwin.mic488.values import Item, named, plan, repeatable, value_of
 from steptwin.wire import pdu
 
 MAP = register_map("1.70")
