@@ -1,12 +1,15 @@
-"""The contract between a pure machine and the shell that gives it time.
+"""The contracts of a pure machine: with the shell that gives it time, the wires at its pins, mechanics, faults and snapshots.
 
-A machine never reads a clock, a file or a socket. It is told the time and says when it wants to be told next.
+A machine never reads a clock, a file or a socket. Time is an argument, the next deadline a return value.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple, Protocol, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+
+if TYPE_CHECKING:
+    from steptwin.motion.divisions import Plan
 
 Nanos: TypeAlias = int
 """A moment or a duration in whole nanoseconds of virtual time."""
@@ -26,6 +29,20 @@ class Edge(NamedTuple):
     """0.0 or 1.0 on digital pins; volts on analog pins."""
 
 
+class Event(Protocol):
+    """Something that happened in a controller, for traces and for people. Controllers add fields of their own."""
+
+    @property
+    def time(self) -> Nanos: ...
+    @property
+    def code(self) -> str:
+        """The kind of event; stable."""
+        ...
+
+    @property
+    def text(self) -> str: ...
+
+
 class Machine(Protocol):
     """A pure machine in virtual time.
 
@@ -38,11 +55,38 @@ class Machine(Protocol):
     def deadline(self) -> Nanos | None: ...
 
 
-class PinMachine(Machine, Protocol):
-    """A machine with named pins.
+class Drive(Protocol):
+    """An axis of a controller, as its motion is followed."""
 
-    Inputs take timestamped changes, outputs give timestamped edges. STEP is never an edge: it stays a profile.
+    @property
+    def plan(self) -> Plan:
+        """What gives its pulses, from now on."""
+        ...
+
+    @property
+    def revision(self) -> int:
+        """Counts replacements of ``plan``."""
+        ...
+
+    @property
+    def offset_p(self) -> int:
+        """The position that the controller shows, less the pulses counted since power-on; 0 where it is not traced."""
+        ...
+
+
+class MotionController(Machine, Protocol):
+    """A machine with named pins and axes: what a kernel, mechanics, faults and snapshots ask of a controller.
+
+    Inputs take timestamped changes, outputs give timestamped edges. STEP is never an edge: it stays a plan of its axis.
     """
+
+    changed: Callable[[], None]
+    """Hook: called whenever the next deadline, an output or a plan may have changed."""
+
+    @property
+    def axes(self) -> Sequence[Drive]:
+        """The drives, the same objects throughout."""
+        ...
 
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         """Apply an input change after everything that happens at ``now``. Unknown names raise with the permitted ones."""
@@ -54,6 +98,22 @@ class PinMachine(Machine, Protocol):
 
     def take_edges(self) -> list[Edge]:
         """Output edges since the last call, in order."""
+        ...
+
+    def power_off(self, now: Nanos) -> None:
+        """Drives and outputs off. Until `power_cycle` no request or character is given to the controller."""
+        ...
+
+    def power_cycle(self, now: Nanos) -> None:
+        """Off and on again: as after power-on; shafts, the levels at its inputs and stored memory stay as they are."""
+        ...
+
+    def snapshot(self) -> Any:
+        """All state at the present moment, hooks excepted; it is immutable and can be pickled."""
+        ...
+
+    def restore(self, snapshot: Any) -> None:
+        """Take the state of a snapshot, its moment too. `steptwin.errors.Misuse` when it is of a different controller."""
         ...
 
 

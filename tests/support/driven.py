@@ -2,42 +2,29 @@
 
 from __future__ import annotations
 
+from toy import Bare, ToyAxis
+
 from steptwin.machine import Nanos
-from steptwin.motion import MotionState, plan_position, plan_velocity
-from steptwin.world.course import Build, Plan, Standing
+from steptwin.motion import MotionState, plan_position
+from steptwin.motion.divisions import Plan
+from steptwin.world.course import Build, Standing
 
 
-class Driven:
+class Driven(Bare):
     """A machine whose only axis goes where the test says."""
 
+    __slots__ = ("axis",)
+
     def __init__(self) -> None:
-        self.now = 0
-        self.profile = plan_velocity(MotionState(0, 0, 0.0, 0.0), 0.0, 1.0, 1.0)
-        self.revision = 0
-        self.changed = lambda: None
+        super().__init__()
+        self.axis = ToyAxis()
 
     @property
-    def axes(self) -> tuple[Driven, ...]:
-        return (self,)
-
-    def advance(self, now: Nanos) -> None:
-        self.now = now
-
-    def deadline(self) -> None:
-        return None
-
-    def set_pin(self, pin: str, value: float, now: Nanos) -> None:
-        raise AssertionError(pin)
-
-    def pins(self) -> dict[str, float]:
-        return {}
-
-    def take_edges(self) -> list:
-        return []
+    def axes(self) -> tuple[ToyAxis]:
+        return (self.axis,)
 
     def go(self, target: int, now: Nanos) -> None:
-        self.profile = plan_position(MotionState.of(self.profile, now), target, 500.0, 500.0, 200.0)
-        self.revision += 1
+        self.axis.follow(plan_position(MotionState.of(self.axis.plan, now), target, 500.0, 500.0, 200.0))
         self.changed()
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import ClassVar
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mic488_rig import Rig, controller
+from toy import Bare, ToyAxis
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import MILLISECOND, SECOND, Edge, Nanos
@@ -23,29 +25,27 @@ RUN_M1 = bytes.fromhex("10 2754 0002 04" + REAL_1000)
 """VEL_ABS = 1000 imp/s; with ACC 1000 the axis is at 500 after a second."""
 
 
-class Relay:
+class Relay(Bare):
     """Gives the inverse of its input A on its output B after a time, which may be 0. It has one axis."""
 
+    __slots__ = ("axis", "coming", "delay", "levels")
+    FIXED: ClassVar[frozenset[str]] = Bare.FIXED | {"delay"}
+
     def __init__(self, delay: Nanos = 0) -> None:
+        super().__init__()
         self.delay = delay
-        self.now = 0
         self.levels = {"A": 0.0, "B": 1.0}
-        self.changed: Callable[[], None] = lambda: None
         self.coming: list[tuple[Nanos, float]] = []
-        self.edges: list[Edge] = []
-        self.profile = at_rest(0, 0)
-        self.revision = 0
+        self.axis = ToyAxis()
 
     @property
-    def axes(self) -> tuple[Relay, ...]:
-        return (self,)
+    def axes(self) -> tuple[ToyAxis]:
+        return (self.axis,)
 
     def advance(self, now: Nanos) -> None:
-        if now < self.now:
-            raise TimeReversal(self.now, now)
+        super().advance(now)
         while self.coming and self.coming[0][0] <= now:
             self._put(*self.coming.pop(0))
-        self.now = now
 
     def deadline(self) -> Nanos | None:
         return self.coming[0][0] if self.coming else None
@@ -70,13 +70,8 @@ class Relay:
     def pins(self) -> Mapping[str, float]:
         return dict(self.levels)
 
-    def take_edges(self) -> list[Edge]:
-        edges, self.edges = self.edges, []
-        return edges
-
     def follow(self, profile: Profile) -> None:
-        self.profile = profile
-        self.revision += 1
+        self.axis.follow(profile)
         self.changed()
 
 

@@ -17,7 +17,7 @@ from steptwin.mic488.device import Mic488
 from steptwin.mic488.status import Status
 from steptwin.motion import MotionState, plan_position
 from steptwin.world import script as do
-from steptwin.world.course import Build, Carried, Standing, plan_of
+from steptwin.world.course import Build, Carried, Standing
 from steptwin.world.faults import read
 from steptwin.world.kernel import Kernel
 from steptwin.world.mechanics import EncoderBuild, Mechanism
@@ -241,7 +241,7 @@ def test_a_mechanism_follows_replaced_plans_as_a_simulation_does(moves: list[tup
     for target, pause in moves:
         motor.go(target, now)
         kernel.settle()
-        way = pulse_by_pulse(build, plan_of(motor), standing, now, now + pause)
+        way = pulse_by_pulse(build, motor.axis.plan, standing, now, now + pause)
         now += pause
         kernel.advance(now)
         motor.advance(now)
@@ -331,7 +331,7 @@ def test_an_ideal_axis_that_lost_pulses_keeps_the_loss_through_a_snapshot_and_a_
     mechanism.set_state(later)
     assert mechanism.place(40 * SECOND) == 43
     # A drive that is switched off counts from 0 again: the load stays where it is.
-    drive.profile, drive.revision = plan_position(MotionState(40 * SECOND, 0, 0.0, 0.0), 0, 1.0, 1.0, 1.0), drive.revision + 1
+    drive.axis.follow(plan_position(MotionState(40 * SECOND, 0, 0.0, 0.0), 0, 1.0, 1.0, 1.0))
     assert mechanism.at(40 * SECOND)[:2] == (43, 43)
 
 
@@ -362,7 +362,7 @@ def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_c
     assert mechanism.deadline() == pytest.approx(0.2 * SECOND, abs=1000)
     assert kernel.deadline() == mechanism.deadline()
     kernel.advance(SECOND // 2)
-    end = drive.profile.end
+    end = drive.axis.plan.end
     assert mechanism.deadline() == end
     assert (mechanism.at(kernel.now).stalled, mechanism.at(kernel.now).rotor) == (True, 10)
     kernel.advance(5 * SECOND)
@@ -398,7 +398,7 @@ def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None
     kernel.add("other", other)
     mechanism = Mechanism(kernel, "m", 1, Build())
     kernel.add_part(mechanism)
-    mechanism.fit(EncoderBuild(other, 2, counts=-3, pulses=2), 0)
+    mechanism.fit(EncoderBuild("other", other, 2, counts=-3, pulses=2), 0)
     assert mechanism.deadline() is None
     drive.go(100, 0)
     kernel.settle()
@@ -422,7 +422,7 @@ def test_an_encoder_sits_on_the_rotor_or_on_the_load(on_load: bool, counts: list
     kernel.add("other", other)
     mechanism = Mechanism(kernel, "m", 1, Build(sign=-1, zero=500, play=5))
     kernel.add_part(mechanism)
-    mechanism.fit(EncoderBuild(other, 1, on_load, 1), 0)
+    mechanism.fit(EncoderBuild("other", other, 1, on_load, 1), 0)
     found = [other.axes[0].encoder_counts(0)]
     for target, now in ((-100, 0), (-60, 20 * SECOND)):
         drive.go(target, now)

@@ -51,7 +51,7 @@ class WrongMove(Exception):
 
 
 class Drive(Stateful):
-    """An axis for the world: `profile` and `revision`."""
+    """The axis of a chip: a `steptwin.machine.Drive`."""
 
     __slots__ = (
         "_clock",
@@ -74,6 +74,8 @@ class Drive(Stateful):
         "velocity",
     )
     FIXED: ClassVar[frozenset[str]] = frozenset({"_clock"})
+    offset_p = 0
+    """Traces show the count since power-on: the position counter has its own scale and 24 bits (`counter_u`)."""
 
     def __init__(self, variant: Variant, interface: Interface, now: Nanos) -> None:
         self._clock = variant.clock
@@ -103,6 +105,11 @@ class Drive(Stateful):
         self.grid_u = microstep_size(microstep)
 
     # ------------------------------------------------------------------ where it is
+
+    @property
+    def plan(self) -> StepTrain:
+        """The pulse train in force."""
+        return self.train
 
     @property
     def profile(self) -> Profile:

@@ -108,6 +108,11 @@ class Axis(Stateful):
         self.control = PositionControl()
         self.power_on(0)
 
+    @property
+    def plan(self) -> Profile:
+        """What gives the pulses: the profile itself."""
+        return self.profile
+
     def power_on(self, now: Nanos) -> None:
         """Registers as configured (MIC-27), drive off, position 0; the motor stays where it is."""
         config, gear = self.config, self.gear

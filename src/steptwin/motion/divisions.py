@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
@@ -86,6 +86,15 @@ class StepTrain:
             if way > 0 and (end is None or (end - reached) * self.direction >= 0):
                 return self.profile.pulse_time(reached, after)
         return None
+
+
+Plan: TypeAlias = Profile | StepTrain
+"""What gives the pulses of an axis: its profile, or the train of pulses that the profile drives."""
+
+
+def profile_of(plan: Plan) -> Profile:
+    """The profile of a plan: the motion as time passes."""
+    return plan.profile if isinstance(plan, StepTrain) else plan
 
 
 def step_train(profile: Profile, begin: int, microstepping: Microstepping, grid: int | None = None) -> StepTrain:

@@ -19,7 +19,7 @@ from steptwin.live.lines import Happening
 from steptwin.live.links import Port
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.vision import Com1Link, uses_vision
-from steptwin.machine import Nanos, PinMachine
+from steptwin.machine import MotionController, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Event, Mic488, check_pin, check_turn, pause_observer
 from steptwin.mic488.encoder import Coupling
@@ -171,7 +171,7 @@ class Mic488Line:
             "fault": self.faults.handler(cell),
         }
 
-    def _terminals(self, device: Mic488) -> PinMachine:
+    def _terminals(self, device: Mic488) -> MotionController:
         """Where a hand reaches the inputs of a controller: before a switch that is stuck, not behind it."""
         return next(self.kernel.machines[str(unit)] for unit, served in self.devices.items() if served is device)
 
@@ -203,7 +203,7 @@ def open_state(stack: ExitStack, path: Path | None) -> StateDirectory | None:
     return stack.enter_context(StateDirectory(path)) if path is not None else None
 
 
-def _pin(device: Mic488, terminals: PinMachine, request: Mapping[str, Any], now: Nanos) -> object:
+def _pin(device: Mic488, terminals: MotionController, request: Mapping[str, Any], now: Nanos) -> object:
     """All changes or none, then every pin."""
     levels = {pin: number(pin, value) for pin, value in changes(request).items()}
     for pin, level in levels.items():

@@ -14,7 +14,7 @@ from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.lines import interface
 from steptwin.m1486.syntax import parse as parse_m1486
 from steptwin.m1486.variants import Store, Variant, variant
-from steptwin.machine import Nanos
+from steptwin.machine import Event, Nanos
 from steptwin.mic488.config import BAUDS, ConfigError, ControllerConfig, examine_config
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.inifile import IniFile
@@ -373,7 +373,7 @@ class _Builder:
         now = fitted.kernel.now
         if encoder is None:
             if not mechanism.build.ideal:
-                mechanism.fit(EncoderBuild(machine, mechanism.number), now)
+                mechanism.fit(EncoderBuild(spec.drive[0], machine, mechanism.number), now)
             return
         turned = fitted
         if encoder.follows is not None:
@@ -393,7 +393,7 @@ class _Builder:
             counts *= 1 - Fraction(str(encoder.slip))
         on_load = encoder.mount == "load" or encoder.follows is not None
         numerator, denominator = (None, 1) if counts is None else (counts.numerator, counts.denominator)
-        turned.mechanism.fit(EncoderBuild(machine, mechanism.number, on_load, numerator, denominator), now)
+        turned.mechanism.fit(EncoderBuild(spec.drive[0], machine, mechanism.number, on_load, numerator, denominator), now)
         if encoder.index:
             low = fitted.scale.nearest(encoder.offset)
             period = fitted.scale.pulses_per_rev
@@ -476,8 +476,8 @@ class _Builder:
         kernel.add_part(AnalogSource(kernel, target, _waveform(spec), spec.period))
 
 
-def _record_event(record: Recorder, machine: str, event: object) -> None:
-    record(Record(event.time, machine, "event", event.code, event.text))  # type: ignore[attr-defined]
+def _record_event(record: Recorder, machine: str, event: Event) -> None:
+    record(Record(event.time, machine, "event", event.code, event.text))
 
 
 def _image(text: str, name: str, kind: Variant) -> bytes:

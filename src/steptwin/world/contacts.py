@@ -14,11 +14,11 @@ from math import floor
 from typing import ClassVar, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import Drive, Nanos
+from steptwin.motion.divisions import profile_of
 from steptwin.state import Stateful
 from steptwin.world.chance import Chance
-from steptwin.world.course import plan_of
-from steptwin.world.kernel import Drive, Kernel, PinName
+from steptwin.world.kernel import Kernel, PinName
 
 
 class Carriage(Protocol):
@@ -46,11 +46,11 @@ class CountedPosition:
         return self._drive.revision
 
     def place(self, now: Nanos) -> int:
-        return plan_of(self._drive).count(now)
+        return self._drive.plan.count(now)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
-        plan = plan_of(self._drive)
-        for begin, way in self._drive.profile.legs(after):
+        plan = self._drive.plan
+        for begin, way in profile_of(plan).legs(after):
             if way == direction and (plan.count(begin) - position) * direction < 0:
                 return plan.pulse_time(position, max(begin, after))
         return None

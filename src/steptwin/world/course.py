@@ -18,25 +18,12 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from math import ceil, inf
 from operator import attrgetter
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from steptwin.machine import SECOND, Nanos
-from steptwin.motion import Profile
-from steptwin.motion.divisions import StepTrain
-from steptwin.world.kernel import Drive
+from steptwin.motion import Segment
+from steptwin.motion.divisions import Plan, profile_of
 from steptwin.world.motor import Motor
-
-Plan: TypeAlias = Profile | StepTrain
-
-
-def plan_of(drive: Drive) -> Plan:
-    """What gives the pulses of a drive: its profile, or the train of pulses that the profile drives."""
-    train: StepTrain | None = getattr(drive, "train", None)
-    return drive.profile if train is None else train
-
-
-def profile_of(plan: Plan) -> Profile:
-    return plan.profile if isinstance(plan, StepTrain) else plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,9 +197,9 @@ class Course:
                 self._catch(rest)
             self._stand(rest, 1)
 
-    def _segment(self, s: object, begin: Nanos, end: Nanos | None) -> None:
+    def _segment(self, s: Segment, begin: Nanos, end: Nanos | None) -> None:
         """What happens while the field goes one way."""
-        direction = s.direction * self.build.sign  # type: ignore[attr-defined]
+        direction = s.direction * self.build.sign
         motor, start = self.build.motor, profile_of(self.plan).start
         if self.blocked:
             self._stand(begin, direction)

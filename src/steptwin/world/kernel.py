@@ -6,36 +6,19 @@ advanced only when something happens to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import Edge, Nanos, PinMachine
+from steptwin.machine import Drive, Edge, MotionController, Nanos
 from steptwin.motion import Profile
+from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain
 from steptwin.world.trace import Record, Recorder
 
 MAX_ROUNDS_PER_INSTANT = 1000
 """Signals propagate in zero time; more rounds than this at one moment are a loop of wires."""
-
-
-class Drive(Protocol):
-    """An axis whose commanded profile can be read. ``revision`` counts replacements of ``profile``."""
-
-    @property
-    def profile(self) -> Profile: ...
-    @property
-    def revision(self) -> int: ...
-
-
-class DrivingMachine(PinMachine, Protocol):
-    """A machine with pins and axes."""
-
-    changed: Callable[[], None]
-
-    @property
-    def axes(self) -> Sequence[Drive]: ...
 
 
 class Part(Protocol):
@@ -108,7 +91,7 @@ class Kernel:
 
     def __init__(self, now: Nanos = 0, record: Recorder | None = None) -> None:
         self.now = now
-        self.machines: dict[str, DrivingMachine] = {}
+        self.machines: dict[str, MotionController] = {}
         self.parts: list[Part] = []
         self.observers: list[Callable[[str, Edge], None]] = []
         """Called with machine name and edge, in order, for every output edge."""
@@ -125,13 +108,11 @@ class Kernel:
         self._flights: list[Flight] = []
         self._plans: list[_Plans] = []
         """Of each machine, as recorded last."""
-        self._fresh: dict[str, Plain] = {}
-        """First states of what stands around machines."""
         self._due: Nanos | None = None
 
     # ------------------------------------------------------------------ what is in it
 
-    def add(self, name: str, machine: DrivingMachine) -> None:
+    def add(self, name: str, machine: MotionController) -> None:
         """Add a machine that is not ahead of the kernel's time (`TimeReversal`); its ``changed`` hook is taken."""
         if name in self.machines:
             raise Misuse(f"there is a machine {name!r} already")
@@ -141,12 +122,11 @@ class Kernel:
         machine.changed = self.mark
         self.mark()
 
-    def replace(self, name: str, machine: DrivingMachine) -> None:
+    def replace(self, name: str, machine: MotionController) -> None:
         """Let another machine stand where ``name`` stands: one around it, with the same pins and axes."""
         if name not in self.machines:
             raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
         self.machines[name] = machine
-        self._fresh[name] = machine.copy_state()  # type: ignore[attr-defined]
         machine.changed = self.mark
         self.mark()
 
@@ -325,17 +305,17 @@ class Kernel:
             self.settle()
         return KernelState(
             self.now,
-            tuple(map(_snapshot, self.machines.values())),
+            tuple(machine.snapshot() for machine in self.machines.values()),
             tuple(part.copy_state() for part in self.parts),
             self._levels.copy(),
             tuple(self._flights),
         )
 
     def restore(self, state: KernelState) -> None:
-        """Take the state of a kernel with the same machines and parts; what has come to stand around them since begins anew."""
+        """Take the state of a kernel with the same machines and parts."""
         self.now = state.now
-        for name, its_state in zip(self.machines, state.machines, strict=True):
-            _restore(self.machines[name], its_state, self._fresh.get(name, ()))
+        for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
+            machine.restore(its_state)
         for part, its_state in zip(self.parts, state.parts, strict=True):
             part.set_state(its_state)
         self._levels = dict(state.levels)
@@ -351,7 +331,7 @@ class _Plans:
 
     __slots__ = ("_drives", "_name", "_origins", "_profiles", "_revisions")
 
-    def __init__(self, name: str, machine: DrivingMachine) -> None:
+    def __init__(self, name: str, machine: MotionController) -> None:
         self._name = name
         self._drives = [(i, str(i + 1), drive) for i, drive in enumerate(machine.axes)]
         self._revisions = [-1] * len(self._drives)
@@ -361,42 +341,22 @@ class _Plans:
     def tell(self, record: Recorder, now: Nanos) -> None:
         """Record new plans, and changes of coordinates. An axis at rest where its plan ended has no new plan."""
         for i, number, drive in self._drives:
-            origin = getattr(drive, "offset_p", 0)
+            origin = drive.offset_p
             if origin != self._origins[i]:
                 self._origins[i] = origin
                 record(Record(now, self._name, "coordinate", number, origin))
             if self._revisions[i] == drive.revision:
                 continue
-            before, profile = self._profiles[i], drive.profile
+            plan = drive.plan
+            before, profile = self._profiles[i], profile_of(plan)
             self._revisions[i], self._profiles[i] = drive.revision, profile
             if before is None or not _only_rests(before, profile):
-                record(Record(now, self._name, "plan", number, getattr(drive, "train", profile)))
+                record(Record(now, self._name, "plan", number, plan))
 
     def take_as_told(self) -> None:
         for i, _, drive in self._drives:
-            self._revisions[i], self._profiles[i] = drive.revision, drive.profile
-            self._origins[i] = getattr(drive, "offset_p", 0)
-
-
-class Around(NamedTuple):
-    """State of what stands around a machine, and of the machine."""
-
-    outer: Plain
-    inner: Any
-
-
-def _snapshot(machine: Any) -> Any:
-    inner = getattr(machine, "inner", None)
-    return machine.snapshot() if inner is None else Around(machine.copy_state(), inner.snapshot())
-
-
-def _restore(machine: Any, state: Any, fresh: Plain) -> None:
-    inner = getattr(machine, "inner", None)
-    if inner is None:
-        machine.restore(state)
-    else:
-        machine.set_state(state.outer if isinstance(state, Around) else fresh)
-        inner.restore(state.inner if isinstance(state, Around) else state)
+            self._revisions[i], self._profiles[i] = drive.revision, profile_of(drive.plan)
+            self._origins[i] = drive.offset_p
 
 
 def _only_rests(before: Profile, after: Profile) -> bool:

@@ -12,11 +12,12 @@ from operator import attrgetter
 from typing import ClassVar, NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.machine import MILLISECOND, Drive, Nanos
 from steptwin.mic488.device import Mic488
+from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain, Stateful
-from steptwin.world.course import Build, Carried, Course, Standing, plan_of, profile_of
-from steptwin.world.kernel import Drive, Kernel
+from steptwin.world.course import Build, Carried, Course, Standing
+from steptwin.world.kernel import Kernel
 
 _OUTDATED = -1
 """No drive has this revision."""
@@ -38,11 +39,12 @@ class Shaft(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EncoderBuild:
-    """An encoder that the controller ``device`` reads for its axis ``axis`` (from 1).
+    """An encoder that the controller ``device``, called ``machine`` in the kernel, reads for its axis ``axis`` (from 1).
 
     ``counts`` (negative: backwards) per ``pulses`` of the drive that turns it; None: as the controller is told.
     """
 
+    machine: str
     device: Mic488
     axis: int
     on_load: bool = False
@@ -99,11 +101,11 @@ class Mechanism(Stateful):
         self._simple = build.ideal
         """Nothing has come between pulses and load yet, and nothing can."""
         drive = self._drive
-        here = build.sign * plan_of(drive).count(kernel.now) + build.zero
+        here = build.sign * drive.plan.count(kernel.now) + build.zero
         if (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
             raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
         self._revision = drive.revision
-        self._course = Course(build, plan_of(drive), kernel.now, Standing(here, here))
+        self._course = Course(build, drive.plan, kernel.now, Standing(here, here))
 
     @property
     def _drive(self) -> Drive:
@@ -176,7 +178,7 @@ class Mechanism(Stateful):
 
     def _renew(self, drive: Drive, now: Nanos, standing: Standing | None = None) -> None:
         """The drive follows another plan, or something has changed in the mechanics."""
-        before, plan = self._course, plan_of(drive)
+        before, plan = self._course, drive.plan
         if standing is None:
             if self._simple:
                 here = self.build.sign * plan.count(now) + self.build.zero - self._lost
@@ -220,8 +222,7 @@ class Mechanism(Stateful):
 
     def _is_own(self, encoder: EncoderBuild) -> bool:
         """Whether the axis turns an encoder of its own controller's axis."""
-        machine = self._kernel.machines[self.machine]
-        return encoder.device is getattr(machine, "inner", machine) and encoder.axis == self.number
+        return (encoder.machine, encoder.axis) == (self.machine, self.number)
 
     # ------------------------------------------------------------------ what can go wrong
 

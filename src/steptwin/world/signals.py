@@ -13,9 +13,9 @@ from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.program import ProgramState
 from steptwin.motion import Profile
+from steptwin.motion.divisions import profile_of
 from steptwin.wbc.nearmiss import NearMiss
 from steptwin.world.build import Fitted, Plan
-from steptwin.world.course import profile_of
 from steptwin.world.kernel import Kernel
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown

@@ -15,12 +15,12 @@ from trace_rig import Run
 
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.export.progress import silent
-from steptwin.files.export.recording import profile_of, sort_out
+from steptwin.files.export.recording import sort_out
 from steptwin.files.export.timeline import write_timeline
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.motion.divisions import StepTrain
+from steptwin.motion.divisions import StepTrain, profile_of
 from steptwin.motion.paths import Circular, circle
 from steptwin.motion.pulses import step_times
 from steptwin.world.trace import Record, Trace

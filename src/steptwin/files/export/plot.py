@@ -19,8 +19,9 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import Progress
-from steptwin.files.export.recording import AxisTrack, PinTrack, Recording, profile_of
+from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import SECOND, Nanos
+from steptwin.motion.divisions import profile_of
 from steptwin.motion.pulses import Reals
 
 if TYPE_CHECKING:

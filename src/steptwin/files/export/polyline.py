@@ -8,9 +8,10 @@ from __future__ import annotations
 from math import ceil, inf, sqrt
 from typing import NamedTuple
 
-from steptwin.files.export.recording import AxisTrack, profile_of
+from steptwin.files.export.recording import AxisTrack
 from steptwin.machine import Nanos
 from steptwin.motion import Profile, Segment
+from steptwin.motion.divisions import profile_of
 from steptwin.motion.paths import ArcSegment
 
 _POSITION_STEPS = 2000

@@ -7,21 +7,14 @@ from bisect import bisect_right
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
-from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.files.export.axes import AxisView, AxisViews, plain_view
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile, at_rest
-from steptwin.motion.divisions import StepTrain
+from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.world.course import Carried
 from steptwin.world.trace import Record, Trace
-
-Plan: TypeAlias = Profile | StepTrain
-
-
-def profile_of(plan: Plan) -> Profile:
-    return plan.profile if isinstance(plan, StepTrain) else plan
 
 
 @dataclass(slots=True)

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steptwin.files.export.progress import Progress
-from steptwin.files.export.recording import AxisTrack, PinTrack, Recording, profile_of
+from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import SECOND, Nanos
+from steptwin.motion.divisions import profile_of
 from steptwin.motion.pulses import Reals, Times, positions, velocities
 
 _ROWS = 1 << 15

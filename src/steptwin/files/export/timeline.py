@@ -14,10 +14,10 @@ from typing import IO
 
 from steptwin.files.export.polyline import Piece, pieces_of
 from steptwin.files.export.progress import Progress
-from steptwin.files.export.recording import AxisTrack, PinTrack, Plan, Recording, profile_of
+from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment
-from steptwin.motion.divisions import StepTrain
+from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.world.trace import Record
 
 _SCRIPTS = ("model.js", "draw.js", "timeline.js")

@@ -20,11 +20,11 @@ from steptwin import __version__
 from steptwin.files.export.axes import PhaseOutputs, StepOutputs
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import Progress
-from steptwin.files.export.recording import AxisTrack, PinTrack, Plan, Recording, profile_of
+from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.files.export.vcdtext import Times, Tokens, changes_text
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile
-from steptwin.motion.divisions import StepTrain
+from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.pulses import pulse_runs, step_times
 from steptwin.motion.waveforms import PERIOD, currents
 

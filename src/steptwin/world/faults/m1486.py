@@ -10,6 +10,7 @@ from steptwin.m1486.pins import ALIASES, known_pin
 from steptwin.m1486.variants import Store
 from steptwin.machine import Nanos
 from steptwin.world.faults.machine import FaultyMachine, Shaft
+from steptwin.world.faults.table import Kind, Occasion
 
 
 class M1486Body:
@@ -19,17 +20,16 @@ class M1486Body:
         self._chip = chip
         self.shafts = list(shafts)
 
-    @property
-    def encoders(self) -> bool:
-        return False
-
-    @property
-    def keeps_memory(self) -> bool:
-        return self._chip.variant.store is Store.EEPROM
-
-    @property
-    def no_master(self) -> str | None:
-        return "is an M1486, which is no Modbus master"
+    def lacks(self, kind: Kind) -> str | None:
+        if kind.parameter("axis") is not None and not self.shafts:
+            return "has no shaft: an M1486 has one where a world has its [[axis]]"
+        if kind.name == "slip":
+            return "is an M1486, which reads no encoder"
+        if kind.name == "master-error":
+            return "is an M1486, which is no Modbus master"
+        if kind.occasion is Occasion.SAVE and self._chip.variant.store is not Store.EEPROM:
+            return "saves nothing: it has no memory that survives power-off"
+        return None
 
     def show_master_error(self, shown: bool, now: Nanos) -> None:
         """There is none."""
@@ -47,12 +47,6 @@ class M1486Body:
         known_pin(pin)
         if level not in (0.0, 1.0):
             raise Misuse(f"{pin} = {level:g}: a digital input is 0 or 1")
-
-    def power_off(self, now: Nanos) -> None:
-        self._chip.power_off(now)
-
-    def power_on(self, now: Nanos) -> None:
-        self._chip.power_cycle(now)
 
 
 def _keep(chip: M1486, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine, image: bytes) -> bytes:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Edge, Nanos
-from steptwin.state import Stateful
+from steptwin.machine import Drive, Edge, MotionController, Nanos
+from steptwin.state import Plain, Stateful
 from steptwin.wire.pdu import DEVICE_BUSY, exception_pdu
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.answers import NEVER_SENT
 from steptwin.world.faults.fault import Fault
-from steptwin.world.faults.table import Layer, Occasion
-from steptwin.world.kernel import Drive, DrivingMachine, Kernel, PinName
+from steptwin.world.faults.table import Kind, Layer, Occasion
+from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.trace import Record
 
 
@@ -39,19 +39,8 @@ class Body(Protocol):
     shafts: list[Shaft]
     """By axis. Mechanics put themselves in the place of what is there."""
 
-    @property
-    def encoders(self) -> bool:
-        """Whether it reads encoders."""
-        ...
-
-    @property
-    def keeps_memory(self) -> bool:
-        """Whether it has a memory that survives power-off."""
-        ...
-
-    @property
-    def no_master(self) -> str | None:
-        """Why it cannot show that a slave of its own does not answer; None when it can."""
+    def lacks(self, kind: Kind) -> str | None:
+        """Why faults of a kind cannot happen to it, to follow its name in a message; None: they can."""
         ...
 
     def show_master_error(self, shown: bool, now: Nanos) -> None:
@@ -70,8 +59,12 @@ class Body(Protocol):
         """`Misuse` unless ``pin`` is an input that can take ``level``."""
         ...
 
-    def power_off(self, now: Nanos) -> None: ...
-    def power_on(self, now: Nanos) -> None: ...
+
+class FaultySnapshot(NamedTuple):
+    """State of the faults of a machine, and of the machine."""
+
+    faults: Plain
+    machine: Any
 
 
 class FaultyMachine(Stateful):
@@ -84,6 +77,7 @@ class FaultyMachine(Stateful):
         "_bounces",
         "_cut",
         "_faults",
+        "_fresh",
         "_mute",
         "_off_until",
         "_on_edge",
@@ -95,10 +89,10 @@ class FaultyMachine(Stateful):
         "inner",
         "name",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_on_edge", "body", "changed", "inner", "name"})
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_fresh", "_on_edge", "body", "changed", "inner", "name"})
 
     def __init__(
-        self, inner: DrivingMachine, name: str, faults: Faults, body: Body, on_edge: Callable[[str, Nanos, float], None]
+        self, inner: MotionController, name: str, faults: Faults, body: Body, on_edge: Callable[[str, Nanos, float], None]
     ) -> None:
         """``on_edge`` is called for each edge of an input that a fault makes; the edge is recorded here."""
         self._on_edge = on_edge
@@ -121,6 +115,7 @@ class FaultyMachine(Stateful):
         self._off_until: Nanos | None = None
         self._cut: Nanos | None = None
         """When the supply has failed in the middle of something that must come to its end first."""
+        self._fresh = self.copy_state()
         body.watch(self)
 
     # ------------------------------------------------------------------ the machine's own
@@ -138,6 +133,24 @@ class FaultyMachine(Stateful):
     def pins(self) -> Mapping[str, float]:
         """Levels at the machine, behind the faults."""
         return self.inner.pins()
+
+    def power_off(self, now: Nanos) -> None:
+        self.inner.power_off(now)
+
+    def power_cycle(self, now: Nanos) -> None:
+        self.inner.power_cycle(now)
+
+    # ------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> FaultySnapshot:
+        return FaultySnapshot(self.copy_state(), self.inner.snapshot())
+
+    def restore(self, snapshot: Any) -> None:
+        """A snapshot taken before the machine could have faults is one without faults."""
+        if not isinstance(snapshot, FaultySnapshot):
+            snapshot = FaultySnapshot(self._fresh, snapshot)
+        self.set_state(snapshot.faults)
+        self.inner.restore(snapshot.machine)
 
     # ------------------------------------------------------------------ time
 
@@ -162,7 +175,7 @@ class FaultyMachine(Stateful):
             self.after_request(now)
         if self._off_until is not None and self._off_until <= now:
             self._off_until = None
-            self.body.power_on(now)
+            self.inner.power_cycle(now)
         for active in self._mine():
             while active.due is not None and active.due <= now:
                 self._moment(active, now)
@@ -200,7 +213,7 @@ class FaultyMachine(Stateful):
                 case "supply-drop":
                     self._tell(active, now, f"no supply for {fault.number('for_s'):g} s")
                     if self._off_until is None:
-                        self.body.power_off(now)
+                        self.inner.power_off(now)
                     self._off_until = max(now + active.ns("for_s"), self._off_until or 0)
         active.step()
 
@@ -220,19 +233,12 @@ class FaultyMachine(Stateful):
 
     def check(self, fault: Fault) -> None:
         """`Misuse` unless the machine has the axis or input."""
+        lacks = self.body.lacks(fault.kind)
+        if lacks is not None:
+            raise Misuse(f"fault {fault.kind.name}: {self.name!r} {lacks}")
         axis = fault.whole("axis")
         if axis is not None and axis > len(self.body.shafts):
-            if not self.body.shafts:
-                raise Misuse(
-                    f"fault {fault.kind.name}: {self.name!r} has no shaft: an M1486 has one where a world has its [[axis]]"
-                )
             raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are 1 to {len(self.body.shafts)}")
-        if fault.kind.name == "slip" and not self.body.encoders:
-            raise Misuse(f"fault slip: {self.name!r} is an M1486, which reads no encoder")
-        if fault.kind.occasion is Occasion.SAVE and not self.body.keeps_memory:
-            raise Misuse(f"fault {fault.kind.name}: {self.name!r} saves nothing: it has no memory that survives power-off")
-        if fault.kind.name == "master-error" and self.body.no_master is not None:
-            raise Misuse(f"fault master-error: {self.name!r} {self.body.no_master}")
         if fault.kind.parameter("pin") is None:
             return
         pin = self._pin(fault)
@@ -389,7 +395,7 @@ class FaultyMachine(Stateful):
         if self._cut is None:
             return False
         self._cut = None
-        self.body.power_off(now)
+        self.inner.power_off(now)
         self.changed()
         return True
 

@@ -10,6 +10,7 @@ from steptwin.mic488.encoder import Coupling
 from steptwin.wire.pdu import exception_pdu
 from steptwin.world.faults.answers import NEVER_SENT
 from steptwin.world.faults.machine import FaultyMachine, Shaft
+from steptwin.world.faults.table import Kind
 
 
 class EncoderShaft:
@@ -40,17 +41,8 @@ class Mic488Body:
         self._line = line
         self.shafts: list[Shaft] = [EncoderShaft(device, axis.number) for axis in device.axes]
 
-    @property
-    def encoders(self) -> bool:
-        return True
-
-    @property
-    def keeps_memory(self) -> bool:
-        return True
-
-    @property
-    def no_master(self) -> str | None:
-        if any(register.key == "M_STATUS" for register in self._device.registers):
+    def lacks(self, kind: Kind) -> str | None:
+        if kind.name != "master-error" or any(register.key == "M_STATUS" for register in self._device.registers):
             return None
         return f"has firmware {self._device.firmware.name}, which has no M_STATUS: 1.70 has"
 
@@ -69,12 +61,6 @@ class Mic488Body:
 
     def check_pin(self, pin: str, level: float) -> None:
         check_pin(pin, level)
-
-    def power_off(self, now: Nanos) -> None:
-        self._device.power_off(now)
-
-    def power_on(self, now: Nanos) -> None:
-        self._device.power_cycle(now)
 
 
 class _Watched:

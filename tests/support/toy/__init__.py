@@ -1,0 +1,11 @@
+"""A third controller that the source does not know: it shows that the contracts of `steptwin.machine` are enough.
+
+A `Toy` has one axis, an input STOP and an output BUSY, and is commanded by two bytes: a letter and a number. `ToyPort` is its
+line, `ToyLine` the line of a world with one toy on it, `ToyBody` what can fail.
+"""
+
+from toy.faults import ToyBody
+from toy.line import ToyLine, ToyPort
+from toy.machine import ACCELERATION_P, STEP_P, VELOCITY_P, Bare, Toy, ToyAxis
+
+__all__ = ["ACCELERATION_P", "STEP_P", "VELOCITY_P", "Bare", "Toy", "ToyAxis", "ToyBody", "ToyLine", "ToyPort"]

@@ -1,0 +1,63 @@
+"""Lines of toys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+from steptwin.world.faults import Faults
+from steptwin.world.faults import Line as FaultLine
+from steptwin.world.kernel import Kernel
+from steptwin.world.lines import Line
+from toy.machine import Toy
+
+
+class ToyPort(Stateful):
+    """A connection with one toy; answers at once, when both bytes of a command are there."""
+
+    broken = None
+
+    __slots__ = ("_held", "_toy")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_toy"})
+
+    def __init__(self, toy: Toy) -> None:
+        self._toy = toy
+        self._held = b""
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        data = self._held + data
+        whole = len(data) // 2 * 2
+        self._held = data[whole:]
+        return b"".join(self._toy.execute(data[at : at + 2], now) for at in range(0, whole, 2))
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        return []
+
+    def deadline(self) -> Nanos | None:
+        return None
+
+    def close(self) -> None:
+        self._held = b""
+
+
+class ToyLine(Line):
+    """One toy; every program has a connection of its own."""
+
+    __slots__ = ("_toy",)
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_toy"}) | Line.FIXED
+
+    kinds = ("raw",)
+    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}
+
+    def __init__(self, kernel: Kernel, name: str, toy: Toy, faults: Faults | None = None) -> None:
+        super().__init__(kernel, name, None, Faults() if faults is None else faults)
+        self._toy = toy
+
+    @property
+    def units(self) -> tuple[int, ...]:
+        return ()
+
+    def _port(self, place: str, kind: str) -> ToyPort:
+        return ToyPort(self._toy)
