@@ -5,9 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world.description import read_world
-from steptwin.world.durations import duration
 from steptwin.world.reader import Text, WorldError
 
 TABLE = '[[mic488]]\nname = "table"\n'
@@ -238,27 +236,6 @@ def test_keys_of_nested_tables_have_their_lines() -> None:
     assert {path: text.line(path) for path in paths} == paths
     assert text.line(("a", 1, "b", 1, "no", "such")) == 7
     assert text.line(("nothing",)) == 1
-
-
-@pytest.mark.parametrize(
-    ("value", "nanoseconds"),
-    [
-        ("5 ms", 5 * MILLISECOND),
-        ("1.5s", SECOND * 3 // 2),
-        (2, 2 * SECOND),
-        (0.25, SECOND // 4),
-        ("10 min", 600 * SECOND),
-        (1e-5, 10_000),
-    ],
-)
-def test_durations(value: object, nanoseconds: int) -> None:
-    assert duration(value) == nanoseconds
-
-
-@pytest.mark.parametrize("value", ["", "ms", "5 parsec", "-1 s", True, None, "9999 h", [1], -1e-5, float("inf"), float("nan")])
-def test_what_is_no_duration_is_misuse(value: object) -> None:
-    with pytest.raises(ValueError, match=r"is no time|is too long"):
-        duration(value)
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_world import SMALL, moved, small
 
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, TimeReversal
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.world import plant
 from steptwin.world import script as do
+from steptwin.world.actions import Leave
 from steptwin.world.script import Steps
 
 
@@ -197,3 +199,85 @@ def test_a_move_into_a_stop_loses_what_the_stop_holds() -> None:
     assert world.mic488["a"].axis[1].position == 60.0
     assert (world.axis["x"].position, world.axis["x"].lost) == (101.0, 900)
     assert world.mic488["a"].axis[1].encoder < 60 * 100 * 400 // 3200  # the default encoder sits on the motor
+
+
+def test_inputs_say_whether_the_scripts_had_done_what_was_due() -> None:
+    """A replay has to do the same before and after the scripts of the description at a moment."""
+    world = small('[[event]]\nat = "1 s"\nsteps = [{ note = "due" }]\n')
+    world.press("go")
+    world.press("go")
+    world.run(until=1)
+    world.release("go")
+    world.release("go")
+    assert [(given.time, given.settled) for given in world.inputs] == [(0, False), (0, False), (SECOND, True), (SECOND, False)]
+    unkept = World.from_toml(dedent(SMALL), keep_inputs=False)
+    unkept.press("go")
+    assert unkept.inputs == []
+
+
+def test_what_comes_from_outside_acts_and_is_in_the_trace() -> None:
+    """Characters of a script to a chip, a hand on a shaft, a program that leaves its place, power off and on."""
+    world = small('[[line]]\nname = "bus"\nkind = "m1486"\n[[m1486]]\nname = "d"\nline = "bus"\naddress = 3\n')
+    world.outside(do.Send("bus", b"x3\rf640\rr\r"))
+    world.run(until="idle")
+    assert world.m1486["d"].position == 640
+    world.outside(do.Turn("a", 2, -7))
+    assert world.mic488["a"].axis[2].encoder == -7
+    world.line["bus"].send(b"x3\ru20\r", "plc")
+    assert "plc" in world.lines["bus"].places
+    world.outside(Leave("bus", "plc"))
+    assert "plc" not in world.lines["bus"].places
+    world.outside(Leave("bus", "plc"))
+    world.outside(do.PowerCycle("d"))
+    world.run(for_=0.1)
+    assert world.m1486["d"].counter == 0
+    recorded = [(r.machine, r.subject, r.value) for r in world.trace if r.kind == "input"]
+    assert recorded == [("a", "M2 turned", -7), ("d", "power-cycle", "")]
+    for step, message in (
+        (do.Send("bys", b"x"), r"no line is called 'bys' \(did you mean 'bus'\?\); there are bus"),
+        (do.Turn("d", 1, 1), "'d' is an M1486, which has no encoder"),
+        (do.PowerCycle("e"), "no machine is called 'e'"),
+        (do.Wait(1), "this is for scripts"),
+    ):
+        with pytest.raises(Misuse, match=message):
+            world.outside(step)
+
+
+def test_what_was_to_be_done_later_is_done_once_and_may_be_called_off() -> None:
+    world = small()
+    steps = (do.Wait(SECOND), do.Press("go"))
+    world.do_later("press it", steps)
+    world.run(for_=0.5)
+    world.do_later("press it", steps)
+    world.run(for_=0.75)
+    assert world.read("go.pressed") == 0.0, "begun anew: the first was called off"
+    world.run(for_=0.25)
+    assert world.read("go.pressed") == 1.0
+    world.release("go")
+    world.do_later("press it", steps)
+    world.call_off("press it")
+    world.call_off("press it")
+    world.run(for_=2)
+    assert world.read("go.pressed") == 0.0
+
+
+def test_time_does_not_go_back() -> None:
+    world = small()
+    world.advance(SECOND)
+    with pytest.raises(TimeReversal):
+        world.advance(SECOND - 1)
+    world.advance(SECOND)
+
+
+def test_what_is_remembered_of_texts_does_not_grow_without_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plant, "MOST_REMEMBERED", 3)
+    world = small()
+    for number in range(20):
+        assert world.holds(world.condition(f"time >= -{number}"))
+        world.read(f"b.IN{number + 1}")
+        world.mic488["b"].write("M1_VMAX", 10.0 + number)
+    assert len(world._conditions) <= 3
+    assert len(world._signals) <= 3
+    assert len(world._encoded) <= 3
+    same = world.condition("x.position > 1")
+    assert world.condition("x.position > 1") is same

@@ -1,0 +1,93 @@
+"""Every kind of fault with all it takes, reviewed once: golden/kinds.txt.
+
+Regenerate with ``python tests/world/faults/test_table.py`` and read the diff.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.world.faults.table import KINDS, LARGEST_WHOLE, Form, Kind, Layer, Parameter, check, rows, shared
+
+GOLDEN = Path(__file__).parent / "golden" / "kinds.txt"
+
+
+def described(parameter: Parameter) -> str:
+    without = "required" if parameter.is_required else f"else {parameter.otherwise}" if parameter.otherwise else "default"
+    return f"    {parameter.name}: {parameter.permitted} | {without} {parameter.default!r} | {parameter.meaning}"
+
+
+def kind_lines(kind: Kind) -> list[str]:
+    lines = ", ".join(line.value for line in kind.lines)
+    head = f"{kind.name}: {kind.layer.value}, {kind.occasion.value}, on {lines or 'machines'} | {kind.meaning}"
+    return [head, *map(described, kind.parameters)]
+
+
+def test_kinds_are_the_reviewed_ones() -> None:
+    found = [line for kind in KINDS.values() for line in kind_lines(kind)]
+    assert found == GOLDEN.read_text(encoding="utf-8").splitlines()
+
+
+def test_kinds_by_layer() -> None:
+    assert list(rows()) == list(KINDS.values())
+    assert list(rows(Layer.PHYSICS)) == [kind for kind in KINDS.values() if kind.layer is Layer.PHYSICS]
+    assert {kind.layer for kind in rows(Layer.FRAMES, Layer.PROTOCOL)} == {Layer.FRAMES, Layer.PROTOCOL}
+
+
+def test_shared_parameters_say_which_kinds_have_them() -> None:
+    """Each is in all kinds of what it is said to be shared by, and the texts are without repetition."""
+    found = shared()
+    assert len({parameter for parameter, _ in found}) == len(found)
+    for parameter, of in found:
+        for layer in Layer:
+            if layer.value in of.split(", "):
+                assert all(parameter in kind.parameters for kind in rows(layer)), (parameter.name, layer)
+    own = [parameter for kind in KINDS.values() for parameter in kind.own]
+    assert not {parameter for parameter, _ in found} & set(own)
+
+
+@pytest.mark.parametrize(
+    ("form", "least", "most", "value", "found"),
+    [
+        (Form.WHOLE, 1, 5, 1, 1),
+        (Form.WHOLE, 1, 5, 5, 5),
+        (Form.WHOLE, 1, 5, 0, None),
+        (Form.WHOLE, 1, 5, 6, None),
+        (Form.WHOLE, 1, 5, 1.0, None),
+        (Form.WHOLE, 1, 5, True, None),
+        (Form.WHOLE, 1, None, LARGEST_WHOLE - 1, LARGEST_WHOLE - 1),
+        (Form.WHOLE, None, None, 1 - LARGEST_WHOLE, 1 - LARGEST_WHOLE),
+        (Form.WHOLE, 1, None, LARGEST_WHOLE, None),
+        (Form.WHOLE, None, None, -LARGEST_WHOLE, None),
+        (Form.NUMBER, 0.5, 2, 0.5, 0.5),
+        (Form.NUMBER, 0.5, 2, 2, 2.0),
+        (Form.NUMBER, 0.5, 2, 0.49, None),
+        (Form.NUMBER, 0.5, 2, 2.01, None),
+        (Form.NUMBER, 0, 2, False, None),
+        (Form.NUMBER, 0, 2, float("nan"), None),
+        (Form.NUMBER, 0, 2, float("inf"), None),
+        (Form.NUMBER, 0, 2, "1", None),
+        (Form.SPAN, 0, 9, 3, (3, 3)),
+        (Form.SPAN, 0, 9, "3-9", (3, 9)),
+        (Form.SPAN, 0, 9, "3", (3, 3)),
+        (Form.SPAN, 0, 9, "0-0", (0, 0)),
+        (Form.SPAN, 0, 9, "4-3", None),
+        (Form.SPAN, 0, 9, "3-10", None),
+        (Form.SPAN, 0, 9, "x", None),
+    ],
+)
+def test_what_a_parameter_takes(form: Form, least: float | None, most: float | None, value: object, found: object) -> None:
+    parameter = Parameter("p", form, "Something.", least, most)
+    if found is not None:
+        taken = check(parameter, value, "here")
+        assert (taken, type(taken)) == (found, type(found))
+        return
+    with pytest.raises(Misuse, match=r"^here.*permitted are"):
+        check(parameter, value, "here")
+
+
+if __name__ == "__main__":
+    GOLDEN.write_text("\n".join(line for kind in KINDS.values() for line in kind_lines(kind)) + "\n", "utf-8")

@@ -1,0 +1,56 @@
+"""Values that replace those of a description."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.world.overrides import override
+
+DATA: dict[str, Any] = {
+    "world": {"seed": 1},
+    "axis": [{"name": "x", "pitch": 2.0}, {"name": "y", "motor": {"load": 1.0}}, {"pitch": 9.0}, {"name": 7}],
+}
+
+
+@pytest.mark.parametrize(
+    ("key", "place"),
+    [
+        ("world.seed", ("world", "seed")),
+        ("axis.x.pitch", ("axis", 0, "pitch")),
+        ("axis.0.pitch", ("axis", 0, "pitch")),
+        ("axis.y.motor.load", ("axis", 1, "motor", "load")),
+        ("axis.2.pitch", ("axis", 2, "pitch")),
+        ("axis.y.new", ("axis", 1, "new")),
+    ],
+)
+def test_a_value_is_put_where_its_key_says(key: str, place: tuple[str | int, ...]) -> None:
+    found, expected = deepcopy(DATA), deepcopy(DATA)
+    inner: Any = expected
+    for part in place[:-1]:
+        inner = inner[part]
+    inner[place[-1]] = 5.5
+    override(found, {key: 5.5})
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("seed", "override 'seed': expected TABLE.KEY or TABLE.NAME.KEY, such as 'axis.x.pitch'"),
+        ("axis.pitch", "override 'axis.pitch': expected TABLE.KEY or TABLE.NAME.KEY"),
+        ("axes.x.pitch", r"override 'axes\.x\.pitch': there is no 'axes'; did you mean 'axis'\?$"),
+        ("axis.zzzz.pitch", r"override 'axis\.zzzz\.pitch': there is no 'zzzz'$"),
+        ("axis.4.pitch", r"there is no '4'"),
+        ("axis.x.pitch.more", r"override 'axis\.x\.pitch\.more': expected TABLE\.KEY"),
+        ("axis.x.pitch.more.most", r"override 'axis\.x\.pitch\.more\.most': there is no 'more'$"),
+    ],
+)
+def test_a_key_that_leads_nowhere_is_refused(key: str, message: str) -> None:
+    found = deepcopy(DATA)
+    with pytest.raises(Misuse, match=message):
+        override(found, {key: 1.0})
+    assert found == DATA

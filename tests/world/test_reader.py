@@ -1,0 +1,64 @@
+"""How values of a description are read, at the edges of what is permitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.world.reader import flag, number, pair, pin_name, points, positive_time, whole, word
+
+
+@pytest.mark.parametrize(
+    ("read", "value", "expected"),
+    [
+        (flag, True, True),
+        (flag, 1, "1: expected true or false"),
+        (number(), -9.5e299, -9.5e299),
+        (number(), 1e300, r"1e\+300: expected a number"),
+        (number(), "1", "'1': expected a number"),
+        (number(), True, "True: expected a number"),
+        (number(2.0), 2, 2.0),
+        (number(2.0), 1.99, r"1\.99: permitted are numbers from 2$"),
+        (number(2.0, above=True), 2.0, r"2\.0: permitted are numbers above 2$"),
+        (number(2.0, above=True), 2.01, 2.01),
+        (number(2.0, 3.0), 3.0, 3.0),
+        (number(2.0, 3.0), 3.01, r"3\.01: permitted are numbers from 2 to 3$"),
+        (whole(1, 4), 1, 1),
+        (whole(1, 4), 4, 4),
+        (whole(1, 4), 0, "0: permitted are whole numbers from 1 to 4"),
+        (whole(1, 4), 5, "5: permitted are whole numbers from 1 to 4"),
+        (whole(0, 4), True, "True: permitted are whole numbers"),
+        (whole(1, 4), 2.0, r"2\.0: permitted are whole numbers"),
+        (word("sine", "ramp"), "ramp", "ramp"),
+        (word("sine", "ramp"), "sin", r"'sin': permitted are sine, ramp; did you mean 'sine'\?$"),
+        (word("sine", "ramp"), 3, "3: permitted are sine, ramp$"),
+        (positive_time, "1 us", 1000),
+        (positive_time, "0 s", "'0 s': must be more than 0"),
+        (pair, [1, 2.5], (1.0, 2.5)),
+        (pair, [2, 2], r"\[2, 2\]: the first must be below the second"),
+        (pair, [1, 2, 3], r"\[1, 2, 3\]: expected \[low, high\]"),
+        (pair, "12", r"'12': expected \[low, high\]"),
+        (points, [[0, 1], [1, 1.5]], ((0.0, 1.0), (1.0, 1.5))),
+        (points, [[0, 1], [0, 2]], "the first numbers must grow"),
+        (points, [[1, 1], [0, 2]], "the first numbers must grow"),
+        (points, [], r"\[\]: expected \[\[x, y\], \[x, y\], \.\.\.\]"),
+        (points, [[1]], r"expected \[\[x, y\], \[x, y\], \.\.\.\]"),
+        (points, [3], r"expected \[\[x, y\], \[x, y\], \.\.\.\]"),
+        (pin_name, "table.in3", ("table", "IN3")),
+        (pin_name, "a.b.c", ("a", "B.C")),
+        (pin_name, ".in3", r"'\.in3': expected MACHINE\.PIN, such as 'table\.IN3'"),
+        (pin_name, "table.", r"'table\.': expected MACHINE\.PIN"),
+        (pin_name, "table", "'table': expected"),
+        (pin_name, 3, "3: expected"),
+    ],
+)
+def test_values_at_their_limits(read: Callable[[Any], Any], value: object, expected: object) -> None:
+    if isinstance(expected, str) and expected != value:
+        with pytest.raises(Misuse, match=f"^{expected}" if not expected.startswith(("the", "expected")) else expected):
+            read(value)
+        return
+    found = read(value)
+    assert (found, type(found)) == (expected, type(expected))

@@ -1,0 +1,57 @@
+"""Every key of a description and of a step, with its default and what it refuses, reviewed once: golden/tables.txt.
+
+Regenerate with ``python tests/world/test_tables.py`` and read the diff.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.world.reader import Key
+from steptwin.world.script import ACTIONS, REPEAT, STEPS
+from steptwin.world.tables import KEYS
+
+GOLDEN = Path(__file__).parent / "golden" / "tables.txt"
+PROBES: tuple[object, ...] = (None, -(10**30), 10**30, "?", "", [], 0, -1, True)
+"""No key takes all of these; what is said of those it refuses has its range in it."""
+
+
+def answer(key: Key, value: object) -> str:
+    try:
+        return f"= {key.read(value)!r}"
+    except (Misuse, AttributeError, TypeError) as error:
+        return str(error).replace(repr(value), "…", 1).removeprefix("…: ")
+
+
+def described(table: str, keys: Iterable[Key]) -> list[str]:
+    lines = []
+    for key in keys:
+        default = "required" if key.is_required else f"default {key.default!r}"
+        lines += [f"{table}.{key.name} {key.attribute} | {default} | {key.meaning}"]
+        answers: dict[str, list[str]] = {}
+        for value in PROBES:
+            answers.setdefault(answer(key, value), []).append(repr(value).replace("1" + 30 * "0", "10^30"))
+        lines += [f"    {', '.join(values)}: {text}" for text, values in answers.items()]
+    return lines
+
+
+def everything() -> dict[str, list[str]]:
+    tables = {table: described(table, keys) for table, keys in KEYS.items()}
+    steps = [line for name, action in ACTIONS.items() for line in described(f"{{{name}}}", (action.main, *action.others))]
+    return tables | {"step": [*steps, *described("{repeat}", (REPEAT, STEPS))]}
+
+
+@pytest.mark.parametrize("table", [*KEYS, "step"])
+def test_keys_are_the_reviewed_ones(table: str) -> None:
+    texts = GOLDEN.read_text(encoding="utf-8").split("=== ")[1:]
+    expected = {name: lines for name, *lines in (text.rstrip().splitlines() for text in texts)}
+    assert expected.keys() == everything().keys()
+    assert everything()[table] == expected[table]
+
+
+if __name__ == "__main__":
+    GOLDEN.write_text("\n".join("\n".join([f"=== {name}", *lines]) for name, lines in everything().items()) + "\n", "utf-8")
