@@ -319,6 +319,21 @@ def test_a_target_too_near_to_brake_for_is_passed_and_met_from_behind(rig: Rig) 
     assert rig.position() == 1600.0
 
 
+def test_a_move_over_no_distance_is_over_with_its_command(rig: Rig) -> None:
+    rig.set("POS_REL", 0.0)
+    axis = rig.device.axes[0]
+    assert (axis.status, rig.device.deadline()) == (4, None)
+
+
+def test_after_a_move_the_axis_stands_with_a_profile_of_its_own(rig: Rig) -> None:
+    """What recordings show as one piece."""
+    rig.set("POS_REL", 250.0)
+    revision = rig.device.axes[0].revision
+    rig.until(1, 4)
+    axis = rig.device.axes[0]
+    assert (axis.profile.start, axis.profile.segments, axis.revision) == (SECOND, (), revision + 1)
+
+
 def test_velocity_and_position_commands_replace_each_other(rig: Rig) -> None:
     rig.set("VEL_ABS", 1000.0)
     rig.wait(1.5)

@@ -446,3 +446,61 @@ def test_characters_the_file_cannot_hold_are_refused() -> None:
 def test_a_long_line_is_read_in_no_time() -> None:
     text = "[Axis0]\nGear=1" + " " * 200_000 + "x\n" + "a" * 200_000 + "\n" + "k " * 100_000 + "=1"
     assert read_config(parse(text.replace("Gear=1", "Note=1"))) == ControllerConfig()
+
+
+# ---------------------------------------------------------------------- what every key permits
+
+
+KEYS = [
+    # section, key, permitted ends, values just outside
+    ("Axis0", "Unit", ("0", "5"), ("-1", "6")),
+    ("Axis1", "Gear", ("1e-37", "3.4e38"), ("0", "-1e-37", "1e39")),
+    ("Axis2", "Acc", ("1e-37", "3.4e38"), ("0", "1e39")),
+    ("Axis3", "Dec", ("1e-37", "3.4e38"), ("0", "1e39")),
+    ("Axis0", "Vel", ("1e-37", "3.4e38"), ("0", "1e39")),
+    ("Axis1", "MotResol", ("1", "2147483647"), ("0", "2147483648")),
+    ("Axis2", "EncResol", ("1", "2147483647"), ("0", "2147483648")),
+    ("Axis3", "EncOffset", ("-2147483648", "2147483647"), ("-2147483649", "2147483648")),
+    ("Axis0", "HomeMode", ("0", "4"), ("-1", "5")),
+    ("Axis1", "LimitMode", ("0", "3"), ("-1", "4")),
+    ("Axis2", "InKL", ("0", "20"), ("-1", "21")),
+    ("Axis3", "InKR", ("0", "20"), ("-1", "21")),
+    ("Axis0", "PosCtrlMode", ("0", "2"), ("-1", "3")),
+    ("Axis1", "ErrCtrlMode", ("0", "3"), ("-1", "4")),
+    ("Axis2", "Kp", ("0", "3.4e38"), ("-0.001", "1e39")),
+    ("Axis3", "EncTolerance", ("0", "2147483647"), ("-1", "2147483648")),
+    ("Axis0", "EncSettle", ("1", "3600000"), ("0", "3600001")),
+    ("Axis1", "ErrTime", ("1", "3600000"), ("0", "3600001")),
+    ("Axis2", "EnWired", ("0", "1"), ("-1", "2")),
+    ("IN0", "Filter", ("0", "4"), ("-1", "5")),
+    ("IN7", "Level", ("0", "1"), ("-1", "2")),
+    ("IN19", "Int", ("0", "3"), ("-1", "4")),
+    ("AIN0", "LoVal", ("-3.4e38", "3.4e38"), ("-1e39", "1e39")),
+    ("AIN1", "HiVal", ("-3.4e38", "3.4e38"), ("-1e39", "1e39")),
+    ("AIN0", "Baud", ("9600", "115200"), ("9599", "9601", "115201", "0")),
+    ("AIN1", "Baud", ("9600", "115200"), ("9599", "9601", "115201", "0")),
+    ("AIN0", "ID", ("1", "247"), ("0", "248")),
+    ("WBC_PROGRAM", "Activate", ("0", "1"), ("-1", "2")),
+    ("WBC_PROGRAM", "ProgBankToRun", ("0", "5"), ("-1", "6")),
+    ("WBC_PROGRAM", "PosBankToRun", ("0", "5"), ("-1", "6")),
+    ("TRIGGER", "Keep", ("0", "1"), ("-1", "2")),
+]
+
+
+@pytest.mark.parametrize(("section", "key", "ends", "beyond"), KEYS, ids=[f"{section} {key}" for section, key, *_ in KEYS])
+def test_every_key_takes_its_range_and_nothing_beyond(section: str, key: str, ends: tuple[str, str], beyond: tuple[str]) -> None:
+    low, high = (examine_config(parse(f"[{section}]\n{key}={end}")) for end in ends)
+    assert (low[1], high[1]) == ([], [])
+    assert low[0] != high[0]
+    for value in beyond:
+        config, found = examine_config(parse(f"[{section}]\n{key}={value}"))
+        assert [finding.code for finding in found] == ["C008"], value
+        assert config == ControllerConfig(), value
+
+
+def test_the_sections_of_every_axis_and_input() -> None:
+    text = "".join(f"[Axis{n}]\nEncOffset={n + 1}\n" for n in range(4)) + "".join(f"[IN{n}]\nFilter={n % 5}\n" for n in range(20))
+    config = read_config(parse(text))
+    assert [axis.enc_offset for axis in config.axes] == [1, 2, 3, 4]
+    assert [one.filter for one in config.inputs] == [n % 5 for n in range(20)]
+    assert (len(config.analog), len(config.ports)) == (2, 2)

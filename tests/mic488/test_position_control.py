@@ -503,3 +503,24 @@ def test_an_axis_that_nobody_disturbs_needs_no_control_loop() -> None:
         assert rig.kernel.deadline() is None
         rig.set("VEL_ABS", 100.0)
         assert rig.kernel.deadline() is None
+
+
+def test_a_slip_between_two_moves_is_corrected_by_the_second() -> None:
+    rig = encoder_rig()
+    rig.set("POS_ABS", 800.0)
+    rig.until(1, REACHED)
+    turn(rig, -20)
+    rig.set("POS_REL", 80.0)
+    rig.until(1, CORRECTION)
+    rig.until(1, REACHED)
+    assert rig.get("ENC_IMP") == 110
+
+
+def test_what_was_turned_while_the_drive_was_off_is_no_slip() -> None:
+    rig = encoder_rig(en_wired=0)
+    rig.coil(EN, False)
+    turn(rig, -20)
+    rig.set("POS_REL", 80.0)
+    rig.until(1, REACHED)
+    rig.wait(1.0)
+    assert (rig.status(), rig.get("ENC_IMP")) == (REACHED, -10)

@@ -487,6 +487,8 @@ def test_mic_3_lenient_holes_read_0_and_write_only_registers_their_last_value() 
     assert rig.bits(2, 5019, 2) == [0, 0]
     assert rig.read_words(rig.base + 63, 2) == [real_words(-12.5)[1], 0]  # MIC-5
     assert rig.exception(word_pdu(30000, 1)) == ILLEGAL_ADDRESS
+    assert rig.read_words(0xFFFF, 1) == [0]
+    assert rig.read_words(0xFFFF - 124, 125) == [0] * 125
 
 
 def test_mic_3_lenient_last_values_follow_data_type_and_end_with_the_power() -> None:

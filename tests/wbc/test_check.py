@@ -134,3 +134,23 @@ def test_the_line_limit_is_that_of_the_firmware() -> None:
     assert codes(text) == []
     assert codes(text + "OUT1 = ON\n") == ["W136"]
     assert codes("OUT1 = ON\n" * 1001, "1.40") == ["W136"]
+
+
+@pytest.mark.parametrize(
+    ("written", "seconds"),
+    [
+        ("20 s", "20"), ("20 sec", "20"), ("2,5sek", "2,5"), ("20 ms", "0.02"), ("1500ms", "1.5"), ("20 us", "0.00002"),
+        ("20000 µs", "0.02"), ("20 min", "1200"), ("1.5 h", "5400"), ("20 mm", None),
+    ],
+)  # fmt: skip
+def test_times_with_a_unit_are_repaired_into_seconds(written: str, seconds: str | None) -> None:
+    for statement, fixed in ((f"DELAY {written}", f"DELAY {seconds}"), (f"PULSE(OUT1, {written})", f"PULSE(OUT1, {seconds})")):
+        (found,) = (d for d in check(f"{statement}\n").diagnostics if d.code.startswith("W1"))
+        assert found.message == "numbers have no unit"
+        if seconds is None:
+            assert found.fix is None
+            continue
+        assert found.fix is not None
+        repaired = statement[: found.fix.span.start] + found.fix.text + statement[found.fix.span.end :]
+        assert repaired == fixed
+        assert [code for code in codes(repaired) if code.startswith("W1")] == []

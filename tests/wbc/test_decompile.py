@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
+from steptwin.errors import Misuse
 from steptwin.wbc.check import check
-from steptwin.wbc.decompile import Decompiled, ImageError, decompile, read_image
+from steptwin.wbc.decompile import MARK, Decompiled, ImageError, decompile, program_of, read_image
 from steptwin.wbc.image import SIZE, build, image_of
 from steptwin.wbc.positions import parse_positions
 
@@ -230,3 +231,36 @@ def images(draw: DrawFn) -> bytes:
 @given(images())
 def test_round_trip(data: bytes) -> None:
     assert again(decompile(data)) == data
+
+
+def test_an_image_that_is_to_be_run() -> None:
+    source, positions, doubts = program_of(image(KNOWN, KNOWN_ROWS), "a.wbc")
+    assert (source.name, source.text, len(positions.rows), doubts) == ("a.wbc", KNOWN_TEXT, 2, [])
+
+
+@pytest.mark.parametrize(
+    ("records", "message"),
+    [
+        ("15\n13 06 01\n", "1 statement is inferred from the order of the vendor's keywords (WBC-40)"),
+        ("13 06 01\n13 06 02\n1C\n", "3 statements are inferred from the order of the vendor's keywords (WBC-40)"),
+    ],
+)
+def test_wbc_40_inferred_statements_of_a_program_are_a_doubt(records: str, message: str) -> None:
+    source, _, (doubt,) = program_of(image(records), "a.wbc")
+    assert (doubt.code, doubt.message) == ("W260", message)
+    assert source.text[doubt.span.start : doubt.span.end] == MARK
+    assert source.text.index(MARK) == doubt.span.start
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (image("1D\n15\n"), "cannot run a.wbc: 1 of its records is not known; 'steptwin decompile' shows the others"),
+        (image("1D\n15\n1D 01\n"), "cannot run a.wbc: 2 of its records are not known; 'steptwin decompile' shows the others"),
+        (b"12", "cannot run a.wbc: not a compiled image: 2 bytes instead of 20094"),
+    ],
+)
+def test_images_that_cannot_be_run(data: bytes, message: str) -> None:
+    with pytest.raises(Misuse) as refused:
+        program_of(data, "a.wbc")
+    assert str(refused.value) == message

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD, OPERATOR_WORDS, TIME_UNITS, UNITS
 from steptwin.wbc.lexer import NUMBER, OPERATOR, WORD, Token, is_name
+from steptwin.wbc.positions import number_text
 from steptwin.wbc.registers import BIT, ROWS, parts
 from steptwin.wbc.statements import COMPARISONS, SET, STATEMENTS, Kind
 
@@ -330,7 +331,7 @@ def _unit(line: Line) -> Advice | None:
     start, end = line.start + match.start(1), line.start + match.end()
     if line.key in ("DELAY", "PULSE"):
         factor = TIME_UNITS.get(unit)
-        fix = None if factor is None else match[1] if factor == 1 else f"{number * factor:.10g}"
+        fix = None if factor is None else match[1] if factor == 1 else number_text(float(f"{number * factor:.10g}"))
         return Advice(start, end, "numbers have no unit", f"{line.key} is in seconds", fix)
     fix = None if unit in TIME_UNITS and unit != "s" else match[1]
     return Advice(

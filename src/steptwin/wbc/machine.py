@@ -111,10 +111,6 @@ class Machine(Stateful):
         self.cells = array("f")
         self.now: Nanos = 0
         """The moment of the statement being executed."""
-        self.due: Nanos | None = None
-        """When the next statement is executed; None: nothing but an event will have one executed."""
-        self.running = False
-        self.paused_at: Nanos | None = None
         self.acted = False
         """The controller has been asked for something since somebody set this to False."""
         self.effects = 0
@@ -122,6 +118,7 @@ class Machine(Stateful):
         self._moment: Nanos = -1
         self._spent = 0
         """Statements executed at that moment; a program that starts itself again has no more of them."""
+        self.stop()
         self.clear()
 
     def clear(self) -> None:
@@ -168,8 +165,9 @@ class Machine(Stateful):
 
     def stop(self) -> None:
         self.running = False
-        self.paused_at = None
-        self.due = None
+        self.paused_at: Nanos | None = None
+        self.due: Nanos | None = None
+        """When the next statement is executed; None: nothing but an event will have one executed."""
         self._forget()
 
     def pause(self, now: Nanos) -> None:
