@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from steptwin.drivers.exchange import More
@@ -25,18 +27,18 @@ class Line:
 
     def __init__(self) -> None:
         self.heard: list[tuple[int, Direction, bytes]] = []
-        self.talk = CharacterTalk(SerialLine(4800), "bus", on_bytes=lambda *told: self.heard.append(told))
+        self.talk = CharacterTalk(SerialLine(4800), "bus", on_bytes=lambda now, way, data: self.heard.append((now, way, data)))
         self.now = 0
 
-    def say(self, address: int | None, text: str, *, urgent: bool = False, **options: object) -> bytes:
-        self.request = Say(address, text, **options)  # type: ignore[arg-type]
+    def say(self, address: int | None, text: str, *, urgent: bool = False, **options: Any) -> bytes:
+        self.request = Say(address, text, **options)
         self.now += SECOND
         return self.talk.start(self.request, self.now, urgent=urgent)
 
     def hear(self, data: bytes) -> bytes | More | None:
         return self.talk.receive(data, self.now)
 
-    def typed(self, address: int | None, text: str, **options: object) -> list[bytes]:
+    def typed(self, address: int | None, text: str, **options: Any) -> list[bytes]:
         """A whole command whose echo is right: everything that was typed."""
         said = [self.say(address, text, **options)]
         while isinstance(answer := self.hear(said[-1]), More):
