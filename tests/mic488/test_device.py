@@ -30,7 +30,7 @@ from mic488_rig import (
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import MILLISECOND, SECOND, Edge, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig, ProgramConfig
-from steptwin.mic488.device import Mic488, Snapshot
+from steptwin.mic488.device import Mic488, Snapshot, pause_observer
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program import ProgramControl
 from steptwin.state import Stateful
@@ -571,3 +571,13 @@ def test_a_controller_at_rest_has_nothing_to_do() -> None:
     assert rig.device.deadline() == 10 * MILLISECOND
     rig.wait(0.01)
     assert rig.device.deadline() is None
+
+
+@pytest.mark.parametrize(("unit", "told"), [(0, [3, 7]), (3, [3]), (7, [7])])
+def test_mic_15_a_pause_inside_a_request_is_an_event_of_those_it_was_for(unit: int, told: list[int]) -> None:
+    devices = {3: Mic488(ControllerConfig()), 7: Mic488(ControllerConfig())}
+    pause_observer(devices)(unit, 1_250_000)
+    text = "a request had a pause of 1.2 ms inside: the controller drops a frame at 0.75 ms (MIC-15)"
+    assert {n: [(e.code, e.text) for e in d.events] for n, d in devices.items()} == {
+        n: [("frame-pause", text)] if n in told else [] for n in devices
+    }

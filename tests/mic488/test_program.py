@@ -9,6 +9,7 @@ import pytest
 from mic488_rig import Rig, controller
 from wbc_rig import PAUSED, RUNNING, STOPPED, ProgramRig, loaded
 
+from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Edge
 from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
@@ -353,3 +354,14 @@ def test_mic_8_a_program_stops_and_moves_an_axis_whose_en_is_not_wired() -> None
     rig.pin("IN1", 1)
     rig.wait(5.0)
     assert (rig.out(1), rig.position(1), rig.position(2)) == (True, 5.0, 5.0)
+
+
+def test_behind_the_last_line_a_program_stands_at_the_end_of_its_text() -> None:
+    text = "OUT1 = ON\nOUT2 = ON\n"
+    rig = ProgramRig(text)
+    rig.start()
+    places = []
+    for _ in range(4):
+        places.append(rig.device.program.statement)
+        rig.wait(0.001)
+    assert places == [Span(0, 9), Span(10, 19), Span(len(text), len(text)), None]

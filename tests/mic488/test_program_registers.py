@@ -97,6 +97,21 @@ def test_analog_inputs_are_scaled() -> None:
     assert (rig.r(0), rig.r(2)) == (2.5, 10.0)
 
 
+@pytest.mark.parametrize(
+    ("counts", "pulses", "first", "seconds"),
+    [(100_000, 1, 0, 2**31 / 1e8), (400, 3200, 2**31 - 1001, 1000 / 125), (-400, 3200, -(2**31) + 1000, 1000 / 125)],
+)
+def test_a_wait_notices_that_an_encoder_wraps(counts: int, pulses: int, first: int, seconds: float) -> None:
+    """At 1000 pulses/s, with as many counts per pulses as the encoder gives, whatever is configured."""
+    wait = f"WAIT ENC1 {'<' if counts > 0 else '>'} 0"
+    rig = ProgramRig(f"M1 = ON\nVABS M1 1000\n{wait}\nOUT1 = ON\nWAIT IN9 = ON\n")
+    rig.device.gear_encoder(1, counts, pulses, 0)
+    rig.set("ENC_IMP", first)
+    rig.start()
+    # A ramp of 1 s is half a second longer than no ramp.
+    assert rig.pin_until("OUT1", 1.0) == pytest.approx(seconds + 0.5, abs=0.02)
+
+
 # ---------------------------------------------------------------------- motion statements
 
 ROWS = "here;10;x;x;x\nboth;30;20;x;x\nline;40;0;25;x\ncircle;50;0;10;360\narc;20;40;10;0\nnothing;x;x;x;x\n"

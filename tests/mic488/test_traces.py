@@ -1,4 +1,4 @@
-"""What axes do with sequences of commands, event by event: golden/traces.txt.
+"""What a controller does with sequences of commands and with programs, event by event: golden/traces.txt.
 
 The rules behind it have their own tests; here whole sequences are compared, so that no value of a motion changes unnoticed.
 Regenerate with ``PYTHONPATH=tests/support python tests/mic488/test_traces.py`` and read the diff.

@@ -1,4 +1,4 @@
-"""Programs with every statement and register, event by event: golden/traces.txt.
+"""Programs that calculate, branch and are interrupted, event by event: golden/traces.txt.
 
 The rules behind it have their own tests; here whole sequences are compared, so that no step of a program changes unnoticed.
 Regenerate with ``PYTHONPATH=tests/support python tests/wbc/test_traces.py`` and read the diff.
