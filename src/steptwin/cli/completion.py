@@ -46,7 +46,7 @@ def pins(context: typer.Context, incomplete: str) -> list[str]:
 
 def faults(context: typer.Context, incomplete: str) -> list[str]:
     """The kinds of faults, then ``NAME=`` of what the kind takes."""
-    from steptwin.world.faults.table import KINDS
+    from steptwin.world.faults.kinds import KINDS
 
     words = context.params.get("words") or []
     if not words or words[0] not in KINDS:

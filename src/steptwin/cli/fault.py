@@ -62,7 +62,8 @@ def fault(
 
 def sections() -> list[Section]:
     """The table of faults for people."""
-    from steptwin.world.faults.table import Layer, rows, shared
+    from steptwin.world.faults.kinds import rows, shared
+    from steptwin.world.faults.table import Layer
 
     def described(parameter: Parameter) -> str:
         default = "required" if parameter.is_required else _else(parameter)

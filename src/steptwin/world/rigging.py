@@ -9,7 +9,7 @@ from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488
 from steptwin.world.build import Plan
 from steptwin.world.faults import Active, Fault, M1486Body, Mic488Body, Wire, check_place, rig
-from steptwin.world.faults.table import Layer
+from steptwin.world.faults.table import Layer, OfRequest
 from steptwin.world.lines import SCRIPTS
 
 LINELESS_UNIT = 1
@@ -42,7 +42,7 @@ class Rigging:
         there.set_state(state)
 
     def _prepare(self, fault: Fault) -> None:
-        if fault.kind.layer not in (Layer.BYTES, Layer.FRAMES) or fault.kind.name == "no-answer":
+        if fault.kind.layer is Layer.PHYSICS or isinstance(fault.kind.effect, OfRequest):
             for name in self._plan.machines:
                 self._rig(name)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.faults import FaultyMachine, Kind, Layer, Occasion, Shaft
+from steptwin.world.faults import FaultyMachine, Kind, Occasion, Shaft
 
 
 class ToyBody:
@@ -14,7 +14,7 @@ class ToyBody:
         self.shafts = list(shafts)
 
     def lacks(self, kind: Kind) -> str | None:
-        if kind.layer is Layer.PHYSICS and (kind.name in ("slip", "master-error") or kind.occasion is Occasion.SAVE):
+        if kind.needs is not None or kind.occasion is Occasion.SAVE:
             return "is a toy"
         return None if self.shafts or kind.parameter("axis") is None else "has no shaft"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import tomllib
 from dataclasses import replace
 
@@ -10,8 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
-from steptwin.world.faults import KINDS, Fault, Kind, Layer, Occasion, Parameter, parse, read, schema
-from steptwin.world.faults.table import LARGEST_WHOLE, Form, _checked, check
+from steptwin.tables import IncompleteTable
+from steptwin.world.faults import KINDS, Active, Fault, Kind, Layer, Occasion, Parameter, parse, read, schema
+from steptwin.world.faults.stream import Run, spoil
+from steptwin.world.faults.table import LARGEST_WHOLE, Form, OfByte, Tell, check, checked
 
 WANTED = {
     Layer.BYTES: {"flip", "drop", "insert", "gap", "split", "noise"},
@@ -121,15 +124,63 @@ def test_what_a_file_says_wrongly_is_refused_with_its_place(table: dict[str, obj
 def test_the_table_checks_itself() -> None:
     crc = KINDS["crc"]
     with pytest.raises(Misuse, match="two kinds of fault are named 'crc'"):
-        _checked((crc, crc))
+        checked((crc, crc))
     with pytest.raises(Misuse, match="fault crc: a parameter is given twice"):
-        _checked((replace(crc, own=(Parameter("nth", Form.WHOLE, "", default=1),)),))
+        checked((replace(crc, own=(Parameter("nth", Form.WHOLE, "", default=1),)),))
     with pytest.raises(Misuse, match="fault crc, parameter x = 9: permitted are whole numbers 0 to 5"):
-        _checked((replace(crc, own=(Parameter("x", Form.WHOLE, "", 0, 5, default=9),)),))
+        checked((replace(crc, own=(Parameter("x", Form.WHOLE, "", 0, 5, default=9),)),))
     with pytest.raises(Misuse, match="parameter x: a default, what holds otherwise, or required"):
-        _checked((replace(crc, own=(Parameter("x", Form.WHOLE, ""),)),))
+        checked((replace(crc, own=(Parameter("x", Form.WHOLE, ""),)),))
     with pytest.raises(Misuse, match="lines belong to all faults but those of physics"):
-        _checked((Kind("x", Layer.PHYSICS, Occasion.MOMENT, "", (), crc.lines),))
+        checked((Kind("x", Layer.PHYSICS, Occasion.MOMENT, "", (), crc.lines),))
+
+
+_CRC, _STALL = KINDS["crc"], KINDS["stall"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        *(
+            (replace(kind, effect=None), f"fault {kind.name} lacks its effect: {effect}")
+            for kind, effect in (
+                (KINDS["flip"], "OfByte"),
+                (KINDS["split"], "BeforeDelivery or InPieces"),
+                (_CRC, "OfAnswer"),
+                (KINDS["busy"], "OfRequest"),
+                (_STALL, "OfMoment"),
+                (KINDS["stuck"], "OfWindow"),
+                (KINDS["bounce"], "OfChange"),
+                (KINDS["wear"], "OfSave"),
+            )
+        ),
+        (replace(_CRC, effect=_STALL.effect), "fault crc needs the effect OfAnswer, not OfMoment"),
+        (replace(_CRC, occasion=Occasion.BYTE), "fault crc: nothing of layer frames waits for the occasion byte"),
+        (replace(KINDS["no-answer"], effect=KINDS["busy"].effect), "fault no-answer lacks what it does to answers"),
+    ],
+)
+def test_a_kind_without_the_effect_of_its_occasion_is_refused(kind: Kind, message: str) -> None:
+    with pytest.raises(IncompleteTable) as caught:
+        checked((kind,))
+    assert str(caught.value) == message
+
+
+def test_a_new_kind_is_one_row() -> None:
+    def invert(active: Active, byte: int, run: Run, tell: Tell) -> int:
+        tell(active, "inverted")
+        return byte ^ 0xFF
+
+    kind = replace(KINDS["flip"], name="invert", own=(), effect=OfByte(invert))
+    active = Active(Fault(checked((kind,))["invert"], {"nth": 2}), "", 0, 0)
+    said: list[str] = []
+    assert spoil(b"\x01\x02\x03", [active], 0, lambda _, text: said.append(text)) == [(0, b"\x01\xfd\x03")]
+    assert said == ["byte 2 of 3: inverted"]
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+def test_faults_can_be_pickled_with_their_kind(kind: Kind) -> None:
+    fault = Fault(kind, {}, "it")
+    assert pickle.loads(pickle.dumps(fault)) == fault
 
 
 def test_the_schema_has_a_table_for_each_kind_with_all_it_takes() -> None:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.world.faults.table import KINDS, LARGEST_WHOLE, Form, Kind, Layer, Parameter, check, rows, shared
+from steptwin.world.faults.kinds import KINDS, rows, shared
+from steptwin.world.faults.table import LARGEST_WHOLE, Form, Kind, Layer, Parameter, check
 
 GOLDEN = Path(__file__).parent / "golden" / "kinds.txt"
 

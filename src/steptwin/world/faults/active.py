@@ -230,11 +230,7 @@ class Faults(Stateful):
 
     def refusing(self) -> list[Active]:
         """The faults that keep a request from being carried out."""
-        return [
-            a
-            for a in self.active
-            if a.fault.kind.layer is Layer.PROTOCOL or (a.fault.kind.name == "no-answer" and a.fault.get("lost") == "request")
-        ]
+        return [active for active in self.active if active.fault.refuses]
 
     def _changed(self) -> None:
         for port in list(self.ports):

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
-from steptwin.world.faults.table import KINDS, Form, Kind, Parameter, Value, check
+from steptwin.world.faults.kinds import KINDS
+from steptwin.world.faults.table import Form, Kind, OfRequest, Parameter, Value, check
 
 GRAMMAR = "KIND [NAME=VALUE ...]"
 EXAMPLE = "crc unit=1 nth=3"
@@ -38,6 +39,12 @@ class Fault:
     def whole(self, name: str) -> int | None:
         value = self.get(name)
         return value if isinstance(value, int) else None
+
+    @property
+    def refuses(self) -> bool:
+        """Whether the requests it happens to are not carried out."""
+        effect = self.kind.effect
+        return isinstance(effect, OfRequest) and (effect.is_refused is None or effect.is_refused(self))
 
     def __str__(self) -> str:
         """The line that `read` makes this of."""

@@ -10,7 +10,7 @@ from steptwin.m1486.pins import ALIASES, known_pin
 from steptwin.m1486.variants import Store
 from steptwin.machine import Nanos
 from steptwin.world.faults.machine import FaultyMachine, Shaft
-from steptwin.world.faults.table import Kind, Occasion
+from steptwin.world.faults.table import Kind, Need, Occasion
 
 
 class M1486Body:
@@ -23,9 +23,9 @@ class M1486Body:
     def lacks(self, kind: Kind) -> str | None:
         if kind.parameter("axis") is not None and not self.shafts:
             return "has no shaft: an M1486 has one where a world has its [[axis]]"
-        if kind.name == "slip":
+        if kind.needs is Need.ENCODER:
             return "is an M1486, which reads no encoder"
-        if kind.name == "master-error":
+        if kind.needs is Need.MODBUS_MASTER:
             return "is an M1486, which is no Modbus master"
         if kind.occasion is Occasion.SAVE and self._chip.variant.store is not Store.EEPROM:
             return "saves nothing: it has no memory that survives power-off"

@@ -8,11 +8,11 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from steptwin.errors import Misuse
 from steptwin.machine import Drive, Edge, MotionController, Nanos
 from steptwin.state import Plain, Stateful
-from steptwin.wire.pdu import DEVICE_BUSY, exception_pdu
+from steptwin.wire.pdu import exception_pdu
 from steptwin.world.faults.active import Active, Faults
-from steptwin.world.faults.answers import NEVER_SENT
 from steptwin.world.faults.fault import Fault
-from steptwin.world.faults.table import Kind, Layer, Occasion
+from steptwin.world.faults.kinds_frames import NEVER_SENT
+from steptwin.world.faults.table import Kind, Occasion, OfChange, OfSave
 from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.trace import Record
 
@@ -188,34 +188,29 @@ class FaultyMachine(Stateful):
 
     def _moment(self, active: Active, now: Nanos) -> None:
         """The moment of a fault that comes by itself."""
-        fault = active.fault
-        if fault.kind.occasion is Occasion.ALWAYS:
-            if fault.kind.name == "stuck":
-                self._stick(active, now)
-            else:
-                self._fail_master(active, now)
+        kind = active.fault.kind
+        if kind.occasion is Occasion.ALWAYS:
+            kind.effect.act(active, self, now)
             return
         if active.strikes(now):
-            axis = fault.whole("axis") or 1
-            match fault.kind.name:
-                case "stall":
-                    self._tell(active, now, f"M{axis} is blocked for {fault.number('for_s'):g} s")
-                    self.body.shafts[axis - 1].block(True, now)
-                    self._released.append((now + active.ns("for_s"), active.name, axis))
-                case "lost-steps":
-                    pulses = int(fault.number("pulses"))
-                    self._tell(active, now, f"M{axis} loses {pulses} pulses")
-                    self.body.shafts[axis - 1].lose(pulses, now)
-                case "slip":
-                    counts = int(fault.number("counts"))
-                    self._tell(active, now, f"the encoder of M{axis} slips by {counts} counts")
-                    self.body.shafts[axis - 1].slip(counts, now)
-                case "supply-drop":
-                    self._tell(active, now, f"no supply for {fault.number('for_s'):g} s")
-                    if self._off_until is None:
-                        self.inner.power_off(now)
-                    self._off_until = max(now + active.ns("for_s"), self._off_until or 0)
+            kind.effect.act(active, self, now)
         active.step()
+
+    def block(self, active: Active, axis: int, now: Nanos, until: Nanos) -> None:
+        """Block the shaft of an axis (from 1)."""
+        self.body.shafts[axis - 1].block(True, now)
+        self._released.append((until, active.name, axis))
+
+    def drop_supply(self, now: Nanos, until: Nanos) -> None:
+        """The supply is off until a moment, or for longer where it is off already."""
+        if self._off_until is None:
+            self.inner.power_off(now)
+        self._off_until = max(until, self._off_until or 0)
+
+    def cut_supply(self, now: Nanos, until: Nanos) -> None:
+        """As `drop_supply`, as soon as what is being done has come to its end."""
+        self._cut, self._off_until = now, until
+        self.changed()
 
     def _let_go(self, released: tuple[Nanos, str, int], now: Nanos) -> None:
         self._released.remove(released)
@@ -226,7 +221,7 @@ class FaultyMachine(Stateful):
     def _mine(self) -> list[Active]:
         return self._faults.of(self.name)
 
-    def _tell(self, active: Active, now: Nanos, text: str) -> None:
+    def tell(self, active: Active, now: Nanos, text: str) -> None:
         self._faults.tell(active, self.name, now, text)
 
     # ------------------------------------------------------------------ setting and removing
@@ -239,11 +234,11 @@ class FaultyMachine(Stateful):
         axis = fault.whole("axis")
         if axis is not None and axis > len(self.body.shafts):
             raise Misuse(f"fault {fault.kind.name}: axis = {axis}: permitted are 1 to {len(self.body.shafts)}")
+        if fault.kind.check is not None:
+            fault.kind.check(self, fault)
         if fault.kind.parameter("pin") is None:
             return
-        pin = self._pin(fault)
-        if fault.kind.name == "bounce" and pin.startswith("AIN"):
-            raise Misuse(f"fault bounce: pin = {pin!r} is an analog input, which has no switch")
+        pin = self.pin_of(fault)
         levels = self.inner.pins()
         if pin not in levels:
             raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: {self.name!r} has {', '.join(levels)}")
@@ -253,7 +248,7 @@ class FaultyMachine(Stateful):
     def begin(self, active: Active) -> None:
         """A fault of this machine was set."""
         if active.fault.kind.parameter("pin") is not None:
-            pin = self._pin(active.fault)
+            pin = self.pin_of(active.fault)
             self._outer.setdefault(pin, self.inner.pins()[pin])
         if active.fault.kind.occasion is Occasion.ALWAYS:
             active.due = active.begin
@@ -262,12 +257,12 @@ class FaultyMachine(Stateful):
     def end(self, active: Active, now: Nanos) -> None:
         """A fault of this machine was removed: what it holds is let go."""
         if active.fault.kind.parameter("pin") is not None:
-            pin = self._pin(active.fault)
+            pin = self.pin_of(active.fault)
             self._bounces = [b for b in self._bounces if b[1] != pin]
             if self._stuck.get(pin, active.name) == active.name:
                 self._stuck.pop(pin, None)
                 self._put(pin, self._outer[pin], now)
-            if not any(other.fault.get("pin") and self._pin(other.fault) == pin for other in self._mine()):
+            if not any(other.fault.get("pin") and self.pin_of(other.fault) == pin for other in self._mine()):
                 del self._outer[pin]
         for released in [r for r in self._released if r[1] == active.name]:
             self._let_go(released, now)
@@ -278,7 +273,8 @@ class FaultyMachine(Stateful):
 
     # ------------------------------------------------------------------ inputs
 
-    def _pin(self, fault: Fault) -> str:
+    def pin_of(self, fault: Fault) -> str:
+        """The pin that a fault names, under its one name."""
         return self.body.pin_name(str(fault.get("pin")))
 
     def _put(self, pin: str, level: float, now: Nanos) -> None:
@@ -305,21 +301,18 @@ class FaultyMachine(Stateful):
         self.inner.set_pin(name, value, now)
         if value != before:
             for active in self._mine():
-                if active.fault.kind.name == "bounce" and self._pin(active.fault) == name and active.strikes(now):
-                    self._bounce(active, name, before, value, now)
+                effect = active.fault.kind.effect
+                if isinstance(effect, OfChange) and self.pin_of(active.fault) == name and active.strikes(now):
+                    effect.act(active, self, name, (before, value), now)
 
-    def _bounce(self, active: Active, pin: str, before: float, level: float, now: Nanos) -> None:
-        """To ``level`` it has gone; back and there again some times, the last time at the end of the bouncing."""
-        bounces, within = active.fault.whole("bounces") or 1, active.ns("for_ms")
-        moments = sorted(1 + active.chance.below(within) for _ in range(2 * bounces - 1))
-        levels = [before, level] * bounces
-        self._bounces += [(now + at, pin, to) for at, to in zip((*moments, within), levels, strict=True)]
-        self._tell(active, now, f"{pin} bounces {bounces} times in {active.fault.number('for_ms'):g} ms")
+    def bounce(self, changes: list[tuple[Nanos, str, float]]) -> None:
+        """Levels of inputs to come, each with its moment and pin."""
+        self._bounces += changes
         self.changed()
 
-    def _stick(self, active: Active, now: Nanos) -> None:
+    def stick(self, active: Active, now: Nanos) -> None:
         """The first moment sticks, the second lets go."""
-        pin = self._pin(active.fault)
+        pin = self.pin_of(active.fault)
         if self._stuck.get(pin) != active.name:
             wanted = active.fault.get("value")
             level = wanted if isinstance(wanted, float) else self.inner.pins()[pin]
@@ -327,25 +320,25 @@ class FaultyMachine(Stateful):
             self._stuck[pin] = active.name
             self._put(pin, level, now)
             active.struck += 1
-            self._tell(active, now, f"{pin} is stuck at {level:g}")
+            self.tell(active, now, f"{pin} is stuck at {level:g}")
             active.due = active.end
         else:
             active.due = None
             del self._stuck[pin]
             self._put(pin, self._outer[pin], now)
-            self._tell(active, now, f"{pin} is free")
+            self.tell(active, now, f"{pin} is free")
 
-    def _fail_master(self, active: Active, now: Nanos) -> None:
+    def fail_master(self, active: Active, now: Nanos) -> None:
         """The first moment sets the error, the second clears it."""
         if active.struck == 0:
             self._mute.append(active.name)
             active.struck = 1
             active.due = active.end
-            self._tell(active, now, "a slave of its Modbus master does not answer")
+            self.tell(active, now, "a slave of its Modbus master does not answer")
         else:
             self._mute.remove(active.name)
             active.due = None
-            self._tell(active, now, "the slave of its Modbus master answers again")
+            self.tell(active, now, "the slave of its Modbus master answers again")
         self.body.show_master_error(bool(self._mute), now)
 
     # ------------------------------------------------------------------ what the body asks
@@ -357,38 +350,19 @@ class FaultyMachine(Stateful):
             return exception_pdu(function, NEVER_SENT)
         for active in self._faults.refusing():
             if active.matches(unit, pdu) and active.is_on(self._faults.link, line) and active.strikes(now):
-                if active.fault.kind.layer is Layer.FRAMES:
-                    self._tell(active, now, f"request lost on its way: {pdu.hex(' ')}")
-                    return exception_pdu(function, NEVER_SENT)
-                code = active.fault.whole("code") or DEVICE_BUSY
-                self._tell(active, now, f"refused with exception {code:02X}: {pdu.hex(' ')}")
+                code, text = active.fault.kind.effect.refusal(active)
+                self.tell(active, now, f"{text}: {pdu.hex(' ')}")
                 return exception_pdu(function, code)
         return None
 
     def kept(self, old: bytes, new: bytes, now: Nanos) -> bytes:
         """What the memory holds when ``new`` was to be saved over ``old`` of the same length."""
         kept = bytearray(new)
-        for active in self._mine():
-            if active.fault.kind.name == "wear" and active.strikes(now):
-                self._wear(active, old, kept, now)
-        for active in self._mine():
-            if active.fault.kind.name == "power-cut" and active.strikes(now):
-                written = active.fault.whole("written")
-                written = active.chance.below(len(new) + 1) if written is None else min(written, len(new))
-                kept[written:] = old[written:]
-                self._tell(active, now, f"no supply after {written} of {len(new)} bytes were saved")
-                self._cut, self._off_until = now, now + active.ns("for_s")
-                self.changed()
+        saves = [active for active in self._mine() if isinstance(active.fault.kind.effect, OfSave)]
+        for active in sorted(saves, key=lambda active: active.fault.kind.effect.is_last):
+            if active.strikes(now):
+                active.fault.kind.effect.act(active, self, old, kept, now)
         return bytes(kept)
-
-    def _wear(self, active: Active, old: bytes, kept: bytearray, now: Nanos) -> None:
-        good = active.fault.whole("writes") or 0
-        if active.struck > good and len(active.worn) < len(kept):
-            sound = [place for place in range(len(kept)) if place not in active.worn]
-            active.worn.append(sound[active.chance.below(len(sound))])
-            self._tell(active, now, f"after {active.struck} saves byte {active.worn[-1]} is worn out")
-        for place in active.worn:
-            kept[place] = old[place]
 
     def after_request(self, now: Nanos) -> bool:
         """Whether the supply has failed during a request; it is off then."""

@@ -8,9 +8,9 @@ from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488, Serving, check_pin
 from steptwin.mic488.encoder import Coupling
 from steptwin.wire.pdu import exception_pdu
-from steptwin.world.faults.answers import NEVER_SENT
+from steptwin.world.faults.kinds_frames import NEVER_SENT
 from steptwin.world.faults.machine import FaultyMachine, Shaft
-from steptwin.world.faults.table import Kind
+from steptwin.world.faults.table import Kind, Need
 
 
 class EncoderShaft:
@@ -42,7 +42,7 @@ class Mic488Body:
         self.shafts: list[Shaft] = [EncoderShaft(device, axis.number) for axis in device.axes]
 
     def lacks(self, kind: Kind) -> str | None:
-        if kind.name != "master-error" or any(register.key == "M_STATUS" for register in self._device.registers):
+        if kind.needs is not Need.MODBUS_MASTER or any(register.key == "M_STATUS" for register in self._device.registers):
             return None
         return f"has firmware {self._device.firmware.name}, which has no M_STATUS: 1.70 has"
 

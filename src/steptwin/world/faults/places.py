@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.world.faults.fault import Fault
-from steptwin.world.faults.table import KINDS, Layer, Line
+from steptwin.world.faults.kinds import KINDS
+from steptwin.world.faults.table import Layer, Line
 
 
 class Wire(NamedTuple):
@@ -26,7 +27,7 @@ class Wire(NamedTuple):
 
     def lets_happen(self, fault: Fault) -> bool:
         if self.line is None:
-            return fault.kind.layer is Layer.PROTOCOL or fault.get("lost") == "request"
+            return fault.refuses
         return self.line in fault.kind.lines
 
     def is_called(self, link: str) -> bool:

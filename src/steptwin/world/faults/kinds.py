@@ -1,0 +1,33 @@
+"""Every kind of fault: command line, files, their schema and the reference page are read from this table. A new kind is a row
+with its effect in the file of its layer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from steptwin.world.faults.kinds_bytes import BYTES
+from steptwin.world.faults.kinds_frames import FRAMES
+from steptwin.world.faults.kinds_physics import PHYSICS
+from steptwin.world.faults.table import WHEN, WHERE, Kind, Layer, Occasion, Parameter, checked
+
+KINDS = checked((*BYTES, *FRAMES, *PHYSICS))
+
+
+def rows(*layers: Layer) -> Iterator[Kind]:
+    """The kinds of these layers, of all without any."""
+    return (kind for kind in KINDS.values() if not layers or kind.layer in layers)
+
+
+def shared() -> list[tuple[Parameter, str]]:
+    """What kinds have in common: each parameter, and the layers or occasions that have it."""
+    found: dict[Parameter, list[str]] = {}
+    for layer, where in WHERE.items():
+        for parameter in where:
+            found.setdefault(parameter, []).append(layer.value)
+    lasting = [kind.name for kind in KINDS.values() if kind.occasion is Occasion.ALWAYS]
+    for occasion, when in WHEN.items():
+        for parameter in when:
+            found.setdefault(parameter, []).append(
+                f"each {occasion.value}" if occasion is not Occasion.ALWAYS else ", ".join(lasting)
+            )
+    return [(parameter, ", ".join(of)) for parameter, of in found.items()]

@@ -1,0 +1,129 @@
+"""The kinds of faults of bytes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.machine import Nanos
+from steptwin.world.faults.table import (
+    ALL_LINES,
+    LONGEST_MS,
+    SERIAL,
+    BeforeDelivery,
+    InPieces,
+    Kind,
+    Layer,
+    Occasion,
+    OfByte,
+    Tell,
+    number,
+    whole,
+)
+
+if TYPE_CHECKING:
+    from steptwin.world.faults.active import Active
+    from steptwin.world.faults.stream import Run
+
+
+def _flip(active: Active, byte: int, run: Run, tell: Tell) -> int:
+    bit = active.fault.whole("bit")
+    turned = byte ^ 1 << (active.chance.below(8) if bit is None else bit)
+    tell(active, f"{byte:02X} becomes {turned:02X}")
+    return turned
+
+
+def _drop(active: Active, byte: int, run: Run, tell: Tell) -> None:
+    active.left = (active.fault.whole("length") or 1) - 1
+    tell(active, f"{byte:02X} is lost" + (f" and {active.left} more" if active.left else ""))
+
+
+def _insert(active: Active, byte: int, run: Run, tell: Tell) -> int:
+    value = active.fault.whole("value")
+    extra = active.chance.below(256) if value is None else value
+    tell(active, f"{extra:02X} comes before it")
+    run.put((extra,))
+    return byte
+
+
+def _gap(active: Active, byte: int, run: Run, tell: Tell) -> int:
+    tell(active, f"{active.fault.number('for_ms'):g} ms of silence before it")
+    run.pause(active.ns("for_ms"))
+    return byte
+
+
+def _split(active: Active, run: Run, count: int, tell: Tell) -> list[tuple[Nanos, bytes]]:
+    length = active.fault.whole("length") or 1
+    tell(active, f"{count} bytes in pieces of {length}")
+    pause = active.ns("for_ms")
+    pieces: list[tuple[Nanos, bytes]] = []
+    for delay, piece in run.pieces:
+        for start in range(0, len(piece), length):
+            pieces.append((delay + pause * len(pieces), bytes(piece[start : start + length])))
+    return pieces
+
+
+def _noise(active: Active, run: Run, tell: Tell) -> None:
+    rubbish = active.chance.some_bytes(active.fault.whole("length") or 1)
+    tell(active, f"{len(rubbish)} bytes of noise: {rubbish.hex(' ')}")
+    run.put(rubbish)
+
+
+BYTES = (
+    Kind(
+        "flip",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "A bit of a byte arrives turned round.",
+        (whole("bit", "Which bit, 0 is the lowest.", 0, 7, otherwise="any"),),
+        SERIAL,
+        effect=OfByte(_flip),
+    ),
+    Kind(
+        "drop",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "Bytes are lost.",
+        (whole("length", "How many.", 1, 10_000, default=1),),
+        SERIAL,
+        effect=OfByte(_drop),
+    ),
+    Kind(
+        "insert",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "A byte too much comes before a byte.",
+        (whole("value", "Which.", 0, 255, otherwise="any"),),
+        SERIAL,
+        effect=OfByte(_insert),
+    ),
+    Kind(
+        "gap",
+        Layer.BYTES,
+        Occasion.BYTE,
+        "The line is silent before a byte.",
+        (number("for_ms", "How long.", 1e-3, LONGEST_MS, default=30.0),),
+        ALL_LINES,
+        effect=OfByte(_gap),
+    ),
+    Kind(
+        "split",
+        Layer.BYTES,
+        Occasion.DELIVERY,
+        "Bytes come in pieces, as USB adapters deliver them.",
+        (
+            whole("length", "Bytes in a piece.", 1, 10_000, default=1),
+            number("for_ms", "How long after each other pieces come.", 1e-3, LONGEST_MS, default=1.0),
+        ),
+        ALL_LINES,
+        effect=InPieces(_split),
+    ),
+    Kind(
+        "noise",
+        Layer.BYTES,
+        Occasion.DELIVERY,
+        "Bytes of no meaning come before what was sent.",
+        (whole("length", "How many.", 1, 10_000, default=8),),
+        SERIAL,
+        effect=BeforeDelivery(_noise),
+    ),
+)

@@ -1,0 +1,163 @@
+"""The kinds of faults of frames and of the protocol."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.wire.crc import with_crc
+from steptwin.wire.pdu import DEVICE_BUSY
+from steptwin.world.faults.table import (
+    LONGEST_MS,
+    MODBUS,
+    Form,
+    Kind,
+    Layer,
+    Line,
+    Occasion,
+    OfAnswer,
+    OfRequest,
+    Parameter,
+    Tell,
+    number,
+    whole,
+)
+
+if TYPE_CHECKING:
+    from steptwin.world.faults.active import Active
+    from steptwin.world.faults.answers import Exchange, Sent
+    from steptwin.world.faults.fault import Fault
+
+NEVER_SENT = 0
+"""No answer carries this exception code: a slave that must not answer gives it, and the port keeps it."""
+
+_UNITS = {Line.RTU: 248, Line.TCP: 256}
+
+
+def _delay(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+    tell(active, f"{active.fault.number('for_ms'):g} ms later: {sent.answer.hex(' ')}")
+    return sent._replace(delay=sent.delay + active.ns("for_ms"))
+
+
+def _is_request_lost(fault: Fault) -> bool:
+    return fault.get("lost") == "request"
+
+
+def _lose_request(active: Active) -> tuple[int, str]:
+    return NEVER_SENT, "request lost on its way"
+
+
+def _lose_answer(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+    tell(active, f"lost on its way: {sent.answer.hex(' ')}")
+    return sent._replace(delay=0, answer=b"")
+
+
+def _hold_back(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+    tell(active, f"held back: {sent.answer.hex(' ')}")
+    return sent._replace(delay=0, answer=b"", later=sent.answer)
+
+
+def _answer_as(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+    other = active.fault.whole("answers_as")
+    other = (unit + 1) % _UNITS[exchange.line] if other is None else other
+    tell(active, f"answered as unit {other}: {sent.answer.hex(' ')}")
+    return sent._replace(answer=_as_unit(exchange.line, sent.answer, other))
+
+
+def _as_unit(line: Line, raw: bytes, unit: int) -> bytes:
+    if line is Line.RTU:
+        return with_crc(bytes((unit,)) + raw[1:-2])
+    return raw[:6] + bytes((unit,)) + raw[7:]
+
+
+def _spoil_crc(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+    raw = sent.answer
+    wrong = int.from_bytes(raw[-2:], "little") ^ 1 + active.chance.below(0xFFFF)
+    raw = raw[:-2] + wrong.to_bytes(2, "little")
+    tell(active, f"wrong CRC: {raw.hex(' ')}")
+    return sent._replace(answer=raw)
+
+
+def _echo(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+    tell(active, f"echo: {exchange.request.hex(' ')}")
+    return sent._replace(before=exchange.request)
+
+
+def _refuse(active: Active) -> tuple[int, str]:
+    code = active.fault.whole("code") or DEVICE_BUSY
+    return code, f"refused with exception {code:02X}"
+
+
+FRAMES = (
+    Kind(
+        "delay",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer takes longer; the ones behind it wait.",
+        (number("for_ms", "How much longer.", 1e-3, LONGEST_MS, default=500.0),),
+        MODBUS,
+        effect=OfAnswer(_delay),
+    ),
+    Kind(
+        "no-answer",
+        Layer.FRAMES,
+        Occasion.REQUEST,
+        "There is no answer: the request was lost on its way, or was carried out and the answer lost.",
+        (Parameter("lost", Form.WORD, "What was lost.", words=("answer", "request"), default="answer"),),
+        MODBUS,
+        effect=OfRequest(_lose_request, _is_request_lost, _lose_answer),
+    ),
+    Kind(
+        "late",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer is held back and comes before the next one.",
+        (),
+        MODBUS,
+        effect=OfAnswer(_hold_back),
+    ),
+    Kind(
+        "wrong-unit",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer carries the address of another unit.",
+        (whole("answers_as", "Which.", 0, 255, otherwise="the next one"),),
+        MODBUS,
+        effect=OfAnswer(_answer_as),
+    ),
+    Kind(
+        "crc",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The answer has a wrong CRC.",
+        (),
+        (Line.RTU,),
+        effect=OfAnswer(_spoil_crc),
+    ),
+    Kind(
+        "echo",
+        Layer.FRAMES,
+        Occasion.ANSWER,
+        "The request comes back before its answer.",
+        (),
+        (Line.RTU,),
+        effect=OfAnswer(_echo),
+    ),
+    Kind(
+        "exception",
+        Layer.PROTOCOL,
+        Occasion.REQUEST,
+        "The request is refused and not carried out.",
+        (whole("code", "The exception code.", 1, 255, default=4),),
+        MODBUS,
+        effect=OfRequest(_refuse),
+    ),
+    Kind(
+        "busy",
+        Layer.PROTOCOL,
+        Occasion.REQUEST,
+        "The request is refused with exception 6, device busy, and not carried out.",
+        (),
+        MODBUS,
+        effect=OfRequest(_refuse),
+    ),
+)
