@@ -203,3 +203,10 @@ def test_options_for_programs_are_refused() -> None:
         invoke("run", str(FEEDER), "--input", "IN1=1@2s")
     with pytest.raises(Misuse, match=r"--input table\.IN1: IN1 = 2: a digital input is 0 or 1"):
         invoke("run", str(FEEDER), "--input", "table.IN1=2@1s")
+
+
+def test_the_keys_of_a_description_have_their_defaults_with_units() -> None:
+    from steptwin.cli.up import sections
+
+    (source,) = [section for section in sections() if "[[source]]" in section.title]
+    assert {row[0]: row[2] for row in source.rows}["period"] == "10 ms"

@@ -195,6 +195,10 @@ def test_requests_of_the_control_endpoint() -> None:
         assert hand["fault"]({"clear": True}) == []
         with pytest.raises(Misuse, match="choose a machine with --unit: table, drum"):
             hand["state"]({})
+        with pytest.raises(Misuse, match="no machine 'drumm': machines are table, drum"):
+            hand["state"]({"unit": "drumm"})
+        with pytest.raises(Misuse, match=r"stuck: pin = 'TABLE\.IN3': name the machine as machine=NAME, and the pin alone"):
+            hand["fault"]({"set": ["stuck machine=table pin=table.IN3"]})
         with pytest.raises(Misuse, match=r"strat: give a pin as MACHINE\.PIN; machines are table, drum; buttons are start"):
             hand["pin"]({"set": {"strat": 1}})
         with pytest.raises(Misuse, match="start = 2: a button takes 1"):

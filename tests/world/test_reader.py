@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.world.reader import flag, number, pair, pin_name, points, positive_time, whole, word
+from steptwin.world.reader import flag, number, pair, pin_name, points, positive_time, text_value, whole, word
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,11 @@ from steptwin.world.reader import flag, number, pair, pin_name, points, positive
         (flag, True, True),
         (flag, 1, "1: expected true or false"),
         (number(), -9.5e299, -9.5e299),
-        (number(), 1e300, r"1e\+300: expected a number"),
+        (number(), 1e300, 1e300),
+        (number(), 1e308, r"1e\+308: permitted are numbers from -1e\+300 to 1e\+300$"),
+        (number(), float("-inf"), r"-inf: permitted are numbers from -1e\+300 to 1e\+300$"),
+        (number(), -(10**400), r"-10+: permitted are numbers from -1e\+300 to 1e\+300$"),
+        (number(), float("nan"), "nan: expected a number"),
         (number(), "1", "'1': expected a number"),
         (number(), True, "True: expected a number"),
         (number(2.0), 2, 2.0),
@@ -26,6 +30,8 @@ from steptwin.world.reader import flag, number, pair, pin_name, points, positive
         (number(2.0, above=True), 2.01, 2.01),
         (number(2.0, 3.0), 3.0, 3.0),
         (number(2.0, 3.0), 3.01, r"3\.01: permitted are numbers from 2 to 3$"),
+        (text_value, "", "'': expected a text that is not empty"),
+        (text_value, 5, "5: expected a text$"),
         (whole(1, 4), 1, 1),
         (whole(1, 4), 4, 4),
         (whole(1, 4), 0, "0: permitted are whole numbers from 1 to 4"),

@@ -123,7 +123,7 @@ def run(
 
     runner = _RUNNERS.get(file.suffix.lower())
     if runner is None:
-        raise Misuse(f"{file}: what is to be run is told by its suffix: {', '.join(_RUNNERS)}")
+        raise Misuse(f"{file}: unknown suffix: permitted are {', '.join(_RUNNERS)}")
     if until not in (None, "idle") and runner is not _run_world:
         raise Misuse(f"--until {until}: permitted is 'idle'")
     limit = None if duration is None else parse_duration(duration, "--for")

@@ -6,12 +6,16 @@ From Python: `steptwin.files.world.World`, which runs in virtual time.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from steptwin.cli.commands import Format, Section, show
 from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND
+
+if TYPE_CHECKING:
+    from steptwin.world.reader import Key
 
 
 def up(
@@ -88,7 +92,7 @@ def sections() -> list[Section]:
         Section(
             TABLES[name],
             ("key", "meaning", "default"),
-            [(key.name, key.meaning, "required" if key.is_required else _default(key.default)) for key in keys],
+            [(key.name, key.meaning, "required" if key.is_required else _default(key)) for key in keys],
         )
         for name, keys in KEYS.items()
     ]
@@ -100,7 +104,12 @@ def sections() -> list[Section]:
     return [*found, Section("Steps of events and scripts", ("first key", "meaning", "more keys"), steps)]
 
 
-def _default(value: object) -> str:
+def _default(key: Key) -> str:
+    from steptwin.world.reader import positive_time, time_value
+
+    value = key.default
     if value is None or value == ():
         return ""
+    if value and key.read in (positive_time, time_value):
+        return f"{value / MILLISECOND:g} ms"
     return str(value).lower() if isinstance(value, bool) else str(value)

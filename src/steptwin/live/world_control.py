@@ -73,7 +73,7 @@ class WorldControl:
         if pin is not None and not wanted:
             buttons = ", ".join(self._world.plan.buttons) or "none"
             raise Misuse(f"{pin}: give a pin as MACHINE.PIN; machines are {known}; buttons are {buttons}")
-        raise Misuse(f"choose a machine with --unit: {known}")
+        raise Misuse(f"no machine {wanted!r}: machines are {known}" if wanted else f"choose a machine with --unit: {known}")
 
     # ------------------------------------------------------------------ requests
 

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import isnan
 from typing import Any
 
 from steptwin.diagnostics import Diagnostic, Severity, Source, Span, in_order, render
@@ -22,6 +23,8 @@ NAMED = ("line", "mic488", "m1486", "axis", "button")
 MOST_FINDINGS = 100
 """After so many nobody reads on."""
 _LONGEST_MESSAGE = 400
+MOST = 1e300
+"""Numbers beyond it would overflow in products."""
 _WHOLE = range(-(1 << 63), 1 << 63)
 
 
@@ -210,7 +213,7 @@ def _what(path: Path) -> str:
 
 def text_value(value: Any) -> str:
     if not isinstance(value, str) or not value.strip():
-        raise Misuse(f"{value!r}: expected a text")
+        raise Misuse(f"{value!r}: expected a text{' that is not empty' if isinstance(value, str) else ''}")
     return value
 
 
@@ -233,8 +236,10 @@ def number(least: float | None = None, most: float | None = None, *, above: bool
     """A number from ``least`` (not itself with ``above``) to ``most``."""
 
     def read(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
+        if isinstance(value, bool) or not isinstance(value, int | float) or (isinstance(value, float) and isnan(value)):
             raise Misuse(f"{value!r}: expected a number")
+        if abs(value) > MOST:
+            raise Misuse(f"{value!r}: permitted are numbers from {-MOST:g} to {MOST:g}")
         low = least is not None and (value <= least if above else value < least)
         if low or (most is not None and value > most):
             bounds = (f"above {least:g}" if above else f"from {least:g}") if least is not None else ""

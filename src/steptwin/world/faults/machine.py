@@ -240,6 +240,8 @@ class FaultyMachine(Stateful):
             return
         pin = self.pin_of(fault)
         levels = self.inner.pins()
+        if "." in pin:
+            raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: name the machine as machine=NAME, and the pin alone")
         if pin not in levels:
             raise Misuse(f"fault {fault.kind.name}: pin = {pin!r}: {self.name!r} has {', '.join(levels)}")
         level = fault.get("value")
