@@ -6,9 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from mic488_rig import WORDS, Rig, word_pdu
 
 from steptwin.mic488.behaviour import BEHAVIOUR, Behaviour, Bit, OfAxis, OfDevice, checked
-from steptwin.mic488.registermap import Row, Type
+from steptwin.mic488.registermap import Row, Space, Type
 from steptwin.mic488.registers import ROWS
 from steptwin.tables import IncompleteTable
 
@@ -66,3 +67,20 @@ def test_a_register_without_what_it_does_is_refused(row: Row | None, behaviour: 
 
 def test_memory_needs_no_behaviour() -> None:
     assert checked([row for row in ROWS if row.type is Type.MEMORY], {}) == {}
+
+
+ONLY_KEPT = {"DATA_TYPE", "PROG_BANK_SEL", "POS_BANK_SEL", "AXIS_CTR_MODE", "JOG_SPEED", "ACC", "DEC", "VMAX"}
+
+
+@pytest.mark.parametrize("key", [row.key for row in ROWS if row.space is Space.HOLDING and row.writes and row.control])
+def test_deadlines_are_found_anew_for_what_may_change_them_and_for_nothing_else(key: str) -> None:
+    rig = Rig()
+    changes: list[str] = []
+    rig.device.changed = lambda: changes.append(key)
+    if key in WORDS:
+        rig.word(key, 1)
+    elif key == "JOG_SPEED":
+        rig.ask(word_pdu(rig.base + 17, 1))
+    else:
+        rig.set(key, 1)
+    assert bool(changes) == (key not in ONLY_KEPT)

@@ -98,6 +98,20 @@ def test_analog_inputs_are_scaled() -> None:
 
 
 @pytest.mark.parametrize(
+    "assignment",
+    [
+        "OUT1 = ON", "OUT2 = OFF", "OUTPUTS = 5", "M1 = ON", "M2 = OFF", "PosM1 = 2.5", "LimLM1 = -3", "LimRM2 = 40",
+        "AccM1 = 20", "DecM3 = 30", "VmaxM4 = 5", "ENC1 = -7", "CFGINT_IN1 = RIS", "CFGINT_MODBUS = HIGH", "CFGINT_M1 = 4",
+        "PTPM3 = 9", "CircY = 4", "LinVel = 6", "LinAcc = 3", "VisionX = 1.5", "$I5 = -3", "$D6 = 100000", "$R8 = 0.1",
+    ],
+)  # fmt: skip
+def test_a_loop_that_writes_what_is_there_already_rests(assignment: str) -> None:
+    rig = started(f"MAIN:\n{assignment}\nJUMP MAIN\nINT_IN1:\nRETURN\nINT_MODBUS:\nRETURN\nINT_M1:\nRETURN\n")
+    rig.wait(0.1)
+    assert (rig.state, rig.kernel.deadline()) == (RUNNING, None)
+
+
+@pytest.mark.parametrize(
     ("counts", "pulses", "first", "seconds"),
     [(100_000, 1, 0, 2**31 / 1e8), (400, 3200, 2**31 - 1001, 1000 / 125), (-400, 3200, -(2**31) + 1000, 1000 / 125)],
 )

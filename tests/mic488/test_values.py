@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import DataType, Space, Type
 from steptwin.mic488.registers import register_map
-from steptwin.mic488.values import Item, named, plan, repeatable, value_of
+from steptwin.mic488.values import FORM, Item, View, decoded, encoded, moves, named, plan, repeatable, user_item, value_of
 from steptwin.wire import pdu
 
 MAP = register_map("1.70")
@@ -105,3 +105,150 @@ def test_what_may_be_repeated(request_: pdu.Request) -> None:
 @pytest.mark.parametrize("request_", ONCE, ids=str)
 def test_what_is_sent_once(request_: pdu.Request) -> None:
     assert not repeatable(MAP, request_)
+
+
+MOVING = {10005, 10007, 10060, 10068, 10076, 10084, 10090, 10092, 2008, 9000}
+"""First addresses of those requests above that begin a motion, or nobody knows."""
+
+
+@pytest.mark.parametrize("request_", [*REPEATED, *ONCE], ids=str)
+def test_what_may_begin_a_motion(request_: pdu.Request) -> None:
+    starts_program = request_ in (pdu.WriteRegister(10003, 1), pdu.WriteRegister(10003, 2))
+    assert moves(MAP, request_) == (request_.address in MOVING or starts_program)
+
+
+# ---------------------------------------------------------------------- names
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "address", "size"),
+    [
+        ("m1_pos_act", "M1_POS_ACT", 10020, 2),
+        (" M_STATUS ", "M_STATUS", 10009, 1),
+        ("OUT3", "OUT3", 6002, 1),
+        ("USER_REGISTER[0]", "USER_REGISTER[0]", 0, 1),
+        ("user_register[1999]:INT", "USER_REGISTER[1999]:int", 1999, 1),
+        ("USER_REGISTER[7]:word", "USER_REGISTER[7]", 7, 1),
+        ("USER_REGISTER[1998]:dint", "USER_REGISTER[1998]:dint", 1998, 2),
+        ("USER_REGISTER[4]:real", "USER_REGISTER[4]:real", 4, 2),
+    ],
+)
+def test_names_of_values(text: str, name: str, address: int, size: int) -> None:
+    item = named(MAP, text)
+    assert (item.name, item.address, item.size) == (name, address, size)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("M1 POS", f"'M1 POS' is no name of a value: {FORM}"),
+        ("M1_ACC[0]", "'M1_ACC[0]': M1_ACC is one value of type REAL/DINT; name it without [ ] and :"),
+        ("M1_ACC:dint", "'M1_ACC:dint': M1_ACC is one value of type REAL/DINT; name it without [ ] and :"),
+        ("USER_REGISTER", "'USER_REGISTER': choose one of USER_REGISTER[0] to USER_REGISTER[1999]"),
+        ("USER_REGISTER[0]:byte", "'USER_REGISTER[0]:byte': permitted behind : are word, int, dint and real"),
+        ("USER_REGISTER[2000]", "user register 2000 as WORD is outside 0 to 1999"),
+        ("USER_REGISTER[1999]:real", "user register 1999 as REAL is outside 0 to 1998"),
+        ("USER_REGISTER[5]:dint", "user register 5 as DINT: DINTs begin at even registers"),
+    ],
+)
+def test_names_that_are_none(text: str, message: str) -> None:
+    with pytest.raises(Misuse) as refused:
+        named(MAP, text)
+    assert str(refused.value) == message
+
+
+def test_several_user_registers_from_one_on() -> None:
+    assert user_item(MAP, 1990, View.REAL, 5).at(1992).name == "USER_REGISTER[1992]:real"
+    with pytest.raises(Misuse, match=r"user register 1992 as REAL × 5 is outside 0 to 1990"):
+        user_item(MAP, 1992, View.REAL, 5)
+    with pytest.raises(Misuse, match="user register -1 as INT is outside 0 to 1999"):
+        user_item(MAP, -1, View.INT)
+
+
+def test_items_of_one_register_and_view_are_one() -> None:
+    one, other = named(MAP, "USER_REGISTER[4]"), named(MAP, "USER_REGISTER[4]:int")
+    assert one == named(MAP, "user_register[4]:word")
+    assert len({one, other, named(MAP, "user_register[4]")}) == 2
+    assert one != "USER_REGISTER[4]"
+    assert repr(other) == "<Item USER_REGISTER[4]:int>"
+    mixed = [named(MAP, name) for name in ("OUT2", "IN1", "M1_ACC", "OUT1", "USER_REGISTER[4]")]
+    assert [item.name for item in sorted(mixed)] == ["OUT1", "OUT2", "IN1", "USER_REGISTER[4]", "M1_ACC"]
+
+
+# ---------------------------------------------------------------------- values in words
+
+WRITTEN = [
+    # value, DATA_TYPE, request (manual 3.2: the low word comes first)
+    ("M1_EN", 1, DataType.REAL, pdu.WriteCoil(2000, True)),
+    ("OUT8", 0, DataType.DINT, pdu.WriteCoil(6007, False)),
+    ("M_ENABLE", 15, DataType.REAL, pdu.WriteRegister(10014, 15)),
+    ("M2_POS_ABS", 12.5, DataType.REAL, pdu.WriteRegisters(10086, (0, 0x4148))),
+    ("M2_POS_ABS", -2, DataType.DINT, pdu.WriteRegisters(10086, (0xFFFE, 0xFFFF))),
+    ("JOG_SPEED", 1.0, DataType.DINT, pdu.WriteRegisters(10017, (0, 0x3F80))),
+    ("ENC1_IMP", 65537, DataType.REAL, pdu.WriteRegisters(10100, (1, 1))),
+    ("USER_REGISTER[3]", 65535, DataType.REAL, pdu.WriteRegister(3, 0xFFFF)),
+    ("USER_REGISTER[3]:int", -32768, DataType.REAL, pdu.WriteRegister(3, 0x8000)),
+    ("USER_REGISTER[3]:int", 32767, DataType.REAL, pdu.WriteRegister(3, 0x7FFF)),
+    ("USER_REGISTER[4]:dint", 65536, DataType.REAL, pdu.WriteRegisters(4, (0, 1))),
+    ("USER_REGISTER[4]:real", -12.5, DataType.DINT, pdu.WriteRegisters(4, (0, 0xC148))),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "data_type", "request_"), WRITTEN, ids=str)
+def test_values_that_are_written_and_read(name: str, value: float, data_type: DataType, request_: pdu.Request) -> None:
+    item = named(MAP, name)
+    assert encoded(item, value, data_type) == request_
+    match request_:
+        case pdu.WriteCoil(on=on):
+            words: tuple[int, ...] = (int(on),)
+        case pdu.WriteRegister(value=word):
+            words = (word,)
+        case _:
+            words = request_.values  # type: ignore[union-attr]
+    assert decoded(item, words, data_type) == value
+    assert isinstance(decoded(item, words, data_type), bool) == isinstance(request_, pdu.WriteCoil)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "data_type", "message"),
+    [
+        ("M1_STATUS", 1, DataType.REAL, "M1_STATUS can only be read"),
+        ("OUT1", 2, DataType.REAL, "OUT1 = 2: permitted are 0 (OFF) and 1 (ON)"),
+        ("M1_POS_ABS", 0.5, DataType.DINT, "M1_POS_ABS = 0.5 imp: a whole number is needed"),
+        ("M1_POS_ABS", float("inf"), DataType.DINT, "M1_POS_ABS = inf imp: a whole number is needed"),
+        ("M1_ACC", 0, DataType.REAL, "M1_ACC = 0 mm/s²: permitted > 0 mm/s²"),
+        ("M1_VEL_ABS", float("nan"), DataType.REAL, "M1_VEL_ABS = nan mm/s: permitted any finite number mm/s"),
+        ("DATA_TYPE", 2, DataType.REAL, "DATA_TYPE = 2: permitted 0…1"),
+        ("USER_REGISTER[3]", 65536, DataType.REAL, "USER_REGISTER[3] = 65536: permitted 0…65535"),
+        ("USER_REGISTER[3]", -1, DataType.REAL, "USER_REGISTER[3] = -1: permitted 0…65535"),
+        ("USER_REGISTER[3]:int", -32769, DataType.REAL, "USER_REGISTER[3]:int = -32769: permitted −32768…32767"),
+        ("USER_REGISTER[3]:int", 32768, DataType.REAL, "USER_REGISTER[3]:int = 32768: permitted −32768…32767"),
+        ("USER_REGISTER[4]:dint", 1.5, DataType.REAL, "USER_REGISTER[4]:dint = 1.5: a whole number is needed"),
+    ],
+)
+def test_values_that_are_refused(name: str, value: float, data_type: DataType, message: str) -> None:
+    with pytest.raises(Misuse) as refused:
+        encoded(named(MAP, name), value, data_type, "mm")
+    assert str(refused.value) == message
+
+
+@pytest.mark.parametrize(
+    ("names", "reads"),
+    [
+        # A bridge is at most 16 registers or 256 bits, over what can be read.
+        (["USER_REGISTER[0]", "USER_REGISTER[17]"], [(3, 0, 18)]),
+        (["USER_REGISTER[0]", "USER_REGISTER[18]"], [(3, 0, 1), (3, 18, 1)]),
+        (["USER_REGISTER[0]:real", "USER_REGISTER[18]:dint"], [(3, 0, 20)]),
+        (["USER_REGISTER[2]:real", "USER_REGISTER[3]"], [(3, 2, 2)]),
+        (["M1_POS_ACT", "M1_ACC"], [(3, 10020, 18)]),
+        (["M1_POS_ACT", "M2_ACC"], [(3, 10020, 20)]),
+        (["M1_VMAX", "ENC1_IMP"], [(3, 10052, 2), (3, 10100, 2)]),
+        (["M4_STATUS", "M1_POS_ACT"], [(3, 10013, 1), (3, 10020, 2)]),
+        (["IN1", "IN20"], [(2, 5000, 20)]),
+        (["OUT8", "IN3", "OUT2"], [(1, 6001, 7), (2, 5002, 1)]),
+        ([f"USER_REGISTER[{n}]" for n in range(126)], [(3, 0, 125), (3, 125, 1)]),
+    ],
+)
+def test_reads_over_gaps(names: list[str], reads: list[tuple[int, int, int]]) -> None:
+    blocks = plan(MAP, [named(MAP, name) for name in names])
+    assert [(block.request.function, block.request.address, block.request.count) for block in blocks] == reads
