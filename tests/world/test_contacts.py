@@ -149,3 +149,45 @@ def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
     assert (device.pins()["IN3"], button.pressed) == (1.0, False)
     button.press(True, 0)
     assert (device.pins()["IN3"], button.pressed) == (0.0, True)
+
+
+def test_the_bouncing_of_a_contact_that_changes_nothing_for_its_input_is_awaited_all_the_same() -> None:
+    """Beside a closed contact: the input stays 1, and the lane of the contact shows it."""
+    edges: list[Record] = []
+    kernel = Kernel(record=edges.append)
+    device = Mic488(controller())
+    kernel.add("m", device)
+    circuit = Circuit(kernel, PinName("m", "IN3"))
+    closed, bouncing = (
+        Button(circuit, normally_closed=nc, bounce_ns=MILLISECOND, bounces=2, chance=Chance(0, "b"), lane=lane)
+        for nc, lane in ((True, "closed"), (False, "bouncing"))
+    )
+    for button in (closed, bouncing):
+        kernel.add_part(button)
+    circuit.close()
+    kernel.advance(SECOND)
+    assert kernel.deadline() is None
+    bouncing.press(True, SECOND)
+    due = kernel.deadline()
+    assert due is not None
+    assert SECOND < due <= SECOND + MILLISECOND
+    kernel.advance(SECOND + MILLISECOND)
+    assert [record.value for record in edges if record.subject == "bouncing"] == [1.0, 0.0, 1.0, 0.0, 1.0]
+    assert [record.value for record in edges if record.subject == "IN3"] == [1.0]
+    assert (kernel.deadline(), device.pins()["IN3"], bouncing.pressed, closed.pressed) == (None, 1.0, True, False)
+
+
+def test_the_level_of_an_input_is_that_of_its_contacts_at_rest_and_of_the_switch_where_it_is() -> None:
+    """A switch that is on where it is put: NO gives 1, NC 0; without a change nothing bounces."""
+    kernel = Kernel()
+    kernel.add("m", Mic488(controller()))
+    drive = kernel.drive_of("m", 1)
+    for pin, normally_closed, level in (("IN1", False, 1.0), ("IN2", True, 0.0)):
+        circuit = Circuit(kernel, PinName("m", pin))
+        switch = Switch(
+            circuit, CountedPosition(drive), Zone(-5, 5), 0, normally_closed=normally_closed, bounce_ns=MILLISECOND, bounces=2
+        )
+        kernel.add_part(switch)
+        circuit.close()
+        kernel.settle()
+        assert (kernel.machines["m"].pins()[pin], switch.on, switch.deadline()) == (level, True, None)

@@ -375,3 +375,15 @@ def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None
         ("64", "D009: step 4: firmware 1.70 has no register named 'M2_ENN'; "),
         ("66", "D009: step 6: no signal 'good.M1.stat'; there are status, en"),
     ]
+
+
+@pytest.mark.parametrize(("number", "fits"), [(2**63 - 1, True), (-(2**63), True), (2**63, False), (-(2**63) - 1, False)])
+def test_whole_numbers_have_64_bits(number: int, fits: bool) -> None:
+    told = wrong(f"[world]\nseed = {number}\nsize = 1\n")
+    assert ("a whole number of more than 64 bits" in told) is not fits
+
+
+@pytest.mark.parametrize("number", [1, 8, 20])
+def test_every_input_of_a_controller_has_a_table(number: int) -> None:
+    """Of keys as of axes: what is wrong in it is told."""
+    assert f"IN{number}" in wrong(TABLE + f"[mic488.IN{number}]\nnothing = 1\n")

@@ -109,3 +109,22 @@ def test_after_an_ordinary_session_no_letter_is_expected_and_a_stray_one_counts(
     wire.sent.clear()
     assert chip.counter() == 640
     assert wire.sent[0][1] == SPOILER
+
+
+def test_the_functions_of_a_chip_are_found_when_it_is_opened() -> None:
+    """One from each of the three bytes that tell of them; reports (57) are switched off, for they look like answers."""
+    wire = ChipWire("B")
+    first = chip_driver(wire)
+    for number in (42, 51, 60):
+        first.set_function(number, not first.functions()[number])
+    chip = chip_driver(wire)
+    notes = chip._driver._unit.notes
+    expected = first.functions()
+    assert [number for number, on in expected.items() if on] == [41, 42, *(48, 49, 50), *range(52, 56), 60]
+    assert {number: notes.function(number) for number in expected} == expected
+    wire._port.receive(b"t57\r", wire.now)
+    wire.sleep(1.0)
+    wire.unread = b""
+    reporting = chip_driver(wire)
+    assert reporting._driver._unit.notes.function(57) is False
+    assert reporting.functions() == expected

@@ -478,3 +478,27 @@ def test_a_line_that_is_cut_when_a_move_begins_leaves_it_in_doubt() -> None:
     wire.before_each, wire.severed = None, False
     wire.sleep(2.0)
     assert chip.counter() == wire.true() == 0
+
+
+def test_a_chip_that_cannot_be_told_to_stop_is_told_with_the_first_cause() -> None:
+    """That nothing came back to Kill, whatever was tried afterwards."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    wire.severed = True
+    with pytest.raises(Untold) as caught:
+        chip.stop()
+    assert "(memory: no answer to 'chip 7: k' within 0.5 s" in str(caught.value)
+    assert "does not echo" not in str(caught.value)
+    assert "does not echo" in str(caught.value.__cause__)
+
+
+def test_what_is_not_stored_takes_no_time_of_the_memory() -> None:
+    """An E type writes commands into its EEPROM; C75 acts when it is received."""
+    wire = ChipWire("E1")
+    chip = chip_driver(wire)
+    wire.sleep(5.0)
+    notes = chip._driver._unit.notes
+    chip.recover()
+    assert notes.ready_at <= wire.now
+    chip.set_flag(80, True)
+    assert notes.ready_at > wire.now

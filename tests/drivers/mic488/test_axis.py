@@ -274,3 +274,19 @@ def test_without_a_configuration_positions_are_still_those_of_the_registers() ->
     mic.axis(1).move_to(5.0)
     assert str(mic.axis(1).wait()) == "M1: target reached at 5 u"
     assert wire.position() == 500
+
+
+@pytest.mark.parametrize("direction", [-2, 0, 2])
+def test_a_jog_coil_has_two_directions(direction: int) -> None:
+    wire, mic = ready()
+    for on in (True, False):
+        with pytest.raises(Misuse, match=f"direction {direction}: permitted are 1 and -1"):
+            mic.axis(1).jog_bit(direction, on=on)
+    assert wire.sent == []
+    mic.set_jog_speed(2.0)
+    mic.axis(1).jog_bit(-1, on=True)
+    wire.sleep(1.0)
+    assert wire.position() < 0
+    mic.axis(1).jog_bit(-1, on=False)
+    wire.rest()
+    assert not wire.moving()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from host_rig import Fault, Wire, driver, spindles, thread_line
@@ -271,3 +272,27 @@ def test_who_is_what() -> None:
     with pytest.raises(Misuse, match="a time-out of 0 s is outside"):
         Mic488(thread_line(Wire()), timeout_s=0.0)
     assert driver(Wire(config=ControllerConfig()), config=None).config is None
+
+
+def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> None:
+    wire = Wire()
+    twin = wire.twin
+    mic = driver(wire)
+    asked: list[tuple[object, bool, int | None]] = []
+    unit = mic._driver._unit
+    inner = unit.write
+
+    async def write(item: object, value: object, **options: Any) -> None:
+        asked.append((value, options.get("urgent", False), options.get("most")))
+        await inner(item, value, **options)  # type: ignore[arg-type]
+
+    unit.write = write  # type: ignore[method-assign]
+    stops = list(unit.notes.stops)
+    mic.program.pause()
+    mic.program.stop()
+    assert asked == [(ProgramState.PAUSED, True, None), (ProgramState.STOPPED, True, 5)]
+    assert unit.notes.stops[1:] == [count + 1 for count in stops[1:]], "motions asked for before are not begun after it"
+    assert twin.program.state == ProgramState.STOPPED
+    wire.severed = True
+    with pytest.raises(Untold, match="the program could not be stopped: the controller cannot be told"):
+        mic.program.stop()

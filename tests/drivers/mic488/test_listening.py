@@ -72,3 +72,13 @@ def test_both_directions_of_modbus_tcp() -> None:
         "? no frame",
         "→ unit 1: read M1_POS_ACT",
     ]
+
+
+def test_what_is_too_short_for_a_frame_is_none() -> None:
+    """A unit, a function and a checksum, or an MBAP header and a function; what the function makes of it is its own affair."""
+    for is_tcp, raw in ((False, bytes.fromhex("01 03 40 21")), (True, bytes.fromhex("0001 0000 0002 01 03"))):
+        words = FrameWords(tcp=is_tcp)
+        shorter, whole = words.frame(5, Direction.IN, raw[:-1]), words.frame(5, Direction.IN, raw)
+        assert (shorter.time, shorter.direction, shorter.unit, shorter.meaning) == (5, None, None, "no frame")
+        assert (whole.time, whole.direction, whole.unit) == (5, Direction.IN, 1)
+        assert whole.meaning.startswith("unit 1: ")

@@ -257,10 +257,14 @@ def test_an_answer_that_overtakes_others_leaves_them_their_faults() -> None:
 def test_an_answer_asked_for_before_the_fault_was_set_comes_whole() -> None:
     rig = FaultRig(is_timed=True)
     rig.send(REQUEST)
+    plain = FaultRig(is_timed=True)
+    plain.send(REQUEST)
     rig.wait(0.0085)  # eight characters at 9600 bit/s, and the answer has not begun
     assert rig.port.to_send(rig.now) == []
     rig.add("crc")
-    assert [data for _, data in rig.arrivals()] == [ANSWER]
+    arrivals = rig.arrivals()
+    assert [data for _, data in arrivals] == [ANSWER]
+    assert arrivals == plain.arrivals(), "at the moment at which it comes without faults"
 
 
 # ---------------------------------------------------------------------- protocol and what is meant

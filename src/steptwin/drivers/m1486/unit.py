@@ -38,6 +38,8 @@ PATIENCE_NS: Nanos = 10 * SECOND
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Whoever listens for an answer that is owed lets a stop go first this often."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
+_LOOKED_AT = (15, 17, 18, 19, 20)
+"""Interface, functions 40 to 63 and type letter, by the numbers of ``U``."""
 READINGS = 4
 """How often something is read until it reads the same twice."""
 
@@ -412,16 +414,16 @@ class Unit:
     async def look(self) -> None:
         """Find out what is not known of the chip: its type, interface and functions."""
         await self.rest()
-        code, *functions, letter = await self.read(15, 17, 18, 19, 20, rests=True)
+        code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
+        if letter not in _NAMES:
+            await self.say(f"c{REPORT}")  # function 57 reports an empty input buffer before each answer
+            code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
         if letter not in _NAMES:
             raise WrongType(f"{self.place}: {self.name} says that its type is {letter:02X}H, which no M1486 does")
         if self.notes.variant is None:
             self.notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
         self.notes.interface = next((interface for interface in INTERFACES if interface.code == code), None)
         self.notes.functions = int.from_bytes(bytes(functions), "little")
-        if self.notes.function(REPORT):
-            await self.say(f"c{REPORT}")  # what it sends cannot be told from answers
-            self.notes.note_function(REPORT, on=False)
 
     # ------------------------------------------------------------------ stopping
 
