@@ -66,7 +66,9 @@ class Ports(Stateful):
 
     def receive(self, piece: Piece, now: int) -> int:
         """The moment of the next piece."""
-        self.ports[piece.port].receive(piece.data, now)
+        answer = self.ports[piece.port].exchange(piece.data, now)
+        if answer:
+            self.out.append((piece.port, (now, answer)))
         self.out += [(piece.port, sent) for sent in self.ports[piece.port].to_send(now)]
         end = now + piece.pause
         while True:

@@ -6,7 +6,7 @@ A machine never reads a clock, a file or a socket. Time is an argument, the next
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 if TYPE_CHECKING:
     from steptwin.motion.divisions import Plan
@@ -117,9 +117,36 @@ class MotionController(Machine, Protocol):
         ...
 
 
-class WirePort(Protocol):
-    """The serial or network face of a machine."""
+class Port(Protocol):
+    """The serial or network face of machines, for one link, connection or program. Machines are at ``now`` in every call."""
 
-    def receive(self, data: bytes, now: Nanos) -> None: ...
-    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
-    def deadline(self) -> Nanos | None: ...
+    @property
+    def broken(self) -> str | None:
+        """Why the connection has to be closed, or None. It is asked after `exchange`."""
+        ...
+
+    def exchange(self, data: bytes, now: Nanos, /) -> bytes:
+        """Take bytes that arrive at ``now``; what is sent in answer at that moment."""
+        ...
+
+    def to_send(self, now: Nanos, /) -> list[tuple[Nanos, bytes]]:
+        """What else has been sent until ``now``, with its moments. A shell asks whenever `deadline` has come."""
+        ...
+
+    def deadline(self) -> Nanos | None:
+        """When there may be more to send, as far as that is known; later than the ``now`` of the last call."""
+        ...
+
+    def close(self) -> None:
+        """The other end is gone; there are no further calls."""
+        ...
+
+
+@runtime_checkable
+class TalkingPort(Port, Protocol):
+    """A port that sends without being asked, too: it calls ``on_output`` when there is something for `to_send`."""
+
+    @property
+    def on_output(self) -> Callable[[], None] | None: ...
+    @on_output.setter
+    def on_output(self, call: Callable[[], None] | None) -> None: ...

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.live.links import TalkingPort
 from steptwin.live.rfc2217 import MOST_HELD, Rfc2217Port, Telnet, TwinLine, escaped, over_network
+from steptwin.machine import TalkingPort
 
 WILL_COM_PORT, DO_COM_PORT = bytes((255, 251, 44)), bytes((255, 253, 44))
 
@@ -32,12 +32,12 @@ class Echo:
     def deadline(self) -> int | None:
         return 7
 
+    def close(self) -> None:
+        self.broken = "closed"
+
 
 class Talker(Echo):
     on_output: Callable[[], None] | None = None
-
-    def close(self) -> None:
-        self.broken = "closed"
 
 
 @given(st.binary(max_size=200), st.integers(1, 20))

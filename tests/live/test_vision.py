@@ -9,8 +9,8 @@ from wbc_rig import loaded
 
 from steptwin.errors import Misuse
 from steptwin.files.programbanks import Banks
-from steptwin.live.links import Port
 from steptwin.live.vision import uses_vision
+from steptwin.machine import Port
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488
 from steptwin.served.mic488 import LineOptions, Mic488Line, state_of

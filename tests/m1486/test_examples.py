@@ -112,9 +112,10 @@ def test_example_6_two_chips_joined_by_a_wire(manual_examples: dict[int, str], i
     for n, chip in chips.items():
         world.add(f"chip {n}", chip)
     world.connect(Wire(PinName("chip 0", "B1"), PinName("chip 7", "B3")))
-    port = SerialChain(chips.values()).port()
+    line = SerialChain(chips.values())
+    port = line.port()
     # Chip 0 is at work on its loop while chip 7 gets its file.
-    port.receive(characters(manual_examples[6]), 0)
+    line.receive(characters(manual_examples[6]), 0)
     world.advance(120 * SECOND)
     assert [event for chip in chips.values() for event in chip.events if event.code == "wrong-data"] == []
     # Chip 0: f64, f128, ... twenty times.

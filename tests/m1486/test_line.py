@@ -21,7 +21,7 @@ def chain(*addresses: int, kind: str = "B", baud: int = 4800, is_timed: bool = F
 def talk(line: SerialChain, *commands: str, now: int = 0) -> bytes:
     """What comes back within a second."""
     port = line.port()
-    port.receive("".join(f"{command}\r" for command in commands).encode(), now)
+    line.receive("".join(f"{command}\r" for command in commands).encode(), now)
     answer = b"".join(data for _, data in port.to_send(now + SECOND))
     port.close()
     return answer
@@ -67,7 +67,7 @@ def test_m_33_characters_begun_together_come_as_their_and() -> None:
 def test_m_33_a_character_begun_while_another_is_on_the_wire_is_lost() -> None:
     line = chain(1, 2, baud=300, is_timed=True)
     port = line.port()
-    port.receive(b"x2\rw250\rxg\ru20\r", 0)
+    line.receive(b"x2\rw250\rxg\ru20\r", 0)
     answers = port.to_send(2 * SECOND)
     assert [data for _, data in answers] == [b"\x42"]
     assert line.collisions == 1
@@ -77,7 +77,7 @@ def test_m_33_a_character_begun_while_another_is_on_the_wire_is_lost() -> None:
 def test_a_run_of_characters_does_not_collide_with_itself(baud: int) -> None:
     line = chain(1, baud=baud, is_timed=True)
     port = line.port()
-    port.receive(b"[\r" + b"u20\r" * 40 + b"]\r", 0)
+    line.receive(b"[\r" + b"u20\r" * 40 + b"]\r", 0)
     answers = port.to_send(20 * SECOND)
     assert [data for _, data in answers] == [b"\x42"] * 40
     assert line.collisions == 0
@@ -94,7 +94,7 @@ def test_every_port_hears_the_chips() -> None:
     assert one.to_send(MILLISECOND) == [(MILLISECOND, b"\x02")]
     assert other.to_send(MILLISECOND) == [(0, b"\x42"), (MILLISECOND, b"\x02")]
     other.close()
-    one.receive(b"u20\r", SECOND)
+    line.receive(b"u20\r", SECOND)
     assert other.pending == []
     assert one.to_send(SECOND) == [(SECOND, b"\x42")]
 
@@ -126,7 +126,7 @@ def test_a_port_says_when_the_next_character_will_have_left() -> None:
     line = chain(1, is_timed=True)
     port = line.port()
     assert port.deadline() is None
-    port.receive(b"u20\r", 0)
+    line.receive(b"u20\r", 0)
     arrived = -(-40 * SECOND // 4800)
     assert port.to_send(arrived) == []
     assert port.deadline() == arrived + -(-10 * SECOND // 4800)
@@ -135,7 +135,7 @@ def test_a_port_says_when_the_next_character_will_have_left() -> None:
 def test_a_line_keeps_what_is_on_the_wire_in_its_state() -> None:
     line, other = (chain(1, 2, baud=300, is_timed=True) for _ in range(2))
     port = line.port()
-    port.receive(b"x2\rw250\rxg\ru20\r", 0)
+    line.receive(b"x2\rw250\rxg\ru20\r", 0)
     port.to_send(SECOND // 2)
     other.set_state(line.copy_state())
     for chip, twin in zip(other.chips.values(), line.chips.values(), strict=True):

@@ -65,7 +65,7 @@ def test_a_program_sees_records() -> None:
     rig.wait(1)
     port = Com1Port(rig.device)
     for number in (1, 2):
-        port.receive(f"N{number} X12.5 Y-7 A90\r\n".encode(), rig.now)
+        port.exchange(f"N{number} X12.5 Y-7 A90\r\n".encode(), rig.now)
         rig.kernel.deadline()
         rig.wait(1)
         assert [rig.r(n) for n in (0, 2, 4, 6, 8)] == [number, 12.5, -7, 90, number]
@@ -86,12 +86,14 @@ def test_wbc_15_modbus_and_records_on_one_port() -> None:
     answers: list[int] = []
     for pieces in ([ask], [write], [write[:9], write[9:]], [b"N3 X1 Y2 A3\r" + ask], [b"N4 X1 ", ask, b"\r"]):
         rig.wait(0.5)
+        answered = 0
         for piece in pieces:
             rig.wait(0.005)
-            port.receive(piece, rig.now)
+            answered += bool(port.exchange(piece, rig.now))
         rig.kernel.deadline()
         rig.wait(0.5)
-        answers.append(len(port.to_send(rig.now)))
+        assert port.to_send(rig.now) == []
+        answers.append(answered)
     assert answers == [1] * 5
     assert frames.count(Direction.IN) == 5
     assert (rig.r(0), rig.r(8)) == (3, 1)

@@ -24,14 +24,14 @@ import steptwin
 from steptwin.errors import Misuse
 from steptwin.files.memory import StateDirectory
 from steptwin.live.cell import Cell
-from steptwin.live.links import Feed, TalkingPort
+from steptwin.live.links import Feed
 from steptwin.live.tcp import Clients, TcpLink
 from steptwin.m1486.chip import Event
 from steptwin.m1486.eeprom import image_of, unpack
 from steptwin.m1486.lines import DUAL_DAC, TWO_DACS, Interface
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND
+from steptwin.machine import SECOND, TalkingPort
 from steptwin.served.m1486 import ChainOptions, M1486Line, memory_name, parse_addresses, parse_wire
 from steptwin.words.frames import FrameLine
 from steptwin.words.m1486_state import program_words

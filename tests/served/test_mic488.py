@@ -13,9 +13,9 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files.memory import StateDirectory
 from steptwin.live.cell import Cell
-from steptwin.live.links import Feed, Port
+from steptwin.live.links import Feed
 from steptwin.live.rfc2217 import TwinLine, over_network
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.machine import MILLISECOND, SECOND, Port
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.served.demo import demo_config
 from steptwin.served.mic488 import LineOptions, Mic488Line

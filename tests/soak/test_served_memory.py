@@ -14,11 +14,12 @@ from soak import scaled
 from virtual_loop import run_virtually
 
 from steptwin.live.cell import Cell
-from steptwin.live.links import Feed, Port
+from steptwin.live.links import Feed
 from steptwin.m1486.check import check
 from steptwin.m1486.chip import EVENTS_KEPT, Event
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.variants import variant
+from steptwin.machine import Port
 from steptwin.mic488.config import ControllerConfig
 from steptwin.served.m1486 import ChainOptions, M1486Line
 from steptwin.served.mic488 import LineOptions, Mic488Line

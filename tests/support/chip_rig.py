@@ -170,7 +170,7 @@ class ChipWire:
             if direction == "to host":
                 arrived.append(data)
             else:
-                self._port.receive(data, self.now)
+                self.chain.receive(data, self.now)
         for _, data in self._port.to_send(self.now):
             self._carry("to host", data, self.now)
         return arrived

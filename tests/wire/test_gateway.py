@@ -60,9 +60,9 @@ def test_mic_32_a_request_takes_the_time_of_the_line_behind_the_gateway(bank: An
 def test_mic_32_requests_wait_for_their_turn_in_the_order_in_which_they_came(bank: Any) -> None:
     gateway = Gateway(TimedUnits({1: bank}, TIMING))
     first, second = TcpGatewayPort(gateway), TcpGatewayPort(gateway)
-    first.receive(ask(1) + ask(2), 0)
-    second.receive(ask(3), 0)
-    first.receive(ask(4), 0)
+    first.exchange(ask(1) + ask(2), 0)
+    second.exchange(ask(3), 0)
+    first.exchange(ask(4), 0)
     mine, others = run(10**9, first, second)
     moments = [SENT + n * FRAME_INTERVAL_NS for n in range(4)]
     assert mine == [(moments[0], answered(1)), (moments[1], answered(2)), (moments[3], answered(4))]
@@ -83,9 +83,9 @@ def test_mic_32_what_finds_the_queue_full_is_refused_as_busy(bank: Any) -> None:
 def test_mic_32_a_gateway_waits_while_the_controller_serves_another_port(bank: Any) -> None:
     units = TimedUnits({1: bank}, TIMING)
     port, serial = TcpGatewayPort(Gateway(units)), TimedRtuSlavePort(units)
-    serial.receive(b"\x01" + READ + bytes.fromhex("94 0b"), 0)
+    serial.exchange(b"\x01" + READ + bytes.fromhex("94 0b"), 0)
     run(REQUEST_NS, serial)
-    port.receive(ask(1), REQUEST_NS)
+    port.exchange(ask(1), REQUEST_NS)
     (mine, others) = run(10**9, port, serial)
     assert len(others) == 1
     assert mine == [(SENT + FRAME_INTERVAL_NS, answered(1))]
@@ -95,9 +95,9 @@ def test_mic_32_a_gateway_waits_while_the_controller_serves_another_port(bank: A
 def test_requests_of_a_connection_that_is_gone_are_not_executed(bank: Any) -> None:
     gateway = Gateway(TimedUnits({1: bank}, TIMING))
     gone, port = TcpGatewayPort(gateway), TcpGatewayPort(gateway)
-    gone.receive(ask(1), 0)
+    gone.exchange(ask(1), 0)
     gone.close()
-    port.receive(ask(2), 10**9)
+    port.exchange(ask(2), 10**9)
     assert run(2 * 10**9, port) == [[(10**9 + SENT, answered(2))]]
     assert len(bank.executed) == 1
 
@@ -106,7 +106,7 @@ def test_mic_2_a_broadcast_is_executed_by_all_units_in_its_turn_and_not_answered
     banks = {unit: new_bank() for unit in (1, 2)}
     port = TcpGatewayPort(Gateway(TimedUnits(banks, TIMING)))
     write = bytes.fromhex("06 00 05 00 63")
-    port.receive(ask(1, 0, write) + ask(2, 0) + ask(3), 0)
+    port.exchange(ask(1, 0, write) + ask(2, 0) + ask(3), 0)
     ((_, told),) = run(10**9, port)[0]
     assert told == answered(3, bytes.fromhex("03 02 00 63"))
     assert [pdu for _, pdu in banks[2].executed] == [write]
@@ -127,8 +127,8 @@ def test_requests_of_scripts_and_of_clients_share_the_line(bank: Any) -> None:
     script, client = ScriptPort(gateway), TcpGatewayPort(gateway)
     frame = b"\x01" + READ + bytes.fromhex("94 0b")
     assert script.exchange(frame * 12 + frame[:4], 0) == b""
-    client.receive(ask(1), 0)
-    script.receive(frame[4:] + bytes.fromhex("ff 02 03"), 0)
+    client.exchange(ask(1), 0)
+    script.exchange(frame[4:] + bytes.fromhex("ff 02 03"), 0)
     mine, others = run(10**9, script, client)
     assert [moment for moment, _ in mine] == [SENT + n * FRAME_INTERVAL_NS for n in range(14) if n != 12]
     assert others == [(SENT + 12 * FRAME_INTERVAL_NS, answered(1))]
@@ -138,14 +138,14 @@ def test_scripts_address_as_on_a_line(new_bank: NewBank) -> None:
     banks = {unit: new_bank() for unit in (1, 2)}
     script = ScriptPort(Gateway(TimedUnits(banks, TIMING)))
     for text in ("00 06 00 05 00 63", "03 06 00 05 00 63", "00 03 00 05 00 01"):
-        script.receive(with_crc(bytes.fromhex(text)), 0)
+        script.exchange(with_crc(bytes.fromhex(text)), 0)
     assert run(10**9, script) == [[]]
     assert [[pdu for _, pdu in bank.executed] for bank in banks.values()] == [[bytes.fromhex("06 00 05 00 63")]] * 2
 
 
 def test_a_wrong_header_breaks_the_connection(bank: Any) -> None:
     port = TcpGatewayPort(Gateway(TimedUnits({1: bank}, TIMING)))
-    port.receive(ask(1) + bytes.fromhex("00 01 00 01 00 06"), 0)
+    port.exchange(ask(1) + bytes.fromhex("00 01 00 01 00 06"), 0)
     assert port.broken == "MBAP protocol 1 is not 0"
     assert run(10**9, port) == [[(SENT, answered(1))]]
 
@@ -154,6 +154,6 @@ def test_an_observer_sees_requests_when_they_come_and_responses_when_they_leave(
     seen: list[tuple[int, Direction, bytes]] = []
     gateway = Gateway(TimedUnits({1: bank}, TIMING))
     port = TcpGatewayPort(gateway, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
-    port.receive(ask(1), 5)
+    port.exchange(ask(1), 5)
     run(10**9, port)
     assert seen == [(5, Direction.IN, ask(1)), (5 + SENT, Direction.OUT, answered(1))]

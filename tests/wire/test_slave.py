@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
+from steptwin.machine import Port
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import is_intact, with_crc
 from steptwin.wire.line import SerialLine
@@ -23,7 +24,7 @@ from steptwin.wire.pdu import (
     answer,
     encode_request,
 )
-from steptwin.wire.slave import Device, Direction, RtuSlavePort, SlavePort, TcpSlavePort
+from steptwin.wire.slave import Device, Direction, RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
@@ -220,24 +221,24 @@ def test_units_of_a_line(new_bank: NewBank, units: list[int]) -> None:
             port(devices)
 
 
-def test_a_wire_port_gives_what_exchange_gives(new_bank: NewBank) -> None:
+def test_an_answer_is_given_at_once_and_only_once(new_bank: NewBank) -> None:
     ask, pdu = hexed("01 03 00 05 00 01"), bytes.fromhex("03 02 00 05")
-    ports: list[tuple[SlavePort, bytes, bytes]] = [
+    ports: list[tuple[Port, bytes, bytes]] = [
         (RtuSlavePort({1: new_bank()}), ask, hexed("01 03 02 00 05")),
         (TcpSlavePort({1: new_bank()}), mbap.encode_frame(1, 1, ask[1:-2]), mbap.encode_frame(1, 1, pdu)),
     ]
     for port, asked, told in ports:
-        port.receive(asked[:3], 10)
+        assert port.exchange(asked[:3], 10) == b""
         assert port.to_send(10) == []
-        port.receive(asked[3:], 20)
-        port.receive(asked, 30)
-        assert port.to_send(40) == [(20, told), (30, told)]
+        assert port.exchange(asked[3:], 20) == told
+        assert port.exchange(asked, 30) == told
         assert port.to_send(40) == []
         assert port.deadline() is None
+        port.close()
 
 
 def test_no_rubbish_breaks_a_line(bank: Any) -> None:
-    ports: list[SlavePort] = [RtuSlavePort({1: bank}), TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(38400))))]
+    ports: list[Port] = [RtuSlavePort({1: bank}), TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(38400))))]
     for port in ports:
         assert port.exchange(b"GET / HTTP/1.1\r\n", 0) == b""
         assert port.broken is None
@@ -389,11 +390,9 @@ def test_after_anything_and_a_gap_the_port_is_in_step_again(new_bank: NewBank, s
         deadline = port.deadline()
         if deadline is not None and deadline <= now:
             port.to_send(deadline)
-        port.receive(data, now)
+        assert port.exchange(data, now)[:1] in (b"", b"\1")
         received += data
-        for moment, responses in port.to_send(now):
-            assert moment == now
-            assert responses[0] == 1
+        assert port.to_send(now) == []
     for _, pdu in bank.executed:
         # Nothing is executed that was not received behind a unit and before the right CRC.
         assert any(with_crc(bytes((unit,)) + pdu) in received for unit in (0, 1))

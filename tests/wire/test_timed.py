@@ -70,7 +70,7 @@ def test_mic_32_exchange_returns_what_has_left_the_wire(bank: Any) -> None:
 @pytest.mark.parametrize(("baud", "request_ns", "response_ns"), [(9600, 8_333_334, 7_291_667), (115200, 694_445, 607_639)])
 def test_mic_32_the_baud_rate_counts(bank: Any, baud: int, request_ns: int, response_ns: int) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(baud), turnaround_ns=5)))
-    port.receive(READ, 0)
+    port.exchange(READ, 0)
     assert run(port, 10**9) == [(request_ns + 5 + response_ns, TOLD)]
 
 
@@ -79,7 +79,7 @@ def test_mic_32_at_most_100_requests_a_second(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(115200))))
     now = 0
     for _ in range(100):
-        port.receive(READ, now)
+        port.exchange(READ, now)
         ((now, _),) = run(port, now + 20_000_000)
     moments = [moment for moment, _ in bank.executed]
     assert {b - a for a, b in pairwise(moments)} == {FRAME_INTERVAL_NS}
@@ -89,7 +89,7 @@ def test_mic_32_at_most_100_requests_a_second(bank: Any) -> None:
 def test_mic_32_what_arrives_while_a_request_is_served_is_lost(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(115200))))
     writes = [with_crc(bytes((1, 6, 0, 0, 0, n))) for n in range(40)]
-    port.receive(b"".join(writes), 0)
+    port.exchange(b"".join(writes), 0)
     out = run(port, 10**9)
     # 694 us a frame: number 0 has come at 0.694 ms and its response has left at 0.694 + 0.75 + 0.694 = 2.139 ms. The first to
     # begin after that is number 4, at 2.778 ms; it is executed 10 ms after number 0, and its response has left at 12.139 ms.
@@ -101,12 +101,12 @@ def test_mic_32_what_arrives_while_a_request_is_served_is_lost(bank: Any) -> Non
 @pytest.mark.parametrize(("pause", "executed"), [(0, 2), (-1, 1)])
 def test_mic_32_a_request_that_began_before_the_response_had_left_is_lost(bank: Any, pause: int, executed: int) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
-    port.receive(READ, 0)
+    port.exchange(READ, 0)
     sent = READ_NS + TURN + TOLD_NS
     run(port, sent + pause - 1)
-    port.receive(READ[:1], sent + pause)
+    port.exchange(READ[:1], sent + pause)
     run(port, sent + 1_000_000)
-    port.receive(READ[1:], sent + 1_000_000)
+    port.exchange(READ[1:], sent + 1_000_000)
     run(port, 10**9)
     assert (len(bank.executed), port.dropped) == (executed, 2 - executed)
 
@@ -115,17 +115,17 @@ def test_mic_32_all_ports_of_a_controller_together(bank: Any, new_bank: NewBank)
     other = new_bank()
     units = TimedUnits({1: bank, 2: other}, TIMING)
     first, second, third = (TimedRtuSlavePort(units) for _ in range(3))
-    first.receive(READ, 0)
+    first.exchange(READ, 0)
     run(first, READ_NS)
-    second.receive(READ, READ_NS)  # while the response of the first is on its way
-    third.receive(with_crc(bytes.fromhex("02 03 00 05 00 01")), READ_NS)
+    second.exchange(READ, READ_NS)  # while the response of the first is on its way
+    third.exchange(with_crc(bytes.fromhex("02 03 00 05 00 01")), READ_NS)
     run(first, 10**9)
     run(second, 10**9)
     run(third, 10**9)
     assert (len(bank.executed), len(other.executed)) == (1, 1)
     assert (first.dropped, second.dropped, third.dropped) == (0, 1, 0)
     later = READ_NS + TURN + TOLD_NS
-    second.receive(READ, later)
+    second.exchange(READ, later)
     run(second, 10**9)
     assert [moment for moment, _ in bank.executed] == [READ_NS, READ_NS + FRAME_INTERVAL_NS]
 
@@ -133,48 +133,48 @@ def test_mic_32_all_ports_of_a_controller_together(bank: Any, new_bank: NewBank)
 def test_mic_32_a_port_that_goes_away_with_a_request_leaves_the_controller_free(bank: Any) -> None:
     units = TimedUnits({1: bank}, TIMING)
     gone, port = TimedRtuSlavePort(units), TimedRtuSlavePort(units)
-    gone.receive(READ, 0)
+    gone.exchange(READ, 0)
     gone.to_send(READ_NS)
-    gone.receive(READ, 10_000_000)
+    gone.exchange(READ, 10_000_000)
     gone.deadline()
     del gone
-    port.receive(READ, 200_000_000)
+    port.exchange(READ, 200_000_000)
     assert len(run(port, 10**9)) == 1
 
 
 def test_mic_32_nothing_happens_before_it_could_be_known(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({0x41: bank}, TIMING))
     # Could be seven bytes of a request to unit 3; the request inside ends after six, 1.56 ms.
-    port.receive(bytes.fromhex("03 05") + with_crc(bytes.fromhex("41 07")) + b"\xff", 0)
-    port.receive(b"\xff", 1_700_000)
+    port.exchange(bytes.fromhex("03 05") + with_crc(bytes.fromhex("41 07")) + b"\xff", 0)
+    port.exchange(b"\xff", 1_700_000)
     assert run(port, 10**9) == [(1_700_000 + TURN + LINE.duration(5), with_crc(bytes.fromhex("41 87 01")))]
 
 
 def test_what_is_due_happens_before_what_comes(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
-    port.receive(READ, 0)
-    port.receive(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
+    port.exchange(READ, 0)
+    port.exchange(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
     assert bank.executed == [(READ_NS, READ[1:-2])]
 
 
 def test_mic_32_a_long_response_keeps_the_device_busy(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(9600))))
     ask = with_crc(bytes.fromhex("01 03 00 00 00 7D"))
-    port.receive(ask, 0)
+    port.exchange(ask, 0)
     ((sent, whole),) = run(port, 10**9)
     assert sent == 8_333_334 + TURN + 265_625_000
     assert len(whole) == 255
-    port.receive(READ, sent - 1)
+    port.exchange(READ, sent - 1)
     assert run(port, 10**9) == []
-    port.receive(READ, sent + 10_000_000)
+    port.exchange(READ, sent + 10_000_000)
     assert run(port, 10**9) == [(sent + 10_000_000 + 8_333_334 + TURN + 7_291_667, TOLD)]
 
 
 def test_mic_32_characters_wait_for_the_line(bank: Any) -> None:
     whole, pieces = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING)), TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
-    whole.receive(READ, 0)
-    pieces.receive(READ[:3], 0)
-    pieces.receive(READ[3:], 10)
+    whole.exchange(READ, 0)
+    pieces.exchange(READ[:3], 0)
+    pieces.exchange(READ[3:], 10)
     assert whole.deadline() == pieces.deadline() == READ_NS
     assert run(whole, 10**9) == run(pieces, 10**9)
 
@@ -182,7 +182,7 @@ def test_mic_32_characters_wait_for_the_line(bank: Any) -> None:
 def test_mic_32_traffic_of_others_takes_the_line_and_no_slot(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     foreign = with_crc(bytes.fromhex("02 03 00 00 00 01")) + with_crc(bytes.fromhex("02 03 02 12 34"))
-    port.receive(foreign + READ, 0)
+    port.exchange(foreign + READ, 0)
     arrived = LINE.duration(23)
     assert run(port, 10**9) == [(arrived + TURN + TOLD_NS, TOLD)]
     assert bank.executed == [(arrived, READ[1:-2])]
@@ -192,14 +192,14 @@ def test_mic_32_a_broadcast_is_executed_by_each_unit_that_is_free_and_not_answer
     other = new_bank()
     units = TimedUnits({1: bank, 2: other}, TIMING)
     port, elsewhere = TimedRtuSlavePort(units), TimedRtuSlavePort(units)
-    elsewhere.receive(READ, 0)
+    elsewhere.exchange(READ, 0)
     run(elsewhere, READ_NS)
-    port.receive(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
+    port.exchange(with_crc(bytes.fromhex("00 06 00 05 00 63")), READ_NS)
     assert run(port, 10**9) == []
     assert [pdu[0] for _, pdu in bank.executed] == [3]
     assert other.executed == [(2 * READ_NS, bytes.fromhex("06 00 05 00 63"))]
     assert port.dropped == 1
-    port.receive(with_crc(bytes.fromhex("00 03 00 05 00 01")), 10**9)  # reads are ignored
+    port.exchange(with_crc(bytes.fromhex("00 03 00 05 00 01")), 10**9)  # reads are ignored
     assert run(port, 2 * 10**9) == []
     assert (len(bank.executed), len(other.executed)) == (1, 1)
 
@@ -207,24 +207,24 @@ def test_mic_32_a_broadcast_is_executed_by_each_unit_that_is_free_and_not_answer
 def test_mic_32_a_flood_is_bounded_and_the_line_recovers(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     for now in range(0, 1000, 10):
-        port.receive(b"\xff\x01\x41" * 10_000, now)
+        port.exchange(b"\xff\x01\x41" * 10_000, now)
     assert port.overrun == 3_000_000 - LINE_CHARACTERS
     assert port.deadline() is not None
     run(port, 10**12)
     free = LINE.duration(LINE_CHARACTERS) + GAP
-    port.receive(READ, free)
+    port.exchange(READ, free)
     assert run(port, 10**12) == [(free + READ_NS + TURN + TOLD_NS, TOLD)]
     assert port.rubbish == LINE_CHARACTERS
 
 
 def test_mic_32_a_full_line_takes_nothing(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(SerialLine(115200))))
-    port.receive(bytes(4001), 0)
-    port.receive(
+    port.exchange(bytes(4001), 0)
+    port.exchange(
         bytes(96), 86_805
     )  # the first character has ended; by rounding 4097 are waiting now, one more than there is room
     assert port.overrun == 0
-    port.receive(READ, 86_805)
+    port.exchange(READ, 86_805)
     assert port.overrun == 8
     assert run(port, 10**12) == []
 
@@ -235,27 +235,27 @@ def test_mic_15_a_pause_inside_a_frame_is_reported_and_with_strict_timing_drops_
         port = TimedRtuSlavePort(
             TimedUnits({1: bank}, LineTiming(LINE, strict=strict)), on_pause=lambda unit, pause: reported.append((unit, pause))
         )
-        port.receive(READ[:5], 0)
+        port.exchange(READ[:5], 0)
         run(port, 3_000_000)
-        port.receive(READ[5:], 3_000_000)
+        port.exchange(READ[5:], 3_000_000)
         assert len(run(port, 10**9)) == answers
-        port.receive(READ, 10**9)
+        port.exchange(READ, 10**9)
         assert len(run(port, 2 * 10**9)) == 1
     assert reported == [(1, 3_000_000 - LINE.duration(5))]
 
 
 def test_mic_15_characters_that_follow_on_the_line_are_no_pause(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(LINE, strict=True)))
-    port.receive(READ[:5], 0)
+    port.exchange(READ[:5], 0)
     run(port, 1_900_000)
-    port.receive(READ[5:], 1_900_000)  # the first five take 1.3 ms
+    port.exchange(READ[5:], 1_900_000)  # the first five take 1.3 ms
     assert len(run(port, 10**9)) == 1
 
 
 def test_mic_15_frames_of_unknown_length_come_after_the_gap(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING))
     unknown = with_crc(bytes.fromhex("01 41 01 02 03"))
-    port.receive(unknown, 0)
+    port.exchange(unknown, 0)
     cut = LINE.duration(7) + GAP
     assert port.deadline() == cut
     assert run(port, 10**9) == [(cut + TURN + LINE.duration(5), with_crc(bytes.fromhex("01 C1 01")))]
@@ -265,7 +265,7 @@ def test_an_observer_sees_frames_at_their_wire_time(bank: Any) -> None:
     seen: list[tuple[int, Direction, bytes]] = []
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     foreign = with_crc(bytes.fromhex("02 06 00 00 00 01"))
-    port.receive(READ + foreign, 0)
+    port.exchange(READ + foreign, 0)
     run(port, 10**9)
     assert seen == [
         (READ_NS, Direction.IN, READ),
@@ -290,7 +290,7 @@ def test_looking_in_between_changes_nothing(new_bank: NewBank, sent: list[tuple[
                 out += port.to_send(now + pause * part // (looks + 1))
             now += pause
             out += run(port, now)
-            port.receive(data, now)
+            port.exchange(data, now)
         out += run(port, now + 10**9)
         results.append((out, bank.executed, port.dropped))
     assert results[0] == results[1]

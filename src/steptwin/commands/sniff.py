@@ -16,13 +16,12 @@ from steptwin.drivers.place import Place
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
-from steptwin.live.links import Port
 from steptwin.live.pty import PtyLink
 from steptwin.live.tcp import Clients, TcpLink
 from steptwin.m1486.receiver import CR
 from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
 from steptwin.mic488.registers import register_map
 from steptwin.wire.slave import Direction
 from steptwin.words.characters import REPORTS, CharacterLog, LineSplitter

@@ -7,17 +7,8 @@ from typing import Protocol
 
 from steptwin.live.output import Output
 from steptwin.live.server import EndPoint, Server
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import SECOND, Event
 from steptwin.words.frames import FrameLine
-
-
-class Happening(Protocol):
-    """An event of a machine."""
-
-    @property
-    def time(self) -> Nanos: ...
-    @property
-    def text(self) -> str: ...
 
 
 class FrameSource(Protocol):
@@ -33,11 +24,11 @@ class ServedLine(Protocol):
     def title(self) -> str: ...
     @property
     def frames(self) -> FrameSource: ...
-    def watch_events(self, sink: Callable[[int, Happening], None]) -> None:
+    def watch_events(self, sink: Callable[[int, Event], None]) -> None:
         """Tell ``sink`` unit and event."""
         ...
 
-    def told(self, unit: int, event: Happening) -> str:
+    def told(self, unit: int, event: Event) -> str:
         """An event in words; the unit is named where there are several."""
         ...
 
@@ -80,5 +71,5 @@ class Lines:
             line.frames.sinks.append(lambda frame: output.line(str(frame)))
         await server.until_ended()
 
-    def _event(self, unit: int, event: Happening) -> None:
+    def _event(self, unit: int, event: Event) -> None:
         self._output.line(f"{event.time / SECOND:12.6f} s  {self._line.told(unit, event)}")

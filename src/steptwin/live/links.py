@@ -4,45 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 from steptwin.live.cell import Cell
-from steptwin.machine import Nanos
+from steptwin.machine import Nanos, Port, TalkingPort
 
 SLICE_BYTES = 2048
 """A client that sends more at once is served this much at a time, so that it cannot keep others waiting."""
-
-
-class Port(Protocol):
-    """What a link needs of a wire port."""
-
-    @property
-    def broken(self) -> str | None:
-        """Why the connection has to be closed, or None."""
-        ...
-
-    def exchange(self, data: bytes, now: Nanos) -> bytes: ...
-    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
-    def deadline(self) -> Nanos | None: ...
-
-
-@runtime_checkable
-class TalkingPort(Port, Protocol):
-    """A port that has something to send without having been asked; it calls ``on_output`` then."""
-
-    on_output: Callable[[], None] | None
-
-    def close(self) -> None:
-        """Nobody is there any more."""
-        ...
-
-
-@runtime_checkable
-class ClosingPort(Port, Protocol):
-    """A port that has to know when the other end has gone."""
-
-    def close(self) -> None: ...
 
 
 class Writer(Protocol):
@@ -105,8 +73,7 @@ class Feed:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if isinstance(self._port, ClosingPort):
-            self._port.close()
+        self._port.close()
 
 
 class Link(Protocol):

@@ -13,7 +13,8 @@ from pathlib import Path
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
 from steptwin.live.cell import Cell
-from steptwin.live.links import SLICE_BYTES, Feed, Port, where
+from steptwin.live.links import SLICE_BYTES, Feed, where
+from steptwin.machine import Port
 
 PTS = "/dev/pts/"
 

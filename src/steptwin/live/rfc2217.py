@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from steptwin.live.links import Port, TalkingPort
-from steptwin.machine import Nanos
+from steptwin.machine import Nanos, Port, TalkingPort
 
 IAC, DONT, DO, WONT, WILL, SB, SE = 255, 254, 253, 252, 251, 250, 240
 BINARY, SUPPRESS_GO_AHEAD, COM_PORT = 0, 3, 44
@@ -222,6 +221,9 @@ class Rfc2217Port:
     def deadline(self) -> Nanos | None:
         return self._port.deadline()
 
+    def close(self) -> None:
+        self._port.close()
+
 
 class TalkingRfc2217Port(Rfc2217Port):
     """The same of a port that speaks unasked."""
@@ -237,9 +239,6 @@ class TalkingRfc2217Port(Rfc2217Port):
     @on_output.setter
     def on_output(self, told: Callable[[], None] | None) -> None:
         self._talking.on_output = told
-
-    def close(self) -> None:
-        self._talking.close()
 
 
 def over_network(port: Port, line: TwinLine) -> Port:

@@ -10,7 +10,8 @@ import serialx
 
 from steptwin.errors import LineFailure
 from steptwin.live.cell import Cell
-from steptwin.live.links import Feed, Port, where
+from steptwin.live.links import Feed, where
+from steptwin.machine import Port
 
 RETRY_S = 1.0
 """How often a device that has disappeared is looked for."""

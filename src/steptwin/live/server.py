@@ -18,10 +18,10 @@ from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.inputfiles import read_bytes
 from steptwin.live.cell import Cell
 from steptwin.live.control import END_POINTS, ControlEndpoint, Handler
-from steptwin.live.links import Link, Port, where
+from steptwin.live.links import Link, where
 from steptwin.live.pty import PtyLink
 from steptwin.live.tcp import Clients, TcpLink
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import SECOND, Nanos, Port
 from steptwin.world.addresses import Address
 
 MOST_FILES = 65536

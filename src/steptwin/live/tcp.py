@@ -13,7 +13,8 @@ from weakref import WeakSet
 from steptwin.errors import LineFailure
 from steptwin.live.cell import Cell
 from steptwin.live.descriptors import descriptors
-from steptwin.live.links import SLICE_BYTES, Feed, Port, where
+from steptwin.live.links import SLICE_BYTES, Feed, where
+from steptwin.machine import Port
 from steptwin.world.addresses import Address
 
 BACKLOG = 1024

@@ -5,7 +5,7 @@ How a shell builds a line::
     chips = [M1486(variant("B"), address=0, interface=STEP_DIRECTION, baud=4800), M1486(variant("B"), address=7)]
     chain = SerialChain(chips)
     port = chain.port()  # one for each program that is connected
-    port.receive(b"x7\\rf12800\\rr\\r", now)
+    port.exchange(b"x7\\rf12800\\rr\\r", now)
     port.to_send(later)  # [(moment, characters)], the same for every port
 
 Chips are machines of their own: a shell adds each to its `steptwin.world.kernel.Kernel` and advances that before it hands
@@ -129,12 +129,9 @@ class LinePort:
         self.on_output: Callable[[], None] | None = None
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        """`receive`, then everything `to_send` has."""
-        self.receive(data, now)
-        return b"".join(data for _, data in self.to_send(now))
-
-    def receive(self, data: bytes, now: Nanos) -> None:
+        """The chips hear ``data``; everything `to_send` has then."""
         self._chain.receive(data, now)
+        return b"".join(data for _, data in self.to_send(now))
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         """What the chips have sent by ``now`` and this port has not fetched, each with the moment of its end."""

@@ -54,7 +54,9 @@ class VisionReceiver(Stateful):
 
 
 class Com1Port(Stateful):
-    """COM1 of one controller as a `steptwin.machine.WirePort`: Modbus RTU through ``modbus``, if it is given, and records."""
+    """COM1 of one controller as a `steptwin.machine.Port`: Modbus RTU through ``modbus``, if it is given, and records."""
+
+    broken = None
 
     __slots__ = ("_device", "_frames", "_receiver", "modbus")
     FIXED = frozenset({"_device", "_frames", "modbus"})
@@ -75,11 +77,17 @@ class Com1Port(Stateful):
 
             modbus.on_frame = note
 
-    def receive(self, data: bytes, now: Nanos) -> None:
+    @property
+    def rubbish(self) -> int:
+        """Bytes that belonged to no frame; those of records are among them."""
+        return 0 if self.modbus is None else self.modbus.rubbish
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        answer = b""
         if self.modbus is not None:
             # With line timing frames of earlier pieces are observed while nothing arrives.
             self._frames.clear()
-            self.modbus.receive(data, now)
+            answer = self.modbus.exchange(data, now)
             for frame in self._frames:
                 if frame in data:
                     data = data.replace(frame, b"\n", 1)
@@ -90,6 +98,7 @@ class Com1Port(Stateful):
             self._frames.clear()
         for record in self._receiver.feed(data):
             self._device.see(record, now)
+        return answer
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         if self.modbus is None:
@@ -103,3 +112,7 @@ class Com1Port(Stateful):
 
     def deadline(self) -> Nanos | None:
         return None if self.modbus is None else self.modbus.deadline()
+
+    def close(self) -> None:
+        if self.modbus is not None:
+            self.modbus.close()

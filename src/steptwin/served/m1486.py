@@ -15,14 +15,14 @@ from steptwin.errors import Misuse
 from steptwin.files.memory import StateDirectory
 from steptwin.live.cell import Cell
 from steptwin.live.control import changes
-from steptwin.live.lines import Happening
-from steptwin.live.links import Feed, Port
-from steptwin.m1486.chip import EVENTS_KEPT, M1486, OPEN_ADDRESS, Event
+from steptwin.live.links import Feed
+from steptwin.m1486.chip import EVENTS_KEPT, M1486, OPEN_ADDRESS
+from steptwin.m1486.chip import Event as ChipEvent
 from steptwin.m1486.line import LinePort, SerialChain
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.pins import LINE_PINS, known_pin
 from steptwin.m1486.variants import DEFAULT, Store, Variant
-from steptwin.machine import Nanos
+from steptwin.machine import Event, Nanos, Port
 from steptwin.served.faults import FaultDesk
 from steptwin.words.characters import CharacterLog, LineSplitter
 from steptwin.words.m1486_state import state_of
@@ -57,8 +57,8 @@ class M1486Line:
         self.options = options
         self.variant = variant = options.variant
         self.frames = CharacterLog(variant)
-        self._sinks: list[Callable[[int, Event], None]] = []
-        self._untold: deque[tuple[int, Event]] = deque(maxlen=EVENTS_KEPT)
+        self._sinks: list[Callable[[int, ChipEvent], None]] = []
+        self._untold: deque[tuple[int, ChipEvent]] = deque(maxlen=EVENTS_KEPT)
         """What happened before there was a sink: a stored file runs as soon as there is power."""
         self.kernel = Kernel()
         self.chips = make_chips(options, state, image)
@@ -98,7 +98,7 @@ class M1486Line:
 
     # ------------------------------------------------------------------ events
 
-    def _happened(self, address: int, event: Event) -> None:
+    def _happened(self, address: int, event: ChipEvent) -> None:
         if event.code == "upload" and self.options.is_written_down:
             self.frames.upload(event)
         if not self._sinks:
@@ -106,14 +106,14 @@ class M1486Line:
         for sink in self._sinks:
             sink(address, event)
 
-    def watch_events(self, sink: Callable[[int, Event], None]) -> None:
+    def watch_events(self, sink: Callable[[int, ChipEvent], None]) -> None:
         """Tell ``sink`` address and event; the first one also what happened before."""
         self._sinks.append(sink)
         for address, event in self._untold:
             sink(address, event)
         self._untold.clear()
 
-    def told(self, unit: int, event: Happening) -> str:
+    def told(self, unit: int, event: Event) -> str:
         """An event in words; the chip is named where there are several."""
         return f"chip {chip_name(self.chips[unit].address)}: {event.text}" if len(self.chips) > 1 else event.text
 

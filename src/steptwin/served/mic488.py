@@ -15,13 +15,11 @@ from steptwin.files.memory import StateDirectory
 from steptwin.files.programbanks import Banks
 from steptwin.live.cell import Cell
 from steptwin.live.control import axis_number, changes, number
-from steptwin.live.lines import Happening
-from steptwin.live.links import Port
 from steptwin.live.sharedreads import share_reads
-from steptwin.live.vision import Com1Link, uses_vision
-from steptwin.machine import MotionController, Nanos
+from steptwin.live.vision import uses_vision
+from steptwin.machine import Event, MotionController, Nanos, Port
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Event, Mic488, check_pin, check_turn, pause_observer
+from steptwin.mic488.device import Mic488, check_pin, check_turn, pause_observer
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.vision import Com1Port
 from steptwin.served.demo import place_switches
@@ -130,7 +128,7 @@ class Mic488Line:
         else:
             line = None if baud is None else SerialLine(baud)
             port = RtuSlavePort(self._served, gap_ns=gap_ns, line=line, on_frame=observer, on_pause=self._on_pause)
-        shared = Com1Link(Com1Port(self._only_device(), port)) if self._hears_records else port
+        shared = Com1Port(self._only_device(), port) if self._hears_records else port
         watched = WatchedRtuPort(shared, self.frames, link) if self.options.frames else shared
         return FaultyPort(watched, link, self.faults.faults, Line.RTU, framed=port, units=tuple(self.devices))
 
@@ -140,7 +138,7 @@ class Mic488Line:
 
     def vision_port(self) -> Port:
         """A port for a vision system on a connection of its own."""
-        return Com1Link(Com1Port(self._only_device()))
+        return Com1Port(self._only_device())
 
     def _only_device(self) -> Mic488:
         if len(self.devices) > 1:
@@ -190,7 +188,7 @@ class Mic488Line:
         for unit, device in self.devices.items():
             device.on_event = partial(sink, unit)
 
-    def told(self, unit: int, event: Happening) -> str:
+    def told(self, unit: int, event: Event) -> str:
         """An event in words; the unit is named where there are several."""
         return f"unit {unit}: {event.text}" if len(self.devices) > 1 else event.text
 

@@ -14,10 +14,10 @@ from rich.live import Live
 from rich.text import Text
 
 from steptwin.live.cell import Cell
-from steptwin.live.lines import Happening, ServedLine, banner
+from steptwin.live.lines import ServedLine, banner
 from steptwin.live.output import Output
 from steptwin.live.server import Server
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import SECOND, Event, Nanos
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
@@ -65,7 +65,7 @@ class LiveView(ABC):
     def notice(self, text: str) -> None:
         self._tell(self._cell.clock.now(), text)
 
-    def _event(self, unit: int, event: Happening) -> None:
+    def _event(self, unit: int, event: Event) -> None:
         self._tell(event.time, self._line.told(unit, event))
 
     def _tell(self, time: Nanos, text: str) -> None:

@@ -14,11 +14,10 @@ from steptwin.drivers import m1486 as host
 from steptwin.drivers.address import parse_device
 from steptwin.drivers.place import Channel, parse_place
 from steptwin.errors import Misuse
-from steptwin.live.links import Port
 from steptwin.m1486.chip import M1486, OPEN_ADDRESS
 from steptwin.m1486.lines import interface
 from steptwin.m1486.variants import DEFAULT, variant
-from steptwin.machine import Nanos
+from steptwin.machine import Nanos, Port
 from steptwin.served.m1486 import ChainOptions, M1486Line, chip_name, pin_change
 from steptwin.served.serve_m1486 import program_image
 from steptwin.testing.realtime import RealTime, WallTime

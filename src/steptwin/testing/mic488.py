@@ -15,8 +15,7 @@ from steptwin.drivers import Mic488, load_config
 from steptwin.drivers.address import parse_device
 from steptwin.errors import Misuse
 from steptwin.files.programbanks import Banks, ProgramErrors, read_banks
-from steptwin.live.links import Port
-from steptwin.machine import Nanos
+from steptwin.machine import Nanos, Port
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488 as Twin
 from steptwin.mic488.device import check_pin

@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.cell import Advancing, Cell
 from steptwin.live.clock import Clock
-from steptwin.live.links import Link, Port
+from steptwin.live.links import Link
 from steptwin.live.pty import PtyLink
 from steptwin.live.tcp import Clients, TcpLink
-from steptwin.machine import SECOND, Nanos
+from steptwin.machine import SECOND, Nanos, Port
 from steptwin.world.addresses import LOOPBACK, Address
 
 T = TypeVar("T")

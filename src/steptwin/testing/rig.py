@@ -11,8 +11,8 @@ from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeAlias, Type
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.live.lines import Happening, ServedLine
-from steptwin.machine import SECOND, Nanos
+from steptwin.live.lines import ServedLine
+from steptwin.machine import SECOND, Event, Nanos
 from steptwin.served.faults import FaultDesk
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.virtualtime import VirtualTime
@@ -143,7 +143,7 @@ class LineRig(Rig, Generic[L]):
             line.faults.tell(self._told.append)
             line.watch_events(self._happened)
 
-    def _happened(self, unit: int, event: Happening) -> None:
+    def _happened(self, unit: int, event: Event) -> None:
         happened = Happened(event.time / SECOND, getattr(event, "code", ""), event.text)
         self._events.append(happened)
         self._told.append(happened)

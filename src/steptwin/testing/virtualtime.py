@@ -15,8 +15,7 @@ from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
 from steptwin.drivers.place import Channel, Place
 from steptwin.drivers.threads import ThreadLine
 from steptwin.live.cell import Advancing
-from steptwin.live.links import Port, TalkingPort
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
 from steptwin.mic488.config import ControllerConfig
 
 T = TypeVar("T")
@@ -126,8 +125,7 @@ class MemoryChannel:
 
     def close(self) -> None:
         self._closed = True
-        if isinstance(self._port, TalkingPort):
-            self._port.close()
+        self._port.close()
 
 
 def joined_driver(

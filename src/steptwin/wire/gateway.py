@@ -17,7 +17,7 @@ from steptwin.state import Plain, Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, exception_pdu
-from steptwin.wire.slave import Direction, FrameObserver, tcp_response
+from steptwin.wire.slave import Direction, FrameObserver, SlavePort, tcp_response
 from steptwin.wire.timed import TimedUnits
 
 QUEUE_REQUESTS = 16
@@ -102,17 +102,17 @@ def _turn(port: GatewayPort) -> tuple[Nanos, int]:
     return port.waiting[0][:2]
 
 
-class GatewayPort(Stateful):
+class GatewayPort(SlavePort):
     """Base of the ports of a `Gateway`; responses leave when they have come over the line. Call `to_send` at every `deadline`."""
 
-    __slots__ = ("__weakref__", "_gateway", "_responses", "on_frame", "waiting")
-    FIXED = frozenset({"__weakref__", "_gateway", "on_frame"})
+    __slots__ = ("__weakref__", "_gateway", "_responses", "waiting")
+    FIXED = frozenset({"__weakref__", "_gateway"}) | SlavePort.FIXED
 
     def __init__(self, gateway: Gateway, *, on_frame: FrameObserver | None = None) -> None:
+        super().__init__(on_frame)
         self._gateway = gateway
         self._responses: list[tuple[Nanos, bytes]] = []
         self.waiting: deque[_Waiting] = deque()
-        self.on_frame = on_frame
 
     def _requests(self, data: bytes, now: Nanos) -> list[bytes]:
         """The frames completed by ``data``."""
@@ -143,13 +143,10 @@ class GatewayPort(Stateful):
         self._gateway.requeue(self)
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        self.receive(data, now)
-        return b"".join([response for _, response in self.to_send(now)])
-
-    def receive(self, data: bytes, now: Nanos) -> None:
         self._gateway.run(now)
         for raw in self._requests(data, now):
             self._ask(raw, now)
+        return b"".join([response for _, response in self.to_send(now)])
 
     def on_line(self, raw: bytes, moment: Nanos) -> None:
         """The request ``raw`` is executed at ``moment``."""

@@ -1,7 +1,6 @@
 """Devices behind a Modbus line: the frames addressed to them are executed and answered.
 
-A port serves one line or one connection. `exchange` is the short way for a shell that has bytes and wants to send what is
-to be answered now; `receive` and `to_send` are the same as a `steptwin.machine.WirePort`.
+A port serves one line or one connection, as a `steptwin.machine.Port`.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos, WirePort
+from steptwin.machine import SECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import crc16, with_crc
@@ -46,19 +45,17 @@ PAUSE_REPORT_NS: Nanos = SECOND
 """One port reports pauses at most this often."""
 
 
-class SlavePort(WirePort, Protocol):
-    """A port with devices behind it. A shell calls `to_send` whenever `deadline` has come."""
+class SlavePort(Stateful):
+    """Base of the ports with devices behind them."""
 
-    on_frame: FrameObserver | None
+    __slots__ = ("on_frame",)
+    FIXED = frozenset({"on_frame"})
 
-    @property
-    def broken(self) -> str | None:
-        """Why the connection has to be closed, or None."""
-        ...
+    def __init__(self, on_frame: FrameObserver | None) -> None:
+        self.on_frame = on_frame
 
-    def exchange(self, data: bytes, now: Nanos) -> bytes:
-        """Receive ``data`` and return what is to be sent at ``now``, response after response."""
-        ...
+    def close(self) -> None:
+        """Nothing is kept that would have to be given up."""
 
 
 def check_units(devices: Mapping[int, Device]) -> None:
@@ -117,7 +114,7 @@ class PauseReports(Stateful):
             self._observer(frame.unit, frame.pause)
 
 
-class RtuSlavePort(Stateful):
+class RtuSlavePort(SlavePort):
     """One RTU line without the time a wire takes (`steptwin.wire.timed` has it).
 
     ``devices`` is read once. ``gap_ns`` is the silence after which rubbish is given up (MIC-15). ``line`` gives the time that the
@@ -127,8 +124,8 @@ class RtuSlavePort(Stateful):
     broken = None
     """A line cannot be broken by what is on it; a connection can."""
 
-    __slots__ = ("_devices", "_framer", "_held", "_line", "_out", "_pauses", "on_frame")
-    FIXED = frozenset({"_devices", "_held", "_line", "on_frame"})
+    __slots__ = ("_devices", "_framer", "_held", "_line", "_pauses")
+    FIXED = frozenset({"_devices", "_held", "_line"}) | SlavePort.FIXED
 
     def __init__(
         self,
@@ -139,14 +136,13 @@ class RtuSlavePort(Stateful):
         on_frame: FrameObserver | None = None,
         on_pause: PauseObserver | None = None,
     ) -> None:
+        super().__init__(on_frame)
         check_units(devices)
         self._devices = dict(devices)
         self._framer = rtu.RtuFramer(self._devices, gap_ns)
         self._held = self._framer.held
         self._line = line
-        self._out: list[tuple[Nanos, bytes]] = []
         self._pauses = PauseReports(on_pause)
-        self.on_frame = on_frame
 
     @property
     def rubbish(self) -> int:
@@ -184,24 +180,15 @@ class RtuSlavePort(Stateful):
             responses.append(response)
         return b"".join(responses)
 
-    def receive(self, data: bytes, now: Nanos) -> None:
-        response = self.exchange(data, now)
-        if response:
-            self._out.append((now, response))
-
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        if self._held:
-            response = self._execute(self._framer.expire(now), now)
-            if response:
-                self._out.append((now, response))
-        out, self._out = self._out, []
-        return out
+        response = self._execute(self._framer.expire(now), now) if self._held else b""
+        return [(now, response)] if response else []
 
     def deadline(self) -> Nanos | None:
         return self._framer.deadline()
 
 
-class TcpSlavePort(Stateful):
+class TcpSlavePort(SlavePort):
     """One Modbus TCP connection. ``devices`` is read once.
 
     MIC-23: a single device is addressed by 0 and 255 too. With several, 0 is a broadcast, which is not answered (MIC-2). Any
@@ -209,18 +196,17 @@ class TcpSlavePort(Stateful):
     and closes the connection.
     """
 
-    __slots__ = ("_devices", "_framer", "_out", "on_frame")
-    FIXED = frozenset({"_devices", "on_frame"})
+    __slots__ = ("_devices", "_framer")
+    FIXED = frozenset({"_devices"}) | SlavePort.FIXED
 
     def __init__(self, devices: Mapping[int, Device], *, on_frame: FrameObserver | None = None) -> None:
+        super().__init__(on_frame)
         check_units(devices)
         self._devices = dict(devices)
         if len(devices) == 1:
             (device,) = devices.values()
             self._devices[0] = self._devices[255] = device
         self._framer = mbap.TcpFramer()
-        self._out: list[tuple[Nanos, bytes]] = []
-        self.on_frame = on_frame
 
     @property
     def broken(self) -> str | None:
@@ -254,14 +240,8 @@ class TcpSlavePort(Stateful):
                 self.on_frame(now, Direction.OUT, response)
         return response
 
-    def receive(self, data: bytes, now: Nanos) -> None:
-        response = self.exchange(data, now)
-        if response:
-            self._out.append((now, response))
-
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        out, self._out = self._out, []
-        return out
+        return []
 
     def deadline(self) -> Nanos | None:
         return None

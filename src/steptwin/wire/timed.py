@@ -18,7 +18,7 @@ from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import CharacterClock, SerialLine
 from steptwin.wire.pdu import REFUSED, WRITES
-from steptwin.wire.slave import Device, Direction, FrameObserver, PauseObserver, PauseReports, check_units
+from steptwin.wire.slave import Device, Direction, FrameObserver, PauseObserver, PauseReports, SlavePort, check_units
 
 # MIC-32: the highest rate the manual gives.
 FRAME_INTERVAL_NS: Nanos = 10 * MILLISECOND
@@ -87,7 +87,7 @@ class TimedUnits(Stateful):
         self._busy[unit] = sent
 
 
-class TimedRtuSlavePort(Stateful):
+class TimedRtuSlavePort(SlavePort):
     """As `steptwin.wire.slave.RtuSlavePort`, with line timing. Responses leave when their last character would have.
 
     Call `to_send` at every `deadline`: a request is executed at the moment of the call that finds it due. ``gap_ns`` is the
@@ -107,10 +107,9 @@ class TimedRtuSlavePort(Stateful):
         "_responses",
         "_units",
         "dropped",
-        "on_frame",
         "overrun",
     )
-    FIXED = frozenset({"_units", "on_frame"})
+    FIXED = frozenset({"_units"}) | SlavePort.FIXED
 
     def __init__(
         self,
@@ -120,6 +119,7 @@ class TimedRtuSlavePort(Stateful):
         on_frame: FrameObserver | None = None,
         on_pause: PauseObserver | None = None,
     ) -> None:
+        super().__init__(on_frame)
         self._units = units
         timing = units.timing
         if timing.strict:
@@ -136,7 +136,6 @@ class TimedRtuSlavePort(Stateful):
         """Requests lost because the controller was busy; a broadcast counts once for each."""
         self.overrun = 0
         """Characters that found no room on the line."""
-        self.on_frame = on_frame
 
     @property
     def rubbish(self) -> int:
@@ -144,10 +143,10 @@ class TimedRtuSlavePort(Stateful):
         return self._framer.rubbish
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        self.receive(data, now)
+        self._receive(data, now)
         return b"".join([response for _, response in self.to_send(now)])
 
-    def receive(self, data: bytes, now: Nanos) -> None:
+    def _receive(self, data: bytes, now: Nanos) -> None:
         self._run(now)
         clock = self._incoming
         room = max(0, LINE_CHARACTERS - clock.waiting(now))

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.describe import Scale, Wording
 from steptwin.mic488.device import Mic488
 from steptwin.mic488.registermap import DataType
+from steptwin.mic488.vision import Com1Port
 from steptwin.wire.rtu import BROADCAST
-from steptwin.wire.slave import Direction, FrameObserver
+from steptwin.wire.slave import Direction, FrameObserver, RtuSlavePort
+from steptwin.wire.timed import TimedRtuSlavePort
 
 ONE_DEVICE_UNITS = (0, 255)
 """MIC-23: on TCP these address the only device too."""
@@ -79,22 +81,12 @@ class FrameLog:
         return whose + wording.request(pdu)
 
 
-class RtuPort(Protocol):
-    """A port that counts what belongs to no frame."""
-
-    @property
-    def rubbish(self) -> int: ...
-    def exchange(self, data: bytes, now: Nanos) -> bytes: ...
-    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
-    def deadline(self) -> Nanos | None: ...
-
-
 class WatchedRtuPort:
     """An RTU port that reports rubbish too: a wrong CRC, another protocol, another baud rate look like that."""
 
     broken = None
 
-    def __init__(self, port: RtuPort, log: FrameLog, link: str) -> None:
+    def __init__(self, port: RtuSlavePort | TimedRtuSlavePort | Com1Port, log: FrameLog, link: str) -> None:
         self._port = port
         self._log = log
         self._link = link
@@ -112,6 +104,9 @@ class WatchedRtuPort:
 
     def deadline(self) -> Nanos | None:
         return self._port.deadline()
+
+    def close(self) -> None:
+        self._port.close()
 
     def _look(self, now: Nanos) -> None:
         rubbish = self._port.rubbish

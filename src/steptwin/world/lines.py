@@ -12,12 +12,12 @@ from typing import Any, ClassVar
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.line import SerialChain
-from steptwin.machine import Nanos
+from steptwin.machine import Nanos, Port, TalkingPort
 from steptwin.mic488.device import Mic488, pause_observer
 from steptwin.state import Plain, Stateful
 from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Device, Direction, RtuSlavePort, TcpSlavePort
+from steptwin.wire.slave import Device, Direction, RtuSlavePort, SlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
 from steptwin.world.faults import Line as FaultLine
@@ -80,13 +80,9 @@ class Line(Stateful):
 
     # ------------------------------------------------------------------ what kinds of lines have of their own
 
-    def _port(self, place: str, kind: str) -> Any:
-        """A port for one more program."""
+    def _port(self, place: str, kind: str) -> Port:
+        """A port for one more program. Its state is copied by `_port_state`."""
         raise NotImplementedError
-
-    def _framed(self, port: Any) -> Any:
-        """What tells of frames in a port of `_port`."""
-        return None
 
     @property
     def units(self) -> tuple[int, ...]:
@@ -103,7 +99,7 @@ class Line(Stateful):
         if kind not in self.kinds:
             raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
         port = self._port(place, kind)
-        if hasattr(port, "on_output"):
+        if isinstance(port, TalkingPort):
             faulty: FaultyPort = FaultyTalkingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
@@ -115,7 +111,7 @@ class Line(Stateful):
                 place,
                 self._faults,
                 self.fault_kinds[kind],
-                framed=self._framed(port),
+                framed=port if isinstance(port, SlavePort) else None,
                 units=self.units,
                 line_name=self.name,
             )
@@ -256,7 +252,7 @@ class ModbusLine(Line):
     def units(self) -> tuple[int, ...]:
         return tuple(self.devices)
 
-    def _port(self, place: str, kind: str) -> Any:
+    def _port(self, place: str, kind: str) -> Port:
         def tell(now: Nanos, direction: Direction, data: bytes) -> None:
             self._tell(now, place, direction, data)
 
@@ -273,9 +269,6 @@ class ModbusLine(Line):
         if place == SCRIPTS:
             return ScriptPort(gateway, on_frame=observe)
         return TimedRtuSlavePort(units, on_frame=observe, on_pause=on_pause)
-
-    def _framed(self, port: Any) -> Any:
-        return port
 
 
 class ChipLine(Line):
@@ -296,7 +289,7 @@ class ChipLine(Line):
     def units(self) -> tuple[int, ...]:
         return ()
 
-    def _port(self, place: str, kind: str) -> Any:
+    def _port(self, place: str, kind: str) -> Port:
         return self.chain.port()
 
     def exchange(self, place: str, found: Place, data: bytes, now: Nanos) -> bytes:

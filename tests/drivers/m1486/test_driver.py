@@ -382,7 +382,7 @@ def test_a_chip_that_has_no_room_refuses_and_the_command_is_named() -> None:
     wire = ChipWire("A")
     chip = chip_driver(wire)
     chip.move_by(5000.0)
-    wire._port.receive(b"f640\rf64\r", wire.now)
+    wire.chain.receive(b"f640\rf64\r", wire.now)
     wire.sleep(0.2)
     with pytest.raises(NoRoom, match=r"'the chip: u20' was refused: the input buffer has no room \(5EH\)"):
         chip.wait()

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.machine import Nanos, Port, TalkingPort
 from steptwin.state import Plain, Stateful
-from steptwin.wire.gateway import GatewayPort
-from steptwin.wire.slave import Direction, FrameObserver
+from steptwin.wire.slave import Direction, FrameObserver, SlavePort
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer
 from steptwin.world.faults.stream import spoil
@@ -17,40 +16,6 @@ from steptwin.world.faults.table import Layer, Line
 
 _ASKED = 64
 """More requests than this never wait for their answers (`steptwin.wire.gateway.QUEUE_REQUESTS`)."""
-
-
-class InnerPort(Protocol):
-    """What stands behind a line."""
-
-    @property
-    def broken(self) -> str | None: ...
-    def exchange(self, data: bytes, now: Nanos) -> bytes: ...
-    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
-    def deadline(self) -> Nanos | None: ...
-
-
-class InnerTalkingPort(InnerPort, Protocol):
-    """What sends without having been asked."""
-
-    @property
-    def on_output(self) -> Callable[[], None] | None: ...
-    @on_output.setter
-    def on_output(self, call: Callable[[], None] | None) -> None: ...
-    def close(self) -> None: ...
-
-
-class Exchanging(Protocol):
-    def __call__(self, data: bytes, now: Nanos) -> bytes: ...
-
-
-class Sending(Protocol):
-    def __call__(self, now: Nanos) -> list[tuple[Nanos, bytes]]: ...
-
-
-class FramedPort(Protocol):
-    """Something that tells of every frame."""
-
-    on_frame: FrameObserver | None
 
 
 class FaultyPort(Stateful):
@@ -100,18 +65,18 @@ class FaultyPort(Stateful):
         }
     )
 
-    exchange: Exchanging
-    to_send: Sending
+    exchange: Callable[[bytes, Nanos], bytes]
+    to_send: Callable[[Nanos], list[tuple[Nanos, bytes]]]
     deadline: Callable[[], Nanos | None]
 
     def __init__(
         self,
-        port: InnerPort,
+        port: Port,
         link: str,
         faults: Faults,
         line: Line,
         *,
-        framed: FramedPort | None = None,
+        framed: SlavePort | None = None,
         units: tuple[int, ...] = (),
         line_name: str = "",
     ) -> None:
@@ -137,17 +102,9 @@ class FaultyPort(Stateful):
     def broken(self) -> str | None:
         return self._inner.broken
 
-    def receive(self, data: bytes, now: Nanos) -> None:
-        """As `exchange`; what is to be answered waits for `to_send`."""
-        answer = self.exchange(data, now)
-        if answer:
-            self._leaving.append((now, answer))
-            self._be_faulty()
-
     def close(self) -> None:
         """The program is gone."""
-        if isinstance(self._inner, GatewayPort):
-            self._inner.close()
+        self._inner.close()
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
@@ -300,7 +257,7 @@ class FaultyTalkingPort(FaultyPort):
     FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_read", "_talking"}
 
     def __init__(
-        self, port: InnerTalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "", is_read: bool = True
+        self, port: TalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "", is_read: bool = True
     ) -> None:
         self._is_read = is_read
         self._talking = port
@@ -316,6 +273,3 @@ class FaultyTalkingPort(FaultyPort):
     @on_output.setter
     def on_output(self, hook: Callable[[], None] | None) -> None:
         self._talking.on_output = hook
-
-    def close(self) -> None:
-        self._talking.close()
