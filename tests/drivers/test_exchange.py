@@ -370,6 +370,8 @@ def test_what_was_sent_too_late_is_told(answer: bytes) -> None:
     """The program was suspended between the last look at the clock and the sending."""
     e, time = engine(), Time()
     job = permitted(e, time)
+    told: list[bool] = []
+    job.tell = lambda: told.append(job.done)
     assert e.step(0) == b"one"
     time.now = 2 * SECOND
     e.written()
@@ -380,6 +382,7 @@ def test_what_was_sent_too_late_is_told(answer: bytes) -> None:
     with pytest.raises(SentLate, match="'device a: one' was sent more than 1 s after it was asked for") as caught:
         job.result()
     assert caught.value.uncertain
+    assert told == [True], "once"
 
 
 def test_a_permission_is_extended_by_progress_but_never_revived() -> None:

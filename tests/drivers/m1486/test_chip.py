@@ -128,3 +128,18 @@ def test_the_functions_of_a_chip_are_found_when_it_is_opened() -> None:
     reporting = chip_driver(wire)
     assert reporting._driver._unit.notes.function(57) is False
     assert reporting.functions() == expected
+
+
+def test_the_status_has_each_number_in_its_place() -> None:
+    """Counter and variable of 24 bits, flags, functions: no byte is that of its neighbour."""
+    wire = ChipWire("B", interface=DUAL_DAC)
+    chip = chip_driver(wire, steps_per_unit=2.0, unit="mm", origin_u=128)
+    wire.chip.drive.set_counter(0x0A0B0C, wire.now)
+    wire.chip.unit.variable = 0x1D2E3F
+    wire.chip.unit.flags[0] = wire.chip.unit.flags[6] = True
+    status = chip.status()
+    assert (status.counter_u, status.variable, status.unit, status.is_position_valid) == (0x0A0B0C, 0x1D2E3F, "mm", True)
+    assert status.position == (0x0A0B0C - 128) / 128
+    assert [number for number, on in status.flags.items() if on] == [80, 86]
+    assert [number for number, on in status.functions.items() if on] == [41, *range(48, 56)]
+    assert (chip.flags(), chip.functions()) == (status.flags, status.functions)

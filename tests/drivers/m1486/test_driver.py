@@ -502,3 +502,12 @@ def test_what_is_not_stored_takes_no_time_of_the_memory() -> None:
     assert notes.ready_at <= wire.now
     chip.set_flag(80, True)
     assert notes.ready_at > wire.now
+
+
+def test_a_block_is_not_typed_into_a_chip_that_moves() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.run(1)
+    with pytest.raises(Busy, match="the chip is not done with a run without end: wait for its end or stop it"):
+        chip.run_block(["f64"])
+    assert "[" not in typed(wire)

@@ -310,3 +310,16 @@ def test_time_on_the_wire() -> None:
     assert talk.allowance_ns(Say(1, "f12800")) == talk.wire_ns(28)
     for sort in (Sort.LISTEN, Sort.LETTER, Sort.UPLOAD):
         assert talk.allowance_ns(Say(1, "u20", sort=sort)) == 0
+
+
+def test_what_was_not_said_yet_changes_nothing() -> None:
+    say = Say(3, "r")
+    assert not (say.changes or say.committed or say.commented or say.answers)
+    assert (say.acts, say.sort) == (True, Sort.LINE)
+        False,
+        False,
+        False,
+        True,
+        False,
+        Sort.LINE,
+    )
