@@ -122,7 +122,7 @@ def test_the_functions_of_a_chip_are_found_when_it_is_opened() -> None:
     expected = first.functions()
     assert [number for number, on in expected.items() if on] == [41, 42, *(48, 49, 50), *range(52, 56), 60]
     assert {number: notes.function(number) for number in expected} == expected
-    wire._port.receive(b"t57\r", wire.now)
+    wire.chain.receive(b"t57\r", wire.now)
     wire.sleep(1.0)
     wire.unread = b""
     reporting = chip_driver(wire)
