@@ -18,8 +18,9 @@ from pathlib import Path
 from mic488_rig import coil_pdu, controller, word_pdu
 from wbc_rig import RUNNING, ProgramRig
 
-from steptwin.machine import SECOND
+from steptwin.machine import SECOND, Edge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
+from steptwin.mic488.device import Event
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.status import Status
 
@@ -46,12 +47,22 @@ class Case:
         return replace(config, inputs=tuple(inputs))
 
     def trace(self) -> str:
+        """What the script does, in words."""
+        return "\n".join(self._run(in_one_go=False)[0])
+
+    def ends(self, *, in_one_go: bool) -> tuple[list[Edge], list[Event], list[str]]:
+        """Edges, events and what can be seen after the script; ``in_one_go``: without stopping at the events of a wait."""
+        rig = self._run(in_one_go=in_one_go)[1]
+        end = _Trace(rig, 4, program=True, in_one_go=in_one_go)
+        return rig.edges, list(rig.device.events), [*end.look(), *map(str, rig.device.user)]
+
+    def _run(self, *, in_one_go: bool) -> tuple[list[str], ProgramRig]:
         lines = self.script.splitlines()
         program = "".join(line[1:].removeprefix(" ") + "\n" for line in lines if line.startswith("|"))
         rows = "".join(row + "\n" for row in self.settings("row"))
         firmware = (*self.settings("firmware"), "1.70")[0]
         rig = ProgramRig(program or "WAIT IN20 = ON\n", rows, self.config(), firmware)
-        trace = _Trace(rig, int((*self.settings("axes"), "1")[0]), bool(program))
+        trace = _Trace(rig, int((*self.settings("axes"), "1")[0]), program=bool(program), in_one_go=in_one_go)
         found = []
         for line in lines:
             if line and line[0] not in "@|#":
@@ -60,7 +71,7 @@ class Case:
         readers = {"I": rig.i, "D": rig.d, "R": rig.r}
         names = dict.fromkeys(re.findall(r"\$([IDR])(\d+)", program))
         found += [f"${kind}{number} = {readers[kind](int(number)):.9g}" for kind, number in names]
-        return "\n".join(found)
+        return found, rig
 
 
 def _numbers(pairs: str = "") -> dict[str, float]:
@@ -68,7 +79,8 @@ def _numbers(pairs: str = "") -> dict[str, float]:
 
 
 class _Trace:
-    def __init__(self, rig: ProgramRig, axes: int, program: bool) -> None:
+    def __init__(self, rig: ProgramRig, axes: int, *, program: bool, in_one_go: bool) -> None:
+        self.in_one_go = in_one_go
         self.rig = rig
         self.axes = axes
         self.program = program
@@ -113,6 +125,9 @@ class _Trace:
         """From event to event; of a motion also the middle."""
         rig = self.rig
         end = rig.now + round(seconds * SECOND)
+        if self.in_one_go:
+            rig.now = end
+            rig.device.advance(end)
         middle = (rig.now + end) // 2
         while rig.now < end:
             due = rig.kernel.deadline()

@@ -19,5 +19,12 @@ def test_traces_are_the_reviewed_ones(case: Case) -> None:
     assert case.trace().splitlines() == case.expected.splitlines()
 
 
+@pytest.mark.parametrize("case", cases(GOLDEN), ids=lambda case: case.name)
+def test_advancing_in_one_go_gives_the_same(case: Case) -> None:
+    """Rule 2 of the time contract."""
+    edges, events, seen = case.ends(in_one_go=False)
+    assert case.ends(in_one_go=True) == (edges, events, seen)
+
+
 if __name__ == "__main__":
     regenerate(GOLDEN)
