@@ -69,6 +69,26 @@ def test_a_complete_table_is_read_only() -> None:
             "register NEW lacks its access",
         ),
         *(
+            (f"import steptwin.world.script as t\nclass New: ...\n{change}", "steptwin.world.plant", message)
+            for change, message in (
+                ("t.Step |= New", "step New lacks its action"),
+                (
+                    "import typing; t.Step = typing.Union[*(set(typing.get_args(t.Step)) - {t.Note})]",
+                    "action of Note: there is no such step",
+                ),
+            )
+        ),
+        (
+            "import steptwin.world.actions as t; t.FOR_SCRIPTS |= {t.Bytes}",
+            "steptwin.world.scripts",
+            "step of scripts Bytes lacks its execution",
+        ),
+        (
+            "import steptwin.world.actions as t; t.Outside |= int",
+            "steptwin.world.references",
+            "step int lacks its check",
+        ),
+        *(
             (f"import steptwin.wbc.statements as t; {change}", "steptwin.mic488.program_motion", message)
             for change, message in (
                 ("t.MOTIONS |= {'NEW'}", "motion statement NEW lacks its move"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
 
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.pins import known_pin
+from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
 from steptwin.world.kernel import PinName
@@ -37,6 +38,10 @@ class Leave(NamedTuple):
 
 Outside: TypeAlias = do.Step | Bytes | Leave
 """What comes from outside a world. Recorded with its moment, it can be replayed."""
+
+
+FOR_SCRIPTS = frozenset({do.Wait, do.At, do.Until, do.Stop, do.Read, do.Call, do.Repeat})
+"""Steps that only scripts can take; every other one has its action here."""
 
 
 def act(plant: Plant, what: Outside) -> None:
@@ -168,19 +173,24 @@ def _note(plant: Plant, step: do.Note) -> None:
     plant.trace.add(Record(plant.now, "world", "event", "note", step.text))
 
 
-ACTIONS: dict[type, Callable[[Plant, Any], None]] = {
-    do.Set: _set,
-    do.Press: _press,
-    do.Release: _release,
-    do.Write: _write,
-    do.Request: _request,
-    do.Send: _send,
-    do.PowerCycle: _power_cycle,
-    do.Turn: _turn,
-    do.SetFault: _set_fault,
-    do.ClearFault: _clear_fault,
-    do.Expect: _expect,
-    do.Note: _note,
-    Bytes: _bytes,
-    Leave: _leave,
-}
+ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
+    "step",
+    [kind for kind in get_args(Outside) if kind not in FOR_SCRIPTS],
+    "action",
+    {
+        do.Set: _set,
+        do.Press: _press,
+        do.Release: _release,
+        do.Write: _write,
+        do.Request: _request,
+        do.Send: _send,
+        do.PowerCycle: _power_cycle,
+        do.Turn: _turn,
+        do.SetFault: _set_fault,
+        do.ClearFault: _clear_fault,
+        do.Expect: _expect,
+        do.Note: _note,
+        Bytes: _bytes,
+        Leave: _leave,
+    },
+)

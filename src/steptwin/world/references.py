@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from steptwin.errors import Misuse
 from steptwin.m1486.pins import settable_pin
 from steptwin.mic488.device import Mic488, check_pin, check_turn
+from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import master_of
+from steptwin.world.actions import Bytes, Leave, Outside, master_of
 from steptwin.world.faults import Fault
 from steptwin.world.script import STEPS
 from steptwin.world.spec import ScriptSpec
@@ -145,17 +146,27 @@ def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
     plant.plan.faults.called(step.name)
 
 
-_CHECKS: dict[type, Callable[[Plant, Any], None]] = {
-    do.Until: _condition,
-    do.Expect: _condition,
-    do.Set: _set,
-    do.Press: _button,
-    do.Release: _button,
-    do.Write: _write,
-    do.Request: _request,
-    do.Send: _send,
-    do.PowerCycle: _power_cycle,
-    do.Turn: _turn,
-    do.SetFault: _fault,
-    do.ClearFault: _clear_fault,
-}
+def _nothing(plant: Plant, step: object) -> None:
+    """It names nothing that could be missing, or is checked when it is taken."""
+
+
+_CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
+    "step",
+    get_args(Outside),
+    "check",
+    {
+        do.Until: _condition,
+        do.Expect: _condition,
+        do.Set: _set,
+        do.Press: _button,
+        do.Release: _button,
+        do.Write: _write,
+        do.Request: _request,
+        do.Send: _send,
+        do.PowerCycle: _power_cycle,
+        do.Turn: _turn,
+        do.SetFault: _fault,
+        do.ClearFault: _clear_fault,
+        **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat, Bytes, Leave), _nothing),
+    },
+)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Runaway
 from steptwin.machine import Nanos
+from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import Outside, master_of
+from steptwin.world.actions import FOR_SCRIPTS, Outside, master_of
 from steptwin.world.agenda import Agenda, Watchers
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 MOST_STEPS_PER_INSTANT = 10_000
 """More steps of scripts at one moment are a runaway."""
+
+
+Taken: TypeAlias = tuple[Waiting | None, Any]
+"""What a step waits for, or else what it gives."""
 
 
 class ScriptsState(NamedTuple):
@@ -204,37 +209,45 @@ class Scripts:
                 return
         raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self._plant.now} ns")
 
-    def _take(self, step: do.Step, script: Script) -> tuple[Waiting | None, Any]:
+    def _take(self, step: do.Step, script: Script) -> Taken:
         """Take a step: what it waits for, or else what it gives."""
-        plant = self._plant
-        match step:
-            case do.Wait():
-                return (Waiting(plant.now + step.duration) if step.duration > 0 else None), None
-            case do.At():
-                return (Waiting(step.time) if step.time > plant.now else None), None
-            case do.Until():
-                plant.condition(step.condition)  # raises `Misuse` here
-                return Waiting(None if step.within is None else plant.now + step.within, step.condition), None
-            case do.Stop():
-                plant.stopped = step.reason if plant.stopped is None else plant.stopped
-                return Waiting(plant.now + 1), None
-            case do.Request():
-                master = self._master(step.line)
-                number = master.asked + 1
-                master.wanted |= {number}
-                self._do(script, step)
-                return Waiting(None, asked=(Asked(step.line, number, number),), is_request=True), None
-            case do.Write():
-                return self._write(step, script), None
-            case do.Read():
-                return None, plant.read(step.signal)
-            case do.Call():
-                step.function()
-            case _:
-                self._do(script, step)
+        return _TAKING.get(type(step), Scripts._act)(self, step, script)
+
+    def _act(self, step: do.Step, script: Script) -> Taken:
+        self._do(script, step)
         return None, None
 
-    def _write(self, step: do.Write, script: Script) -> Waiting | None:
+    def _pause(self, step: do.Wait, script: Script) -> Taken:
+        return (Waiting(self._plant.now + step.duration) if step.duration > 0 else None), None
+
+    def _wait_for_moment(self, step: do.At, script: Script) -> Taken:
+        return (Waiting(step.time) if step.time > self._plant.now else None), None
+
+    def _wait_for_condition(self, step: do.Until, script: Script) -> Taken:
+        plant = self._plant
+        plant.condition(step.condition)  # raises `Misuse` here
+        return Waiting(None if step.within is None else plant.now + step.within, step.condition), None
+
+    def _stop(self, step: do.Stop, script: Script) -> Taken:
+        plant = self._plant
+        plant.stopped = step.reason if plant.stopped is None else plant.stopped
+        return Waiting(plant.now + 1), None
+
+    def _read(self, step: do.Read, script: Script) -> Taken:
+        return None, self._plant.read(step.signal)
+
+    def _call(self, step: do.Call, script: Script) -> Taken:
+        step.function()
+        return None, None
+
+    def _request(self, step: do.Request, script: Script) -> Taken:
+        master = self._master(step.line)
+        number = master.asked + 1
+        master.wanted |= {number}
+        self._do(script, step)
+        return Waiting(None, asked=(Asked(step.line, number, number),), is_request=True), None
+
+    def _write(self, step: do.Write, script: Script) -> Taken:
         """Write as a master does: wait for the answers before the next step."""
         plant = self._plant
         lines = dict.fromkeys(plant.plan.line_of[name][0].name for name, *_ in step.values if name in plant.plan.line_of)
@@ -242,7 +255,7 @@ class Scripts:
         self._do(script, step)
         asked = tuple(Asked(name, before[name] + 1, self._master(name).asked) for name in lines)
         waiting = Waiting(None, asked=tuple(one for one in asked if self._master(one.line).finished < one.last))
-        return waiting if waiting.asked else None
+        return (waiting if waiting.asked else None), None
 
     def _do(self, script: Script, what: Outside) -> None:
         if script.is_outside:
@@ -264,3 +277,21 @@ class Scripts:
             script = self._scripts[one.number] = Script.at(one)
             if one.waiting is not None:
                 self._wait(script, one.waiting)
+
+
+_TAKING: Mapping[type, Callable[[Scripts, Any, Script], Taken]] = complete(
+    "step of scripts",
+    [*(FOR_SCRIPTS - {do.Repeat}), do.Request, do.Write],
+    "execution",
+    {
+        do.Wait: Scripts._pause,
+        do.At: Scripts._wait_for_moment,
+        do.Until: Scripts._wait_for_condition,
+        do.Stop: Scripts._stop,
+        do.Read: Scripts._read,
+        do.Call: Scripts._call,
+        do.Request: Scripts._request,
+        do.Write: Scripts._write,
+    },
+)
+"""How scripts take the steps that wait or give something (`steptwin.world.script.Walk` resolves `Repeat`)."""
