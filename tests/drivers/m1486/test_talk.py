@@ -314,12 +314,5 @@ def test_time_on_the_wire() -> None:
 
 def test_what_was_not_said_yet_changes_nothing() -> None:
     say = Say(3, "r")
-    assert not (say.changes or say.committed or say.commented or say.answers)
-    assert (say.acts, say.sort) == (True, Sort.LINE)
-        False,
-        False,
-        False,
-        True,
-        False,
-        Sort.LINE,
-    )
+    assert [say.changes, say.committed, say.commented, say.answers, say.acts] == [False] * 4 + [True]
+    assert say.sort is Sort.LINE
