@@ -167,6 +167,18 @@ def test_m_5_four_levels_of_loop() -> None:
     assert codes(nest(5)) == ["M203"] * 3 + ["M125"]
 
 
+@pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("[\nL2\nR\nI1H1\nE\n@1\nR\n]", "I1H1 leads out of a loop", "the loop stays unfinished"),
+        ("[\nI1H1\nL2\n@1\nR\nE\n]", "I1H1 leads into a loop from outside", "its E would find no L"),
+    ],
+)
+def test_jumps_that_cross_a_loop(text: str, message: str, hint: str) -> None:
+    (found,) = (d for d in check(text, A, interface("sd")).diagnostics if d.code == "M204")
+    assert (found.message, found.hint) == (message, hint)
+
+
 def test_m_8_no_ramp_where_the_speed_is_not_above_start_stop() -> None:
     assert codes("V201\nR") == []
     assert codes("V200\nR") == ["M210"]
@@ -189,6 +201,25 @@ def test_m_11_multiples_of_the_microstep_in_force() -> None:
     assert codes("F32") == codes("M4\nF8") == codes("B8", A, "dual") == ["M111"]
     assert codes("G100\n=100") == ["M111", "M111"]
     assert codes("M4\nF16\nM1\nR") == ["M111"]  # right when given, wrong when run
+
+
+@pytest.mark.parametrize(("speed", "found"), [(6000, []), (6001, ["M211"])])
+def test_the_highest_speed_is_that_of_q_or_the_end_of_the_low_range(speed: int, found: list[str]) -> None:
+    assert codes(f"M2\nQ2\nV{speed}\nR") == found
+    # The forbidden pair has a low range that is faster than its Q.
+    assert codes(f"M2\nQ4\nV{speed}\nR") == ["M112", *found]
+
+
+@pytest.mark.parametrize("unknown", ["?16\nQ\nM4", "?16\nM\nQ4", "?16\nV\nM4\nQ4"])
+def test_a_setting_that_is_unknown_is_not_judged(unknown: str) -> None:
+    assert codes(f"V300\n{unknown}\nR", B) == []
+
+
+def test_g_counts_from_a_counter_below_0_only_where_the_position_is_known() -> None:
+    assert codes("B64\nR\nG640") == ["M221"]
+    assert codes("B64\nR\n)1\nG640") == []
+    assert codes("B64\nR\n=640\nG640") == []
+    assert codes("B64\nR\nC100\nG640") == []
 
 
 def test_m_14_both_operand_functions() -> None:

@@ -262,6 +262,38 @@ def test_shutdown_stops_the_motor() -> None:
     at = bench.true
     assert bench.run(1.0) == b""
     assert bench.true == at
+    assert [event.text for event in bench.events("shutdown")] == ["shutdown"]
+
+
+def test_a_wait_is_an_event() -> None:
+    bench = Bench("B")
+    bench.do("w15")
+    assert [event.text for event in bench.events("wait")] == ["waits 15 ms"]
+
+
+def test_rst_with_all_address_pins_low_stops_the_motor_at_once() -> None:
+    bench = Bench("B", address=0)
+    bench.file("f640000", "r")
+    bench.run(1.0)
+    at = bench.true
+    assert at > 0
+    bench.pin(RST=0)
+    bench.pin(RST=1)
+    assert len(bench.events("stands")) == 1
+    bench.run(1.0)
+    assert bench.true == at
+    assert bench.counter == 0
+
+
+def test_power_off_releases_the_outputs_and_is_silent() -> None:
+    bench = Bench("B")
+    bench.do("c2")
+    assert bench.level("B2") == 0
+    bench.chip.power_off(bench.now)
+    assert bench.level("B2") == 1
+    assert bench.do("u20") == b""
+    bench.chip.power_cycle(bench.now)
+    assert bench.do("u20") == b"\x42"
 
 
 def test_e_types_have_no_shutdown() -> None:

@@ -23,6 +23,11 @@ def test_what_was_packed_is_unpacked(code: bytes, labels: dict[int, int]) -> Non
     assert unpack(pack(image), E1) == image
 
 
+def test_a_label_beyond_byte_255() -> None:
+    image = Image(bytes(0x180), {1: 0x17F})
+    assert unpack(pack(image), E2) == image
+
+
 def test_nothing_is_no_file() -> None:
     assert unpack(b"", E1) is None
 

@@ -104,6 +104,11 @@ def test_values_are_exact_while_they_are_few() -> None:
     assert {s.variable for s in states[3]} == {1, 11, 21, 31}
 
 
+def test_the_values_of_five_lines_are_few() -> None:
+    _, states = flow_of("?15\n+1")
+    assert {s.variable for s in states[1]} == set(range(32))
+
+
 def test_what_differs_is_unknown_where_there_are_many() -> None:
     _, states = flow_of("M4\n?16\n+1")
     assert {(s.microstep, s.variable) for s in states[2]} == {(4, None)}

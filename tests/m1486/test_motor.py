@@ -405,6 +405,20 @@ def test_a_seek_ends_with_the_level_of_its_line(line: int) -> None:
         assert bench.chip.drive.is_valid
 
 
+def test_only_the_level_of_its_own_line_ends_a_seek() -> None:
+    bench = Bench()
+    bench.pin(B7=0, B6=0)
+    bench.do("c52")
+    bench.send(")7")
+    bench.run(0.1)
+    for level in (1, 0):
+        bench.pin(B6=level)
+        bench.run(0.1)
+        assert bench.events("stands") == []
+    bench.pin(B7=1)
+    assert len(bench.events("stands")) == 1
+
+
 def test_function_52_ends_a_seek_on_four_full_steps() -> None:
     bench = Bench(interface=TWO_DACS)
     bench.do("s100")

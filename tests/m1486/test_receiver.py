@@ -433,6 +433,8 @@ def test_m_12_a_file_larger_than_the_memory_is_dropped() -> None:
     bench.finish()
     bench = Bench("A")
     assert bench.send("[", *["w1"] * 27, "u20") == b"\x5e"
+    (refused,) = bench.events("file-refused")
+    assert refused.text == f"the file is larger than the command memory of {bench.chip.variant.memory_bits} bits"
     assert bench.send("u20", "]") == b""
     assert bench.finish() == b""
     assert bench.do("u20") == b"\x41"

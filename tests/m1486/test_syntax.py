@@ -184,6 +184,7 @@ def test_what_cannot_be_read_is_pointed_at(text: str, found: list[tuple[str, str
         ("×2", "*2"),
         ("R5", "R"),
         ("F640R", "F640\nR"),
+        ("I111", "I1L1"),
     ],
 )
 def test_suggestions_mend_the_line(text: str, mended: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
-from itertools import pairwise
+from itertools import groupby, pairwise
 from math import atan2, ceil, cos, degrees, dist, floor, hypot, isclose, pi, sin
 from typing import NamedTuple
 
@@ -180,6 +180,8 @@ def test_a_circle_turns_on_whole_positions_without_double_pulses() -> None:
     assert run.way.end is not None
     assert [(d, len(t)) for d, t in pulse_runs(run.x, 0, run.way.end)] == [(-1, 20), (1, 20)]
     assert [(d, len(t)) for d, t in pulse_runs(run.y, 0, run.way.end)] == [(-1, 10), (1, 20), (-1, 10)]
+    for profile, directions in ((run.x, [-1, 1]), (run.y, [-1, 1, -1])):
+        assert [direction for direction, _ in groupby(direction for _, direction in profile.legs(0))] == directions
 
 
 def test_a_circle_begins_at_its_point_nearest_the_origin() -> None:

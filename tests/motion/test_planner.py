@@ -322,4 +322,3 @@ def test_no_permitted_parameter_overflows(*, v: float, to: float, distance: int,
             assert profile.count(now) - 1 <= profile.position(now) <= profile.count(now) + 1 or abs(profile.position(now)) > 2**50
             assert abs(profile.velocity(now)) < inf
         profile.pulse_time(2**53, 0)
-        profile.crossing(0.75, 0)

@@ -13,7 +13,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from steptwin.motion import MotionState, Profile, Segment, at_rest, plan_position, plan_stop, plan_velocity
-from steptwin.motion.profile import cruise, ramp
 
 
 class Stepper:
@@ -169,61 +168,6 @@ def test_the_count_jumps_exactly_at_the_pulse_times(replacement: Replacement, st
                 after = time
 
 
-@given(replacement=replacements, share=st.floats(0.0, 1.0))
-@settings(max_examples=200)
-def test_a_crossing_is_the_first_nanosecond_at_or_after_it(replacement: Replacement, share: float) -> None:
-    profile = replacement._replace(base=0).plan()
-    now = profile.start
-    until = profile.end if profile.end is not None else now + 10**10
-    passed = now + 1 + int(share * (until - now))
-    p = profile.position(passed)
-    time = profile.crossing(p, now)
-    # A position that is not left for a while (the end of a move) is crossed within rounding of it.
-    rounding = 1e-7 + 2**-46 * (abs(p) + profile.velocity(now) ** 2 / min(replacement.second[2:] or replacement.second[1:]))
-    if time is None:
-        assert abs(profile.final_p + profile.base - p) <= rounding or abs(profile.position(now + 1) - p) <= rounding
-        return
-    assert time > now
-    assert time <= passed or abs(profile.position(time) - p) <= rounding + abs(profile.velocity(time)) * 2e-9
-    side = profile.position(now + 1) - p
-    for i in range(40):
-        earlier = profile.position(now + 1 + (time - now - 1) * i // 40) - p
-        assert earlier * side >= 0.0 or min(abs(side), abs(earlier)) <= rounding
-    before, at = profile.position(time - 1) - p, profile.position(time) - p
-    assert before * at <= 0.0 or min(abs(before), abs(at)) <= rounding
-
-
-def test_a_crossing_on_the_seam_of_two_segments_is_found() -> None:
-    """The end of a ramp and the beginning of the cruise differ by rounding; what lies between them is passed too."""
-    profile = plan_position(MotionState(0, 0, 0.3, 0.0), 10_000, 7777.7, 3333.3, 1234.5)
-    seam_s = profile.segments[0].end_s
-    ramp_end, cruise_begin = profile.segments[0].position(seam_s), profile.segments[1].position(seam_s)
-    for p in (ramp_end, cruise_begin, 0.5 * (ramp_end + cruise_begin)):
-        assert profile.crossing(p, 0) == pytest.approx(seam_s * 1e9, abs=1.5)
-
-
-def test_a_crossing_shifts_the_gap_between_segments_to_the_later_one() -> None:
-    segments = (ramp(0.0, 0.0, 0.0, 10.0, 10.0), cruise(1.0, 2.0, 5.001, 10.0))
-    profile = Profile(0, 0, segments, 15.001)
-    assert profile.crossing(5.0005, 0) == 10**9
-
-
-def test_turning_points_and_ends_are_crossings() -> None:
-    profile = plan_position(MotionState(0, 0, 0.0, 3000.0), -500, 20_000.0, 5_000.0, 32_000.0)
-    assert profile.crossing(900.0, 0) == 600_000_000
-    assert profile.crossing(900.5, 0) is None
-    assert profile.end is not None
-    assert profile.crossing(-500.0, 0) == profile.end
-    assert profile.crossing(-500.5, 0) is None
-    # Passed twice: out and back.
-    out = profile.crossing(100.0, 0)
-    assert out is not None
-    back = profile.crossing(100.0, out)
-    assert back is not None
-    assert out < 600_000_000 < back
-    assert profile.crossing(100.0, back) is None
-
-
 def test_turning_on_a_whole_position_gives_no_second_pulse() -> None:
     """Out to exactly 900 and back: pulse 900 belongs to the way out, the first of the way back is 899."""
     profile = plan_position(MotionState(0, 0, 0.0, 3000.0), 0, 20_000.0, 5_000.0, 32_000.0)
@@ -271,7 +215,6 @@ def test_looking_changes_nothing(command: Command, looks: list[int]) -> None:
         profile.velocity(now)
         profile.phase(now)
         profile.pulse_time(17, now)
-        profile.crossing(17.5, now)
         list(profile.legs(now))
         MotionState.of(profile, now)
     assert pickle.dumps(profile) == untouched
@@ -294,7 +237,6 @@ def test_standing_still() -> None:
     assert (profile.end, profile.moving(10)) == (10, False)
     assert (profile.count(10**12), profile.position(10**12), profile.phase(10), profile.velocity(10)) == (5, 5.25, 0.25, 0.0)
     assert profile.pulse_time(6, 0) is None
-    assert profile.crossing(5.25, 0) is None
     assert list(profile.legs(10)) == []
 
 

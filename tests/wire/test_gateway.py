@@ -9,6 +9,7 @@ from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc
 from steptwin.wire.gateway import QUEUE_REQUESTS, Gateway, GatewayPort, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
+from steptwin.wire.rtu import BURSTY_GAP_NS
 from steptwin.wire.slave import Direction
 from steptwin.wire.timed import FRAME_INTERVAL_NS, LineTiming, TimedRtuSlavePort, TimedUnits
 
@@ -157,3 +158,51 @@ def test_an_observer_sees_requests_when_they_come_and_responses_when_they_leave(
     port.exchange(ask(1), 5)
     run(10**9, port)
     assert seen == [(5, Direction.IN, ask(1)), (5 + SENT, Direction.OUT, answered(1))]
+
+
+def test_mic_15_a_frame_of_unknown_length_from_a_script_comes_after_the_gap(bank: Any) -> None:
+    script = ScriptPort(Gateway(TimedUnits({1: bank}, TIMING)))
+    script.receive(with_crc(bytes.fromhex("01 41 01 02 03")), 1000)
+    sent = 1000 + BURSTY_GAP_NS + LINE.duration(7) + TURN + LINE.duration(5)
+    assert run(10**9, script) == [[(sent, with_crc(bytes.fromhex("01 C1 01")))]]
+
+
+def test_refusals_of_one_moment_leave_in_the_order_of_their_requests(bank: Any) -> None:
+    port = TcpGatewayPort(Gateway(TimedUnits({1: bank}, TIMING)))
+    refused = bytes.fromhex("83 0B")
+    assert port.exchange(ask(9, 2) + ask(3, 2), 0) == answered(9, refused, 2) + answered(3, refused, 2)
+
+
+@pytest.mark.parametrize("kind", [TcpGatewayPort, ScriptPort])
+def test_a_snapshot_continues_as_the_original(new_bank: NewBank, kind: type[TcpGatewayPort | ScriptPort]) -> None:
+    """A request that waits, a response on its way, half a request."""
+    request = ask(1) if kind is TcpGatewayPort else with_crc(b"\x01" + READ)
+    ports, gateways, units, banks = [], [], [], []
+    for _ in range(2):
+        banks.append(new_bank())
+        units.append(TimedUnits({1: banks[-1]}, TIMING))
+        gateways.append(Gateway(units[-1]))
+        ports.append(kind(gateways[-1]))
+    ports[1].receive(request, 0)  # replaced by the snapshot
+    ports[0].receive(request * 2 + request[:5], 0)
+    ports[0].to_send(REQUEST_NS)
+    for part, other in ((units[0], units[1]), (gateways[0], gateways[1]), (ports[0], ports[1])):
+        other.set_state(part.copy_state())
+    for port in ports:
+        port.receive(request[5:], REQUEST_NS + 1)
+    banks[0].executed.clear()
+    (mine,), (others,) = (run(10**9, port) for port in ports)
+    assert len(mine) == 3
+    assert mine == others
+    assert banks[0].executed == banks[1].executed
+    ports[1].set_state(kind(gateways[0]).copy_state())
+    assert ports[1].deadline() is None
+
+
+def test_an_observer_of_scripts_sees_requests_when_they_are_executed(bank: Any) -> None:
+    seen: list[tuple[int, Direction, bytes]] = []
+    script = ScriptPort(Gateway(TimedUnits({1: bank}, TIMING)), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
+    request, response = with_crc(b"\x01" + READ), with_crc(b"\x01" + TOLD)
+    script.receive(request, 5)
+    run(10**9, script)
+    assert seen == [(5 + REQUEST_NS, Direction.IN, request), (5 + SENT, Direction.OUT, response)]

@@ -45,6 +45,11 @@ def test_characters_is_the_inverse_of_duration(baud: int, characters: int) -> No
     assert line.characters(time + 1) == characters + 1
 
 
+@pytest.mark.parametrize(("bits", "time_ns"), [(7, 7_000_000), (13, 13_000_000)])
+def test_the_shortest_and_the_longest_character(bits: int, time_ns: int) -> None:
+    assert SerialLine(1000, bits).duration(1) == time_ns
+
+
 def test_nothing_has_begun_before_the_start() -> None:
     assert SerialLine(9600).characters(-5_000_000) == 0
 
@@ -72,6 +77,13 @@ def test_characters_follow_without_pause_while_the_line_is_busy() -> None:
     assert clock.send(96, now=300_000_000) == 400_000_000
     assert clock.end_before(95) == 301_041_667
     assert clock.end_before(200) == 300_000_000
+
+
+def test_what_comes_when_the_line_has_just_become_free_is_rounded_anew() -> None:
+    clock = CharacterClock(SerialLine(38400))
+    assert clock.send(8, now=0) == 2_083_334
+    assert clock.send(8, now=2_083_334) == 4_166_668
+    assert clock.end_before(8) == 2_083_334
 
 
 @given(bauds, st.lists(st.integers(0, 300), min_size=1, max_size=30))

@@ -212,6 +212,15 @@ def test_when_a_frame_began_and_the_longest_pause_inside_it() -> None:
     assert (frame.raw, frame.begin, frame.pause) == (two, 1800, 50)
 
 
+def test_a_silence_behind_a_frame_is_not_inside_it() -> None:
+    framer = RtuFramer({0x41})
+    # Could be seven bytes of a request to unit 3; what comes later shows that the request inside is one.
+    frame = hexed("41 07")
+    assert framer.feed(bytes.fromhex("03 05") + frame, 0) == []
+    (found,) = framer.feed(b"\xff\xff", 10_000_000)
+    assert (found.raw, found.pause) == (frame, 0)
+
+
 def test_mic_15_strict_framing_drops_a_frame_that_pauses() -> None:
     good = hexed("01 03 27 24 00 02")
     for pause, found in ((750_000, [good]), (750_001, [])):
@@ -277,6 +286,7 @@ def test_an_unknown_frame_after_a_beginning_given_up() -> None:
     raw = hexed("01 41 01 02 03")
     assert framer.feed(raw, 2_000_000) == []
     assert [frame.raw for frame in framer.expire(2_750_000)] == [raw]
+    assert framer.rubbish == 8
 
 
 @pytest.mark.parametrize(
@@ -446,3 +456,28 @@ def test_frames_that_cannot_be(unit: int, size: int, message: str) -> None:
 def test_a_gap_takes_time() -> None:
     with pytest.raises(Misuse, match="a gap of 0 ns is not positive"):
         RtuFramer(gap_ns=0)
+
+
+@pytest.mark.parametrize("size", [1, 253])
+def test_the_shortest_and_the_longest_pdu(size: int) -> None:
+    assert len(encode_frame(247, bytes(size))) == size + 3
+
+
+def test_a_shell_that_feeds_nothing_gets_what_the_gap_completes() -> None:
+    framer = RtuFramer()
+    unknown = with_crc(bytes.fromhex("01 41 01 02 03"))
+    assert framer.feed(unknown, 0) == []
+    assert [frame.raw for frame in framer.feed(b"", BURSTY_GAP_NS)] == [unknown]
+
+
+def test_a_snapshot_of_an_untouched_framer_is_one_of_an_untouched_framer() -> None:
+    framer = RtuFramer({1})
+    framer.feed(b"\x01\x03", 5)
+    framer.set_state(RtuFramer({1}).copy_state())
+    assert (framer.held, framer.fed, framer.rubbish, framer.deadline()) == (b"", 0, 0, None)
+
+
+def test_the_shortest_gap() -> None:
+    framer = RtuFramer(gap_ns=1)
+    framer.feed(b"\x01", 7)
+    assert framer.deadline() == 8

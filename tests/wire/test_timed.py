@@ -304,3 +304,29 @@ def test_timing_that_is_none(turnaround_ns: int, interval_ns: int, message: str)
     with pytest.raises(Misuse) as misuse:
         LineTiming(LINE, turnaround_ns, interval_ns)
     assert str(misuse.value) == message
+
+
+def test_mic_32_a_device_may_answer_at_once(bank: Any) -> None:
+    port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(LINE, turnaround_ns=0, interval_ns=0)))
+    port.receive(READ, 0)
+    assert run(port, 10**9) == [(READ_NS + TOLD_NS, TOLD)]
+
+
+def test_what_is_executed_at_the_moment_of_an_arrival_is_executed_first(bank: Any) -> None:
+    second = READ_NS + TURN + TOLD_NS
+    later = 5_000_000
+    seen: list[tuple[int, int]] = []
+    timing = LineTiming(LINE, interval_ns=second + later)
+    port = TimedRtuSlavePort(
+        TimedUnits({1: bank}, timing),
+        on_frame=lambda now, way, raw: seen.append((now, len(bank.executed))) if way is Direction.IN else None,
+    )
+    port.receive(READ, 0)
+    run(port, second)
+    port.receive(READ, second)
+    run(port, second + later)
+    port.receive(with_crc(bytes.fromhex("02 06 00 00 00 01")), second + later)
+    run(port, 10**9)
+    both = second + later + READ_NS
+    assert bank.executed == [(READ_NS, READ[1:-2]), (both, READ[1:-2])]
+    assert seen == [(READ_NS, 0), (second + READ_NS, 1), (both, 2)]

@@ -75,11 +75,10 @@ class CommandMemory(Stateful):
         """Empty it: the next command goes to the first byte."""
         self._clear()
         self._reader.bytes_changed(0, self.size)
-        self._reader.labels_changed()
 
     def _clear(self) -> None:
         self._bytes = array("B", bytes(self.size))
-        self._own = array("H", bytes(2 * len(GENERAL)))
+        self._own = array("H", [0] * len(GENERAL))
         #: Where the next command goes.
         self.write = 0
         #: Commands before this place may run.
@@ -182,7 +181,6 @@ class CommandMemory(Stateful):
         self.write = len(image.code)
         self.labels = dict(image.labels)
         self.enable()
-        self._reader.labels_changed()
 
     # ------------------------------------------------------------------ registers 1 to 8
 

@@ -293,6 +293,3 @@ class ArcProfile(Profile):
                 count = self.counts[i]
                 return self.base + (reached if (reached - count) * s.direction > 0 else count)
         return self.base + self.counts[-1]
-
-    def _end_p(self, index: int) -> float:
-        return self.final_p if index == len(self.segments) - 1 else self.segments[index].end_p

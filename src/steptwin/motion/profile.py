@@ -195,13 +195,6 @@ class Profile:
         k = round(p)
         return k if self.pulse_ns(index, k) <= n else k - self.segments[index].direction
 
-    def _end_p(self, index: int) -> float:
-        """Real position, relative to ``base``, at which segment ``index`` ends; infinite when it does not."""
-        s = self.segments[index]
-        if s.end_s == inf:
-            return inf * s.direction
-        return self.final_p if index == len(self.segments) - 1 else s.position(s.end_s)
-
     def pulse_ns(self, index: int, k: int) -> int:
         """Nanoseconds from ``start`` of pulse ``k`` (relative to ``base``) of segment ``index``."""
         n = ceil(self.segments[index].when(k) * 1e9)
@@ -236,23 +229,6 @@ class Profile:
             if s.end_s != inf and (k - self.counts[i + 1]) * s.direction > 0:
                 continue
             time = self.start + self.pulse_ns(i, k)
-            if time > after:
-                return time
-        return None
-
-    def crossing(self, position: float, after: Nanos) -> Nanos | None:
-        """First whole nanosecond > ``after`` at which the real position has come to ``position`` (pulses); None if never.
-
-        Touching counts: the turning point of a reversal and the end of a move are crossings.
-        """
-        p = position - self.base
-        end_p = self.segments[0].position(0.0) if self.segments else 0.0
-        for i, s in enumerate(self.segments):
-            begin_p, end_p = end_p, self._end_p(i)
-            if (p - begin_p) * s.direction < 0.0 or (p - end_p) * s.direction > 0.0:
-                continue
-            n = max(ceil(s.when(p) * 1e9), self.ends[i - 1] if i else 0)
-            time = self.start + int(min(n, self.ends[i]))
             if time > after:
                 return time
         return None

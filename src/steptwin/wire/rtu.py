@@ -245,7 +245,7 @@ class RtuFramer(Stateful):
         start = self._scan
         while start < size:
             length, role = self._look(start, waiting=True)
-            if length == 0 and start < self._burst < size:
+            if length == 0 and start < self._burst:
                 # What came before the gap may have been given up by its sender: then a frame begins after it.
                 after, after_role = self._look(self._burst, waiting=True)
                 if after > 0:

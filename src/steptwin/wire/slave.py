@@ -217,7 +217,7 @@ class TcpSlavePort(SlavePort):
         # Nearly always one whole request comes alone; this is that case without a framer.
         framer = self._framer
         size = len(data)
-        if 8 <= size <= mbap.MAX_FRAME and data[2:5] == _PLAIN and data[5] == size - 6 and not framer.held and not framer.broken:
+        if size >= 8 and data[2:5] == _PLAIN and data[5] == size - 6 and not framer.held and not framer.broken:
             device = self._devices.get(data[6])
             if device is not None and self.on_frame is None:
                 pdu = device.execute(data[7:], now)
