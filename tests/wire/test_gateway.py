@@ -162,7 +162,7 @@ def test_an_observer_sees_requests_when_they_come_and_responses_when_they_leave(
 
 def test_mic_15_a_frame_of_unknown_length_from_a_script_comes_after_the_gap(bank: Any) -> None:
     script = ScriptPort(Gateway(TimedUnits({1: bank}, TIMING)))
-    script.receive(with_crc(bytes.fromhex("01 41 01 02 03")), 1000)
+    script.exchange(with_crc(bytes.fromhex("01 41 01 02 03")), 1000)
     sent = 1000 + BURSTY_GAP_NS + LINE.duration(7) + TURN + LINE.duration(5)
     assert run(10**9, script) == [[(sent, with_crc(bytes.fromhex("01 C1 01")))]]
 
@@ -183,13 +183,13 @@ def test_a_snapshot_continues_as_the_original(new_bank: NewBank, kind: type[TcpG
         units.append(TimedUnits({1: banks[-1]}, TIMING))
         gateways.append(Gateway(units[-1]))
         ports.append(kind(gateways[-1]))
-    ports[1].receive(request, 0)  # replaced by the snapshot
-    ports[0].receive(request * 2 + request[:5], 0)
+    ports[1].exchange(request, 0)  # replaced by the snapshot
+    ports[0].exchange(request * 2 + request[:5], 0)
     ports[0].to_send(REQUEST_NS)
     for part, other in ((units[0], units[1]), (gateways[0], gateways[1]), (ports[0], ports[1])):
         other.set_state(part.copy_state())
     for port in ports:
-        port.receive(request[5:], REQUEST_NS + 1)
+        port.exchange(request[5:], REQUEST_NS + 1)
     banks[0].executed.clear()
     (mine,), (others,) = (run(10**9, port) for port in ports)
     assert len(mine) == 3
@@ -203,6 +203,6 @@ def test_an_observer_of_scripts_sees_requests_when_they_are_executed(bank: Any) 
     seen: list[tuple[int, Direction, bytes]] = []
     script = ScriptPort(Gateway(TimedUnits({1: bank}, TIMING)), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     request, response = with_crc(b"\x01" + READ), with_crc(b"\x01" + TOLD)
-    script.receive(request, 5)
+    script.exchange(request, 5)
     run(10**9, script)
     assert seen == [(5 + REQUEST_NS, Direction.IN, request), (5 + SENT, Direction.OUT, response)]

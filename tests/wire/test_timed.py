@@ -308,7 +308,7 @@ def test_timing_that_is_none(turnaround_ns: int, interval_ns: int, message: str)
 
 def test_mic_32_a_device_may_answer_at_once(bank: Any) -> None:
     port = TimedRtuSlavePort(TimedUnits({1: bank}, LineTiming(LINE, turnaround_ns=0, interval_ns=0)))
-    port.receive(READ, 0)
+    port.exchange(READ, 0)
     assert run(port, 10**9) == [(READ_NS + TOLD_NS, TOLD)]
 
 
@@ -321,11 +321,11 @@ def test_what_is_executed_at_the_moment_of_an_arrival_is_executed_first(bank: An
         TimedUnits({1: bank}, timing),
         on_frame=lambda now, way, raw: seen.append((now, len(bank.executed))) if way is Direction.IN else None,
     )
-    port.receive(READ, 0)
+    port.exchange(READ, 0)
     run(port, second)
-    port.receive(READ, second)
+    port.exchange(READ, second)
     run(port, second + later)
-    port.receive(with_crc(bytes.fromhex("02 06 00 00 00 01")), second + later)
+    port.exchange(with_crc(bytes.fromhex("02 06 00 00 00 01")), second + later)
     run(port, 10**9)
     both = second + later + READ_NS
     assert bank.executed == [(READ_NS, READ[1:-2]), (both, READ[1:-2])]
