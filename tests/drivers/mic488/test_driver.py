@@ -296,3 +296,15 @@ def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> 
     wire.severed = True
     with pytest.raises(Untold, match="the program could not be stopped: the controller cannot be told"):
         mic.program.stop()
+
+
+@pytest.mark.parametrize(("timeout_s", "patience_s"), [(0.3, 5.0), (0.8, 5.0), (1.0, 6.0), (2.0, 12.0)])
+def test_what_moves_is_sent_within_5_s_or_twice_the_time_of_its_tries(timeout_s: float, patience_s: float) -> None:
+    """Of a driver that tries three times."""
+    unit = driver(Wire(), timeout_s=timeout_s)._driver._unit
+    assert unit.tries == 3
+    assert unit.permission(1).patience_ns == patience_s * SECOND
+    assert unit.permission(1, patience_ns=7).patience_ns == 7
+    stopped, other = unit.permission(1, 3), unit.permission(2)
+    unit.notes.stops[3] += 1
+    assert (stopped.is_stopped(), other.is_stopped()) == (True, False)

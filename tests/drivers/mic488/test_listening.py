@@ -7,6 +7,7 @@ import pytest
 from steptwin.drivers.mic488.frames import FrameWords, Heard
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.machine import MILLISECOND
+from steptwin.mic488.registermap import DataType
 from steptwin.wire import mbap
 from steptwin.wire.slave import Direction
 
@@ -82,3 +83,19 @@ def test_what_is_too_short_for_a_frame_is_none() -> None:
         assert (shorter.time, shorter.direction, shorter.unit, shorter.meaning) == (5, None, None, "no frame")
         assert (whole.time, whole.direction, whole.unit) == (5, Direction.IN, 1)
         assert whole.meaning.startswith("unit 1: ")
+
+
+@pytest.mark.parametrize(
+    ("first", "count", "is_learnt"), [(10000, 1, True), (9999, 2, True), (9999, 1, False), (10001, 1, False)]
+)
+def test_a_read_of_data_type_tells_how_values_travel(first: int, count: int, is_learnt: bool) -> None:
+    """DATA_TYPE is 10000; 1 is DINT."""
+    words = FrameWords(tcp=True)
+    address = words._registers.of("DATA_TYPE").address
+    begin = address + first - 10000
+    request = bytes((3, *begin.to_bytes(2, "big"), 0, count))
+    registers = [1 if begin + n == address else 0 for n in range(count)]
+    answer = bytes((3, 2 * count)) + b"".join(value.to_bytes(2, "big") for value in registers)
+    words.observe(0, Direction.IN, mbap.encode_frame(1, 1, request))
+    words.observe(1, Direction.OUT, mbap.encode_frame(1, 1, answer))
+    assert (words._wordings[1].data_type is DataType.DINT) is is_learnt
