@@ -33,16 +33,20 @@ WORLDS = {
 name = "bus"
 tcp = "127.0.0.1:0"
 rtu_tcp = "127.0.0.1:0"
+rfc2217 = "127.0.0.1:0"
+gap = 5
 pty = "pty"
 [[mic488]]
 name = "twin"
 line = "bus"
+vision = "127.0.0.1:0"
 """,
     "m1486": """
 [[line]]
 name = "bus"
 kind = "m1486"
 tcp = "127.0.0.1:0"
+rfc2217 = "127.0.0.1:0"
 pty = "pty"
 [[m1486]]
 name = "F"
@@ -51,8 +55,11 @@ variant = "A"
 """,
 }
 SERVED = {
-    "mic488": ["--tcp", "127.0.0.1:0", "--rtu-tcp", "127.0.0.1:0", "--pty", "pty"],
-    "m1486": ["--tcp", "127.0.0.1:0", "--pty", "pty"],
+    "mic488": [
+        *("--tcp", "127.0.0.1:0", "--rtu-tcp", "127.0.0.1:0", "--rfc2217", "127.0.0.1:0"),
+        *("--gap", "5", "--pty", "pty", "--vision", "127.0.0.1:0"),
+    ],
+    "m1486": ["--tcp", "127.0.0.1:0", "--rfc2217", "127.0.0.1:0", "--pty", "pty"],
 }
 
 
@@ -207,6 +214,29 @@ def rtu_over_tcp(twin: Twin) -> object:
     return twin._read(line, 5).hex(" ")
 
 
+def network_port(twin: Twin) -> object:
+    """The rate of the line, and another that the client sets."""
+    line = twin.connection("rfc2217")
+    line.sendall(bytes.fromhex("fffa2c0100000000fff0"))
+    rate = twin._read(line, 10).hex(" ")
+    line.sendall(bytes.fromhex("fffa2c0100002580fff0"))
+    changed = twin._read(line, 10).hex(" ")
+    return rate, changed
+
+
+def network_requests(twin: Twin) -> object:
+    line = twin.connection("rfc2217")
+    line.sendall(bytes.fromhex("01 03 27 24 00 02 8e b4"))
+    return twin._read(line, 9).hex(" ")
+
+
+def vision_records(twin: Twin) -> object:
+    """Nothing is answered to them, nor to what is no record."""
+    line = twin.connection("vision")
+    line.sendall(b"N1 X12.5 Y-3 A90\r\nnonsense\r\n")
+    return without_time(twin.asked(do="state"))
+
+
 def pins(twin: Twin) -> object:
     asked: list[dict[str, Any]] = [{}, {"IN1": 1}, {"in2": 1, "AIN1": 4.5}, {"IN99": 1}, {"IN1": 2}, {"AIN1": 11}, {"IN1": "x"}]
     told = [bare(twin.asked(do="pin", set=changes)) for changes in asked]
@@ -321,6 +351,9 @@ PROBES: dict[str, tuple[Probe, ...]] = {
         refused,
         units,
         rtu_over_tcp,
+        network_requests,
+        network_port,
+        vision_records,
         motion,
         pins,
         names_of_pins,
@@ -338,6 +371,7 @@ PROBES: dict[str, tuple[Probe, ...]] = {
         ready_file,
         chip_state,
         chip_answers,
+        network_port,
         chip_pins,
         chip_faults,
         chip_encoder,

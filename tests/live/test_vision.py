@@ -9,10 +9,10 @@ from wbc_rig import loaded
 
 from steptwin.errors import Misuse
 from steptwin.files.programbanks import Banks
-from steptwin.live.vision import uses_vision
 from steptwin.machine import Port
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488
+from steptwin.mic488.vision import uses_vision
 from steptwin.served.mic488 import LineOptions, Mic488Line, state_of
 from steptwin.wire.crc import crc16
 

@@ -11,16 +11,20 @@ from types import FrameType
 import pytest
 
 from steptwin.errors import Misuse
+from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.descriptors import descriptors
-from steptwin.live.links import Feed
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.links import Feed, Port
+from steptwin.live.world import LiveWorld, PlacePort, VisionPort
+from steptwin.live.world_frames import follow_frames
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
-from steptwin.served.mic488 import Mic488Line
+from steptwin.served.mic488 import LineOptions, Mic488Line
+from steptwin.words.frames import FrameLine
 from steptwin.world import script as do
+from steptwin.world.actions import See
 
 LINE = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "twin"\nline = "bus"\n'
 READ = bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 0a")
@@ -178,3 +182,89 @@ def test_reads_of_scripts_are_not_shared() -> None:
         assert answers == [bytes.fromhex("02 01 00"), bytes.fromhex("02 01 01")]
 
     asyncio.run(run())
+
+
+def test_records_of_a_vision_system_are_inputs_of_the_session() -> None:
+    world = World.from_toml(LINE)
+    live = LiveWorld(world)
+    live.advance(MILLISECOND)
+    port = VisionPort(live, "twin")
+    assert [port.exchange(data, live.now) for data in (b"N1 X12.5 Y-3 ", b"A90\r\nnonsense\r\n")] == [b"", b""]
+    live.advance(2 * MILLISECOND)
+    assert [(given.time, given.what) for given in world.inputs] == [(MILLISECOND, See("twin", 1.0, 12.5, -3.0, 90.0))]
+    session = session_of(world)
+    again = session.replay()
+    assert again.trace.digest() == session.digest
+    assert again.mic488["twin"].device.snapshot() == world.mic488["twin"].device.snapshot()
+
+
+@pytest.mark.parametrize("timing", ["off", "real", "strict"])
+def test_frames_of_a_world_are_shown_as_those_of_a_served_controller(timing: str) -> None:
+    """Requests, answers and bytes that belong to no frame, on Modbus TCP and RTU."""
+    world = World.from_toml(LINE + "" if timing == "off" else LINE.replace("tcp =", f'timing = "{timing}"\ngap = 5\ntcp ='))
+    world.stop_recording()
+    live = LiveWorld(world)
+    shown: list[FrameLine] = []
+    follow_frames(live, shown.append)
+    served = Mic488Line(
+        ControllerConfig(), [1], "1.70", options=LineOptions(timing=timing != "off", strict=timing == "strict", frames=True)
+    )
+    expected: list[FrameLine] = []
+    served.frames.sinks.append(expected.append)
+    gap = 5 * MILLISECOND if timing != "off" else 20 * MILLISECOND
+    ports: list[tuple[Port, Port]] = [
+        (PlacePort(live, "bus", "tcp-1", "tcp"), served.tcp_port()),
+        (PlacePort(live, "bus", "rtu-1", "rtu"), served.rtu_port("rtu-1", gap)),
+    ]
+    at = 0
+    for number, data in ((0, READ), (1, bytes.fromhex("01 03 27 24 00 02 8e b4")), (1, b"rubbish!!!"), (0, READ)):
+        at += 100 * MILLISECOND
+        ours, theirs = ports[number]
+        live.advance(at)
+        ours.exchange(data, at)
+        served.kernel.advance(at)
+        theirs.exchange(data, at)
+        while (due := theirs.deadline()) is not None:
+            served.kernel.advance(due)
+            theirs.to_send(due)
+        live.advance(at + 90 * MILLISECOND)
+    assert [str(line) for line in shown] == [str(line) for line in expected]
+    assert len(shown) == 7
+
+
+def test_characters_of_a_world_are_shown_with_the_line_where_there_are_several() -> None:
+    chips = '[[line]]\nname = "chips"\nkind = "m1486"\n[[m1486]]\nname = "F"\nline = "chips"\nvariant = "A"\n'
+    world = World.from_toml(LINE + chips)
+    live = LiveWorld(world)
+    shown: list[str] = []
+    follow_frames(live, lambda line: shown.append(f"{line.link} {line.meaning}"))
+    PlacePort(live, "chips", "tcp-1", "raw").exchange(b"U1\r", live.now)
+    live.advance(SECOND)
+    PlacePort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
+    assert shown[:2] == ["chips/tcp-1 U1  Upload 1", "chips/line U1 position, low byte = 0"]
+    assert shown[2].startswith("bus/tcp-1 read M1_POS_ACT")
+
+
+@pytest.mark.parametrize(("given", "nanoseconds"), [("0.75", 750_000), ("5", 5_000_000), ('"2 ms"', 2_000_000)])
+def test_a_line_gives_up_rubbish_after_its_gap(given: str, nanoseconds: int) -> None:
+    world = World.from_toml(LINE.replace("tcp =", f"gap = {given}\ntcp ="))
+    live = LiveWorld(world)
+    PlacePort(live, "bus", "rtu-1", "rtu").exchange(b"\x01", live.now)
+    assert live.deadline() == nanoseconds
+
+
+@pytest.mark.parametrize("gap", ["0", "-1", "10001", '"11 s"', "true"])
+def test_gaps_that_cannot_be_are_errors_of_the_description(gap: str) -> None:
+    with pytest.raises(Misuse, match="gap"):
+        World.from_toml(LINE.replace("tcp =", f"gap = {gap}\ntcp ="))
+
+
+def test_a_real_serial_port_has_the_gap_of_a_uart() -> None:
+    world = World.from_toml(LINE.replace("tcp =", "baud = 9600\ntcp ="))
+    line = world.lines["bus"]
+    assert (line.baud, line.is_timed) == (9600, False)
+    live = LiveWorld(world)
+    live.advance(SECOND)
+    port = PlacePort(live, "bus", "serial", "serial")
+    port.exchange(b"\x01\x03", live.now)
+    assert live.deadline() == SECOND + 750_000

@@ -45,6 +45,9 @@ def up(
     ] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    log_frames: Annotated[
+        bool, typer.Option("--log-frames", help="Print what goes over every line with time, direction, bytes and meaning.")
+    ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 also for what was waited for in vain.")] = False,
     allow_outside: Annotated[
         bool, typer.Option("--allow-outside", help="Permit files that do not lie beside the description or below.")
@@ -76,6 +79,7 @@ def up(
         faults=tuple(fault or ()),
         ready_file=ready_file,
         listen_any=listen_any,
+        log_frames=log_frames,
         strict=strict,
         allow_outside=allow_outside,
     )

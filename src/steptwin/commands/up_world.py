@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from math import inf
 from pathlib import Path
@@ -20,10 +21,12 @@ from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
+from steptwin.live.rfc2217 import TwinLine, over_network
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.live.serving import check_name
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import LiveWorld, PlacePort, VisionPort
 from steptwin.live.world_control import WorldControl
+from steptwin.live.world_frames import follow_frames
 from steptwin.machine import Nanos
 from steptwin.words.records import describe, is_told
 from steptwin.world.actions import Leave
@@ -51,6 +54,7 @@ class UpOptions:
     strict: bool = False
     """Whether what was waited for in vain counts as a failure."""
     listen_any: bool = False
+    log_frames: bool = False
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
 
@@ -76,10 +80,11 @@ def up(options: UpOptions) -> bool:
     if options.session is None and options.trace is None:
         world.stop_recording()
     set_faults(world, options.faults)
-    outside = [line for line in world.spec.lines if line.tcp or line.rtu_tcp or line.pty or line.serial]
+    outside = [line for line in world.spec.lines if line.is_open]
     if speed == inf and outside:
         raise Misuse(f"--speed max: line {outside[0].name!r} has clients outside, which need a clock; use 'steptwin run'")
-    check_addresses((address for line in world.spec.lines for address in (line.tcp, line.rtu_tcp)), listen_any=options.listen_any)
+    addresses = [address for line in world.spec.lines for address in (line.tcp, line.rtu_tcp, line.rfc2217)]
+    check_addresses((*addresses, *(spec.vision for spec in world.spec.mic488)), listen_any=options.listen_any)
     if options.trace is not None:
         check_target(options.trace)
     if options.session is not None:
@@ -108,6 +113,8 @@ async def _serve(options: UpOptions, world: World, speed: float, name: str, *, h
         live.on_stop = server.end
         begun = False
         try:
+            if options.log_frames:
+                follow_frames(live, lambda frame: output.line(str(frame)))
             await _open(server, live, pace, options, name)
             begun = True
             _greet(output, server, world)
@@ -173,12 +180,16 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     await server.open_control(name, {**WorldControl(server.cell, live).handlers(), **pace.handlers()})
     for line in live.world.spec.lines:
         await _open_line(server, live, line, options)
+    for spec in live.world.spec.mic488:
+        if spec.vision is not None:
+            address = parse_address(spec.vision, listen_any=options.listen_any)
+            await server.open_tcp("vision", address, f"vision records, {spec.name}", partial(VisionPort, live, spec.name))
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file, name)
 
 
 async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: UpOptions) -> None:
-    number = count(1)
+    number, there = count(1), live.world.lines[line.name]
     serial_kind = "rtu" if line.kind == "modbus" else "raw"
     what = f"Modbus RTU, {line.name}" if line.kind == "modbus" else f"M1486 line, {line.name}"
 
@@ -188,8 +199,8 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
     if line.pty is not None:
         await server.open_pty(Path(line.pty), what, maker("pty", serial_kind, several=False))
     if line.serial is not None:
-        baud = line.baud or 38400
-        await server.open_serial(line.serial, baud, what, maker("serial", serial_kind, several=False))
+        kind = "serial" if line.kind == "modbus" else "raw"
+        await server.open_serial(line.serial, there.baud, what, maker("serial", kind, several=False))
     if line.tcp is not None:
         address = parse_address(line.tcp, listen_any=options.listen_any)
         kind = "tcp" if line.kind == "modbus" else "raw"
@@ -198,3 +209,8 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
     if line.rtu_tcp is not None:
         address = parse_address(line.rtu_tcp, listen_any=options.listen_any)
         await server.open_tcp("rtu-tcp", address, f"RTU over TCP, {line.name}", maker("rtu", "rtu", several=True))
+    if line.rfc2217 is not None:
+        address = parse_address(line.rfc2217, listen_any=options.listen_any)
+        make = maker("rtu" if line.kind == "modbus" else "tcp", serial_kind, several=True)
+        wire = TwinLine(lambda: there.baud, there.is_timed, server.notice)
+        await server.open_tcp("rfc2217", address, f"network port, {line.name}", lambda: over_network(make(), wire))

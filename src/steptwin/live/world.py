@@ -11,7 +11,8 @@ from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.machine import Nanos
-from steptwin.world.actions import Bytes, Leave, Outside
+from steptwin.mic488.vision import VisionReceiver
+from steptwin.world.actions import Bytes, Leave, Outside, See
 from steptwin.world.kernel import Kernel
 from steptwin.world.lines import ModbusLine, Place
 
@@ -147,6 +148,32 @@ class _Dues:
 
 def _size(what: Outside) -> int:
     return len(what.data) if isinstance(what, Bytes) else 0
+
+
+class VisionPort:
+    """A connection of a vision system to a MIC488: its records are inputs of the world."""
+
+    broken = None
+
+    def __init__(self, live: LiveWorld, machine: str) -> None:
+        self._live = live
+        self._machine = machine
+        self._receiver = VisionReceiver()
+
+    def exchange(self, data: bytes, now: Nanos) -> bytes:
+        for record in self._receiver.feed(data):
+            self._live.outside(See(self._machine, *record))
+            self._live.stale = True
+        return b""
+
+    def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
+        return []
+
+    def deadline(self) -> Nanos | None:
+        return None
+
+    def close(self) -> None:
+        """Nothing is kept of it."""
 
 
 class PlacePort:

@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
+from steptwin.wbc import steps as s
+from steptwin.wbc.usage import sources
 from steptwin.wire.slave import Direction, RtuSlavePort
 from steptwin.wire.timed import TimedRtuSlavePort
 
 if TYPE_CHECKING:
     from steptwin.mic488.device import Mic488
+    from steptwin.mic488.program import LoadedProgram
 
+VISION = "VISION"
+"""How the registers of the vision system begin."""
 LONGEST_RECORD = 80
 """Characters; of more that comes without a line end the last ones are kept."""
 
@@ -59,7 +64,7 @@ class Com1Port(Stateful):
     broken = None
 
     __slots__ = ("_device", "_frames", "_receiver", "modbus")
-    FIXED = frozenset({"_device", "_frames", "modbus"})
+    FIXED = frozenset({"_device", "_frames"})
 
     def __init__(self, device: Mic488, modbus: RtuSlavePort | TimedRtuSlavePort | None = None) -> None:
         self._device = device
@@ -116,3 +121,10 @@ class Com1Port(Stateful):
     def close(self) -> None:
         if self.modbus is not None:
             self.modbus.close()
+
+
+def uses_vision(program: LoadedProgram) -> bool:
+    """Whether a program reads or writes a register of the vision system."""
+    used = [source for step in program.steps for source in sources(step)]
+    used += [step.target for step in program.steps if isinstance(step, s.Set)]
+    return any(isinstance(source, s.Register) and source.row.key.startswith(VISION) for source in used)

@@ -16,12 +16,11 @@ from steptwin.files.programbanks import Banks
 from steptwin.live.cell import Cell
 from steptwin.live.control import axis_number, changes, number
 from steptwin.live.sharedreads import share_reads
-from steptwin.live.vision import uses_vision
 from steptwin.machine import Event, MotionController, Nanos, Port
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488, check_pin, check_turn, pause_observer
 from steptwin.mic488.encoder import Coupling
-from steptwin.mic488.vision import Com1Port
+from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.served.demo import place_switches
 from steptwin.served.faults import FaultDesk
 from steptwin.wbc.machine import STATEMENT_TIME

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.pins import known_pin
+from steptwin.mic488.vision import Record as VisionRecord
 from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
@@ -29,6 +30,16 @@ class Bytes(NamedTuple):
     data: bytes
 
 
+class See(NamedTuple):
+    """A record of a vision system comes to a MIC488."""
+
+    machine: str
+    number: float
+    x: float
+    y: float
+    angle: float
+
+
 class Leave(NamedTuple):
     """A program outside has gone."""
 
@@ -36,7 +47,7 @@ class Leave(NamedTuple):
     place: str
 
 
-Outside: TypeAlias = do.Step | Bytes | Leave
+Outside: TypeAlias = do.Step | Bytes | See | Leave
 """What comes from outside a world. Recorded with its moment, it can be replayed."""
 
 
@@ -132,6 +143,14 @@ def _bytes(plant: Plant, given: Bytes) -> None:
     kernel.settle()
 
 
+def _see(plant: Plant, given: See) -> None:
+    device = plant.controller(given.machine, "vision registers")
+    kernel = plant.touch(given.machine)
+    _record(plant, given.machine, "vision", given[1:])
+    device.see(VisionRecord(*given[1:]), plant.now)
+    kernel.settle()
+
+
 def _leave(plant: Plant, given: Leave) -> None:
     line = plant.line_called(given.line)
     plant.touch(given.line)
@@ -191,6 +210,7 @@ ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.Expect: _expect,
         do.Note: _note,
         Bytes: _bytes,
+        See: _see,
         Leave: _leave,
     },
 )

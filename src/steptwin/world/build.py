@@ -38,12 +38,10 @@ from steptwin.world.names import Unknown
 from steptwin.world.scale import Scale, motor_of, scale_of
 from steptwin.world.sources import Constant, Sine, Table, Waveform
 from steptwin.world.sources import Source as AnalogSource
-from steptwin.world.spec import AxisSpec, ButtonSpec, M1486Spec, Mic488Spec, SourceSpec, SwitchSpec, WorldSpec
+from steptwin.world.spec import AxisSpec, ButtonSpec, LineSpec, M1486Spec, Mic488Spec, SourceSpec, SwitchSpec, WorldSpec
 from steptwin.world.terminals import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, check_terminal
 from steptwin.world.tomlplaces import Path
 from steptwin.world.trace import Record, Recorder
-
-DEFAULT_BAUD = 38400
 
 Files = Mapping[str, bytes]
 """Contents of the files a description names."""
@@ -260,9 +258,10 @@ class _Builder:
 
     def _make_lines(self) -> None:
         for spec in self.spec.lines:
-            self._told(spec.path, partial(self._line, spec.name, spec.kind, spec.baud, spec.timing))
+            self._told(spec.path, partial(self._line, spec))
 
-    def _line(self, name: str, kind: str, baud: int | None, timed: str) -> None:
+    def _line(self, line_spec: LineSpec) -> None:
+        name, kind, baud, timed = line_spec.name, line_spec.kind, line_spec.baud, line_spec.timing
         plan, kernel = self.plan, self._kernel(name)
         chips: list[M1486] = []
         devices: dict[int, Mic488] = {}
@@ -295,8 +294,11 @@ class _Builder:
                 raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")
             line = ChipLine(kernel, name, plan.record, plan.faults, chips)
         else:
-            timing = None if timed == "off" else timing_of(baud or DEFAULT_BAUD, strict=timed == "strict")
-            line = ModbusLine(kernel, name, plan.record, plan.faults, devices=devices, timing=timing)
+            baud = baud or next(iter(devices.values())).config.ports[0].baud
+            timing = None if timed == "off" else timing_of(baud, strict=timed == "strict")
+            line = ModbusLine(
+                kernel, name, plan.record, plan.faults, devices=devices, timing=timing, baud=baud, gap=line_spec.gap
+            )
         kernel.add_part(line)
         plan.lines[name] = line
         for unit, machine_name in names.items():

@@ -7,16 +7,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486
 from steptwin.m1486.line import SerialChain
 from steptwin.machine import Nanos, Port, TalkingPort
 from steptwin.mic488.device import Mic488, pause_observer
+from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.state import Plain, Stateful
 from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
+from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
 from steptwin.wire.slave import Device, Direction, RtuSlavePort, SlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
@@ -35,17 +37,31 @@ MOST_RECEIVED = 1 << 16
 """More pieces than these are not kept for a program that does not fetch them: the oldest go."""
 
 
+class FrameFollower(Protocol):
+    """Takes what goes over a line."""
+
+    def frame(self, now: Nanos, place: str, direction: Direction, data: bytes) -> None:
+        """A frame, or characters; ``place`` is ``"chips"`` for what M1486 chips send."""
+        ...
+
+    def rubbish(self, now: Nanos, place: str, count: int) -> None:
+        """Bytes came that belong to no frame."""
+        ...
+
+
 class Place(Stateful):
     """Where one program is connected. ``received`` is what has come and was not fetched, with its moments."""
 
-    __slots__ = ("inner", "kind", "on_output", "port", "received", "talks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"inner", "kind", "on_output", "port", "talks"})
+    __slots__ = ("inner", "kind", "on_output", "port", "received", "rubbish", "talks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"inner", "kind", "on_output", "port", "rubbish", "talks"})
 
     def __init__(self, kind: str, port: FaultyPort, inner: Any, *, talks: bool) -> None:
         self.kind = kind
         self.port = port
         self.inner = inner
         """The port behind the faults of the line."""
+        self.rubbish = 0
+        """Bytes that belonged to no frame, as far as that was reported."""
         self.talks = talks
         """Whether the port may send without having been asked."""
         self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
@@ -62,8 +78,8 @@ class Place(Stateful):
 class Line(Stateful):
     """Base of the lines; a part of its kernel."""
 
-    __slots__ = ("_busy", "_faults", "_kernel", "_record", "name", "places")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_busy", "_faults", "_kernel", "_record", "name", "places"})
+    __slots__ = ("_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_busy", "_faults", "_followers", "_kernel", "_record", "name", "places"})
 
     kinds: ClassVar[tuple[str, ...]]
     """Kinds of places; the first is that of scripts."""
@@ -75,6 +91,7 @@ class Line(Stateful):
         self._faults = faults
         self.name = name
         self.places: dict[str, Place] = {}
+        self._followers: list[FrameFollower] = []
         self._busy: dict[str, Place] = {}
         """Places at which something may come without being asked for, or is due later."""
 
@@ -86,6 +103,16 @@ class Line(Stateful):
 
     @property
     def units(self) -> tuple[int, ...]:
+        raise NotImplementedError
+
+    @property
+    def baud(self) -> int:
+        """The present rate of the line, bit/s."""
+        raise NotImplementedError
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether characters take the time of a wire."""
         raise NotImplementedError
 
     # ------------------------------------------------------------------ places
@@ -111,7 +138,7 @@ class Line(Stateful):
                 place,
                 self._faults,
                 self.fault_kinds[kind],
-                framed=port if isinstance(port, SlavePort) else None,
+                framed=_framed(port),
                 units=self.units,
                 line_name=self.name,
             )
@@ -128,6 +155,14 @@ class Line(Stateful):
         if found is not None:
             found.port.close()
 
+    def _count_rubbish(self, name: str, place: Place, now: Nanos) -> None:
+        """Report bytes that belonged to no frame."""
+        rubbish = getattr(place.inner, "rubbish", 0)
+        if rubbish > place.rubbish:
+            for follower in self._followers:
+                follower.rubbish(now, name, rubbish - place.rubbish)
+        place.rubbish = rubbish
+
     def exchange(self, place: str, found: Place, data: bytes, now: Nanos) -> bytes:
         """Give bytes of the program at ``place``, which is connected as ``found``; the kernel is at ``now``. Returns what is
         answered at once; what is answered later is in `Place.received` then."""
@@ -135,6 +170,8 @@ class Line(Stateful):
         if place in self._busy or found.port.deadline() is not None:
             self._busy[place] = found
             self._kernel.mark()
+        if self._followers:
+            self._count_rubbish(place, found, now)
         return answer
 
     def receive(self, place: str, data: bytes, now: Nanos) -> None:
@@ -157,6 +194,8 @@ class Line(Stateful):
             pieces = place.port.to_send(now)
             if pieces:
                 self._came(name, place, pieces)
+            if self._followers:
+                self._count_rubbish(name, place, now)
             if not place.talks and place.port.deadline() is None:
                 self._busy.pop(name, None)
 
@@ -171,6 +210,16 @@ class Line(Stateful):
     def _tell(self, now: Nanos, place: str, direction: Direction, data: bytes) -> None:
         if self._record is not None:
             self._record(Record(now, self.name, "frame", f"{place}/{direction.value}", data))
+        for follower in self._followers:
+            follower.frame(now, place, direction, data)
+
+    def follow_frames(self, follower: FrameFollower) -> None:
+        """Call ``follower`` with every frame; what a port carries that is there already is not followed, but for the scripts'."""
+        self._followers.append(follower)
+
+    @property
+    def _is_followed(self) -> bool:
+        return self._record is not None or bool(self._followers)
 
     # ------------------------------------------------------------------ snapshots
 
@@ -204,11 +253,12 @@ class Line(Stateful):
 class ModbusLine(Line):
     """Controllers with different units on one line. With ``timing`` requests take the time of a wire and of the controllers."""
 
-    __slots__ = ("_timed", "devices", "master", "served")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"devices", "served"}) | Line.FIXED
+    __slots__ = ("_baud", "_gap", "_seeing", "_timed", "devices", "master", "served")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_baud", "_gap", "_seeing", "devices", "served"}) | Line.FIXED
 
-    kinds = ("rtu", "tcp")
-    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"rtu": FaultLine.RTU, "tcp": FaultLine.TCP}
+    kinds = ("rtu", "serial", "tcp")
+    """``serial``: a real serial port, on which characters take their time whatever the line timing is."""
+    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"rtu": FaultLine.RTU, "serial": FaultLine.RTU, "tcp": FaultLine.TCP}
 
     def __init__(
         self,
@@ -219,11 +269,19 @@ class ModbusLine(Line):
         *,
         devices: Mapping[int, Mic488],
         timing: LineTiming | None,
+        baud: int = 38400,
+        gap: Nanos | None = None,
     ) -> None:
         super().__init__(kernel, name, record, faults)
         self.devices = devices
         self.served: Mapping[int, Device] = devices
         """What executes the requests of programs outside without line timing; ports that are made from now on use it."""
+        self._baud = baud
+        self._gap = gap
+        # WBC-15: a vision system belongs to one controller; without its registers in a program it costs nothing.
+        device = next(iter(devices.values()))
+        sees = len(devices) == 1 and any(map(uses_vision, device.program.programs.values()))
+        self._seeing = device if sees else None
         self._timed: tuple[TimedUnits, Gateway] | None = None
         if timing is not None:
             units = TimedUnits(devices, timing)
@@ -256,19 +314,32 @@ class ModbusLine(Line):
         def tell(now: Nanos, direction: Direction, data: bytes) -> None:
             self._tell(now, place, direction, data)
 
-        observe = None if self._record is None else tell
+        observe = tell if self._is_followed else None
+        if self._timed is None and kind == "tcp":
+            return TcpSlavePort(self.served, on_frame=observe)
+        if self._timed is not None and kind == "tcp":
+            return TcpGatewayPort(self._timed[1], on_frame=observe)
+        if self._timed is not None and place == SCRIPTS:
+            return ScriptPort(self._timed[1], on_frame=observe)
+        usual = UART_GAP_NS if kind == "serial" else BURSTY_GAP_NS
+        gap = usual if self._gap is None else self._gap
         on_pause = pause_observer(self.devices)
-        if self._timed is None:
-            if kind == "tcp":
-                return TcpSlavePort(self.served, on_frame=observe)
+        port: RtuSlavePort | TimedRtuSlavePort
+        if self._timed is not None:
+            port = TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=observe, on_pause=on_pause)
+        else:
             devices = self.devices if place == SCRIPTS else self.served
-            return RtuSlavePort(devices, on_frame=observe, on_pause=on_pause)
-        units, gateway = self._timed
-        if kind == "tcp":
-            return TcpGatewayPort(gateway, on_frame=observe)
-        if place == SCRIPTS:
-            return ScriptPort(gateway, on_frame=observe)
-        return TimedRtuSlavePort(units, on_frame=observe, on_pause=on_pause)
+            wire = SerialLine(self._baud) if kind == "serial" else None
+            port = RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=observe, on_pause=on_pause)
+        return port if self._seeing is None or place == SCRIPTS else Com1Port(self._seeing, port)
+
+    @property
+    def baud(self) -> int:
+        return self._baud
+
+    @property
+    def is_timed(self) -> bool:
+        return self._timed is not None
 
 
 class ChipLine(Line):
@@ -288,6 +359,14 @@ class ChipLine(Line):
     @property
     def units(self) -> tuple[int, ...]:
         return ()
+
+    @property
+    def baud(self) -> int:
+        return next(iter(self.chain.chips.values())).uart.baud
+
+    @property
+    def is_timed(self) -> bool:
+        return next(iter(self.chain.chips.values())).is_timed
 
     def _port(self, place: str, kind: str) -> Port:
         return self.chain.port()
@@ -314,3 +393,9 @@ class ChipLine(Line):
 
 def timing_of(baud: int, *, strict: bool) -> LineTiming:
     return LineTiming(SerialLine(baud), strict=strict)
+
+
+def _framed(port: Port) -> SlavePort | None:
+    """What reports frames in a port of a line."""
+    inner = port.modbus if isinstance(port, Com1Port) else port
+    return inner if isinstance(inner, SlavePort) else None

@@ -11,7 +11,7 @@ from steptwin.m1486.pins import settable_pin
 from steptwin.mic488.device import Mic488, check_pin, check_turn
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Leave, Outside, master_of
+from steptwin.world.actions import Bytes, Leave, Outside, See, master_of
 from steptwin.world.faults import Fault
 from steptwin.world.script import STEPS
 from steptwin.world.spec import ScriptSpec
@@ -138,6 +138,10 @@ def _turn(plant: Plant, step: do.Turn) -> None:
     check_turn(step.axis, step.counts)
 
 
+def _see(plant: Plant, step: See) -> None:
+    plant.controller(step.machine, "vision registers")
+
+
 def _fault(plant: Plant, step: do.SetFault) -> None:
     plant.rigging.check(step.fault)
 
@@ -165,6 +169,7 @@ _CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.Send: _send,
         do.PowerCycle: _power_cycle,
         do.Turn: _turn,
+        See: _see,
         do.SetFault: _fault,
         do.ClearFault: _clear_fault,
         **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat, Bytes, Leave), _nothing),

@@ -77,8 +77,8 @@ def _wires(plan: Plan) -> Iterator[Wire]:
             for link, kind, is_open in (
                 ("pty", serial, spec.pty),
                 ("serial", serial, spec.serial),
-                ("rtu", serial, spec.rtu_tcp),
-                ("tcp", network, spec.tcp),
+                ("rtu", serial, spec.rtu_tcp or (spec.rfc2217 if spec.kind == "modbus" else None)),
+                ("tcp", network, spec.tcp or (spec.rfc2217 if spec.kind == "m1486" else None)),
             )
             if is_open is not None
         ]

@@ -19,7 +19,7 @@ _EXCLUDE: Mapping[str, tuple[tuple[str, str], ...]] = {
 }
 """Keys that say the same in two ways."""
 _ONLY: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "line": {"rtu_tcp": ("modbus",)},
+    "line": {"rtu_tcp": ("modbus",), "gap": ("modbus",)},
     "source": {
         "value": ("constant", "sine"),
         "amplitude": ("sine",),

@@ -21,9 +21,16 @@ class LineSpec:
     timing: str
     tcp: str | None
     rtu_tcp: str | None
+    rfc2217: str | None
+    gap: Nanos | None
     pty: str | None
     serial: str | None
     path: Path = ()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether programs outside can talk on it."""
+        return any((self.tcp, self.rtu_tcp, self.rfc2217, self.pty, self.serial))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +45,7 @@ class Mic488Spec:
     start: bool
     statement_time: Nanos | None
     lenient: bool
+    vision: str | None
     trigger_keeps: bool | None
     axes: Mapping[int, Mapping[str, Any]]
     """Changed attributes of `AxisConfig`, by axis from 1."""

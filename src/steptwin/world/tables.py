@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from steptwin.errors import Misuse
 from steptwin.m1486.lines import INTERFACES
 from steptwin.m1486.variants import VARIANTS
-from steptwin.machine import MILLISECOND
+from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.registers import FIRMWARES
 from steptwin.wire.rtu import MAX_UNIT
 from steptwin.world.addresses import parse_address
+from steptwin.world.durations import duration
 from steptwin.world.reader import (
     Key,
     flag,
@@ -30,6 +32,8 @@ from steptwin.world.reader import (
 )
 from steptwin.world.script import STEPS
 
+MOST_GAP_MS = 10_000
+
 _positive = number(0.0, above=True)
 _not_negative = number(0.0)
 
@@ -42,6 +46,14 @@ def _address_text(value: Any) -> str:
     """HOST:PORT as it is written; whether it may be reached by others is decided where the line is opened."""
     parse_address(text_value(value), listen_any=True)
     return value
+
+
+def _gap(value: Any) -> Nanos:
+    """Milliseconds, as the command line takes them, or a text such as ``"5 ms"``."""
+    found = duration(value) if isinstance(value, str) else round(number(0.0, MOST_GAP_MS, above=True)(value) * MILLISECOND)
+    if not 0 < found <= MOST_GAP_MS * MILLISECOND:
+        raise Misuse(f"{value!r}: permitted are more than 0 and at most {MOST_GAP_MS} ms")
+    return found
 
 
 def _firmware(value: Any) -> str:
@@ -80,7 +92,11 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
     "line": (
         Key("name", name_value, "how controllers and scripts name it"),
         _optional(word("modbus", "m1486"), "kind", "modbus (MIC488) or m1486", "modbus"),
-        _optional(whole(300, 1_000_000), "baud", "bit/s; default 38400, the highest of the chips"),
+        _optional(
+            whole(300, 1_000_000),
+            "baud",
+            "bit/s; default that of the first controller, the highest of the chips",
+        ),
         _optional(
             word("real", "strict", "off"),
             "timing",
@@ -88,7 +104,13 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
             "off",
         ),
         _optional(_address_text, "tcp", "HOST:PORT for live clients (Modbus TCP, or raw characters)"),
+        _optional(
+            _gap,
+            "gap",
+            "silence in ms after which bytes of no frame are given up; default 0.75 on a serial port, else 20",
+        ),
         _optional(_address_text, "rtu_tcp", "HOST:PORT for live clients of RTU over TCP"),
+        _optional(_address_text, "rfc2217", "HOST:PORT of a network serial port (RFC 2217) for live clients"),
         _optional(text_value, "pty", "path of a pseudo terminal for a live client"),
         _optional(text_value, "serial", "a real serial port"),
     ),
@@ -103,6 +125,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(flag, "start", "whether the program starts at power-on", False),
         _optional(time_value, "statement_time", "what a statement of the program takes"),
         _optional(flag, "lenient", "holes of the register map read 0", False),
+        _optional(_address_text, "vision", "HOST:PORT for records of a vision system ('N1 X12.5 Y-3 A90' and a line end)"),
         _optional(flag, "trigger_keeps", "whether a trigger keeps the values it uses; default that of its configuration, no"),
     ),
     "m1486": (
