@@ -20,6 +20,7 @@ from steptwin.mic488.device import Mic488
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
 from steptwin.mic488.program import LoadedProgram, load, setup_of
+from steptwin.mic488.registers import firmware
 from steptwin.textcodec import decode
 from steptwin.wbc.check import check
 from steptwin.wbc.decompile import IMAGE, program_of
@@ -158,32 +159,47 @@ class _Builder:
                 raise ConfigError(file.source, found)
             self._warn(file.source, found)
         config = config_of(spec, base)
-        positions: dict[int, PositionTable] = {}
-        programs: dict[int, LoadedProgram] = {}
-        if spec.positions is not None:
-            table, findings = parse_positions(self._text(spec.positions))
-            errors = [finding for finding in findings if finding.severity is Severity.ERROR]
-            if errors or table is None:
-                raise Misuse(f"positions do not check:\n{render(Source(spec.positions, self._text(spec.positions)), errors)}")
-            self._warn(Source(spec.positions, self._text(spec.positions)), findings)
-            positions[0] = table
-        if spec.program is not None:
-            if spec.program.lower().endswith(IMAGE):
-                source, table, doubts = program_of(self._data(spec.program), spec.program)
-                self._warn(source, doubts)
-                if table.rows:
-                    positions.setdefault(0, table)
-            else:
-                source = Source(spec.program, self._text(spec.program))
-            checked = check(source.text, positions.get(0), setup_of(config), dialect_for(spec.firmware))
-            if checked.errors:
-                raise Misuse(f"the program does not check:\n{render(source, checked.errors)}")
-            self._warn(source, checked.diagnostics)
-            programs[0] = load(checked, spec.program)
+        programs, positions = self._banks(spec, config)
         statement_time = STATEMENT_TIME if spec.statement_time is None else spec.statement_time
         return Mic488(
             config, spec.firmware, lenient=spec.lenient, programs=programs, positions=positions, statement_time=statement_time
         )
+
+    def _banks(self, spec: Mic488Spec, config: ControllerConfig) -> tuple[dict[int, LoadedProgram], dict[int, PositionTable]]:
+        """What is in the banks. Names of positions are found in the table of the same bank, or else in the only one there is."""
+        number = firmware(spec.firmware).banks
+        for key, given in (("programs", spec.all_programs), ("positions", spec.positions)):
+            for bank, name in given:
+                if bank >= number:
+                    raise Misuse(f"{key}: {name} is for bank {bank}: firmware {spec.firmware} has banks 0 to {number - 1}")
+        tables = {bank: self._positions(name) for bank, name in spec.positions}
+        sources: dict[int, Source] = {}
+        for bank, name in spec.all_programs:
+            if name.lower().endswith(IMAGE):
+                sources[bank], table, doubts = program_of(self._data(name), name)
+                self._warn(sources[bank], doubts)
+                if table.rows:
+                    tables.setdefault(bank, table)
+            else:
+                sources[bank] = Source(name, self._text(name))
+        only = next(iter(tables.values())) if len(tables) == 1 else None
+        programs: dict[int, LoadedProgram] = {}
+        for bank, name in spec.all_programs:
+            checked = check(sources[bank].text, tables.get(bank, only), setup_of(config), dialect_for(spec.firmware))
+            if checked.errors:
+                raise Misuse(f"the program does not check:\n{render(sources[bank], checked.errors)}")
+            self._warn(sources[bank], checked.diagnostics)
+            programs[bank] = load(checked, name)
+        return programs, tables
+
+    def _positions(self, name: str) -> PositionTable:
+        source = Source(name, self._text(name))
+        table, findings = parse_positions(source.text)
+        errors = [finding for finding in findings if finding.severity is Severity.ERROR]
+        if errors or table is None:
+            raise Misuse(f"positions do not check:\n{render(source, errors)}")
+        self._warn(source, findings)
+        return table
 
     def _m1486(self, spec: M1486Spec) -> M1486:
         kind = variant(spec.variant)

@@ -279,6 +279,20 @@ def positive_time(value: Any) -> int:
     return found
 
 
+def banks_value(value: Any) -> tuple[tuple[int, str], ...]:
+    """Files by bank: a text is for bank 0, a list for 0, 1 …, a table names the banks."""
+    if isinstance(value, str):
+        return ((0, text_value(value)),)
+    if isinstance(value, list):
+        return tuple((bank, text_value(name)) for bank, name in enumerate(value))
+    if not isinstance(value, Mapping):
+        raise Misuse(f"{value!r}: expected a file, a list of files, or files by bank such as {{ 3 = 'file' }}")
+    for bank in value:
+        if not (bank.isascii() and bank.isdecimal() and len(bank) < 4) or (len(bank) > 1 and bank[0] == "0"):
+            raise Misuse(f"{bank!r} is no bank: expected a number from 0 on")
+    return tuple(sorted((int(bank), text_value(name)) for bank, name in value.items()))
+
+
 def pair(value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
         raise Misuse(f"{value!r}: expected [low, high]")

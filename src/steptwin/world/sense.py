@@ -14,6 +14,7 @@ _NEED: Mapping[str, Mapping[str, str]] = {
 }
 """Keys that mean nothing without another."""
 _EXCLUDE: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "mic488": (("program", "programs"),),
     "axis": (("pulses_per_unit", "pitch"),),
     "encoder": (("counts_per_rev", "counts_per_unit"),),
 }

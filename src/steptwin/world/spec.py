@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from steptwin.machine import Nanos
 from steptwin.world.faults import Fault
@@ -33,6 +33,10 @@ class LineSpec:
         return any((self.tcp, self.rtu_tcp, self.rfc2217, self.pty, self.serial))
 
 
+Banks: TypeAlias = tuple[tuple[int, str], ...]
+"""Numbers of banks and the files that are for them."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mic488Spec:
     name: str
@@ -41,7 +45,8 @@ class Mic488Spec:
     firmware: str
     config: str | None
     program: str | None
-    positions: str | None
+    programs: Banks
+    positions: Banks
     start: bool
     statement_time: Nanos | None
     lenient: bool
@@ -51,6 +56,11 @@ class Mic488Spec:
     """Changed attributes of `AxisConfig`, by axis from 1."""
     inputs: Mapping[int, Mapping[str, Any]]
     path: Path = ()
+
+    @property
+    def all_programs(self) -> Banks:
+        """``programs``, and ``program`` in bank 0."""
+        return self.programs if self.program is None else ((0, self.program), *self.programs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,9 +219,12 @@ class WorldSpec:
     def files(self) -> Iterator[tuple[str, Path]]:
         """Names of the files the description refers to, and the keys that do."""
         for spec in self.mic488:
-            for key in ("config", "program", "positions"):
+            for key in ("config", "program"):
                 name = getattr(spec, key)
                 if name is not None:
+                    yield name, (*spec.path, key)
+            for key in ("programs", "positions"):
+                for _, name in getattr(spec, key):
                     yield name, (*spec.path, key)
         for chip in self.m1486:
             if chip.program is not None:

@@ -18,6 +18,7 @@ from steptwin.world.addresses import parse_address
 from steptwin.world.durations import duration
 from steptwin.world.reader import (
     Key,
+    banks_value,
     flag,
     name_value,
     number,
@@ -121,7 +122,8 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
         _optional(_firmware, "firmware", f"one of {', '.join(FIRMWARES)}", "1.70"),
         _optional(text_value, "config", "the vendor tool's .cfg file"),
         _optional(text_value, "program", "a WBC program for bank 0"),
-        _optional(text_value, "positions", "a position table for bank 0"),
+        _optional(banks_value, "programs", "WBC programs by bank: ['a.prg', 'b.prg'] for 0 and 1, or { 3 = 'd.prg' }", ()),
+        _optional(banks_value, "positions", "position tables by bank, as programs; 'a.csv' alone is for bank 0", ()),
         _optional(flag, "start", "whether the program starts at power-on", False),
         _optional(time_value, "statement_time", "what a statement of the program takes"),
         _optional(flag, "lenient", "holes of the register map read 0", False),
