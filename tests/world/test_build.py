@@ -303,3 +303,30 @@ def test_a_branch_with_shared_inputs_does_the_same(moment: float) -> None:
     branch = cut.branch()
     branch.run(until=15)
     assert branch.trace.digest() == whole.trace.digest()
+
+
+@pytest.mark.parametrize(("own", "other", "at_once"), [("off", "real", True), ("real", "off", False)])
+def test_characters_of_a_chip_take_the_time_of_its_own_line(own: str, other: str, at_once: bool) -> None:
+    world = world_of(
+        f"""
+        [[line]]
+        name = "one"
+        kind = "m1486"
+        timing = "{own}"
+        [[line]]
+        name = "two"
+        kind = "m1486"
+        timing = "{other}"
+        [[m1486]]
+        name = "a"
+        line = "one"
+        [[m1486]]
+        name = "b"
+        line = "two"
+        """
+    )
+    world.line["one"].send(b"u20\r")
+    early = world.line["one"].received()
+    assert (early == b"B") is at_once
+    world.run(for_=1)
+    assert early + world.line["one"].received() == b"B"

@@ -511,3 +511,15 @@ def test_a_block_is_not_typed_into_a_chip_that_moves() -> None:
     with pytest.raises(Busy, match="the chip is not done with a run without end: wait for its end or stop it"):
         chip.run_block(["f64"])
     assert "[" not in typed(wire)
+
+
+def test_an_end_says_how_long_it_was_waited_for() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.configure(**KNOWN)
+    chip.move_by(100.0)
+    wire.sleep(0.1)
+    begin = wire.now
+    end = chip.wait()
+    assert end.after_s == pytest.approx((wire.now - begin) / SECOND, abs=0.05)
+    assert 0.1 < end.after_s < 10.0
