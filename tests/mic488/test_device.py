@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import pickle
 import tracemalloc
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -25,6 +25,7 @@ from mic488_rig import (
     controller,
     read_pdu,
     word_pdu,
+    words_pdu,
 )
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
@@ -33,6 +34,7 @@ from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig, Pr
 from steptwin.mic488.device import Mic488, Snapshot, pause_observer
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program import ProgramControl
+from steptwin.mic488.vision import Record
 from steptwin.state import Stateful
 
 BUSY = ControllerConfig(
@@ -581,3 +583,35 @@ def test_mic_15_a_pause_inside_a_request_is_an_event_of_those_it_was_for(unit: i
     assert {n: [(e.code, e.text) for e in d.events] for n, d in devices.items()} == {
         n: [("frame-pause", text)] if n in told else [] for n in devices
     }
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda device, now: device.set_pin("IN1", 1.0, now),
+        lambda device, now: device.set_pin("AIN1", 5.0, now),
+        lambda device, now: device.see(Record(1.0, 2.0, 3.0, 4.0), now),
+        lambda device, now: device.turn_encoder(1, 30, now),
+        lambda device, now: device.couple_encoder(1, Coupling.BLOCKED, now),
+        lambda device, now: device.follow_shaft(1, None, now),
+        lambda device, now: device.gear_encoder(1, -7, 3, now),
+        lambda device, now: device.execute(word_pdu(10014, 2), now),
+        lambda device, now: device.power_cycle(now),
+        lambda device, now: device.power_off(now),
+    ],
+)
+def test_an_input_comes_after_all_that_is_due_at_its_moment(act: Callable[[Mic488, int], object]) -> None:
+    """Rule 1 of the time contract: nobody need advance the controller before."""
+    states = []
+    for advanced in (True, False):
+        device = Mic488(controller(AxisConfig(pos_ctrl_mode=1, enc_settle_ms=20)))
+        device.execute(word_pdu(10014, 1), 0)
+        device.execute(words_pdu(10092, 0, 0x447A), 0)  # M1_POS_REL 1000
+        device.turn_encoder(1, -50, SECOND)
+        # At rest from 2 s on, corrected a little later.
+        for now in (1_500_000_000, 2_100_000_000):
+            if advanced:
+                device.advance(now)
+            act(device, now)
+        states.append((device.now, device.copy_state(), device.take_edges(), list(device.events)))
+    assert states[0] == states[1]

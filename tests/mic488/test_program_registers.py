@@ -112,6 +112,21 @@ def test_a_loop_that_writes_what_is_there_already_rests(assignment: str) -> None
 
 
 @pytest.mark.parametrize(
+    "name",
+    [
+        "OUT1", "OUTPUTS", "M1", "PosM1", "LimLM1", "LimRM2", "AccM1", "DecM3", "VmaxM4", "ENC1", "TIMA1", "TIMB16",
+        "PTPM3", "CircY", "LinVel", "LinAcc", "VisionX", "$I5", "$D6", "$R8",
+    ],
+)  # fmt: skip
+def test_a_loop_that_changes_a_register_and_changes_it_back_does_not_rest(name: str) -> None:
+    values = "10" if name in ("OUT1", "M1") else "12"
+    rig = started(f"MAIN:\n{name} = {values[0]}\n{name} = {values[1]}\nJUMP MAIN\n")
+    rig.wait(0.1)
+    deadline = rig.kernel.deadline()
+    assert (rig.state, deadline) == (RUNNING, rig.now + 1_000_000)
+
+
+@pytest.mark.parametrize(
     ("counts", "pulses", "first", "seconds"),
     [(100_000, 1, 0, 2**31 / 1e8), (400, 3200, 2**31 - 1001, 1000 / 125), (-400, 3200, -(2**31) + 1000, 1000 / 125)],
 )

@@ -85,6 +85,31 @@ def test_messages_have_row_and_column(text: str, expected: list[tuple[str, int, 
     assert found(text) == expected
 
 
+NUMBER = "write a number like 20, -70, 20.5 or 20,5, or x to leave the axis alone"
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("A;1;2;3\n", "4 columns instead of 5", "a row is name;p1;p2;p3;p4"),
+        ("A;1;2;3;4;5\n", "6 columns instead of 5", "a row is name;p1;p2;p3;p4"),
+        ("A;1;zwei;3;4\n", "p2 is 'zwei', neither a number nor x", NUMBER),
+        ("A;1;2;3;\n", "p4 is nothing, neither a number nor x", NUMBER),
+        (f"A;{'9' * 40};x;x;x\n", "p1 is beyond the range of REAL, ±3.4e+38", NUMBER),
+        ("A;1;2;3;4\na;1;2;3;4\n", "a is already the name of row 0", "names differ in more than case"),
+        ("A;1;2;3;4\n\nB;1;2;3;4\n", "an empty line", "remove it: rows are counted by lines"),
+        (
+            "my pos;1;2;3;4\n",
+            "'my pos' cannot be written after @",
+            "names have letters without accents, digits and _, and do not begin with a digit",
+        ),
+        ("A;1;2;3;4\n" + "".join(f"P{n};1;2;3;4\n" for n in range(227)), "more than 227 rows", "the table holds 227"),
+    ],
+)
+def test_messages_and_hints(text: str, message: str, hint: str) -> None:
+    assert [(d.message, d.hint) for d in parse_positions(text)[1]] == [(message, hint)]
+
+
 def test_a_wrong_cell_keeps_its_row() -> None:
     table, _ = parse_positions("A;1;?;3;4\nB;1;2;3;4\n")
     assert table.rows[0].values == (1, None, 3, 4)

@@ -31,7 +31,6 @@ class Scope:
         self._near = NearMiss()
         self._near_registers = NearMiss()
         self._broken: set[str] = set()
-        self._status_told = False
         self.known: dict[str, Source] = {}
         self.constants: dict[str, Name] = {}
         self.variables: dict[str, Name] = {}
@@ -186,8 +185,7 @@ class Scope:
             else:
                 self._say(f.NO_SUCH_REGISTER.at(name, f"there is no {name.text}", row.spelling(dialect)))
             return None
-        if row.key == "STATUS" and not dialect.has(_STATUS_SINCE) and not self._status_told:
-            self._status_told = True
+        if row.key == "STATUS" and not dialect.has(_STATUS_SINCE):
             hint = f"it gives M_STATUS from firmware {_STATUS_SINCE} on"
             self._say(f.STATUS_IS_ZERO.at(name, f"STATUS is always 0 in firmware {dialect.firmware}", hint))
         return Register(row, number)
