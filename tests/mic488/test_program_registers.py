@@ -6,6 +6,10 @@ import pytest
 from mic488_rig import controller
 from wbc_rig import MM, RUNNING, STOPPED, ProgramRig, started
 
+from steptwin.mic488.config import AxisConfig
+from steptwin.mic488.program_registers import position_p
+from steptwin.wbc.real import ProgramFault
+
 # ---------------------------------------------------------------------- registers
 
 
@@ -95,6 +99,16 @@ def test_analog_inputs_are_scaled() -> None:
     rig.pin("AIN2", 10.0)
     rig.wait(0.1)
     assert (rig.r(0), rig.r(2)) == (2.5, 10.0)
+
+
+@pytest.mark.parametrize("gear", [1.0, 4.0])
+def test_mic_14_positions_that_the_counter_holds_after_rounding(gear: float) -> None:
+    axis = ProgramRig("OUT1 = ON\n", "", controller(AxisConfig(gear=gear))).device.axes[0]
+    for pulses, rounded in ((-(2**31) - 0.25, -(2**31)), (2**31 - 0.75, 2**31 - 1), (12.75, 13), (-0.25, 0)):
+        assert position_p(axis, pulses / gear, "PABS M1") == rounded
+    for pulses in (-(2**31) - 0.5, -(2**31) - 1.25, 2**31 - 0.5, 2**31 + 0.25):
+        with pytest.raises(ProgramFault, match="PABS M1 = .* imp: permitted are -"):
+            position_p(axis, pulses / gear, "PABS M1")
 
 
 @pytest.mark.parametrize(
