@@ -107,7 +107,7 @@ def test_mic_14_positions_that_the_counter_holds_after_rounding(gear: float) -> 
     for pulses, rounded in ((-(2**31) - 0.25, -(2**31)), (2**31 - 0.75, 2**31 - 1), (12.75, 13), (-0.25, 0)):
         assert position_p(axis, pulses / gear, "PABS M1") == rounded
     for pulses in (-(2**31) - 0.5, -(2**31) - 1.25, 2**31 - 0.5, 2**31 + 0.25):
-        with pytest.raises(ProgramFault, match="PABS M1 = .* imp: permitted are -"):
+        with pytest.raises(ProgramFault, match=r"PABS M1 = .* imp: permitted are -"):
             position_p(axis, pulses / gear, "PABS M1")
 
 
