@@ -222,3 +222,9 @@ def test_paths_that_cannot_be_run_are_program_errors(statement: str, rows: str, 
     assert (rig.state, rig.m_status) == (STOPPED, 2)
     (error,) = rig.events("program-error")
     assert problem in error.text.lower()
+
+
+def test_velocities_of_programs_are_in_units() -> None:
+    rig = started("M2 = ON\nVABS M2 -12.5\nDELAY 1\n$R0 = VactM2\nWAIT IN9 = ON\n")
+    rig.wait(1.5)
+    assert rig.r(0) == rig.velocity(2) == -12.5
