@@ -34,7 +34,7 @@ test: $(DEV_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missi
 soak: $(DEV_STAMP)  ## Run the soak tests at full length (STEPTWIN_SOAK=0.1 for a tenth)
 	STEPTWIN_SOAK=$${STEPTWIN_SOAK:-1} $(BIN)/pytest -n auto -m soak tests/soak $(ARGS)
 
-extras: $(DEV_STAMP)  ## Install what pictures, other exports and the monitor need (as the tests do)
+extras: $(DEV_STAMP)  ## Install what pictures, other exports, the monitor and the editor server need (as the tests do)
 
 lint: $(DEV_STAMP)  ## Check style and formatting
 	$(BIN)/ruff check .
@@ -74,7 +74,7 @@ peers:  ## Install the system packages the tests talk to (Debian)
 
 lock: $(UV)  ## Pin the dependencies anew (ARGS="--upgrade" takes newer ones)
 	$(COMPILE) requirements/tools.in -o requirements/tools.txt
-	$(COMPILE) pyproject.toml --group build -o requirements/run.txt
+	$(COMPILE) pyproject.toml --extra lsp --group build -o requirements/run.txt
 	$(COMPILE) pyproject.toml --all-extras --group build --group dev -c requirements/run.txt -o requirements/dev.txt
 
 COMPILE := env -u UV_FIND_LINKS -u PIP_FIND_LINKS UV_CUSTOM_COMPILE_COMMAND="make lock" \

@@ -8,11 +8,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from steptwin.files.export import AxisView, write_trace
-from steptwin.files.export.axes import PhaseOutputs
+from steptwin.files.export import AxisLane, write_trace
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.trace import Record, Trace
+from steptwin.world.lanes import PhaseOutputs
+from steptwin.world.trace import Trace, TraceRecord
 
 HOUR: Nanos = 3600 * SECOND
 AXES = 4
@@ -25,7 +25,9 @@ def run_of(duration: Nanos, speed: float) -> Trace:
     trace = Trace(["table"])
     chance = random.Random(1)
     records = [
-        Record(n, "table", "frame", f"tcp-1/{end}", bytes(12)) for n in range(0, duration, SECOND // 10) for end in ("in", "out")
+        TraceRecord(n, "table", "frame", f"tcp-1/{end}", bytes(12))
+        for n in range(0, duration, SECOND // 10)
+        for end in ("in", "out")
     ]
     for axis in range(1, AXES + 1):
         now: Nanos = 0
@@ -33,9 +35,9 @@ def run_of(duration: Nanos, speed: float) -> Trace:
         while now < duration:
             target = chance.randrange(TRAVEL_P)
             plan = plan_position(MotionState(now, at, 0.0, 0.0), target, 4 * speed, 4 * speed, speed)
-            records += [Record(now, "table", "edge", f"OUT{axis}", 1.0), Record(now, "table", "plan", str(axis), plan)]
+            records += [TraceRecord(now, "table", "edge", f"OUT{axis}", 1.0), TraceRecord(now, "table", "plan", str(axis), plan)]
             at, now = target, plan.end or now
-            records.append(Record(now, "table", "edge", f"OUT{axis}", 0.0))
+            records.append(TraceRecord(now, "table", "edge", f"OUT{axis}", 0.0))
             now += SECOND // 4
     for record in sorted(records, key=lambda record: record.time):
         trace.add(record)
@@ -62,7 +64,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         minute = run_of(60 * SECOND, 32_000.0)
-        steps = {("table", str(axis)): AxisView(f"M{axis}") for axis in range(1, AXES + 1)}
+        steps = {("table", str(axis)): AxisLane(f"M{axis}") for axis in range(1, AXES + 1)}
         phases = {key: view._replace(outputs=PhaseOutputs()) for key, view in steps.items()}
         print(f"{'value change dump':<34}{'changes':>12}")
         for title, views in (("STEP and DIR, four axes, a minute", steps), ("phase currents of the same", phases)):

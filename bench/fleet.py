@@ -8,11 +8,12 @@ import socket
 import sys
 
 from steptwin.live.cell import Cell
+from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.descriptors import descriptors
-from steptwin.live.tcp import Clients, Connection
+from steptwin.live.tcp_epoll import Connection
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.wire.slave import TcpSlavePort
 from steptwin.world.addresses import Address
 from steptwin.world.kernel import Kernel
@@ -33,7 +34,7 @@ async def main(port: int) -> None:
         client, peer = listener.accept()
         client.setblocking(False)
         kernel = Kernel(clock.now())
-        device = Mic488(config)
+        device = Mic488Device(config)
         kernel.add("1", device)
         for request in (ENABLE_ALL, *RUN):
             device.execute(request, kernel.now)

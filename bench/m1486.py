@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.m1486.signals import step_pulses, strobes
 from steptwin.m1486.variants import variant
@@ -32,8 +32,8 @@ def best_s(work: Callable[[], object]) -> float:
     return min(times)
 
 
-def running(program: str, statement_ns: Nanos | None = None) -> M1486:
-    chip = M1486(variant("B"), statement_ns=statement_ns)
+def running(program: str, statement_ns: Nanos | None = None) -> M1486Chip:
+    chip = M1486Chip(variant("B"), statement_ns=statement_ns)
     chip.receive(program.encode(), 0)
     return chip
 
@@ -70,7 +70,7 @@ def pulses() -> None:
         count = len(step_pulses(steps, 0, end))
         seconds = best_s(lambda steps=steps, end=end: step_pulses(steps, 0, end))
         print(f"{name:<34}{count:>10,} {count / seconds / 1e6:>12.0f} M/s")
-    chip = M1486(variant("B"), interface=DUAL_DAC)
+    chip = M1486Chip(variant("B"), interface=DUAL_DAC)
     chip.receive(b"v3000\rq4\rf640000\rr\r", 0)
     chip.advance(100 * SECOND)
     count = sum(1 for _ in strobes(chip.drive.train, 1, 0, chip.now))

@@ -1,4 +1,4 @@
-"""``make bench ARGS=ways``: a served controller and the same in a world, interleaved: requests per second, processor time."""
+"""``make bench ARGS=ways``: a controller of `serve` and the same recorded in a file, interleaved: rate, processor time."""
 
 from __future__ import annotations
 
@@ -15,14 +15,6 @@ from statistics import median
 
 from bench.__main__ import BIN, REQUESTS, Figures, build, mbap, on_processor, run_client
 
-WORLD = """
-[[line]]
-name = "bus"
-tcp = "127.0.0.1:0"
-[[mic488]]
-name = "twin"
-line = "bus"
-"""
 ROUNDS = 5
 SECONDS = 0.3
 
@@ -47,14 +39,14 @@ def twin(folder: Path, name: str, *command: str) -> Generator[tuple[int, int]]:
 
 
 def main() -> None:
-    print("Requests per second and processor time per request in us: serve, up; then rate (processor time) of up.")
+    print("Requests per second and processor time in us: serve, with --trace FILE; then rate (processor time) of that.")
     with tempfile.TemporaryDirectory() as place, contextlib.ExitStack() as stack:
         folder = Path(place)
         client = build("client.c", folder)
-        (folder / "world.toml").write_text(WORLD)
+        serve = ("serve", "mic488", "--tcp", "127.0.0.1:0")
         ways = {
-            "serve": stack.enter_context(twin(folder, "serve", "serve", "mic488", "--tcp", "127.0.0.1:0")),
-            "up": stack.enter_context(twin(folder, "up", "up", str(folder / "world.toml"))),
+            "serve": stack.enter_context(twin(folder, "serve", *serve)),
+            "traced": stack.enter_context(twin(folder, "traced", *serve, "--trace", str(folder / "t.jsonl"))),
         }
         for name, (pdu, _) in REQUESTS.items():
             for connections in (1, 16):
@@ -66,7 +58,7 @@ def main() -> None:
                 rate = {way: median(run.per_second for run in found) for way, found in runs.items()}
                 cpu = {way: median(run.cpu_us for run in found) for way, found in runs.items()}
                 cells = "  ".join(f"{rate[way]:7.0f}/s {cpu[way]:6.1f}" for way in ways)
-                ratios = f"{rate['up'] / rate['serve']:5.2f} ({cpu['serve'] / cpu['up']:5.2f})"
+                ratios = f"{rate['traced'] / rate['serve']:5.2f} ({cpu['serve'] / cpu['traced']:5.2f})"
                 print(f"{f'{name} ×{connections}':<12} {cells}  {ratios}")
                 sys.stdout.flush()
 

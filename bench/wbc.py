@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from time import perf_counter
 
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program import load
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
@@ -39,7 +40,7 @@ M2 = ON
 M3 = ON
 MAIN:
     IF halt = ON
-        JUMP HALT
+        JUMP SHUTDOWN
     ENDIF
     IF ready = ON
         JUMP PICK
@@ -61,7 +62,7 @@ PICK:
     parts = parts + 1
     $D0 = parts
 RETURN
-HALT:
+SHUTDOWN:
     END
 """
 ROWS = "pick;0;0;10;x\nover;80;40;0;x\nplace;120;60;100;x\n"
@@ -84,9 +85,8 @@ RUNS = 3
 
 def statements_per_second() -> float:
     """Of the compute loop with a statement time of 0."""
-    device = Mic488(ControllerConfig(), programs={0: load(check(COMPUTE))}, statement_time=0)
-    device.program.command(1, 0)
-    device.touch()
+    device = Mic488Device(ControllerConfig(), programs={0: load(check(COMPUTE))}, statement_time=0)
+    device.command(partial(device.program.command, 1), 0)
     begin = perf_counter()
     now: Nanos = 0
     while device.program.state:
@@ -104,9 +104,8 @@ CONFIG = ControllerConfig(axes=(AxisConfig(gear=100.0, acc=1000.0, dec=1000.0, v
 def machine_hour() -> tuple[float, int]:
     """Seconds for an hour of a machine, statement time 1 ms, and the parts it made."""
     table, _ = parse_positions(ROWS)
-    machine = Mic488(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
-    machine.program.command(1, 0)
-    machine.touch()
+    machine = Mic488Device(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
+    machine.command(partial(machine.program.command, 1), 0)
     begin = perf_counter()
     for part in range(900):
         now = part * 4 * SECOND
@@ -119,16 +118,15 @@ def machine_hour() -> tuple[float, int]:
 def cell_hour() -> tuple[float, int]:
     """Seconds for an hour of a machine and its feeder, a controller too, on the wires of a world."""
     table, _ = parse_positions(ROWS)
-    machine = Mic488(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
-    feeder = Mic488(CONFIG, programs={0: load(check(FEEDER))})
+    machine = Mic488Device(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
+    feeder = Mic488Device(CONFIG, programs={0: load(check(FEEDER))})
     kernel = Kernel()
     kernel.add("machine", machine)
     kernel.add("feeder", feeder)
     kernel.connect(Wire(PinName("feeder", "OUT1"), PinName("machine", "IN1")))
     kernel.connect(Wire(PinName("machine", "OUT2"), PinName("feeder", "IN1")))
     for device in (machine, feeder):
-        device.program.command(1, 0)
-        device.touch()
+        device.command(partial(device.program.command, 1), 0)
     begin = perf_counter()
     kernel.advance(3600 * SECOND)
     return perf_counter() - begin, machine.user[0]
@@ -137,9 +135,8 @@ def cell_hour() -> tuple[float, int]:
 def polling_hour() -> float:
     """Seconds for an hour of a machine that only looks at its inputs."""
     table, _ = parse_positions(ROWS)
-    device = Mic488(ControllerConfig(), programs={0: load(check(MACHINE, table))}, positions={0: table})
-    device.program.command(1, 0)
-    device.touch()
+    device = Mic488Device(ControllerConfig(), programs={0: load(check(MACHINE, table))}, positions={0: table})
+    device.command(partial(device.program.command, 1), 0)
     begin = perf_counter()
     for minute in range(60):
         device.advance(minute * 60 * SECOND + MILLISECOND)

@@ -13,7 +13,12 @@ project = "steptwin"
 copyright = "the steptwin authors"  # noqa: A001 - Sphinx wants this name
 release = __version__
 
-extensions = ["myst_parser", "command_output"]
+extensions = ["myst_parser", "command_output", "sphinx.ext.autodoc"]
+default_role = "py:obj"  # docstrings name things in single backticks
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+autodoc_type_aliases = {"Reaction": "Reaction"}  # a long union
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 

@@ -69,9 +69,14 @@ def outcome(tree: Tree, reach: Reach, mutant: Mutant) -> str:
     """The stage in which a test failed, or ``survived``."""
     first = mutant.mutation.line(mutant.source)
     last = first + mutant.source.count("\n", mutant.mutation.start, mutant.mutation.end)
-    with tree.changed(mutant.module, mutant.mutation.apply(mutant.source)):
+    changed = mutant.mutation.apply(mutant.source)
+    forked = not reach.on_import(mutant.module, first, last)
+    with tree.changed(mutant.module, changed):
         for name, seconds in reach.stages(mutant.module, first, last):
-            if not tree.passes(seconds):
+            passed = tree.passes_forked(mutant.module, mutant.source, changed, seconds) if forked else None
+            if passed is None:
+                passed = tree.passes(seconds)
+            if not passed:
                 return name
     return "survived"
 
@@ -168,6 +173,8 @@ def main() -> None:
         try:
             reach = recorded(workers, base.path, packages)
             mutants = islice(sample(base.path, packages, options.seed), options.n)
+            for tree in trees:
+                tree.fork(reach.folders)
             tasks = [partial(_tried, reach, equivalents(), mutant) for mutant in mutants]
             for result in workers.each(tasks):
                 results.append(result)

@@ -2,7 +2,7 @@
 
 Mutated are comparisons, arithmetic and logical operators, numbers, truth values, statements (left out) and arguments (left out or
 swapped), in functions as well as in tables and defaults. Not mutated: texts, annotations, decorators, imports, and what changes
-nothing: the order in max() and min(), the ``strict`` of zip().
+nothing: the order in max() and min(), the ``strict`` of zip(). A product becomes a sum: a quotient by a sign would be the same.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ COMPARISONS: dict[type[ast.cmpop], tuple[str, ...]] = {
 ARITHMETIC: dict[type[ast.operator], str] = {
     ast.Add: "-",
     ast.Sub: "+",
-    ast.Mult: "/",
+    ast.Mult: "+",
     ast.Div: "*",
     ast.FloorDiv: "*",
     ast.Mod: "*",

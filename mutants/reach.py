@@ -11,7 +11,9 @@ from pathlib import Path
 
 CORE = ("motion", "wire", "mic488", "m1486", "wbc", "world", "drivers")
 """Packages that are mutated; tests/<package> mirrors each of them."""
-FOLDERS = tuple(f"tests/{name}" for name in CORE)
+USERS = ("commands", "files", "lsp", "served", "words")
+"""Packages above them whose tests run in one process and do not wait for real time."""
+FOLDERS = tuple(f"tests/{name}" for name in (*CORE, *USERS))
 
 FEW = 3
 """What no more tests than these execute may be kept by a cache or a fixture, and be used by others."""
@@ -23,6 +25,7 @@ class Reach:
     """What each test executes, and how long it takes, from one record per folder."""
 
     def __init__(self, root: Path, records: dict[str, Path]) -> None:
+        self.folders = list(records)
         self._root = root
         self._imported = {folder: imported_files(root, folder) for folder in records}
         self._seconds: dict[str, float] = {}
@@ -55,6 +58,10 @@ class Reach:
             if test not in inside and total <= OTHERS_S:
                 outside[test] = self._seconds[test]
         return [stage for stage in (("folder", inside), ("others", outside)) if stage[1]]
+
+    def on_import(self, module: Path, first: int, last: int) -> bool:
+        """Whether one of these lines is executed on import."""
+        return self._executing(module, range(first, last + 1))[1]
 
     def _executing(self, module: Path, lines: range) -> tuple[set[str], bool]:
         """The tests that execute one of the lines; whether they are executed on import."""

@@ -1,4 +1,8 @@
-"""Whether the tests notice a mutation: a copy of the project, mutated in one place, and pytest in it."""
+"""Whether the tests notice a mutation: a copy of the project, mutated in one place, and pytest in it.
+
+What runs on import needs a new process. For mutations inside of functions a fork of one that has collected the tests will do, see
+`mutants.forks`.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,6 +26,9 @@ RECORD = "MUTANTS_RECORD"
 [test]}}}``; tests of lines are numbers in the order of ``seconds``, and -1 is what ran before the first test."""
 CHOICE = "MUTANTS_CHOICE"
 """The environment variable that names the file for `mutants.choice`: node ids in order, each with the seconds it may take."""
+REQUESTS, ANSWERS = "MUTANTS_REQUESTS", "MUTANTS_ANSWERS"
+"""The environment variables with the numbers of the pipes to and from `mutants.forks`."""
+PASSED, FAILED, UNFIT = 0, 1, 3
 PYTEST = (sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider")
 MEMORY_BYTES = 4 * 2**30
 START_S = 20.0
@@ -38,6 +45,7 @@ class Tree:
         self.path = directory / "tree"
         self._run = directory / "run"
         self._process: subprocess.Popen[bytes] | None = None
+        self._forking: subprocess.Popen[bytes] | None = None
         self._ended = False
         listed = subprocess.run(
             ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
@@ -72,25 +80,65 @@ class Tree:
     def passes(self, seconds: dict[str, float]) -> bool:
         """Run these tests in this order up to the first failure; they take so many seconds without a mutation."""
         choice = self._run / "choice.json"
-        choice.write_text(json.dumps({test: START_S + SLOWER * taken for test, taken in seconds.items()}))
+        choice.write_text(json.dumps(_limits(seconds)))
         files = {test.partition("::")[0]: None for test in seconds}
-        return self._pytest(["-p", "mutants.choice", *files], {CHOICE: str(choice)}, START_S + SLOWER * sum(seconds.values()))
+        arguments = ["-p", "mutants.choice", *files]
+        return self._passed(self._pytest(arguments, {CHOICE: str(choice)}), _limit(seconds))
+
+    def fork(self, folders: Iterable[str]) -> None:
+        """Collect the tests of these folders once, for `passes_forked`."""
+        requests, answers = os.pipe(), os.pipe()
+        numbers = {REQUESTS: str(requests[0]), ANSWERS: str(answers[1])}
+        arguments = ["-p", "mutants.forks", *folders]
+        self._forking = self._pytest(arguments, numbers, (requests[0], answers[1]))
+        for number in (requests[0], answers[1]):
+            os.close(number)
+        self._requests, self._answers = os.fdopen(requests[1], "w"), os.fdopen(answers[0])
+        self._answer()
+
+    def passes_forked(self, module: Path, before: str, after: str, seconds: dict[str, float]) -> bool | None:
+        """The same without a new process; None if this mutation needs one."""
+        if self._ended:
+            return False
+        ask = {"path": str(self.path / module), "before": before, "after": after, "limits": _limits(seconds)}
+        self._requests.write(json.dumps({**ask, "limit_s": _limit(seconds)}) + "\n")
+        self._requests.flush()
+        return {PASSED: True, UNFIT: None}.get(self._answer(), False)
+
+    def _answer(self) -> int:
+        line = self._answers.readline()
+        if not line and not self._ended:
+            raise RuntimeError("the process with the collected tests has ended")
+        return int(line or FAILED)
 
     def record(self, folder: str, file: Path) -> bool:
         """Write what the tests of a folder execute, as described in `mutants.record`; False if one of them fails."""
-        return self._pytest(["-p", "mutants.record", "-o", f"timeout={RECORD_S}", folder], {RECORD: str(file)}, RECORD_S)
+        arguments = ["-p", "mutants.record", "-o", f"timeout={RECORD_S}", folder]
+        return self._passed(self._pytest(arguments, {RECORD: str(file)}), RECORD_S)
 
     def end(self) -> None:
         """End the tests that run, and let no others begin."""
         self._ended = True
+        if self._forking is not None:
+            self._forking.terminate()
+            self._forking.wait()
+            self._requests.close()
+            self._answers.close()
         self._kill()
 
-    def _pytest(self, arguments: list[str], environment: dict[str, str], limit_s: float) -> bool:
-        if self._ended:
+    def _passed(self, process: subprocess.Popen[bytes], limit_s: float) -> bool:
+        self._process = process
+        try:
+            return not self._ended and process.wait(limit_s) in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+        except subprocess.TimeoutExpired:
             return False
-        temporary = self._run / "tmp"
-        self._process = subprocess.Popen(
-            [*PYTEST, f"--basetemp={temporary}", *arguments],
+        finally:
+            self._kill()
+            shutil.rmtree(self._run / "tmp", ignore_errors=True)
+
+    def _pytest(self, arguments: list[str], environment: dict[str, str], pipes: tuple[int, ...] = ()) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [*PYTEST, f"--basetemp={self._run / 'tmp'}", *arguments],
             cwd=self.path,
             env={
                 **os.environ,
@@ -103,21 +151,23 @@ class Tree:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
+            pass_fds=pipes,
             preexec_fn=_limit_memory,  # noqa: PLW1509
         )
-        try:
-            return self._process.wait(limit_s) in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
-        except subprocess.TimeoutExpired:
-            return False
-        finally:
-            self._kill()
-            shutil.rmtree(temporary, ignore_errors=True)
 
     def _kill(self) -> None:
         if self._process is not None:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
+
+
+def _limits(seconds: dict[str, float]) -> dict[str, float]:
+    return {test: START_S + SLOWER * taken for test, taken in seconds.items()}
+
+
+def _limit(seconds: dict[str, float]) -> float:
+    return START_S + SLOWER * sum(seconds.values())
 
 
 def _limit_memory() -> None:

@@ -26,13 +26,14 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 import pytest
+from facts import checked_facts
 from hypothesis import Phase, settings
 from soak import time_limit
 from virtual_loop import VirtualLoop, run_virtually
 
 from steptwin.live.cell import Cell
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.world.kernel import Kernel
 
 T = TypeVar("T")
@@ -79,6 +80,13 @@ def _missing(peer: str) -> NoReturn:
     if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
         pytest.fail(reason, pytrace=False)
     pytest.skip(reason)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def facts_of_all_events() -> Iterator[None]:
+    """Whatever happens in a controller in any test, its facts are those of its data sheet."""
+    with checked_facts():
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -253,13 +261,13 @@ def run() -> Callable[[Coroutine[Any, Any, T]], T]:
 
 
 @pytest.fixture
-def make_cell() -> Callable[[], tuple[Cell, Mic488]]:
+def make_cell() -> Callable[[], tuple[Cell, Mic488Device]]:
     """``make_cell()``, in a running virtual loop: a cell with one MIC488 as it comes from the shop."""
 
-    def make() -> tuple[Cell, Mic488]:
+    def make() -> tuple[Cell, Mic488Device]:
         loop = asyncio.get_running_loop()
         assert isinstance(loop, VirtualLoop)
-        device = Mic488(ControllerConfig())
+        device = Mic488Device(ControllerConfig())
         kernel = Kernel()
         kernel.add("1", device)
         return Cell(kernel, loop.clock()), device

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.diagnostics import MOST_SHOWN, Diagnostic, Fix, Severity, Source, Span, in_order, render, to_json
+from steptwin.diagnostics import MOST_SHOWN, Diagnostic, Fix, Severity, SourceText, Span, in_order, render, to_json
 
 
 def found(start: int, end: int, code: str = "W101", hint: str | None = None, fix: Fix | None = None) -> Diagnostic:
@@ -30,7 +30,7 @@ def found(start: int, end: int, code: str = "W101", hint: str | None = None, fix
     ],
 )
 def test_position(text: str, offset: int, place: tuple[int, int]) -> None:
-    assert Source("p", text).position(offset) == place
+    assert SourceText("p", text).position(offset) == place
 
 
 @pytest.mark.parametrize(
@@ -38,13 +38,13 @@ def test_position(text: str, offset: int, place: tuple[int, int]) -> None:
     [("", [""]), ("a", ["a"]), ("a\n", ["a", ""]), ("a\r\n\r\nb\rc", ["a", "", "b", "c"]), ("\t x \n", ["\t x ", ""])],
 )
 def test_line(text: str, lines: list[str]) -> None:
-    source = Source("p", text)
+    source = SourceText("p", text)
     assert [source.line(number) for number in range(1, len(lines) + 1)] == lines
 
 
 @given(st.text(alphabet="ab\t\r\n\x0c\u2028"))
 def test_every_offset_is_found_again(text: str) -> None:
-    source = Source("p", text)
+    source = SourceText("p", text)
     lines = re.split(r"\r\n|\n|\r", text)
     for offset in range(len(text) + 1):
         line, column = source.position(offset)
@@ -54,7 +54,7 @@ def test_every_offset_is_found_again(text: str) -> None:
 
 
 def test_sources_compare_by_name_and_text() -> None:
-    assert Source("p", "a\nb") == Source("p", "a\nb") != Source("p", "a")
+    assert SourceText("p", "a\nb") == SourceText("p", "a\nb") != SourceText("p", "a")
 
 
 def test_in_order_follows_the_text_then_the_code() -> None:
@@ -63,7 +63,7 @@ def test_in_order_follows_the_text_then_the_code() -> None:
 
 
 def test_render_shows_the_place_the_hint_and_the_suggestion() -> None:
-    source = Source("feed.prg", "SPEED 60\nMOVEE 10 // out\n")
+    source = SourceText("feed.prg", "SPEED 60\nMOVEE 10 // out\n")
     diagnostic = found(9, 14, hint="statements: MOVE, MOVER", fix=Fix(Span(9, 14), "MOVE"))
     assert render(source, [diagnostic]) == (
         "feed.prg:2:1: error W101: unknown statement\n"
@@ -75,7 +75,7 @@ def test_render_shows_the_place_the_hint_and_the_suggestion() -> None:
 
 
 def test_render_says_remove_it_for_an_empty_replacement() -> None:
-    assert render(Source("p", "END END"), [found(4, 7, fix=Fix(Span(3, 7), ""))]).endswith("= suggestion: remove it")
+    assert render(SourceText("p", "END END"), [found(4, 7, fix=Fix(Span(3, 7), ""))]).endswith("= suggestion: remove it")
 
 
 @pytest.mark.parametrize(
@@ -89,16 +89,16 @@ def test_render_says_remove_it_for_an_empty_replacement() -> None:
     ],
 )
 def test_render_puts_carets_under_the_text(text: str, span: Span, carets: str) -> None:
-    assert render(Source("p", text), [found(span.start, span.end)]).split("\n")[2] == carets
+    assert render(SourceText("p", text), [found(span.start, span.end)]).split("\n")[2] == carets
 
 
 def test_render_keeps_the_gutter_as_wide_as_the_number() -> None:
-    source = Source("p", "\n" * 99 + "GO")
+    source = SourceText("p", "\n" * 99 + "GO")
     assert render(source, [found(99, 101, hint="h")]).split("\n")[1:] == ["  100 | GO", "      | ^^", "      = h"]
 
 
 def test_render_joins_several_and_of_none_is_empty() -> None:
-    source = Source("p", "GO\nGO")
+    source = SourceText("p", "GO\nGO")
     assert render(source, []) == ""
     assert [row for row in render(source, [found(0, 2), found(3, 5)]).split("\n") if row.startswith("p:")] == [
         "p:1:1: error W101: unknown statement",
@@ -107,7 +107,7 @@ def test_render_joins_several_and_of_none_is_empty() -> None:
 
 
 def test_to_json_is_plain_data_with_places_from_one() -> None:
-    source = Source("feed.prg", "GO\nEND\n")
+    source = SourceText("feed.prg", "GO\nEND\n")
     rows = to_json(source, [found(3, 6, fix=Fix(Span(2, 6), "")), Diagnostic("W300", Severity.NOTE, Span(0, 2), "m", "h")])
     assert json.loads(json.dumps(rows)) == [
         {
@@ -140,14 +140,14 @@ def test_to_json_is_plain_data_with_places_from_one() -> None:
 def test_a_suggestion_that_the_text_makes_already_is_shown_once() -> None:
     span = Span(0, 1)
     for message, hint in (("unknown; did you mean speed?", None), ("unknown", "did you mean speed?")):
-        shown = render(Source("p", "x"), [Diagnostic("W104", Severity.ERROR, span, message, hint, Fix(span, "speed"))])
+        shown = render(SourceText("p", "x"), [Diagnostic("W104", Severity.ERROR, span, message, hint, Fix(span, "speed"))])
         assert shown.count("speed") == 1, shown
 
 
 def test_control_characters_do_not_reach_the_terminal() -> None:
     text = "a\x1b]0;title\x07 \x9b2J\x7f\t\u202eb"
     shown = render(
-        Source("x\x1b[1m.prg", text),
+        SourceText("x\x1b[1m.prg", text),
         [Diagnostic("W1", Severity.ERROR, Span(1, 2), "odd \x1b", "hint \x07", Fix(Span(1, 2), "\x1bc"))],
     )
     assert shown.split("\n") == [
@@ -162,9 +162,9 @@ def test_control_characters_do_not_reach_the_terminal() -> None:
 def test_long_words_and_many_findings_are_cut() -> None:
     word = "A" * 2_000_000
     one = [Diagnostic("W1", Severity.ERROR, Span(0, len(word)), f"unknown {word}", word, Fix(Span(0, 1), word))]
-    assert len(render(Source("x", word), one)) < 3_000
+    assert len(render(SourceText("x", word), one)) < 3_000
     many = one * 20_000
-    shown = render(Source("x", "ab"), [Diagnostic("W1", Severity.ERROR, Span(0, 1), "odd")] * 20_000)
+    shown = render(SourceText("x", "ab"), [Diagnostic("W1", Severity.ERROR, Span(0, 1), "odd")] * 20_000)
     assert shown.count("odd") == MOST_SHOWN
     assert shown.endswith("\nx: 19900 more are not shown")
-    assert len(to_json(Source("x", "ab"), many)) == 20_000
+    assert len(to_json(SourceText("x", "ab"), many)) == 20_000

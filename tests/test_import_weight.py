@@ -10,7 +10,21 @@ import steptwin
 
 PURE = ("world", "mic488", "m1486", "wbc", "wire", "motion", "machine", "diagnostics", "errors")
 PROJECTIONS = {"steptwin.motion.pulses"}
-HEAVY = {"anyio", "asyncio", "fastapi", "matplotlib", "numpy", "pyarrow", "pydantic", "rich", "serialx", "textual", "uvloop"}
+HEAVY = {
+    "anyio",
+    "asyncio",
+    "fastapi",
+    "lsprotocol",
+    "matplotlib",
+    "numpy",
+    "pyarrow",
+    "pydantic",
+    "pygls",
+    "rich",
+    "serialx",
+    "textual",
+    "uvloop",
+}
 
 
 def modules_of(*packages: str) -> list[str]:

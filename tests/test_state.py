@@ -13,7 +13,7 @@ import steptwin
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.vision import Com1Port
 from steptwin.state import Stateful
 from steptwin.wire.crc import with_crc
@@ -44,7 +44,7 @@ class Ports(Stateful):
     FIXED = frozenset({"out"})
 
     def __init__(self) -> None:
-        self.device = Mic488(ControllerConfig())
+        self.device = Mic488Device(ControllerConfig())
         units = TimedUnits({1: self.device}, LineTiming(SerialLine(38400)))
         gateway = Gateway(units)
         self.shared = (units, gateway)

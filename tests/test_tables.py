@@ -56,7 +56,7 @@ def test_a_complete_table_is_read_only() -> None:
         (
             "import steptwin.wbc.steps as t; t.STEPS = t.STEPS[1:]",
             "steptwin.wbc.flow",
-            "successors of Set: there is no such step",
+            "successors of SetStep: there is no such step",
         ),
         (
             "import steptwin.wbc.usage, steptwin.wbc.steps as t; t.STEPS += (t.Step,)",
@@ -93,7 +93,7 @@ def test_a_complete_table_is_read_only() -> None:
             for change, message in (
                 ("t.MOTIONS |= {'NEW'}", "motion statement NEW lacks its move"),
                 ("t.HALTS -= {'STOP'}", "action of STOP: there is no such statement that halts"),
-                ("t.ROW_MOTIONS |= {'NEW'}", "statement with a row NEW lacks its path"),
+                ("t.ROW_MOTIONS |= {'NEW'}", "statement with a row NEW lacks its check"),
                 ("t.OPERATORS['**'] = 'power'", "operator ** lacks its operation"),
                 ("t.COMPARISONS['<>'] = 'other'", "comparison <> lacks its test"),
                 ("t.FUNCTIONS['EXP'] = t.FUNCTIONS['SIN']", "function EXP lacks its calculation"),

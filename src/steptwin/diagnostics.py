@@ -58,7 +58,7 @@ class Diagnostic:
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceText:
     """A named text that knows its lines.
 
     Lines end where editors end them: at a line feed, a carriage return or both. Other separators that
@@ -84,7 +84,7 @@ class Source:
 
 
 def split_lines(text: str) -> Iterator[tuple[str, str]]:
-    """The lines of a text as `Source` counts them, each with its line end; an empty last line is left out."""
+    """The lines of a text as `SourceText` counts them, each with its line end; an empty last line is left out."""
     start = 0
     for end in _LINE_END.finditer(text):
         yield text[start : end.start()], end.group()
@@ -98,7 +98,7 @@ def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     return sorted(diagnostics, key=lambda d: (d.span.start, d.span.end, d.code))
 
 
-def render(source: Source, diagnostics: Sequence[Diagnostic]) -> str:
+def render(source: SourceText, diagnostics: Sequence[Diagnostic]) -> str:
     """The diagnostics as text: place, severity, code, message, source line with carets, hint, suggestion.
 
     For terminals: at most `MOST_SHOWN` of them, long texts cut, control characters made visible.
@@ -144,7 +144,7 @@ def _blank_fix(text: str) -> str:
     return "start a new line" if "\n" in text else "a blank"
 
 
-def to_json(source: Source, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:
+def to_json(source: SourceText, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:
     """The diagnostics as plain data: file, line, column, end_line, end_column, severity, code, message, hint, fix."""
     rows: list[dict[str, object]] = []
     for d in diagnostics:

@@ -11,6 +11,10 @@ class Misuse(SteptwinError, ValueError):
     """The caller gave something that is not permitted; the text names value, permitted range and unit."""
 
 
+class SourceErrors(Misuse):
+    """Texts that the caller gave have errors. The text is the diagnostics, each with file, line and column."""
+
+
 class TimeReversal(Misuse):
     """A machine was asked to go back in time."""
 

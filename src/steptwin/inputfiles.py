@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import IO
 
 from steptwin.errors import Misuse
+from steptwin.system import READ_FLAGS, reason
 
 MOST_BYTES = 1 << 20
 """Of programs, configurations, tables and descriptions, which people write."""
@@ -29,7 +30,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
         try:
             data = file.read(most + 1)
         except OSError as error:
-            raise Misuse(f"cannot read {path}: {error.strerror or error}") from error
+            raise Misuse(f"cannot read {path}: {reason(error)}") from error
     if len(data) > most:  # it grew, or its file system tells no sizes
         raise _too_large(path, len(data), most)
     return data
@@ -38,10 +39,10 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 def open_regular(path: Path, most: int | None = None) -> IO[bytes]:
     """A regular file opened for reading. Raises `Misuse` for what cannot be read, is no regular file or has more bytes."""
     try:
-        # Opening a pipe would wait for somebody to write into it.
-        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        # Opening a pipe would wait for a program that writes into it.
+        handle = os.open(path, READ_FLAGS)
     except OSError as error:
-        raise Misuse(f"cannot read {shown(path)}: {error.strerror or error}") from error
+        raise Misuse(f"cannot read {shown(path)}: {reason(error)}") from error
     except ValueError as error:
         raise Misuse(f"cannot read {shown(path)}: {error}") from None
     found = os.fstat(handle)

@@ -14,13 +14,16 @@ if TYPE_CHECKING:
 Nanos: TypeAlias = int
 """A moment or a duration in whole nanoseconds of virtual time."""
 
-NANOSECOND: Nanos = 1
 MICROSECOND: Nanos = 1_000
 MILLISECOND: Nanos = 1_000_000
 SECOND: Nanos = 1_000_000_000
 
 
-class Edge(NamedTuple):
+Fact: TypeAlias = tuple[str, Any]
+"""A name and its plain value, such as the number of an axis: what the text of an event says, for programs."""
+
+
+class PinEdge(NamedTuple):
     """A pin of a machine took a new value."""
 
     time: Nanos
@@ -29,7 +32,7 @@ class Edge(NamedTuple):
     """0.0 or 1.0 on digital pins; volts on analog pins."""
 
 
-class Event(Protocol):
+class MachineEvent(Protocol):
     """Something that happened in a controller, for traces and for people. Controllers add fields of their own."""
 
     @property
@@ -41,6 +44,10 @@ class Event(Protocol):
 
     @property
     def text(self) -> str: ...
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        """What the text says, for programs."""
+        ...
 
 
 class Machine(Protocol):
@@ -96,7 +103,7 @@ class MotionController(Machine, Protocol):
         """Present value of every pin, inputs and outputs."""
         ...
 
-    def take_edges(self) -> list[Edge]:
+    def take_edges(self) -> list[PinEdge]:
         """Output edges since the last call, in order."""
         ...
 

@@ -47,7 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "rtu-tcp://HOST:PORT or rfc2217://HOST:PORT, with ,unit=N ,baud=N ,config=FILE behind it. IT MOVES. NAME= says which, "
         "where tests need several: mic488=, m1486=, or a controller of a world",
     )
-    parser.addini(TIME, "real or virtual: how time passes for twins where their marker does not say", default="real")
+    parser.addini(TIME, "real or virtual: time of twins, unless their marker sets it", default="real")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -154,11 +154,11 @@ def mic488(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[Mic488Rig]
     It is a twin, in real time on a free port unless the marker says otherwise; with ``--device`` it is that device.
     """
     from steptwin.testing.devices import device_for
-    from steptwin.testing.mic488 import Mic488Options, Mic488Rig
+    from steptwin.testing.mic488 import Mic488Marker, Mic488Rig
     from steptwin.testing.rig import options_of
 
     def make() -> Rig:
-        options = options_of("mic488", Mic488Options, *_options(request, "mic488"))
+        options = options_of("mic488", Mic488Marker, *_options(request, "mic488"))
         device = device_for(request.config.stash[_devices], "mic488")
         return Mic488Rig(options, device, tmp_path, request.path.parent)
 
@@ -172,11 +172,11 @@ def m1486(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[M1486Rig]:
     It is a twin, in real time on a free port unless the marker says otherwise; with ``--device`` it is that device.
     """
     from steptwin.testing.devices import device_for
-    from steptwin.testing.m1486 import M1486Options, M1486Rig
+    from steptwin.testing.m1486 import M1486Marker, M1486Rig
     from steptwin.testing.rig import options_of
 
     def make() -> Rig:
-        options = options_of("m1486", M1486Options, *_options(request, "m1486"))
+        options = options_of("m1486", M1486Marker, *_options(request, "m1486"))
         device = device_for(request.config.stash[_devices], "m1486")
         return M1486Rig(options, device, tmp_path, request.path.parent)
 

@@ -42,7 +42,7 @@ def test_what_an_address_stands_for(text: str, expected: list[str] | None) -> No
     ("text", "message"),
     [
         ("10021", "10021 is the second word of M1_POS_ACT, which is at 10020; hr:10021 reads it"),
-        ("9999", "firmware 1.70 has no register at 9999; hr:9999 asks for it nevertheless"),
+        ("9999", "firmware 1.70 has no register at 9999; hr:9999 reads it all the same"),
         ("hr:70000", "'hr:70000': permitted are addresses from 0 to 65535, the first not above the last"),
         ("hr:5-4", "the first not above the last"),
         ("xx:5", "'xx:5': expected ADDRESS, or hr:, co: or di: before it"),

@@ -133,7 +133,7 @@ def test_json_members_are_described(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("/nowhere.m1486",), "cannot read /nowhere.m1486: No such file or directory"),
+        (("/nowhere.m1486",), "cannot read /nowhere.m1486: no such file or directory"),
         (("gate.wbc",), "gate.wbc is a compiled image: steptwin decompile makes a program of it"),
         ((EXAMPLES,), f"cannot read {EXAMPLES}: it is a directory, not a file"),
         ((EXAMPLES / "example1.m1486", "--variant", "Z"), "no M1486 variant is called 'Z'; there are A, B, C, E1, E2, A2x"),

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.conftest import STEPTWIN, until
 
 from steptwin.drivers.address import parse_device
 from steptwin.drivers.m1486 import unit
@@ -57,7 +58,7 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert "'1=40 2=3': '40 2=3' is no number" in run("move", "1=40", "2=3", code=2)
     assert "a time to wait of -1 s is outside" in run("move", "1=40", "--timeout", "-1", code=2)
     assert run("watch", "position", "--count", "1").splitlines()[1].split()[1] == "40"
-    assert "is nothing an M1486 tells: there are POSITION" in run("get", "M1_POS_ACT", code=2)
+    assert "is no value of an M1486: there are POSITION" in run("get", "M1_POS_ACT", code=2)
     assert "an M1486 has info, get, set" in run("enable", "1", code=2)
     assert "velocity = 30000: M1486B takes 16 to 20 000 step/s" in run("set", "V=30000", code=2)
 
@@ -71,6 +72,59 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert run("get", "counter").startswith("COUNTER")
     program.write_text("v99999\n")
     assert "error M110: V 99 999 is out of range" in run("send", str(program), code=2)
+
+
+def test_homing_seeking_and_jogging(serve_m1486: Callable[..., Any]) -> None:
+    twin = serve_m1486("--variant", "B")
+
+    def run(*arguments: str, code: int = 0) -> str:
+        done = twin.command(*arguments, "--device", "m1486")
+        assert done.returncode == code, done.stderr
+        return done.stdout or done.stderr
+
+    run("move", "1=40")
+    late = twin.command("home", "1=-B3", "--timeout", "0.5", "--device", "m1486")
+    assert (late.returncode, late.stderr) == (1, "stopped, because the time is over\n")
+    run("pin", "B3=0")
+    assert run("seek", "1=+B3").startswith("chip F: line reached at ")
+    assert run("home", "1=-B3") == "chip F: line reached at 0 step\n"
+    assert run("get", "POSITION") == "POSITION  0  step\n"
+    jogged = json.loads(run("jog", "1=200", "--seconds", "0.5", "--json"))
+    assert jogged["ok"]
+    assert 20 <= jogged["position"] <= 100
+    assert run("get", "POSITION").split()[1] == f"{jogged['position']:g}"
+    for arguments, message in (
+        (("home", "1=-20", "--no-wait"), "--no-wait: to home an M1486 is to seek a line"),
+        (("home", "1=B3"), "expected the direction and the line of an M1486, such as 1=-B8 or 1=+B8"),
+        (("home", "2=-B3"), "an M1486 has one axis: expected 1=-B8"),
+        (("seek", "1=+B22"), "the line to seek = 22: M1486B takes 1 to 21"),
+        (("jog", "1=5", "--seconds", "1"), "velocity = 5: M1486B takes 16 to 20 000 step/s"),
+        (("jog", "1=50", "--seconds", "1", "--hold", "9"), "--hold 9: permitted are 0.2 to 2 s"),
+    ):
+        assert message in run(*arguments, code=2)
+
+
+def test_a_jog_that_is_killed_ends_by_itself_and_the_position_is_right(serve_m1486: Callable[..., Any]) -> None:
+    twin = serve_m1486("--variant", "B")
+    arguments = [STEPTWIN, "jog", "1=100", "--seconds", "60", "-d", f"tcp://127.0.0.1:{twin.tcp_port},kind=m1486"]
+    with subprocess.Popen(arguments, stderr=subprocess.DEVNULL) as command:
+        until(lambda: twin.state()["motion"]["true_position"] > 0, "the motor has moved")
+        command.kill()
+    until(lambda: twin.state()["motion"]["is"] == "at rest", "the move has ended", seconds=5.0)
+    motion = twin.state()["motion"]
+    assert motion["position_valid"]
+    assert motion["position"] == motion["true_position"]
+
+
+def test_an_e_type_is_not_jogged(serve_m1486: Callable[..., Any]) -> None:
+    twin = serve_m1486("--variant", "E1")
+    refused = twin.command("jog", "1=100", "--seconds", "1", "--device", "m1486")
+    assert (refused.returncode, "writes every command into its EEPROM" in refused.stderr) == (2, True)
+
+
+def test_seek_is_no_command_of_a_mic488(serve: Callable[..., Any]) -> None:
+    refused = serve("--demo").command("seek", "1=-B3")
+    assert (refused.returncode, refused.stderr) == (2, "steptwin: seek is a command of the M1486; a MIC488 has home\n")
 
 
 def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: Path) -> None:
@@ -90,7 +144,7 @@ def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: 
     )
     assert sent("f64\nr\nx0\nr\n", "chip=7")[0] == 0
     code, told = sent("f64\nr\nx0\nr\n", "kind=m1486")
-    assert (code, "what stands before its first X is for which chip?" in told) == (2, True)
+    assert (code, "the commands before its first X need a chip" in told) == (2, True)
     counters = [twin.command("get", "counter", "-d", f"{twin.pty},chip={chip}").stdout for chip in "07"]
     assert [counter.split()[1] for counter in counters] == ["1280", "0"]
     code, told = sent("x3\nr\n", "kind=m1486,timeout=0.2")
@@ -164,7 +218,7 @@ def test_info_without_a_kind_leaves_nothing_in_front_of_the_next_command(serve_m
     twin = serve_m1486("--variant", "B")
     place = f"tcp://127.0.0.1:{twin.tcp_port}"
     for address in (place, f"rtu-{place}"):
-        run = twin.command("info", "-d", address)
+        run = twin.command("info", "-d", f"{address},kind=mic488")
         assert run.returncode == 1
         assert "If these are M1486 chips, put ',kind=m1486' behind the address" in run.stderr
         with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:

@@ -40,12 +40,13 @@ def test_faults_and_what_they_take() -> None:
 
 def test_running_twins_and_their_pins(serve: Callable[..., Any]) -> None:
     here = {"XDG_RUNTIME_DIR": serve("--name", "left").environment["XDG_RUNTIME_DIR"]}
-    assert offered("steptwin state --twin l", **here) == ["left"]
+    assert offered("steptwin state --device l", **here) == ["left", "left.mic488"]
+    assert offered("steptwin info -d l", **here) == ["left", "left.mic488"]
     assert offered("steptwin pin IN2", **here) == ["IN2=", "IN20="]
-    assert offered("steptwin pin --twin left AIN", **here) == ["AIN1=", "AIN2="]
+    assert offered("steptwin pin --device left AIN", **here) == ["AIN1=", "AIN2="]
 
 
 def test_without_a_twin_nothing_is_offered(tmp_path: Any) -> None:
     tmp_path.chmod(0o700)
-    for typed in ("steptwin state --twin ", "steptwin pin "):
+    for typed in ("steptwin state --device ", "steptwin pin "):
         assert offered(typed, XDG_RUNTIME_DIR=str(tmp_path)) == []

@@ -1,7 +1,4 @@
-"""A served controller and one in a world are the same machine: one suite, asked of both ways of making a twin.
-
-What differs is listed in `KNOWN`, with the reason; an entry that no longer differs fails, so the list can only shrink.
-"""
+"""`serve`, `up` with the description that it prints, and a world in this process answer alike: one suite for all three."""
 
 from __future__ import annotations
 
@@ -14,46 +11,24 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Generator
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from steptwin.errors import SteptwinError
-from steptwin.live.control import ask
+from steptwin.files.world import World
+from steptwin.live.remote import RemoteSubject, ask
+from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.machine import MILLISECOND
 from steptwin.mic488.registermap import Space
 from steptwin.mic488.registers import register_map
+from steptwin.subject.commands import read_command
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 LIMIT_S = 60.0
 
-WORLDS = {
-    "mic488": """
-[[line]]
-name = "bus"
-tcp = "127.0.0.1:0"
-rtu_tcp = "127.0.0.1:0"
-rfc2217 = "127.0.0.1:0"
-gap = 5
-pty = "pty"
-[[mic488]]
-name = "twin"
-line = "bus"
-vision = "127.0.0.1:0"
-""",
-    "m1486": """
-[[line]]
-name = "bus"
-kind = "m1486"
-tcp = "127.0.0.1:0"
-rfc2217 = "127.0.0.1:0"
-pty = "pty"
-[[m1486]]
-name = "F"
-line = "bus"
-variant = "A"
-""",
-}
 SERVED = {
     "mic488": [
         *("--tcp", "127.0.0.1:0", "--rtu-tcp", "127.0.0.1:0", "--rfc2217", "127.0.0.1:0"),
@@ -71,8 +46,10 @@ class Twin:
         self.directory = directory
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(directory), "COLUMNS": "200", "TERM": "dumb"}
         self.environment.pop("STEPTWIN_DEVICE", None)
-        (directory / "twin.toml").write_text(WORLDS[kind])
-        begin = ["serve", kind, *SERVED[kind]] if way == "serve" else ["up", "twin.toml"]
+        served = ["serve", kind, *SERVED[kind]]
+        printed = subprocess.run([STEPTWIN, *served, "--print-world"], capture_output=True, text=True, check=True, cwd=directory)
+        (directory / "twin.toml").write_text(printed.stdout)
+        begin = served if way == "serve" else ["up", "twin.toml"]
         ready = directory / "ready.json"
         self._out = (directory / "out").open("w")
         self.process = subprocess.Popen(
@@ -99,9 +76,23 @@ class Twin:
     def asked(self, **request: object) -> object:
         """The answer of the control endpoint, or the kind and text of its error."""
         try:
-            return ask("twin", request)
+            return ask("twin", read_command(request.pop("do"), request))
         except SteptwinError as error:
             return type(error).__name__, str(error)
+
+    @cached_property
+    def machine(self) -> str:
+        with RemoteSubject("twin") as subject:
+            return subject.description.machines[0].name
+
+    def set(self, levels: dict[str, Any]) -> object:
+        return self.asked(do="set", levels={f"{self.machine}.{pin}": level for pin, level in levels.items()})
+
+    def pins(self) -> object:
+        return self.asked(do="pins", machine=self.machine)
+
+    def state(self) -> object:
+        return self.asked(do="state", machine=self.machine)
 
     def connection(self, kind: str) -> socket.socket:
         if kind not in self._sockets:
@@ -205,7 +196,7 @@ def units(twin: Twin) -> object:
 def motion(twin: Twin) -> object:
     """Drive 1 on, VMAX 100000, ACC and DEC so that 400 pulses take a moment, then the position and the state."""
     told = [twin.pdu("0507d0ff00"), twin.pdu("1027640002040000 43c8".replace(" ", ""))]
-    return told, twin.settled("03271a0001", "01 03 02 00 04"), twin.pdu("0327240002"), without_time(twin.asked(do="state"))
+    return told, twin.settled("03271a0001", "01 03 02 00 04"), twin.pdu("0327240002"), without_time(twin.state())
 
 
 def rtu_over_tcp(twin: Twin) -> object:
@@ -234,50 +225,53 @@ def vision_records(twin: Twin) -> object:
     """Nothing is answered to them, nor to what is no record."""
     line = twin.connection("vision")
     line.sendall(b"N1 X12.5 Y-3 A90\r\nnonsense\r\n")
-    return without_time(twin.asked(do="state"))
+    return without_time(twin.state())
 
 
 def pins(twin: Twin) -> object:
     asked: list[dict[str, Any]] = [{}, {"IN1": 1}, {"in2": 1, "AIN1": 4.5}, {"IN99": 1}, {"IN1": 2}, {"AIN1": 11}, {"IN1": "x"}]
-    told = [bare(twin.asked(do="pin", set=changes)) for changes in asked]
-    return told, twin.settled("0213880014", "01 02 03 03 00 00")  # both have passed their filters
+    told = [bare(twin.set(changes)) for changes in asked]
+    return told, bare(twin.pins()), twin.settled("0213880014", "01 02 03 03 00 00")  # both have passed their filters
 
 
 def names_of_pins(twin: Twin) -> object:
-    shown = twin.asked(do="pin", set={"IN1": 0})
+    shown = twin.pins()
     assert isinstance(shown, dict)
     return list(shown)
 
 
 def encoders(twin: Twin) -> object:
-    asked: list[dict[str, Any]] = [{}, {"1": 40}, {"9": 1}, {"1": 1.5}]
-    return [bare(twin.asked(do="encoder", set=changes)) for changes in asked]
+    turns = [bare(twin.asked(do="turn", machine=twin.machine, axis=axis, counts=counts)) for axis, counts in ((1, 40), (9, 1))]
+    return turns, twin.asked(do="encoders", machine=twin.machine)
 
 
 def coupling_of_encoders(twin: Twin) -> object:
-    return [twin.asked(do="encoder", set={"1": word}) for word in ("blocked", "drive", "nothing")]
+    told = [twin.asked(do="couple", machine=twin.machine, axis=1, to=word) for word in ("blocked", "drive", "nothing")]
+    return [bare(answer) for answer in told], twin.asked(do="encoders", machine=twin.machine)
 
 
 def requests_for_units(twin: Twin) -> object:
-    return without_time(twin.asked(do="state", unit=1)) == without_time(twin.asked(do="state")), twin.asked(do="state", unit=9)
+    return bare(twin.asked(do="state", machine="nobody")), bare(twin.asked(do="state", machine=""))
 
 
 def faults(twin: Twin) -> object:
     """Set, strike, list, clear; kinds and values that are none."""
-    told = [twin.asked(do="fault", set=["exception code=6 nth=1"]), twin.pdu("0100000001"), twin.asked(do="fault")]
-    told += [twin.asked(do="fault", set=[text]) for text in ("nonsense", "stuck pin=IN99 value=1", "crc nth=x")]
-    return [bare(answer) for answer in [*told, twin.asked(do="fault", clear=["nobody"]), twin.asked(do="fault", clear=True)]]
+    told = [twin.asked(do="fault", fault="exception code=6 nth=1"), twin.pdu("0100000001"), twin.asked(do="faults")]
+    told += [twin.asked(do="fault", fault=text) for text in ("nonsense", "stuck pin=IN99 value=1", "crc nth=x")]
+    told += [twin.asked(do="clear_fault", name=name) for name in ("nobody", "exception")]
+    return [bare(answer) for answer in [*told, twin.asked(do="faults")]]
 
 
 def occasions_of_faults(twin: Twin) -> object:
-    told = twin.asked(do="fault", set=["crc nth=3"])
-    twin.asked(do="fault", clear=True)
+    twin.asked(do="fault", fault="crc nth=3")
+    told = twin.asked(do="faults")
+    twin.asked(do="clear_fault", name="crc")
     return told
 
 
 def power_cycle(twin: Twin) -> object:
     twin.pdu("0507d0ff00")
-    return twin.asked(do="power-cycle"), twin.pdu("0107d00001"), without_time(twin.asked(do="state"))
+    return twin.asked(do="power_cycle", machine=twin.machine), twin.pdu("0107d00001"), without_time(twin.state())
 
 
 def known_requests(twin: Twin) -> object:
@@ -285,7 +279,7 @@ def known_requests(twin: Twin) -> object:
 
 
 def wrong_requests(twin: Twin) -> object:
-    asked: list[dict[str, Any]] = [{"do": "pin", "set": ["IN1"]}, {"do": "state", "unit": []}, {"do": "fault", "set": 1}]
+    asked: list[dict[str, Any]] = [{"do": "set", "levels": ["IN1"]}, {"do": "state", "machine": []}, {"do": "fault", "fault": 1}]
     return [bare(twin.asked(**request)) for request in asked]
 
 
@@ -298,7 +292,7 @@ def shell_codes(twin: Twin) -> object:
         ["power-cycle"],
         ["fault", "nonsense"],
         ["fault"],
-        ["state", "--twin", "other"],
+        ["state", "--device", "other"],
     ]
     return {" ".join(words): twin.command(*words)[0] for words in typed}
 
@@ -317,26 +311,26 @@ def chip_answers(twin: Twin) -> object:
 
 
 def chip_state(twin: Twin) -> object:
-    return without_time(twin.asked(do="state"))
+    return without_time(twin.state())
 
 
 def chip_pins(twin: Twin) -> object:
     asked: list[dict[str, Any]] = [{}, {"B3": 0}, {"limit": 0}, {"B99": 1}, {"B3": 2}]
-    return [bare(twin.asked(do="pin", set=changes)) for changes in asked]
+    return [bare(twin.set(changes)) for changes in asked], bare(twin.pins())
 
 
 def chip_power_cycle(twin: Twin) -> object:
-    return twin.asked(do="power-cycle"), without_time(twin.asked(do="state"))
+    return twin.asked(do="power_cycle", machine=twin.machine), without_time(twin.state())
 
 
 def chip_faults(twin: Twin) -> object:
     given = ("crc nth=3", "nonsense", "noise every=1000", "slip axis=1 counts=5")
-    told = [twin.asked(do="fault", set=[text]) for text in given]
-    return [bare(answer) for answer in [*told, twin.asked(do="fault"), twin.asked(do="fault", clear=True)]]
+    told = [twin.asked(do="fault", fault=text) for text in given]
+    return [bare(answer) for answer in [*told, twin.asked(do="faults")]]
 
 
 def chip_encoder(twin: Twin) -> object:
-    return twin.asked(do="encoder", set={})
+    return bare(twin.asked(do="encoders", machine=twin.machine))
 
 
 def chip_shell_codes(twin: Twin) -> object:
@@ -382,21 +376,41 @@ PROBES: dict[str, tuple[Probe, ...]] = {
     ),
 }
 
-_NAMES = "a world names machines and asks by name, a served line asks by unit or address"
-_TIME = "only a world can be paused, stepped and saved"
-
-KNOWN: dict[tuple[str, str], str] = {
-    ("mic488", "names_of_pins"): _NAMES,
-    ("mic488", "requests_for_units"): _NAMES,
-    (
-        "mic488",
-        "coupling_of_encoders",
-    ): "what turns an encoder of a world is in its description; sessions record no other",
-    ("mic488", "occasions_of_faults"): "only served controllers count the occasions of a fault",
-    ("mic488", "known_requests"): _TIME,
-    ("m1486", "known_requests"): _TIME,
-    ("m1486", "chip_encoder"): "chips that are served do not know the request; the exit code is the same",
+IN_PROCESS = {
+    "mic488": (all_registers, refused, units, names_of_pins, wrong_requests),
+    "m1486": (chip_answers, chip_encoder, wrong_requests),
 }
+"""Those that need no more than the line and the dispatcher, in this order after power-on."""
+
+
+class InProcess(Twin):
+    """A world of the printed description in this process, in virtual time."""
+
+    def __init__(self, kind: str, text: str) -> None:
+        self.kind = kind
+        self.live = LiveWorld(World.from_toml(text))
+        self.port = PlacePort(self.live, "bus", "tcp-1", "tcp" if kind == "mic488" else "raw")
+
+    @cached_property
+    def machine(self) -> str:
+        return self.live.subject.description.machines[0].name
+
+    def asked(self, **request: object) -> object:
+        try:
+            return json.loads(json.dumps(self.live.subject.do(read_command(request.pop("do"), request)).value))
+        except SteptwinError as error:
+            return type(error).__name__, str(error)
+
+    def pdu(self, pdu: str, unit: int = 1) -> str:
+        data = bytes.fromhex(pdu)
+        return self.port.exchange(struct.pack(">HHHB", 7, 0, len(data) + 1, unit) + data, self.live.now)[6:].hex(" ")
+
+    def characters(self, text: str, answers: int) -> str:
+        data = self.port.exchange(text.encode(), self.live.now)
+        while len(data) < answers:
+            self.live.advance(self.live.now + MILLISECOND)
+            data += b"".join(piece for _, piece in self.port.to_send(self.live.now))
+        return data.hex(" ")
 
 
 @pytest.fixture(scope="module", params=list(PROBES))
@@ -416,19 +430,17 @@ def twins(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
             twin.close()
 
 
-def test_both_ways_answer_alike(twins: tuple[Twin, Twin], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_ways_answer_alike(twins: tuple[Twin, Twin], monkeypatch: pytest.MonkeyPatch) -> None:
     served, up = twins
-    differing, equal = {}, []
+    here = InProcess(served.kind, (up.directory / "twin.toml").read_text())
+    differing: list[str] = []
     for probe in PROBES[served.kind]:
-        told = []
-        for twin in (served, up):
+        shown: dict[str, object] = {}
+        for way, twin in (("serve", served), ("up", up)):
             monkeypatch.setenv("XDG_RUNTIME_DIR", str(twin.directory))
-            told.append(probe(twin))
-        if told[0] != told[1]:
-            differing[probe.__name__] = told
-        else:
-            equal.append(probe.__name__)
-    unexpected = {name: told for name, told in differing.items() if (served.kind, name) not in KNOWN}
-    text = "\n".join(f"{name}\n  serve: {told[0]}\n  up:    {told[1]}" for name, told in unexpected.items())
-    assert not unexpected, f"these differ, and are not in KNOWN:\n{text}"
-    assert [name for name in equal if (served.kind, name) in KNOWN] == [], "these do not differ any more: remove them from KNOWN"
+            shown[way] = probe(twin)
+        if probe in IN_PROCESS[served.kind]:
+            shown["World"] = probe(here)
+        if any(answer != shown["serve"] for answer in shown.values()):
+            differing.append("\n".join([probe.__name__, *(f"  {way}: {answer}" for way, answer in shown.items())]))
+    assert not differing, "\n".join(["these differ:", *differing])

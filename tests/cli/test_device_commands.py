@@ -22,7 +22,7 @@ from steptwin.cli.device import HeldUp, shown, table, tell_under_way, tied
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import DeviceAddress, parse_device
 from steptwin.errors import Misuse, Refusal
-from steptwin.live.ports import Place
+from steptwin.live.ports import FoundPort
 from steptwin.mic488.registers import register_map
 
 STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
@@ -159,9 +159,9 @@ def test_reading(twin: Any, shell: Shell) -> None:
 MISTAKES: list[tuple[list[str], int, str]] = [
     (["get", "M1_POS_AKT"], 2, "did you mean M1_POS_ACT"),
     (["get", "10021"], 2, "is the second word of"),
-    (["get", "9999"], 2, "hr:9999 asks for it nevertheless"),
+    (["get", "9999"], 2, "hr:9999 reads it all the same"),
     (["get", "hr:10020:float"], 2, "expected ADDRESS"),
-    (["get", "X*"], 2, "'X*' stands for no register"),
+    (["get", "X*"], 2, "'X*' matches no register"),
     (["set", "M1_ACC"], 2, "expected NAME=VALUE"),
     (["set", "M1_ACC=much"], 2, "'much' is no number"),
     (["set", "IN3=1"], 2, "IN3 can only be read"),
@@ -169,7 +169,7 @@ MISTAKES: list[tuple[list[str], int, str]] = [
     (["move", "1=1", "M1=2"], 2, "M1 is given twice"),
     (["move", "1"], 2, "expected AXIS=NUMBER"),
     (["move", "1=5"], 1, "M1 of unit 1 is switched off: enable it first"),
-    (["jog", "1=5"], 2, "without a terminal nobody can press a key"),
+    (["jog", "1=5"], 2, "no terminal, so no key can end the jog"),
     (["jog", "1=5", "--seconds", "-1"], 2, "--seconds -1: permitted are more than 0"),
     (["jog", "1=5", "--seconds", "nan"], 2, "--seconds nan: permitted are more than 0"),
     (["move", "1=5", "--timeout", "-1"], 2, "a time to wait of -1 s is outside 0 to 1000000 s"),
@@ -193,9 +193,9 @@ def test_who_does_not_answer(twin: Any, shell: Shell, monkeypatch: pytest.Monkey
     assert "no answer to 'unit 9: read the control registers of firmware" in shell.errors
     assert "If these are M1486 chips, put ',kind=m1486' behind the address" in shell.errors
     monkeypatch.delenv("STEPTWIN_DEVICE")
-    monkeypatch.setattr("steptwin.drivers.address.DEFAULT", "tcp://127.0.0.1:1")
+    monkeypatch.setattr("steptwin.live.twins.running", list)
     shell("info")
-    assert (shell.code, "start one with 'steptwin serve mic488 --demo', or name a device" in shell.errors) == (1, True)
+    assert (shell.code, "no twin is running: start one with 'steptwin serve mic488 --demo'" in shell.errors) == (1, True)
 
 
 def test_an_interrupted_command_stops_the_axis(twin: Any) -> None:
@@ -276,8 +276,8 @@ def test_scanning(twin: Any, shell: Shell) -> None:
 
 
 def test_ports(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("steptwin.live.ports.serial_ports", lambda: [Place("/dev/ttyUSB7", "FTDI (0403:6001)")])
-    monkeypatch.setattr("steptwin.live.ports.twin_ports", lambda: [Place("/run/mic488", "twin mic488")])
+    monkeypatch.setattr("steptwin.live.ports.serial_ports", lambda: [FoundPort("/dev/ttyUSB7", "FTDI (0403:6001)")])
+    monkeypatch.setattr("steptwin.live.ports.twin_ports", lambda: [FoundPort("/run/mic488", "twin mic488")])
     assert shell("ports").splitlines() == ["/dev/ttyUSB7  FTDI (0403:6001)", "/run/mic488   twin mic488"]
     assert json.loads(shell("ports", "--json"))[0] == {"address": "/dev/ttyUSB7", "what": "FTDI (0403:6001)"}
 

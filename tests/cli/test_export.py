@@ -9,7 +9,7 @@ from steptwin.cli import main
 from steptwin.files.export import write_trace
 from steptwin.machine import SECOND
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -31,7 +31,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 @pytest.fixture
 def trace(tmp_path: Path) -> Path:
     recorded = Trace()
-    recorded.add(Record(0, "a", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1000.0, 1000.0, 500.0)))
+    recorded.add(TraceRecord(0, "a", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1000.0, 1000.0, 500.0)))
     write_trace(recorded, tmp_path / "run.jsonl")
     return tmp_path / "run.jsonl"
 
@@ -62,7 +62,7 @@ def test_a_directory_is_its_trace(run: Run, trace: Path) -> None:
     ("arguments", "message"),
     [
         ([], "nothing to write: name formats with --to (html, png,"),
-        (["--to", "html", "--from", "soon"], "--from soon: expected a time"),
+        (["--to", "html", "--from", "soon"], "--from: 'soon' is no time"),
         (["--to", "csv", "--machine", "b"], "no machine 'b' in the trace: there are a"),
     ],
 )

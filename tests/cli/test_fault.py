@@ -12,10 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from steptwin.cli import app
+from steptwin.commands.serve import ServeM1486, ServeMic488, serve_m1486, serve_mic488
 from steptwin.errors import Misuse
-from steptwin.served.serve_m1486 import M1486Options
-from steptwin.served.serve_m1486 import serve as serve_chips
-from steptwin.served.serve_mic488 import Mic488Options, serve
 from steptwin.world.faults import KINDS
 
 Serve = Callable[..., Any]
@@ -51,9 +49,9 @@ def test_a_stuck_switch_stays_stuck_under_a_hand(serve: Serve) -> None:
     twin = serve("--demo")
     twin.command("fault", "stuck", "pin=IN9", "value=1")
     twin.command("pin", "IN9=0")
-    assert json.loads(twin.command("pin", "--json").stdout)["IN9"] == 1
+    assert json.loads(twin.command("pin", "--json").stdout)["mic488.IN9"] == 1
     twin.command("fault", "--clear-all")
-    assert json.loads(twin.command("pin", "--json").stdout)["IN9"] == 0
+    assert json.loads(twin.command("pin", "--json").stdout)["mic488.IN9"] == 0
 
 
 def test_faults_of_a_line_of_chips(serve_m1486: Serve) -> None:
@@ -72,7 +70,7 @@ def test_faults_of_a_line_of_chips(serve_m1486: Serve) -> None:
 @pytest.mark.parametrize(
     ("fault", "text"),
     [
-        ("crc", "fault crc happens on Modbus RTU: this twin serves Modbus TCP"),
+        ("crc", "fault crc happens on Modbus RTU: line 'bus' carries Modbus TCP"),
         ("busy unit=7", "fault busy: unit = 7: served are 1"),
         ("stuck pin=IN99", "fault stuck: pin = 'IN99'"),
         ("bang", "fault: kind = 'bang': permitted are flip,"),
@@ -83,12 +81,12 @@ def test_a_twin_that_cannot_have_the_fault_does_not_start(
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(Misuse) as refused:
-        serve(Mic488Options(tcp="127.0.0.1:0", faults=(fault,)))
+        serve_mic488(ServeMic488(tcp="127.0.0.1:0", faults=(fault,)))
     assert str(refused.value).startswith(text)
     assert [file for _, _, files in os.walk(tmp_path) for file in files] == []
 
 
 def test_frames_of_chips_cannot_go_wrong(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    with pytest.raises(Misuse, match="fault late happens on Modbus RTU and Modbus TCP: this twin serves M1486"):
-        serve_chips(M1486Options(tcp="127.0.0.1:0", faults=("late",)))
+    with pytest.raises(Misuse, match="fault late happens on Modbus RTU and Modbus TCP: line 'bus' carries M1486"):
+        serve_m1486(ServeM1486(tcp="127.0.0.1:0", faults=("late",)))

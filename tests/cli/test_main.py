@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from typer.core import TyperGroup
@@ -75,4 +78,80 @@ def test_help_names_values_and_no_python_types(arguments: tuple[str, ...]) -> No
 def test_a_missing_argument_is_named() -> None:
     wrong = steptwin("run")
     assert wrong.returncode == 2
-    assert "Missing argument 'file'" in wrong.stderr
+    assert wrong.stderr == "steptwin: Missing argument 'FILE'; usage: python -m steptwin run -h\n"
+
+
+def failed(arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> tuple[object, str, str]:
+    monkeypatch.setattr("sys.argv", ["steptwin", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    out, errors = capsys.readouterr()
+    return ended.value.code, out, errors
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["check", "missing.prg"],
+        ["fmt", "missing.prg"],
+        ["build", "missing.prg"],
+        ["decompile", "missing.wbc"],
+        ["run", "missing.prg"],
+        ["run", "missing.m1486"],
+        ["run", "missing.toml"],
+        ["run", "missing.json"],
+        ["up", "missing.toml"],
+        ["replay", "missing.json"],
+        ["export", "missing.jsonl", "--to", "csv"],
+        ["serve", "mic488", "--config", "missing.cfg"],
+        ["serve", "m1486", "--program", "missing.m1486"],
+        ["record", "missing.txt"],
+        ["diff", "missing.txt", "other.txt"],
+        ["send", "missing.m1486", "-d", "/dev/none,chip=1"],
+        ["info", "-d", "/dev/none,config=missing.cfg"],
+    ],
+)
+def test_a_missing_file_is_the_same_everywhere(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = next(part for argument in arguments for part in argument.split("=") if part.startswith("missing"))
+    message = f"cannot read {name}: no such file or directory"
+    assert failed(arguments, monkeypatch, capsys) == (2, "", f"steptwin: {message}\n")
+    if arguments[0] not in ("up", "serve", "record"):
+        code, out, errors = failed([*arguments, "--json"], monkeypatch, capsys)
+        assert (code, out, json.loads(errors)) == (2, "", {"error": message, "code": 2})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["info", "--nothing"], "No such option: --nothing; usage: steptwin info -h"),
+        (["nothing"], "No such command 'nothing'; usage: steptwin -h"),
+        (["fmt", "--check"], "Missing argument 'FILES'; usage: steptwin fmt -h"),
+    ],
+)
+def test_usage_errors_are_one_line(
+    arguments: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert failed(arguments, monkeypatch, capsys) == (2, "", f"steptwin: {message}\n")
+    code, out, errors = failed([*arguments, "--json"], monkeypatch, capsys)
+    assert (code, out, json.loads(errors)) == (2, "", {"error": message, "code": 2})
+
+
+def test_errors_in_files_have_their_place_and_nothing_before_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in (("w.toml", "[worlds]\n"), ("p.prg", "WAIT\n")):
+        (tmp_path / name).write_text(text)
+        code, out, errors = failed(["run", str(tmp_path / name)], monkeypatch, capsys)
+        assert (code, out, errors.startswith(f"{tmp_path / name}:1:1: error ")) == (2, "", True), errors
+
+
+def test_json_of_every_command_is_documented() -> None:
+    command = get_command(app)
+    assert isinstance(command, TyperGroup)
+    named = {name for name, each in command.commands.items() if any("--json" in option.opts for option in each.params)}
+    page = (Path(__file__).parents[2] / "docs/reference/command-line.md").read_text().partition("## JSON of each command")[2]
+    first = " ".join(row.split("|")[1] for row in page.splitlines() if row.startswith("|"))
+    documented = set(re.findall(r"`([a-z-]+)`", first))
+    assert named <= documented

@@ -98,6 +98,7 @@ def test_json(run: Run) -> None:
         "went_wrong": False,
         "virtual_s": 2.001,
         "lines_not_taken": 0,
+        "sent": "0045",
         "chips": [
             {
                 "address": "F",
@@ -105,7 +106,6 @@ def test_json(run: Run) -> None:
                 "position_valid": True,
                 "true_position": 0,
                 "program": "has nothing to do",
-                "sent": "0045",
             }
         ],
     }
@@ -143,13 +143,13 @@ def test_an_error_is_shown_and_what_the_chip_makes_of_it(run: Run) -> None:
 def test_a_trace_can_be_read_back(run: Run, tmp_path: Path) -> None:
     assert run(PROGRAM, "--until", "idle", "--trace", str(tmp_path / "t.jsonl")).exit_code == 0
     saved = read_trace(tmp_path / "t.jsonl")
-    assert [record.time // 1_000_000 for record in saved.trace.plans()] == [2, 832]
+    assert [record.time // 1_000_000 for record in saved.trace.plans()] == [0, 2, 832]
     assert [(record.subject, record.value) for record in saved.trace.edges() if record.subject == "B1"] == [
         ("B1", 0.0),
         ("B1", 1.0),
     ]
     assert saved.until == 1_162_000_000
-    view = saved.views["F", "1"]
+    view = saved.views["chipF", "1"]
     assert (view.unit, view.pulses_per_unit) == ("step", 64.0)
 
 
@@ -158,7 +158,7 @@ def test_a_trace_can_be_read_back(run: Run, tmp_path: Path) -> None:
     [
         (["--variant", "D"], "no M1486 variant is called 'D'"),
         (["--until", "dark"], "--until dark: permitted is 'idle'"),
-        (["--for", "soon"], "--for soon: expected a time with"),
+        (["--for", "soon"], "--for: 'soon' is no time: expected a number with"),
         (["--for", "0"], "--for 0: must be more than 0"),
         (["--input", "B3"], "--input B3: expected PIN=VALUE@TIME"),
         (["--input", "B22=0@1s"], "no input pin 'B22'"),

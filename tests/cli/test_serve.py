@@ -25,7 +25,7 @@ def test_end_points_without_addresses(
     monkeypatch: pytest.MonkeyPatch, device: str, option: list[str], expected: tuple[str | None, ...]
 ) -> None:
     served: list[Any] = []
-    monkeypatch.setattr(f"steptwin.served.serve_{device}.serve", served.append)
+    monkeypatch.setattr(f"steptwin.commands.serve.serve_{device}", served.append)
     assert CliRunner().invoke(app, ["serve", device, *option]).exit_code == 0
     (options,) = served
     pty: Path | None = options.pty

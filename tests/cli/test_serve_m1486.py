@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
+from steptwin.commands.serve import ServeM1486, serve_m1486
 from steptwin.errors import Misuse
-from steptwin.served.serve_m1486 import M1486Options, remarks_of, serve
 
 Serve = Callable[..., Any]
 
@@ -64,7 +64,7 @@ def test_programs_on_tcp_and_pty_share_the_line(serve_m1486: Serve) -> None:
         one.close()
         two.close()
     for text in (
-        "M1486B, Step & Direction, addresses 0, 7, 4800 bit/s",
+        "m1486; chip0: M1486, chip 0, variant B; chip7: M1486, chip 7, variant B",
         "78 37 0d  X7  indeX 7",
         "U20 type letter in ASCII = 66",
     ):
@@ -90,22 +90,22 @@ def test_a_hand_at_the_chips(serve_m1486: Serve) -> None:
     twin = serve_m1486("--variant", "B", "--chain", "0,A", "--wire", "0.B1=A.B3")
     host = Host(twin.tcp_port)
     assert host.ask("xA\nz3\nu20\nx0\nu16\n", 1) == b"\x01"
-    assert "waits until B3 is low" in twin.command("state", "--unit", "A").stdout
-    assert twin.command("pin", "--unit", "A", "B3=0").returncode == 0
+    assert "waits until B3 is low" in twin.command("state", "--device", "m1486.A").stdout
+    assert twin.command("pin", "--device", "m1486.A", "B3=0").returncode == 0
     assert host.hear(1) == b"B"
-    shown = twin.command("pin", "--unit", "a").stdout
-    assert "B3     0" in shown.splitlines()
+    shown = twin.command("pin", "--device", "m1486.a").stdout
+    assert "chipA.B3 0" in shown.splitlines()
     assert host.ask("x0\nc1\nu20\n", 1) == b"B"
 
-    assert twin.command("power-cycle").returncode == 0
-    lines = twin.command("state", "--unit", "0").stdout.splitlines()
+    assert twin.command("power-cycle").returncode == 0  # of all chips of the line
+    lines = twin.command("state", "--device", "m1486.0").stdout.splitlines()
     assert lines[0].startswith("M1486B at address 0, 4800 bit/s, ")
     assert lines[1:3] == ["program  has nothing to do", "memory   0 of 2032 bits, input buffer 0 of 32 characters"]
     refused = twin.command("pin", "B1=0")
-    assert (refused.returncode, refused.stderr) == (2, "steptwin: several chips are served: choose one with --unit: 0, A\n")
-    cannot = twin.command("encoder", "M1+1")
-    assert cannot.returncode == 2
-    assert "this twin cannot do 'encoder': it can pin, power-cycle, state" in cannot.stderr
+    there = "controllers are chip0, chipA; buttons are none"
+    assert (refused.returncode, refused.stderr) == (2, f"steptwin: B1: give a pin as CONTROLLER.PIN; {there}\n")
+    cannot = twin.command("encoder", "--device", "m1486.0", "M1+1")
+    assert (cannot.returncode, cannot.stderr) == (2, "steptwin: 'chip0' is an M1486, which has no encoder\n")
     host.close()
 
 
@@ -142,31 +142,17 @@ def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None
         ({"wires": ("B1=B3",)}, "--wire B1=B3: expected FROM=TO"),
         ({"name": "a b"}, "--name 'a b': permitted are"),
         ({"tcp": "0.0.0.0:0"}, "0.0.0.0 is not a loopback address"),
-        ({"program": Path("nowhere.m1486")}, "cannot read nowhere.m1486: No such file or directory"),
+        ({"program": Path("nowhere.m1486")}, "cannot read nowhere.m1486: no such file or directory"),
     ],
 )
 def test_wrong_options_are_said(options: dict[str, Any], text: str) -> None:
     with pytest.raises(Misuse) as refusal:
-        serve(M1486Options(**options))
+        serve_m1486(ServeM1486(**options))
     assert str(refusal.value).startswith(text)
 
 
 def test_a_program_with_errors_is_shown(tmp_path: Path) -> None:
     path = tmp_path / "p.m1486"
     path.write_text("f640\nj3\n")
-    with pytest.raises(Misuse) as refusal:
-        serve(M1486Options(program=path))
-    assert str(refusal.value).startswith(f"{path} is no program to switch on with:\n{path}:2:")
-
-
-@pytest.mark.parametrize(
-    ("variant", "state", "remarks"),
-    [
-        ("B", None, []),
-        ("B", Path("here"), ["M1486B keeps its program in RAM: nothing goes into here"]),
-        ("E1", None, ["the EEPROM ends with this process (--state DIR keeps it)"]),
-        ("E1", Path("here"), []),
-    ],
-)
-def test_what_one_should_know(variant: str, state: Path | None, remarks: list[str]) -> None:
-    assert remarks_of(M1486Options(variant=variant, state=state)) == remarks
+    with pytest.raises(Misuse, match=r"p\.m1486:2:"):
+        serve_m1486(ServeM1486(program=path))

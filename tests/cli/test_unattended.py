@@ -34,16 +34,17 @@ class Twin(NamedTuple):
 
 TWINS = {
     "m1486": Twin(
-        ("serve", "m1486", "--variant", "B", "--program", "chip.m1486", "--tcp", "127.0.0.1:0"), "0.601000 s  U16 sends 01H"
+        ("serve", "m1486", "--variant", "B", "--program", "chip.m1486", "--tcp", "127.0.0.1:0"),
+        "0.601000 s  chipF      U16 sends 01H",
     ),
     "mic488": Twin(
         ("serve", "mic488", "--config", "mover.cfg", "--program", "mover.prg", "--tcp", "127.0.0.1:0"),
-        "0.301000 s  position command ignored: M1 is not enabled",
+        "0.301000 s  mic488     position command ignored: M1 is not enabled",
     ),
     "world": Twin(("up", "world.toml"), "0.301000 s  a          position command ignored: M1 is not enabled"),
     "fault": Twin(
         ("serve", "m1486", "--variant", "B", "--tcp", "127.0.0.1:0", "--fault", "supply-drop at_s=0.3 for_s=0.3"),
-        "0.600000 s  power-on",
+        "0.600000 s  chipF      power-on",
     ),
 }
 

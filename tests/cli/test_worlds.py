@@ -184,12 +184,12 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_runs(tm
     program.write_text('[[mic488]]\nname = "a"\n')
     with pytest.raises(Misuse, match=r"out\.foo: formats are jsonl, html"):
         invoke("run", str(program), "--trace", str(tmp_path / "out.foo"))
-    with pytest.raises(Misuse, match=r"cannot write .*w\.toml/t/trace\.jsonl: Not a directory"):
+    with pytest.raises(Misuse, match=r"cannot write .*w\.toml/t/trace\.jsonl: not a directory"):
         invoke("run", str(program), "--trace", str(program / "t"))
     with pytest.raises(Misuse, match=r"out\.foo: formats are jsonl, html"):
         invoke("up", str(program), "--trace", str(tmp_path / "out.foo"))
     (tmp_path / "s.json").mkdir()
-    with pytest.raises(Misuse, match=r"cannot write .*: Is a directory"):
+    with pytest.raises(Misuse, match=r"cannot write .*: is a directory"):
         invoke("up", str(program), "--session", str(tmp_path / "s.json"))
     for command in (("up", str(program), "--session"), ("run", str(program), "--session"), ("save",)):
         with pytest.raises(Misuse, match=r"now\.toml: a session is called NAME\.json$"):
@@ -197,7 +197,7 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_runs(tm
 
 
 def test_options_for_programs_are_refused() -> None:
-    with pytest.raises(Misuse, match="--firmware is not for worlds, whose file says all that"):
+    with pytest.raises(Misuse, match="--firmware is not for worlds, whose file has these settings"):
         invoke("run", str(FEEDER), "--firmware", "1.70")
     with pytest.raises(Misuse, match=r"--input IN1: expected MACHINE\.PIN; machines are table, drum"):
         invoke("run", str(FEEDER), "--input", "IN1=1@2s")

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 from host_rig import Wire, driver
 
-from steptwin.commands.devicesession import Step, carry_out, carry_out_one, differences, from_text, steps_of, to_text
+from steptwin.commands.devicesession import SessionStep, carry_out, carry_out_one, differences, from_text, steps_of, to_text
 from steptwin.errors import Misuse, Refusal
 from steptwin.mic488.registers import register_map
 
@@ -21,7 +21,7 @@ sleep 0
 """
 
 
-def recorded(wire: Wire) -> list[Step]:
+def recorded(wire: Wire) -> list[SessionStep]:
     return list(carry_out(driver(wire), steps_of(SESSION, register_map())))
 
 
@@ -93,8 +93,8 @@ def test_two_recordings() -> None:
     assert differences(one, slow) == []
     assert [d.what for d in differences(one, slow, time_s=1.0)] == ["time in s"]
     other = list(one)
-    other[2] = Step("wait M1", 0.0, {"M1": {"reason": "stopped at limit R", "position": 7.99}})
-    other[3] = Step(one[3].line, 0.0, {"M1_STATUS": 4})
+    other[2] = SessionStep("wait M1", 0.0, {"M1": {"reason": "stopped at limit R", "position": 7.99}})
+    other[3] = SessionStep(one[3].line, 0.0, {"M1_STATUS": 4})
     assert [str(d) for d in differences(one, other)] == [
         'step 3, wait M1: M1 reason: "target reached" | "stopped at limit R"',
         "step 3, wait M1: M1 position: 8.0 | 7.99",

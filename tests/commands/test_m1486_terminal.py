@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from steptwin.commands.m1486_terminal import ChipTerminal, ChipWords, command_of
+from steptwin.commands.m1486_terminal import ChipTerminal, TerminalWords, command_of
 from steptwin.drivers import LineLost
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.variants import variant
@@ -53,7 +53,7 @@ def inverted(text: str) -> bytes:
     ],
 )
 def test_what_comes_back_in_words(typed: list[str], heard: bytes, told: list[str]) -> None:
-    words = ChipWords()
+    words = TerminalWords()
     for line in typed:
         words.typed(line)
     assert words.heard(heard) == told
@@ -61,7 +61,7 @@ def test_what_comes_back_in_words(typed: list[str], heard: bytes, told: list[str
 
 
 def test_an_answer_that_takes_its_time_is_still_known() -> None:
-    words = ChipWords()
+    words = TerminalWords()
     words.typed("u3")
     assert words.heard(b"u3\r") == []
     assert words.is_awaiting

@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 
 from steptwin.commands.run_wbc import WbcRun, run
-from steptwin.commands.wbc_bench import Travel, parse_travel
+from steptwin.commands.travels import Travel, parse_travel
 from steptwin.errors import Misuse
 from steptwin.files.export import read_trace
 from steptwin.files.programbanks import ProgramErrors
 from steptwin.files.timedinputs import parse_inputs
+from steptwin.files.world import World
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import DEFAULT
 from steptwin.wbc.image import build
@@ -80,7 +81,7 @@ def test_everything_a_program_does_with_times_and_lines(play: Play) -> None:
     )
     assert ran.told() == [
         ("0.001000", "M1 on", "1"),
-        ("0.003000", "M1 goes to 50 mm", "3"),
+        ("0.003000", "M1 moves to 50 mm", "3"),
         ("0.004000", "waits", "4"),
         ("0.603000", "M1 at 50 mm, position reached", ""),
         ("0.604000", "OUT3 on", "5"),
@@ -112,7 +113,7 @@ def test_an_interrupt_and_an_error(play: Play) -> None:
         ("3.011000", "line 7: division by zero", "7"),
         ("3.011000", "M2 slows down from 100 imp/s", "7"),
         ("3.011000", "ERR on", "7"),
-        ("4.011000", "M2 stands at 300.8 imp", ""),
+        ("4.011000", "M2 at rest at 300.8 imp", ""),
     ]
     assert not ran.went_right
     assert "an error has stopped the program in line 7: division by zero" in ran.lines
@@ -149,7 +150,7 @@ SWITCHES = "[Axis0]\nUnit=3\nGear=10\nAcc=1000\nDec=1000\nVel=50\nHomeMode=0\nLi
 def test_switches_stand_where_travel_says_or_are_assumed(play: Play, level: int) -> None:
     config = SWITCHES.format(level=level)
     assumed = play(HOMING, config=config, until_idle=True)
-    assert assumed.lines[0] == "M1: KL on IN3 assumed at -5 mm (--travel M1=LOW.. says otherwise)"
+    assert assumed.lines[0] == "M1: KL on IN3 assumed at -5 mm (--travel M1=LOW.. changes it)"
     told = play(HOMING, config=config, until_idle=True, travels=[Travel(1, -12.0, None)])
     assert "assumed" not in "".join(told.lines)
     homed = [next(float(time) for time, text, _ in ran.told() if "position reached" in text) for ran in (assumed, told)]
@@ -171,8 +172,8 @@ def test_positions_are_of_the_moment_the_run_ended(play: Play) -> None:
 
 
 BOTH = "[Axis2]\nUnit=3\nGear=10\nVel=50\nHomeMode=0\nInKL=1\nInKR=2\n[Axis0]\nGear=10\nInKL=3\n"
-KR = "M3: KR on IN3 assumed at 5 mm (--travel M3=..HIGH says otherwise)"
-KL = "M3: KL on IN2 assumed at -5 mm (--travel M3=LOW.. says otherwise)"
+KR = "M3: KR on IN3 assumed at 5 mm (--travel M3=..HIGH changes it)"
+KL = "M3: KL on IN2 assumed at -5 mm (--travel M3=LOW.. changes it)"
 
 
 @pytest.mark.parametrize(
@@ -396,7 +397,7 @@ def test_trace(play: Play, tmp_path: Path) -> None:
         (10_000_000, "edge", "AIN1", 2.5),
     ]
     assert [r.value for r in saved.trace.statements()][:4] == [1, 2, 3, 4]
-    assert [r.value for r in saved.trace.events()] == ["line 5: division by zero"]
+    assert [r.value for r in saved.trace.events("mic488")] == ["line 5: division by zero"]
 
 
 @pytest.mark.parametrize(("statement_ns", "told"), [(0, "0.000000"), (100_000, "0.060300"), (1_000_000, "0.603000")])
@@ -423,3 +424,25 @@ def test_pick_and_place_as_documented() -> None:
         ("OUT2 off", "34"),
     ]
     assert "it waits for ever in line 24: WAIT partReady = ON" in ran.lines
+
+
+def test_the_world_it_runs_in_is_printed_and_runs_alike(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    files = {
+        "a.prg": HOMING + "WAIT IN9 = 1\nOUT1 = ON\nWAIT IN1 = 1\n",
+        "a.cfg": SWITCHES.format(level=1) + "[WBC_PROGRAM]\nProgBank=2\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    options: dict[str, Any] = {"until_idle": True, "inputs": parse_inputs("IN9=1@5s")}
+    ran = Ran(Path("a.prg"), trace=tmp_path / "t.jsonl", **options)
+    assert Ran(Path("a.prg"), print_world=True, **options).went_right
+    world = World.from_toml(capsys.readouterr().out, {name: text.encode() for name, text in files.items()})
+    world.run(for_="6 s")
+    recorded = read_trace(tmp_path / "t.jsonl").trace
+    kinds = ("edge", "plan", "event")
+    assert [r[:4] for r in world.trace.of(*kinds, machine="mic488")] == [r[:4] for r in recorded.of(*kinds, machine="mic488")]
+    assert world.read("mic488.OUT1") == 1.0
+    assert any("KL on IN3 assumed" in line for line in ran.lines)

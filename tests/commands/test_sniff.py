@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from steptwin.commands.sniff import Decoder, M1486Decoder, ModbusDecoder, sniff
-from steptwin.drivers.place import parse_place
+from steptwin.drivers.place import parse_line_address
 from steptwin.errors import LineFailure, Misuse
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 from steptwin.words.frames import FrameLine
 from steptwin.world.addresses import Address
 
@@ -46,7 +46,7 @@ async def through(scheme: str, decoder: Decoder, answers: dict[bytes, bytes]) ->
     """A client asks through a tap and hears what the device says."""
     server, port = await device(answers.__getitem__)
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-    place = parse_place(f"{scheme}://127.0.0.1:{port}", 38400)
+    place = parse_line_address(f"{scheme}://127.0.0.1:{port}", 38400)
     tap = asyncio.create_task(sniff(place, decoder, listen=ANYWHERE, ready=ready.set_result))
     reader, writer = await asyncio.open_connection("127.0.0.1", int((await ready).rpartition(":")[2]))
     for asked, answer in answers.items():
@@ -96,7 +96,7 @@ def decoded(*heard: tuple[str, bytes]) -> list[str]:
             now = due
             decoder.expire(now)
         else:
-            decoder.heard(data, now, Direction.IN if what == ">" else Direction.OUT)
+            decoder.heard(data, now, FrameDirection.IN if what == ">" else FrameDirection.OUT)
     return told(frames)
 
 
@@ -141,7 +141,7 @@ def test_listening_only() -> None:
     master, slave = os.openpty()
 
     async def main() -> None:
-        place = parse_place(os.ttyname(slave), 38400)
+        place = parse_line_address(os.ttyname(slave), 38400)
         decoder = ModbusDecoder(frames.append, "1.70", tcp=False)
 
         def ready(where: str) -> None:
@@ -166,7 +166,7 @@ def test_standing_in_a_line_with_a_pty(tmp_path: Path) -> None:
     async def main() -> None:
         server, port = await device(lambda data: ANSWER)
         ready = asyncio.Event()
-        place = parse_place(f"rtu-tcp://127.0.0.1:{port}", 38400)
+        place = parse_line_address(f"rtu-tcp://127.0.0.1:{port}", 38400)
         decoder = ModbusDecoder(frames.append, "1.70", tcp=False)
         tap = asyncio.create_task(sniff(place, decoder, pty=tmp_path / "tty", ready=lambda where: ready.set()))
         await ready.wait()
@@ -184,7 +184,7 @@ def test_standing_in_a_line_with_a_pty(tmp_path: Path) -> None:
 
 
 def test_a_connection_cannot_be_listened_to() -> None:
-    place = parse_place("tcp://127.0.0.1:1", 38400)
+    place = parse_line_address("tcp://127.0.0.1:1", 38400)
     with pytest.raises(Misuse, match="stand in it, --listen HOST:PORT"):
         asyncio.run(sniff(place, ModbusDecoder(print, "1.70", tcp=True)))
 
@@ -192,6 +192,6 @@ def test_a_connection_cannot_be_listened_to() -> None:
 def test_a_device_that_cannot_be_reached() -> None:
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
-        place = parse_place(f"rtu-tcp://127.0.0.1:{s.getsockname()[1]}", 38400)
+        place = parse_line_address(f"rtu-tcp://127.0.0.1:{s.getsockname()[1]}", 38400)
     with pytest.raises(LineFailure, match="connection refused"):
         asyncio.run(sniff(place, ModbusDecoder(print, "1.70", tcp=False), listen=ANYWHERE))

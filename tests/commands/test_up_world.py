@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from steptwin.commands.up_world import LiveWorld, PlacePort, UpOptions, up
 from steptwin.errors import LineFailure, Misuse
+from steptwin.files.export.tracefile import TraceFile
 from steptwin.files.session import load, session_of
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
@@ -22,6 +23,7 @@ from steptwin.live.pace import Pace
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.wire.crc import with_crc
+from steptwin.world import script as do
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_POSITION = bytes.fromhex("01 03 27 24 00 02 8e b4")
@@ -62,7 +64,8 @@ def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], spee
         wall = Wall()
         world, live, cell = started(wall, speed)
         bus, chips = PlacePort(live, "bus", "tcp-1", "rtu"), PlacePort(live, "chips", "raw-1", "raw")
-        hand = WorldControl(cell, live).handlers()
+        hand = WorldControl(cell, live, Pace(live, cell, lambda _: None, has_clients=True), list)
+        cell.clock.run(speed)
         for pause, what in looks:
             # Less than what counts as held up: nothing here runs the loop between.
             for _ in range(pause // 100 + 1):
@@ -74,9 +77,9 @@ def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], spee
             elif what == "chips":
                 chips.exchange(b"x3\rf640\rr\r", now)
             elif what == "press":
-                hand["pin"]({"set": {"START": 1}})
+                hand.do(do.Press("start"))
             elif what == "pin":
-                hand["pin"]({"set": {"TABLE.IN8": pause % 2}})
+                hand.do(do.Set((("table", "IN8", pause % 2),)))
         cell.close()
         return world
 
@@ -136,7 +139,7 @@ def test_a_script_that_stops_a_live_world_stops_it_for_all() -> None:
 def arguments(tmp_path: Path, text: str) -> UpOptions:
     world = tmp_path / "stopping.toml"
     world.write_text(text)
-    return UpOptions(world=world, speed="1000", session=tmp_path / "s.json", trace=tmp_path / "t.jsonl")
+    return UpOptions(world=world, speed="1000", session=tmp_path / "s.json", trace=str(tmp_path / "t.jsonl"))
 
 
 def test_a_script_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -144,7 +147,7 @@ def test_a_script_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[
     assert up(options)
     told = capfd.readouterr().out.splitlines()
     assert told[-3:-1] == [f"wrote {options.session}", f"wrote {options.trace}"]
-    assert told[-1].startswith("1.000 s, 0 inputs, ended by: enough, digest ")
+    assert told[-1].startswith("ran for 1.000 s, 0 inputs, ended by: enough, digest ")
     assert load(tmp_path / "s.json").until == SECOND
 
 
@@ -160,12 +163,13 @@ def test_a_world_can_begin_with_faults(tmp_path: Path, capfd: pytest.CaptureFixt
 
 
 def test_a_trace_that_cannot_be_written_leaves_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object, **__: object) -> list[Path]:
-        raise Misuse("cannot write the trace: No space left on device")
+    def full(file: TraceFile, _: object) -> None:
+        file._file.close()
+        raise Misuse("cannot write the trace: no space left on device")
 
-    monkeypatch.setattr("steptwin.commands.up_world.write_trace", full)
+    monkeypatch.setattr("steptwin.commands.up_world.TraceFile.close", full)
     options = arguments(tmp_path, STOPPING)
-    with pytest.raises(Misuse, match="No space left on device"):
+    with pytest.raises(Misuse, match="no space left on device"):
         up(options)
     assert load(tmp_path / "s.json").until == SECOND
 
@@ -176,39 +180,10 @@ def test_what_did_not_begin_overwrites_nothing(tmp_path: Path) -> None:
         options = arguments(tmp_path, STOPPING + line + '[[m1486]]\nname = "b"\nline = "chips"\n')
         for path in (options.session, options.trace):
             assert path is not None
-            path.write_text("yesterday")
+            Path(path).write_text("yesterday")
         with pytest.raises(LineFailure, match="in use"):
             up(options)
     assert [path.read_text() for path in tmp_path.glob("?.json*")] == ["yesterday"] * 2
-
-
-def test_requests_of_the_control_endpoint() -> None:
-    async def run() -> None:
-        wall = Wall()
-        world, live, cell = started(wall)
-        hand = WorldControl(cell, live).handlers()
-        assert hand["pin"]({"unit": "table", "set": {"IN7": 1}})["table.IN7"] == 1.0  # type: ignore[index]
-        assert hand["state"]({"unit": "DRUM"})["controller"] == "M1486"  # type: ignore[index]
-        assert hand["encoder"]({"unit": "table", "set": {"2": 12}})[1]["counts"] == 12  # type: ignore[index]
-        hand["power-cycle"]({"unit": "table"})
-        assert hand["fault"]({"set": ["busy unit=1"]})[0]["name"] == "busy"  # type: ignore[index]
-        assert hand["fault"]({"clear": True}) == []
-        with pytest.raises(Misuse, match="choose a machine with --unit: table, drum"):
-            hand["state"]({})
-        with pytest.raises(Misuse, match="no machine 'drumm': machines are table, drum"):
-            hand["state"]({"unit": "drumm"})
-        with pytest.raises(Misuse, match=r"stuck: pin = 'TABLE\.IN3': name the machine as machine=NAME, and the pin alone"):
-            hand["fault"]({"set": ["stuck machine=table pin=table.IN3"]})
-        with pytest.raises(Misuse, match=r"strat: give a pin as MACHINE\.PIN; machines are table, drum; buttons are start"):
-            hand["pin"]({"set": {"strat": 1}})
-        with pytest.raises(Misuse, match="start = 2: a button takes 1"):
-            hand["pin"]({"set": {"start": 2}})
-        with pytest.raises(Misuse, match="axis = 9: permitted are 1 to 4"):
-            hand["fault"]({"set": ["stall machine=table axis=9"]})
-        cell.close()
-        assert len(world.inputs) == 5
-
-    asyncio.run(run())
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from steptwin.drivers.exchange import Exchanger, Job, LineLost, More, NoAnswer, Overtaken, SentLate, TooLate
+from steptwin.drivers.exchange import Exchanger, Job, LineLost, NoAnswer, Overtaken, SendNext, SentLate, TooLate
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, SECOND
@@ -39,7 +39,7 @@ class Spelling:
         self.asked, self.held = request, ""
         return request.text.encode()
 
-    def receive(self, data: bytes, now: int) -> str | More | None:
+    def receive(self, data: bytes, now: int) -> str | SendNext | None:
         self.held += data.decode()
         if self.held.endswith("?"):
             raise Refusal(self.held)
@@ -47,7 +47,7 @@ class Spelling:
             raise LineLost("no sense any more")
         if self.held.endswith("+"):
             self.held = ""
-            return More(b"more", self.may_wait)
+            return SendNext(b"more", self.may_wait)
         return self.held if self.held == f"{self.asked.text}!" else None
 
     def allowance_ns(self, request: Ask) -> int:

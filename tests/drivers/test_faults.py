@@ -14,7 +14,7 @@ from host_rig import KINDS, Fault, Kind, Wire, driver
 
 from steptwin.drivers import Mic488, NoAnswer
 from steptwin.errors import LineFailure
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 
 START_P = 200
 POS_ACT = 10020
@@ -65,13 +65,13 @@ OPERATIONS = {
     "move_velocity": Operation(lambda mic: mic.axis(1).move_velocity(5.0), lambda w: velocity(w) == 500.0, still),
     "home": Operation(
         lambda mic: mic.axis(1).home(-5.0),
-        lambda w: target(w) == 0 and w.twin.axes[0].status is Status.REACHED,
+        lambda w: target(w) == 0 and w.twin.axes[0].status is AxisStatus.REACHED,
         still,
         repeatable=False,
     ),
     "stop": Operation(
         stop_in_motion,
-        lambda w: w.twin.axes[0].status is Status.ON and not w.moving(),
+        lambda w: w.twin.axes[0].status is AxisStatus.ON and not w.moving(),
         lambda w: False,
     ),
     "move_together": Operation(

@@ -11,17 +11,17 @@ from itertools import pairwise
 import pytest
 from host_rig import INTERVAL, MemoryEndpoint, Wire, async_driver, driver, run_virtual, task_line, thread_line
 
-from steptwin.drivers import LineLost, Mic488, NoAnswer, Overtaken, Untold
+from steptwin.drivers import LineLost, Mic488, NoAnswer, Overtaken, Unconfirmed
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.modbus import Query, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.wire.pdu import Read, WriteCoil
+from steptwin.wire.pdu import ReadRequest, WriteCoilRequest
 
 TIMEOUT = 300 * MILLISECOND
-M1_STOP = WriteCoil(2004, True)
+M1_STOP = WriteCoilRequest(2004, True)
 
 
 def fill(wire: Wire) -> None:
@@ -121,11 +121,11 @@ def test_a_waiting_motion_is_not_begun_after_a_stop() -> None:
     stopped = [False]
     engine = line._engine
     permission = Permission(wire.clock, TIMEOUT, lambda: stopped[0])
-    motion: Job[Query, bytes] = Job(Query(1, WriteCoil(2008, True)), TIMEOUT, most=3, permission=permission)
+    motion: Job[Query, bytes] = Job(Query(1, WriteCoilRequest(2008, True)), TIMEOUT, most=3, permission=permission)
     engine.submit(motion)
     stopped[0] = True
     finish(line.exchange(Job(Query(1, M1_STOP), TIMEOUT, urgent=True)))
-    finish(line.exchange(Job(Query(1, Read(3, 0, 1)), TIMEOUT)))
+    finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
     with pytest.raises(Overtaken):
         motion.result()
     assert [frame[:4].hex() for _, frame in wire.sent[-2:]] == ["010507d4", "01030000"]
@@ -216,7 +216,7 @@ def test_what_cannot_be_told_to_stop_is_said() -> None:
     mic.axis(1).move_velocity(5.0)
     wire.severed = True
     for stop in (mic.axis(1).stop, mic.stop_all, mic.axis(1).disable, mic.program.stop):
-        with pytest.raises(Untold, match=r"could not be (stopped|switched off): the controller cannot be told, and goes on"):
+        with pytest.raises(Unconfirmed, match=r"could not be (stopped|switched off): the controller cannot be reached"):
             stop()
     wire.severed = False
     mic.stop_all()
@@ -409,3 +409,19 @@ def test_the_answers_of_two_units_are_kept_apart() -> None:
     assert words(b"\3\2\0\1") == (1,)
     assert SECOND // INTERVAL == 100
     assert issubclass(NoAnswer, LineFailure)
+
+
+def test_timers_do_not_pile_up() -> None:
+    """Each exchange moves the time at which something is to be done next."""
+    wire = Wire()
+
+    async def main() -> int:
+        async with async_driver(task_line(wire), wire) as mic:
+            most = 0
+            for _ in range(60):
+                await mic.positions()
+                timers = asyncio.get_running_loop()._scheduled  # type: ignore[attr-defined]
+                most = max(most, sum(not timer.cancelled() for timer in timers))
+            return most
+
+    assert run_virtual(wire, main()) <= 4

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from steptwin.drivers.exchange import LineLost, More
+from steptwin.drivers.exchange import LineLost, SendNext
 from steptwin.drivers.modbus import LATE_NS, NOISE_NS, QUIET_NS, Query, RtuMaster, TcpMaster, bits, check_unit, words
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND
@@ -14,33 +14,33 @@ from steptwin.wire import mbap, rtu
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import (
     ModbusException,
-    Read,
-    Registers,
-    WriteCoil,
-    WriteRegister,
-    WriteRegisters,
+    ReadRequest,
+    RegistersResponse,
+    WriteCoilRequest,
+    WriteRegisterRequest,
+    WriteRegistersRequest,
     encode_response,
 )
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 
-POSITION = Read(3, 10020, 2)
-INPUTS = Read(2, 5000, 8)
+POSITION = ReadRequest(3, 10020, 2)
+INPUTS = ReadRequest(2, 5000, 8)
 GOLDEN = {
     "01 02 13 88 00 08 FD 62": INPUTS,
-    "01 05 17 71 00 00 98 65": WriteCoil(6001, False),
+    "01 05 17 71 00 00 98 65": WriteCoilRequest(6001, False),
     "01 03 27 24 00 02 8E B4": POSITION,
 }
 
 
 def registers(*values: int, unit: int = 1) -> bytes:
-    return rtu.encode_frame(unit, encode_response(Registers(values)))
+    return rtu.encode_frame(unit, encode_response(RegistersResponse(values)))
 
 
 def exception(function: int, code: int) -> bytes:
     return rtu.encode_frame(1, bytes((function | 0x80, code)))
 
 
-def asked(request: Read | WriteCoil | WriteRegister | WriteRegisters = POSITION) -> RtuMaster:
+def asked(request: ReadRequest | WriteCoilRequest | WriteRegisterRequest | WriteRegistersRequest = POSITION) -> RtuMaster:
     master = RtuMaster()
     master.start(Query(1, request), 0, urgent=False)
     return master
@@ -50,21 +50,25 @@ def asked(request: Read | WriteCoil | WriteRegister | WriteRegisters = POSITION)
 
 
 @pytest.mark.parametrize(("frame", "request_"), GOLDEN.items())
-def test_golden_requests(frame: str, request_: Read | WriteCoil) -> None:
+def test_golden_requests(frame: str, request_: ReadRequest | WriteCoilRequest) -> None:
     assert RtuMaster().start(Query(1, request_), 0, urgent=False) == bytes.fromhex(frame)
 
 
 ANSWERS = [
     (POSITION, registers(0, 0x4148), bytes.fromhex("03 04 00 00 41 48")),
     (INPUTS, rtu.encode_frame(1, b"\2\1\5"), b"\2\1\5"),
-    (WriteCoil(6001, False), bytes.fromhex("01 05 17 71 00 00 98 65"), bytes.fromhex("05 17 71 00 00")),
-    (WriteRegister(10014, 3), rtu.encode_frame(1, bytes.fromhex("06 27 1E 00 03")), bytes.fromhex("06 27 1E 00 03")),
-    (WriteRegisters(10084, (0, 0x4148)), rtu.encode_frame(1, bytes.fromhex("10 27 64 00 02")), bytes.fromhex("10 27 64 00 02")),
+    (WriteCoilRequest(6001, False), bytes.fromhex("01 05 17 71 00 00 98 65"), bytes.fromhex("05 17 71 00 00")),
+    (WriteRegisterRequest(10014, 3), rtu.encode_frame(1, bytes.fromhex("06 27 1E 00 03")), bytes.fromhex("06 27 1E 00 03")),
+    (
+        WriteRegistersRequest(10084, (0, 0x4148)),
+        rtu.encode_frame(1, bytes.fromhex("10 27 64 00 02")),
+        bytes.fromhex("10 27 64 00 02"),
+    ),
 ]
 
 
 @pytest.mark.parametrize(("request_", "frame", "pdu"), ANSWERS)
-def test_an_answer_whole_byte_by_byte_and_behind_rubbish(request_: Read, frame: bytes, pdu: bytes) -> None:
+def test_an_answer_whole_byte_by_byte_and_behind_rubbish(request_: ReadRequest, frame: bytes, pdu: bytes) -> None:
     assert asked(request_).receive(frame, 1) == pdu
     master = asked(request_)
     assert [master.receive(bytes((byte,)), 1) for byte in frame] == [None] * (len(frame) - 1) + [pdu]
@@ -73,7 +77,7 @@ def test_an_answer_whole_byte_by_byte_and_behind_rubbish(request_: Read, frame: 
 
 
 @pytest.mark.parametrize(("request_", "frame", "pdu"), ANSWERS)
-def test_a_wrong_byte_anywhere_is_no_answer(request_: Read, frame: bytes, pdu: bytes) -> None:
+def test_a_wrong_byte_anywhere_is_no_answer(request_: ReadRequest, frame: bytes, pdu: bytes) -> None:
     for place in range(len(frame)):
         for flip in (0x01, 0x80):
             wrong = frame[:place] + bytes((frame[place] ^ flip,)) + frame[place + 1 :]
@@ -106,14 +110,14 @@ def test_what_answers_something_else_is_passed_over(other: bytes) -> None:
 
 
 def test_a_write_is_answered_by_its_own_echo_only() -> None:
-    assert asked(WriteRegister(10014, 3)).receive(rtu.encode_frame(1, bytes.fromhex("06 27 1E 00 01")), 1) is None
-    assert asked(WriteRegisters(10084, (0, 1))).receive(rtu.encode_frame(1, bytes.fromhex("10 27 66 00 02")), 1) is None
+    assert asked(WriteRegisterRequest(10014, 3)).receive(rtu.encode_frame(1, bytes.fromhex("06 27 1E 00 01")), 1) is None
+    assert asked(WriteRegistersRequest(10084, (0, 1))).receive(rtu.encode_frame(1, bytes.fromhex("10 27 66 00 02")), 1) is None
 
 
 # ---------------------------------------------------------------------- late answers
 
 
-def late(master: RtuMaster, request: Read = POSITION) -> Query:
+def late(master: RtuMaster, request: ReadRequest = POSITION) -> Query:
     """An exchange whose answer has not come in time."""
     query = Query(1, request)
     master.start(query, 0, urgent=False)
@@ -124,12 +128,12 @@ def late(master: RtuMaster, request: Read = POSITION) -> Query:
 def test_a_request_that_a_late_answer_could_seem_to_answer_is_preceded_by_a_marker() -> None:
     master = RtuMaster()
     late(master)
-    other = Query(1, Read(3, 10022, 2))
+    other = Query(1, ReadRequest(3, 10022, 2))
     marker = master.start(other, 2000, urgent=False)
     assert marker == rtu.encode_frame(1, bytes.fromhex("03 00 00 00 01"))
     assert master.receive(registers(1, 2), 3000) is None  # the late answer
     assert master.receive(exception(3, 2), 3000) is None  # or a late refusal
-    assert master.receive(registers(9), 4000) == More(other.rtu_frame, may_wait=True)
+    assert master.receive(registers(9), 4000) == SendNext(other.rtu_frame, may_wait=True)
     assert master.receive(registers(3, 4), 5000) == bytes.fromhex("03 04 00 03 00 04")
     # In step again: the next one needs no marker.
     assert master.start(Query(1, POSITION), 6000, urgent=False) == Query(1, POSITION).rtu_frame
@@ -138,8 +142,8 @@ def test_a_request_that_a_late_answer_could_seem_to_answer_is_preceded_by_a_mark
 def test_markers_differ_from_everything_owed() -> None:
     master = RtuMaster()
     late(master)
-    late(master, Read(3, 0, 1))
-    marker = master.start(Query(1, Read(3, 10022, 2)), 2000, urgent=False)
+    late(master, ReadRequest(3, 0, 1))
+    marker = master.start(Query(1, ReadRequest(3, 10022, 2)), 2000, urgent=False)
     assert marker == rtu.encode_frame(1, bytes.fromhex("03 00 00 00 03"))  # answers of 1 and 2 registers are owed
 
 
@@ -148,21 +152,21 @@ def test_a_repeated_request_needs_no_marker_but_leaves_an_answer_owed() -> None:
     query = late(master)
     assert master.start(query, 2000, urgent=False) == query.rtu_frame
     assert master.receive(registers(1, 2), 3000) is not None
-    assert master.start(Query(1, Read(3, 10022, 2)), 4000, urgent=False) != Query(1, Read(3, 10022, 2)).rtu_frame
+    assert master.start(Query(1, ReadRequest(3, 10022, 2)), 4000, urgent=False) != Query(1, ReadRequest(3, 10022, 2)).rtu_frame
 
 
 @pytest.mark.parametrize(
     "request_",
-    [INPUTS, WriteRegister(10016, 15)],
+    [INPUTS, WriteRegisterRequest(10016, 15)],
 )
-def test_another_function_cannot_be_confused_and_its_answer_settles_everything(request_: Read) -> None:
+def test_another_function_cannot_be_confused_and_its_answer_settles_everything(request_: ReadRequest) -> None:
     master = RtuMaster()
     late(master)
     query = Query(1, request_)
     assert master.start(query, 2000, urgent=False) == query.rtu_frame
     answer = rtu.encode_frame(1, b"\2\1\5") if request_ is INPUTS else query.rtu_frame
     assert master.receive(registers(1, 2) + answer, 3000) == answer[1:-2]
-    assert master.start(Query(1, Read(3, 10022, 2)), 4000, urgent=False) == Query(1, Read(3, 10022, 2)).rtu_frame
+    assert master.start(Query(1, ReadRequest(3, 10022, 2)), 4000, urgent=False) == Query(1, ReadRequest(3, 10022, 2)).rtu_frame
 
 
 def test_another_unit_cannot_be_confused() -> None:
@@ -174,10 +178,10 @@ def test_another_unit_cannot_be_confused() -> None:
 
 def test_a_stop_waits_for_no_marker() -> None:
     master = RtuMaster()
-    write = Query(1, WriteCoil(2000, True))
+    write = Query(1, WriteCoilRequest(2000, True))
     master.start(write, 0, urgent=False)
     master.abandon(1000)
-    stop = Query(1, WriteCoil(2004, True))
+    stop = Query(1, WriteCoilRequest(2004, True))
     assert master.start(stop, 2000, urgent=True) == stop.rtu_frame
     assert master.receive(write.rtu_frame, 3000) is None
     assert master.receive(stop.rtu_frame, 3000) == stop.pdu
@@ -186,7 +190,7 @@ def test_a_stop_waits_for_no_marker() -> None:
 def test_an_owed_answer_is_not_waited_for_for_ever() -> None:
     master = RtuMaster()
     late(master)
-    other = Query(1, Read(3, 10022, 2))
+    other = Query(1, ReadRequest(3, 10022, 2))
     assert master.start(other, 1000 + LATE_NS, urgent=False) == other.rtu_frame
 
 
@@ -194,7 +198,7 @@ def test_a_new_connection_owes_nothing() -> None:
     master = RtuMaster()
     late(master)
     master.reset()
-    other = Query(1, Read(3, 10022, 2))
+    other = Query(1, ReadRequest(3, 10022, 2))
     assert master.start(other, 2000, urgent=False) == other.rtu_frame
     assert master.free_ns == 0
 
@@ -228,7 +232,7 @@ def test_an_adapter_that_echoes_is_noticed_at_the_first_read() -> None:
     assert master.receive(registers(1, 2), 1) == bytes.fromhex("03 04 00 01 00 02")
     assert master.echo
     # From then on the echo of a write is not taken for its answer.
-    stop = Query(1, WriteCoil(2004, True))
+    stop = Query(1, WriteCoilRequest(2004, True))
     master.start(stop, 2, urgent=True)
     assert master.receive(stop.rtu_frame[:5], 3) is None
     assert master.receive(stop.rtu_frame[5:], 3) is None
@@ -236,15 +240,15 @@ def test_an_adapter_that_echoes_is_noticed_at_the_first_read() -> None:
 
 
 def test_without_echo_the_answer_of_a_write_is_its_answer() -> None:
-    master = asked(WriteCoil(2004, True))
-    assert master.receive(Query(1, WriteCoil(2004, True)).rtu_frame, 1) is not None
+    master = asked(WriteCoilRequest(2004, True))
+    assert master.receive(Query(1, WriteCoilRequest(2004, True)).rtu_frame, 1) is not None
     assert not master.echo
 
 
 @pytest.mark.parametrize(("baud", "gap"), [(9600, 3_645_834), (38400, 1750 * MICROSECOND)])
 def test_real_lines_have_a_gap_before_a_frame_and_time_for_its_characters(baud: int, gap: int) -> None:
     master = RtuMaster(SerialLine(baud))
-    query = Query(1, Read(3, 10020, 16))
+    query = Query(1, ReadRequest(3, 10020, 16))
     assert master.allowance_ns(query) == SerialLine(baud).duration(8 + 37)
     master.start(query, 0, urgent=False)
     master.receive(registers(*range(16)), 1000)
@@ -252,7 +256,7 @@ def test_real_lines_have_a_gap_before_a_frame_and_time_for_its_characters(baud: 
 
 
 def test_every_frame_is_shown_to_the_observer() -> None:
-    seen: list[tuple[Direction, bytes]] = []
+    seen: list[tuple[FrameDirection, bytes]] = []
     master = RtuMaster(on_frame=lambda now, direction, raw: seen.append((direction, raw)))
     query = Query(1, POSITION)
     master.start(query, 0, urgent=False)
@@ -261,10 +265,10 @@ def test_every_frame_is_shown_to_the_observer() -> None:
     master.receive(b"\1\3", 3)
     master.abandon(4)
     assert seen == [
-        (Direction.IN, query.rtu_frame),
-        (Direction.OUT, registers(1, 2)),
-        (Direction.IN, query.rtu_frame),
-        (Direction.OUT, b"\1\3"),
+        (FrameDirection.IN, query.rtu_frame),
+        (FrameDirection.OUT, registers(1, 2)),
+        (FrameDirection.IN, query.rtu_frame),
+        (FrameDirection.OUT, b"\1\3"),
     ]
 
 
@@ -276,8 +280,8 @@ def answered(number: int, pdu: str, unit: int = 1) -> bytes:
 
 
 @pytest.fixture
-def tcp() -> Callable[[Read], TcpMaster]:
-    def make(request: Read = POSITION) -> TcpMaster:
+def tcp() -> Callable[[ReadRequest], TcpMaster]:
+    def make(request: ReadRequest = POSITION) -> TcpMaster:
         master = TcpMaster("tcp://h:502")
         assert master.start(Query(1, request), 0, urgent=False) == bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 02")
         return master
@@ -344,6 +348,28 @@ def test_tcp_numbers_wrap_round() -> None:
 
 
 # ---------------------------------------------------------------------- odds and ends
+
+
+def test_without_a_line_of_its_own_a_frame_takes_no_time() -> None:
+    for master in (RtuMaster(), TcpMaster()):
+        assert master.allowance_ns(Query(1, POSITION)) == 0
+
+
+@pytest.mark.parametrize("size", [1, 100])
+def test_tcp_an_answer_is_taken_once(size: int) -> None:
+    master = TcpMaster()
+    master.start(Query(1, POSITION), 0, urgent=False)
+    frame = mbap.encode_frame(1, 1, encode_response(RegistersResponse((0, 0x4148))))
+    found = [master.receive(frame[at : at + size], 0) for at in range(0, len(frame), size)]
+    assert found[-1] == frame[7:]
+    assert master.receive(frame, 0) is None
+
+
+def test_rtu_nothing_is_an_answer_when_nothing_was_asked() -> None:
+    master = asked()
+    answer = registers(0, 0x4148)
+    assert master.receive(answer, 0) == answer[1:-2]
+    assert master.receive(answer, 0) is None
 
 
 def test_content_of_answers() -> None:

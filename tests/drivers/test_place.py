@@ -6,37 +6,38 @@ import asyncio
 import os
 import socket
 import threading
+import time
 from collections.abc import Callable
 
 import pytest
 
-from steptwin.drivers import LineLost
-from steptwin.drivers.place import SerialEndpoint, TcpEndpoint, parse_place
+from steptwin.drivers import LineLost, place
+from steptwin.drivers.place import SerialEndpoint, SocketChannel, TcpEndpoint, TimedSocketChannel, parse_line_address
 from steptwin.errors import Misuse
 from steptwin.wire.line import SerialLine
 
 
 def test_addresses() -> None:
-    place = parse_place("tcp://127.0.0.1:5020", 38400)
-    assert (place.endpoint, place.framed, place.serial) == (TcpEndpoint("tcp", "127.0.0.1", 5020), True, None)
-    assert parse_place("tcp://host", 38400).endpoint == TcpEndpoint("tcp", "host", 502)
-    place = parse_place("rtu-tcp://[::1]:5021", 38400)
-    assert (str(place.endpoint), place.framed) == ("rtu-tcp://[::1]:5021", False)
-    place = parse_place("/dev/ttyUSB0", 9600)
-    assert (place.endpoint, place.framed, place.serial) == (SerialEndpoint("/dev/ttyUSB0", 9600), False, SerialLine(9600))
-    assert str(parse_place("rfc2217://127.0.0.1:2217", 9600).endpoint) == "rfc2217://127.0.0.1:2217"
-    assert str(parse_place("COM3", 9600).endpoint) == "COM3"
+    found = parse_line_address("tcp://127.0.0.1:5020", 38400)
+    assert (found.endpoint, found.framed, found.serial) == (TcpEndpoint("tcp", "127.0.0.1", 5020), True, None)
+    assert parse_line_address("tcp://host", 38400).endpoint == TcpEndpoint("tcp", "host", 502)
+    found = parse_line_address("rtu-tcp://[::1]:5021", 38400)
+    assert (str(found.endpoint), found.framed) == ("rtu-tcp://[::1]:5021", False)
+    found = parse_line_address("/dev/ttyUSB0", 9600)
+    assert (found.endpoint, found.framed, found.serial) == (SerialEndpoint("/dev/ttyUSB0", 9600), False, SerialLine(9600))
+    assert str(parse_line_address("rfc2217://127.0.0.1:2217", 9600).endpoint) == "rfc2217://127.0.0.1:2217"
+    assert str(parse_line_address("COM3", 9600).endpoint) == "COM3"
 
 
 @pytest.mark.parametrize("text", ["", "127.0.0.1:5020", "http://x:1", "rtu-tcp://host", "tcp://", "tcp://h:99999", "tcp://h:1/x"])
 def test_what_is_no_address(text: str) -> None:
     with pytest.raises(Misuse, match=r"address|names no port"):
-        parse_place(text, 38400)
+        parse_line_address(text, 38400)
 
 
 def test_what_is_no_baud_rate() -> None:
     with pytest.raises(Misuse, match="5 bit/s is outside 300 to 1000000"):
-        parse_place("/dev/ttyUSB0", 5)
+        parse_line_address("/dev/ttyUSB0", 5)
 
 
 @pytest.fixture
@@ -47,15 +48,15 @@ def closed_port() -> int:
 
 
 def test_nobody_listens(closed_port: int) -> None:
-    place = parse_place(f"tcp://127.0.0.1:{closed_port}", 38400)
+    found = parse_line_address(f"tcp://127.0.0.1:{closed_port}", 38400)
     with pytest.raises(LineLost, match=f"cannot connect to tcp://127.0.0.1:{closed_port}: connection refused"):
-        place.endpoint.open()
+        found.endpoint.open()
     with pytest.raises(LineLost, match="connection refused"):
-        asyncio.run(place.endpoint.connect(asyncio.Protocol))
+        asyncio.run(found.endpoint.connect(asyncio.Protocol))
 
 
 def test_no_such_port() -> None:
-    endpoint = parse_place("/dev/none", 38400).endpoint
+    endpoint = parse_line_address("/dev/none", 38400).endpoint
     with pytest.raises(LineLost, match="cannot open serial port /dev/none at 38400 bit/s: no such file or directory"):
         endpoint.open()
     with pytest.raises(LineLost, match="no such file or directory"):
@@ -77,7 +78,11 @@ def listener() -> Callable[[Callable[[socket.socket], None]], str]:
     return listen
 
 
-def test_a_socket_is_read_with_a_time_out(listener: Callable[..., str]) -> None:
+@pytest.mark.parametrize("kind", [SocketChannel, TimedSocketChannel])
+def test_a_socket_is_read_with_a_time_out(
+    kind: type[SocketChannel], listener: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(place, "CHANNEL", kind)
     go = threading.Event()
 
     def talk(client: socket.socket) -> None:
@@ -85,20 +90,40 @@ def test_a_socket_is_read_with_a_time_out(listener: Callable[..., str]) -> None:
         client.sendall(b"answer")
         go.wait(60)
 
-    channel = parse_place(listener(talk), 38400).endpoint.open()
+    channel = parse_line_address(listener(talk), 38400).endpoint.open()
     assert channel.read(0.0) == b""
+    assert channel.read(0.01) == b""
     channel.write(b"ask")
     assert channel.read(60.0) == b"answer"
+    assert channel.read(-1.0) == b""
+    with pytest.raises(LineLost, match="the other end takes nothing any more"):
+        channel.write(bytes(100 << 20))
     go.set()
+    with pytest.raises(LineLost, match=r"the other end closed the connection|connection reset by peer"):
+        channel.read(60.0)
+    channel.close()
+
+
+@pytest.mark.parametrize("kind", [SocketChannel, TimedSocketChannel])
+def test_a_socket_that_was_closed_is_not_written_to(
+    kind: type[SocketChannel], listener: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(place, "CHANNEL", kind)
+    address = listener(lambda client: None)
+    channel = parse_line_address(address, 38400).endpoint.open()
     with pytest.raises(LineLost, match="the other end closed the connection"):
         channel.read(60.0)
+    with pytest.raises(LineLost, match=rf"{address}: (broken pipe|connection reset by peer)"):  # noqa: PT012
+        for _ in range(100):
+            channel.write(b"x")
+            time.sleep(0.01)
     channel.close()
 
 
 def test_a_port_is_read_with_a_time_out() -> None:
     master, slave = os.openpty()
     try:
-        channel = parse_place(os.ttyname(slave), 38400).endpoint.open()
+        channel = parse_line_address(os.ttyname(slave), 38400).endpoint.open()
         assert channel.read(0.0) == b""
         channel.write(b"ask")
         assert os.read(master, 9) == b"ask"

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from steptwin.drivers import AsyncMic488, Mic488, NoAnswer, Refused
+from steptwin.drivers import AsyncMic488, Mic488, ModbusRefusal, NoAnswer
 from steptwin.wire.crc import crc16
-from steptwin.wire.pdu import Read, WriteCoil
+from steptwin.wire.pdu import ReadRequest, WriteCoilRequest
 
 
 def framed(text: str) -> bytes:
@@ -76,8 +76,8 @@ def test_the_frames_of_the_manual() -> None:
         ]
     )
     with Mic488(peer.port, timeout_s=30.0) as mic:
-        assert mic.request(Read(2, 5000, 8)).packed == b"\5"  # type: ignore[union-attr]
-        assert mic.request(WriteCoil(6001, False)) == WriteCoil(6001, False)
+        assert mic.request(ReadRequest(2, 5000, 8)).packed == b"\5"  # type: ignore[union-attr]
+        assert mic.request(WriteCoilRequest(6001, False)) == WriteCoilRequest(6001, False)
         assert mic.registers(10020, 2) == (0, 0x4148)
     peer.end()
 
@@ -95,7 +95,7 @@ def test_answers_come_in_pieces_behind_rubbish_and_as_refusals() -> None:
     with Mic488(peer.port, timeout_s=30.0) as mic:
         assert mic.registers(10020, 2) == (0, 0x4148)
         assert mic.registers(10020, 2) == (0, 0x4148)
-        with pytest.raises(Refused, match="exception 02"):
+        with pytest.raises(ModbusRefusal, match="exception 02"):
             mic.registers(10020, 2)
     peer.end()
 
@@ -127,7 +127,7 @@ def test_tasks_on_a_real_port() -> None:
 
     async def main() -> None:
         async with AsyncMic488(peer.port, timeout_s=30.0) as mic:
-            await mic.request(Read(2, 5000, 8))
+            await mic.request(ReadRequest(2, 5000, 8))
             assert await mic.registers(10020, 2) == (0, 0x4148)
 
     asyncio.run(main())

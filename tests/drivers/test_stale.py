@@ -21,7 +21,9 @@ def test_input_while_the_program_runs_is_fresh() -> None:
     for _ in range(20):
         clock.run(0.3)
         assert not clock.stale.is_stale()
-    clock.s += SUSPENDED_S * 0.9  # a slow moment
+    clock.s = 200.0
+    clock.stale = StaleInput(lambda: clock.s)
+    clock.s += SUSPENDED_S  # a slow moment
     assert not clock.stale.is_stale()
 
 

@@ -61,7 +61,7 @@ def test_a_directory_that_is_not_open_keeps_nothing(tmp_path: Path) -> None:
 
 def test_a_file_in_the_way(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("")
-    with pytest.raises(StateFailure, match="cannot be used: it is no directory"), StateDirectory(tmp_path / "state"):
+    with pytest.raises(StateFailure, match="cannot be used: not a directory"), StateDirectory(tmp_path / "state"):
         pass
 
 
@@ -233,7 +233,7 @@ def test_a_full_disk_is_said_and_keeps_the_old_content(tmp_path: Path, monkeypat
     with StateDirectory(tmp_path) as state:
         state.save("unit1", image(1))
         monkeypatch.setattr(os, "fsync", full)
-        with pytest.raises(StateFailure, match=r"unit1 cannot be saved in .*: No space left on device"):
+        with pytest.raises(StateFailure, match=r"unit1 cannot be saved in .*: no space left on device"):
             state.save("unit1", image(2))
         assert state.load("unit1") == image(1)
 

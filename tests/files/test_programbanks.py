@@ -64,7 +64,8 @@ def test_errors_of_all_files_come_at_once(write: Write) -> None:
         read_banks({0: wrong, 1: right}, {0: table}, ControllerConfig())
     codes = {Path(source.name).name: [d.code for d in found] for source, found in refused.value.findings}
     assert codes == {"a.csv": ["W150"], "a.prg": ["W120"], "b.prg": ["W110"]}
-    assert str(refused.value) == f"{table} and {wrong} and {right} cannot be loaded: see the errors above"
+    shown = [line.partition(": error ")[0] for line in str(refused.value).splitlines() if ": error " in line]
+    assert shown == [f"{table}:1:1", f"{wrong}:1:6", f"{right}:2:6"]
 
 
 def test_warnings_are_kept_and_stop_nothing(write: Write) -> None:
@@ -74,5 +75,5 @@ def test_warnings_are_kept_and_stop_nothing(write: Write) -> None:
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(Misuse, match=r"cannot read .*none\.prg: No such file"):
+    with pytest.raises(Misuse, match=r"cannot read .*none\.prg: no such file"):
         read_banks({0: tmp_path / "none.prg"}, {}, ControllerConfig())

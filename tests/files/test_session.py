@@ -55,7 +55,7 @@ def test_a_session_replays_from_its_file_alone(tmp_path: Path) -> None:
     save(session, tmp_path / "s.json")
     loaded = load(tmp_path / "s.json")
     assert loaded == session
-    assert loaded.firmware == {"table": "1.70"}
+    assert loaded.firmware == {"table": "1.70", "drum": "B"}
     again = loaded.replay()
     assert again.trace.digest() == session.digest
     assert list(again.trace) == list(world.trace)
@@ -310,7 +310,7 @@ def test_a_damaged_session_is_misuse(tmp_path: Path, change: dict[str, Any], mes
     ("change", "message"),
     [
         ({"seed": -8}, "seed -8: permitted are whole numbers from 0 to"),
-        ({"firmware": {"table": "1.40"}}, "the session says that table runs firmware 1.40, its world 1.70"),
+        ({"firmware": {"table": "1.40"}}, "the session says that table is of 1.40, its world 1.70"),
         ({"until_ns": SECOND}, "the session ends at 1000000000 ns, before what came at 2000000000 ns"),
     ],
 )

@@ -109,8 +109,8 @@ def test_values_of_a_description_can_be_replaced(tmp_path: Path) -> None:
     ("key", "value", "message"),
     [
         ("axis.y.pitch", 1.0, "override 'axis.y.pitch': there is no 'y'"),
-        ("axs.x.pitch", 1.0, "there is no 'axs'; did you mean 'axis'?"),
-        ("axis.x.pitsch", 1.0, r"error D004: \[axis\] has no 'pitsch'; did you mean 'pitch'?"),
+        ("axs.x.pitch", 1.0, r"there is no 'axs' \(did you mean 'axis'\?\)"),
+        ("axis.x.pitsch", 1.0, r"error D004: \[axis\] has no 'pitsch' \(did you mean 'pitch'\?\)"),
         ("axis.x.pitch", -1, r"error D003: \[axis\]: pitch: -1: permitted are numbers above 0"),
         ("seed", 1, "expected TABLE.KEY or TABLE.NAME.KEY"),
         ("axis.x", 1, "expected TABLE.KEY or TABLE.NAME.KEY"),

@@ -47,11 +47,11 @@ def test_files_elsewhere_are_for_those_who_allow_it(folder: Path, name: str) -> 
     ("name", "message"),
     [
         ("/dev/zero", "does not lie beside"),
-        ("none.cfg", r"cannot read .*none\.cfg: No such file"),
+        ("none.cfg", r"cannot read .*none\.cfg: no such file"),
         ("pipe.cfg", "it is a pipe, not a file"),
         ("below", "it is a directory, not a file"),
         ("circle.cfg", "circle.cfg"),
-        ("x" * 5000, "File name too long"),
+        ("x" * 5000, "file name too long"),
     ],
 )
 def test_what_cannot_be_read_is_told_where_it_is_named(folder: Path, name: str, message: str) -> None:

@@ -8,31 +8,32 @@ from typing import Any
 
 from steptwin.live.cell import LONGEST_DELAY_NS, LONGEST_WAIT_S, Cell
 from steptwin.m1486.check import check
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.mic488.device import Mic488
-from steptwin.mic488.status import Status
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.status import AxisStatus
 from steptwin.world.kernel import Kernel
 
-Make = Callable[[], tuple[Cell, Mic488]]
+Make = Callable[[], tuple[Cell, Mic488Device]]
 Run = Callable[..., Any]
 
 MOVE_NS = 2 * SECOND
 """1000 imp with ACC = DEC = VMAX = 1000: a second up, a second down."""
 
 
-def start_move(cell: Cell, device: Mic488) -> None:
-    now = cell.enter()
-    device.axes[0].enable(now)
-    device.axes[0].move_to(1000, now)
-    device.touch()
+def start_move(cell: Cell, device: Mic488Device) -> None:
+    def start(now: Nanos) -> None:
+        device.axes[0].enable(now)
+        device.axes[0].move_to(1000, now)
+
+    device.command(start, cell.enter())
     cell.leave()
 
 
 def test_a_move_ends_by_itself_though_nobody_looks(run: Run, make_cell: Make) -> None:
-    async def scene() -> tuple[Status, Nanos]:
+    async def scene() -> tuple[AxisStatus, Nanos]:
         cell, device = make_cell()
         start_move(cell, device)
         await asyncio.sleep(2.5)
@@ -40,7 +41,7 @@ def test_a_move_ends_by_itself_though_nobody_looks(run: Run, make_cell: Make) ->
         return device.axes[0].status, device.now
 
     status, last_advanced = run(scene())
-    assert status is Status.REACHED
+    assert status is AxisStatus.REACHED
     assert MOVE_NS <= last_advanced < MOVE_NS + MILLISECOND
 
 
@@ -50,7 +51,7 @@ def test_what_a_machine_does_by_itself_is_done_though_nothing_is_ever_sent(run: 
     async def scene() -> list[tuple[str, Nanos]]:
         loop: Any = asyncio.get_running_loop()
         image = image_of(check("[\nw300\nu20\nw300\nu16\n]").program, variant("B"))
-        chip, kernel = M1486(variant("B"), image=image), Kernel()
+        chip, kernel = M1486Chip(variant("B"), image=image), Kernel()
         done: list[tuple[str, Nanos]] = []
         chip.on_event = lambda event: done.append((event.text, loop.now_ns // MILLISECOND))
         kernel.add("F", chip)
@@ -95,7 +96,7 @@ def test_at_rest_nothing_wakes_up(run: Run, make_cell: Make) -> None:
 
 
 def test_an_earlier_deadline_wakes_earlier(run: Run, make_cell: Make) -> None:
-    async def scene() -> tuple[Status, list[bool]]:
+    async def scene() -> tuple[AxisStatus, list[bool]]:
         cell, device = make_cell()
         start_move(cell, device)
         await asyncio.sleep(0.1)
@@ -107,13 +108,13 @@ def test_an_earlier_deadline_wakes_earlier(run: Run, make_cell: Make) -> None:
         cell.close()
         return device.axes[0].status, list(seen)
 
-    assert run(scene()) == (Status.REACHED, [True])
+    assert run(scene()) == (AxisStatus.REACHED, [True])
 
 
-def held_up(run: Run, make_cell: Make, seconds: float, then: Callable[[Cell], object]) -> tuple[list[Nanos], Nanos, Status]:
+def held_up(run: Run, make_cell: Make, seconds: float, then: Callable[[Cell], object]) -> tuple[list[Nanos], Nanos, AxisStatus]:
     """A process is held up for ``seconds`` one second into a move; ``then`` is what happens first when it goes on."""
 
-    async def scene() -> tuple[list[Nanos], Nanos, Status]:
+    async def scene() -> tuple[list[Nanos], Nanos, AxisStatus]:
         cell, device = make_cell()
         lags: list[Nanos] = []
         cell.on_lag = lags.append
@@ -132,20 +133,20 @@ def held_up(run: Run, make_cell: Make, seconds: float, then: Callable[[Cell], ob
 def test_held_up_time_does_not_pass_for_the_machines(run: Run, make_cell: Make) -> None:
     lags, now, status = held_up(run, make_cell, 3600.0, Cell.enter)
     assert lags == [3599 * SECOND]
-    assert (now, status) == (MOVE_NS, Status.REACHED)
+    assert (now, status) == (MOVE_NS, AxisStatus.REACHED)
 
 
 def test_the_timer_notices_as_well_as_a_client(run: Run, make_cell: Make) -> None:
     lags, now, status = held_up(run, make_cell, 3600.0, lambda cell: None)
     assert lags == [3599 * SECOND]
-    assert (now, status) == (MOVE_NS, Status.REACHED)
+    assert (now, status) == (MOVE_NS, AxisStatus.REACHED)
 
 
 def test_a_short_delay_is_caught_up_with(run: Run, make_cell: Make) -> None:
     seconds = 1.0 + LONGEST_DELAY_NS / SECOND
     lags, now, status = held_up(run, make_cell, seconds, Cell.enter)
     assert lags == []
-    assert (now, status) == (2 * SECOND + LONGEST_DELAY_NS, Status.REACHED)
+    assert (now, status) == (2 * SECOND + LONGEST_DELAY_NS, AxisStatus.REACHED)
 
 
 def test_what_is_short_on_the_wall_is_long_where_time_runs_fast(run: Run, make_cell: Make) -> None:

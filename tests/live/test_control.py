@@ -7,17 +7,28 @@ import json
 import os
 import socket
 import stat
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from steptwin.errors import LineFailure, Misuse, Refusal
-from steptwin.live import control
-from steptwin.live.control import ControlEndpoint, ask, private_directory, running, runtime_directory
+from steptwin.live import control, remote
+from steptwin.live.control import ControlEndpoint
+from steptwin.live.remote import START, ask, running
+from steptwin.motion.profile import at_rest
+from steptwin.subject import commands as command
+from steptwin.subject.contract import Result
+from steptwin.subject.dispatch import FORM
+from steptwin.subject.events import EdgePayload, Event, PlanPayload
+from steptwin.subject.following import Filter, Followers, Following
+from steptwin.world import script as do
+from steptwin.world.addresses import Address
 
-FORM_ERROR = {"error": 'a request is a line of JSON: {"do": NAME, ...}', "misuse": True}
+TOKEN_FIRST = 'the first line of a connection is {"token": TOKEN}, with the token of this twin'
+FORM_ERROR = {"error": {"code": "misuse", "message": FORM}}
 
 
 @pytest.fixture(autouse=True)
@@ -26,24 +37,45 @@ def own_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "steptwin"
 
 
-def refuse(request: Mapping[str, Any]) -> object:
-    raise Misuse("not permitted: 7")
+class Desk:
+    """A subject that is only asked: notes come back, some are refused, one breaks it."""
+
+    def __init__(self) -> None:
+        self.followers = Followers()
+        self.done = 0
+
+    def do(self, wanted: command.Command) -> Result:
+        self.done += 1
+        match wanted:
+            case do.Note("refuse"):
+                raise Misuse("not permitted: 7")
+            case do.Note("deny"):
+                raise Refusal("not now")
+            case do.Note("break"):
+                raise KeyError("x")
+            case do.Note(text):
+                return Result({"note": text}, 5, self.done)
+            case command.Pause():
+                return Result("x" * 1_000_000, 5, self.done)
+        return Result(None, 5, self.done)
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        return self.followers.follow(what, bound)
+
+    def plans(self, what: Filter) -> list[Event]:
+        return [Event(0, 5, "a", PlanPayload("1", at_rest(0, 7), 0))]
+
+    def happen(self, count: int = 1) -> None:
+        for number in range(count):
+            self.followers.publish(Event(number, number, "a", EdgePayload("IN1", 1.0)))
 
 
-def deny(request: Mapping[str, Any]) -> object:
-    raise Refusal("not now")
+def ok(text: str, number: int = 1) -> dict[str, object]:
+    return {"ok": {"note": text}, "number": number, "time_ns": "5"}
 
 
-def break_down(request: Mapping[str, Any]) -> object:
-    return request["x"]
-
-
-HANDLERS: dict[str, Callable[[Mapping[str, Any]], object]] = {
-    "echo": dict,
-    "refuse": refuse,
-    "deny": deny,
-    "break": break_down,
-}
+def misuse(text: str) -> dict[str, object]:
+    return {"error": {"code": "misuse", "message": text}}
 
 
 async def turns() -> None:
@@ -52,12 +84,13 @@ async def turns() -> None:
         await asyncio.sleep(0)
 
 
-def served(play: Callable[[ControlEndpoint], Awaitable[Any]], name: str = "twin") -> Any:
+def served(play: Callable[..., Awaitable[Any]], name: str = "twin", address: Address | None = None) -> Any:
     async def scene() -> Any:
-        endpoint = ControlEndpoint(name, HANDLERS)
+        desk = Desk()
+        endpoint = ControlEndpoint(name, desk, address)
         await endpoint.open()
         try:
-            return await play(endpoint)
+            return await (play(endpoint, desk) if len(signature(play).parameters) == 2 else play(endpoint))
         finally:
             await turns()
             await endpoint.close()
@@ -66,89 +99,296 @@ def served(play: Callable[[ControlEndpoint], Awaitable[Any]], name: str = "twin"
     return asyncio.run(scene())
 
 
-async def answer_to(endpoint: ControlEndpoint, *parts: bytes) -> Any:
+async def answers_to(endpoint: ControlEndpoint, *parts: bytes) -> list[Any]:
+    """The answers to what a client sends before it sends no more."""
     reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
     for part in parts:
         writer.write(part)
         await writer.drain()
         await asyncio.sleep(0)
-    answer = await reader.read()
+    writer.write_eof()
+    answers = [json.loads(line) for line in (await reader.read()).splitlines()]
     writer.close()
-    return json.loads(answer)
+    return answers
+
+
+async def answer_to(endpoint: ControlEndpoint, *parts: bytes) -> Any:
+    (answer,) = await answers_to(endpoint, *parts)
+    return answer
 
 
 @pytest.mark.parametrize(
     ("request_", "answer"),
     [
-        (b'{"do": "echo", "x": [1, null]}\n', {"ok": {"do": "echo", "x": [1, None]}}),
-        (b'{"do": "refuse"}\nmore', {"error": "not permitted: 7", "misuse": True}),
-        (b'{"do": "fly"}\n', {"error": "this twin cannot do 'fly': it can echo, refuse, deny, break", "misuse": True}),
+        (b'{"do": "note", "text": "a"}\n', ok("a")),
+        (b'{"do": "note", "text": "a", "id": 7}\n', {"id": 7, **ok("a")}),
+        (b'{"do": "note", "text": "a", "id": "x", "version": 1}\n', {"id": "x", **ok("a")}),
+        (b'{"do": "note", "text": "refuse", "id": 0}\n', {"id": 0, **misuse("not permitted: 7")}),
+        (b'{"do": "note", "text": "deny"}\n', {"error": {"code": "refusal", "message": "not now"}}),
+        (b'{"do": "note", "text": "a", "version": 2}\n', misuse("version = 2: this subject has version 1")),
+        (b'{"do": "note", "text": "a", "version": true}\n', misuse("version = True: this subject has version 1")),
+        (b'{"do": "note", "txt": "a"}\n', misuse("note: no field 'txt' (did you mean 'text'?); fields are text")),
         (b"\n", FORM_ERROR),
         (b"[]\n", FORM_ERROR),
         (b'{"do": []}\n', FORM_ERROR),
-        (b'{"say": "echo"}\n', FORM_ERROR),
+        (b'{"say": "note"}\n', FORM_ERROR),
         (b"\xff\xfe\n", FORM_ERROR),
         (b"[" * 60000 + b"\n", FORM_ERROR),
-        (b"x" * 70000, {"error": "a request has at most 65536 bytes", "misuse": True}),
+        (b'{"do": "note", "text": "a", "id": %s}\n' % (b"9" * 5000), FORM_ERROR),
+        (b'{"do": "turn", "machine": "a", "axis": 1, "counts": NaN}\n', None),
+        (b'{"do": "turn", "machine": "a", "axis": 1, "counts": 1e999}\n', None),
+        (b"x" * 70000, misuse("a request has at most 65536 bytes")),
+        (b"x" * 70000 + b"\n", misuse("a request has at most 65536 bytes")),
     ],
 )
-def test_whatever_is_asked_is_answered(request_: bytes, answer: object) -> None:
-    assert served(lambda endpoint: answer_to(endpoint, request_)) == answer
+def test_whatever_is_asked_is_answered(request_: bytes, answer: Any) -> None:
+    found = served(lambda endpoint: answer_to(endpoint, request_))
+    assert found == answer if answer is not None else found["error"]["code"] == "misuse"
 
 
-@pytest.mark.parametrize(
-    ("request_", "message"),
-    [
-        (b'{"do": "echo", "x": %s}' % (b"9" * 400), "a number is not finite, or not below 2^63"),
-        (b'{"do": "echo", "x": %s}' % (b"9" * 5000), FORM_ERROR["error"]),
-        (b'{"do": "echo", "x": [1e999]}', "a number is not finite, or not below 2^63"),
-        (b'{"do": "echo", "x": -Infinity}', "a number is not finite, or not below 2^63"),
-        (b'{"do": "echo", "x": NaN}', "a number is not finite, or not below 2^63"),
-        (b'{"do": "echo", "a\\u0000b": 1}', "'a\\x00b': a text takes neither NUL nor surrogates"),
-        (b'{"do": "echo", "x": "\\udcff"}', "'\\udcff': a text takes neither NUL nor surrogates"),
-        (b'{"do": "echo", "x": "%s"}' % (b"x" * 5000), "a text of 5000 characters: permitted are at most 4096"),
-    ],
-)
-def test_values_that_no_handler_has_to_expect(request_: bytes, message: str) -> None:
-    assert served(lambda endpoint: answer_to(endpoint, request_ + b"\n")) == {"error": message, "misuse": True}
+@pytest.mark.parametrize("identity", [True, 1.5, [], {}, "", "x" * 201, "a\nb", 2**63, -(2**63)])
+def test_what_is_no_id(identity: object) -> None:
+    line = json.dumps({"do": "note", "text": "a", "id": identity}).encode() + b"\n"
+    found = served(lambda endpoint: answer_to(endpoint, line))
+    assert found["error"]["message"].endswith("expected a text of at most 200 characters, or a whole number below 2^63")
 
 
-def test_an_exception_of_a_handler_is_an_answer_and_told_to_the_loop() -> None:
+def test_requests_of_one_connection_are_answered_in_order() -> None:
+    lines = b"".join(b'{"do": "note", "text": "a", "id": %d}\n' % n for n in range(500))
+    found = served(lambda endpoint: answers_to(endpoint, lines[:1000], lines[1000:1001], lines[1001:]))
+    assert found == [{"id": n, **ok("a", n + 1)} for n in range(500)]
+
+
+def test_a_wrong_request_does_not_end_a_connection() -> None:
+    lines = b'nonsense\n{"do": "fly"}\n{"do": "note", "text": "a"}\n'
+    first, second, third = served(lambda endpoint: answers_to(endpoint, lines))
+    assert first == FORM_ERROR
+    assert second["error"]["message"].startswith("no command 'fly'; commands are describe, ")
+    assert third == ok("a")
+
+
+def test_an_exception_of_a_subject_is_an_answer_and_told_to_the_loop() -> None:
     told: list[dict[str, Any]] = []
 
     async def play(endpoint: ControlEndpoint) -> Any:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
-        return await answer_to(endpoint, b'{"do": "break"}\n')
+        return await answer_to(endpoint, b'{"do": "note", "text": "break", "id": 1}\n')
 
-    assert served(play) == {"error": "internal error, please report it: KeyError: 'x'"}
+    message = "internal error, please report it: KeyError: 'x'"
+    assert served(play) == {"id": 1, "error": {"code": "internal", "message": message}}
     assert [repr(context["exception"]) for context in told] == ["KeyError('x')"]
 
 
 def test_a_request_that_ends_early_is_answered() -> None:
-    async def play(endpoint: ControlEndpoint) -> Any:
-        reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
-        writer.write(b'{"do": "echo"}')
-        writer.write_eof()
-        answer = await reader.read()
-        writer.close()
-        return json.loads(answer)
-
-    assert served(play)["error"].startswith("the request has no end of line")
+    found = served(lambda endpoint: answer_to(endpoint, b'{"do": "note"}'))
+    assert found["error"]["message"].startswith("the request has no end of line")
 
 
 def test_half_a_request_is_dropped_after_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(control, "TIMEOUT_S", 0.02)
-    answer = served(lambda endpoint: answer_to(endpoint, b'{"do": '))
-    assert answer["error"].startswith("no complete request within 0.02 s")
+
+    async def play(endpoint: ControlEndpoint) -> Any:
+        reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
+        writer.write(b'{"do": "note", "text": "a"}\n{"do": ')
+        lines = (await reader.read()).splitlines()
+        writer.close()
+        return [json.loads(line) for line in lines]
+
+    first, second = served(play)
+    assert first == ok("a")
+    assert second["error"]["message"].startswith("no complete request within 0.02 s")
+
+
+def test_who_has_asked_may_be_silent_for_as_long_as_he_likes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "TIMEOUT_S", 0.01)
+
+    async def play(endpoint: ControlEndpoint) -> Any:
+        reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
+        found = []
+        for _ in range(2):
+            writer.write(b'{"do": "note", "text": "a"}\n')
+            found.append(json.loads(await reader.readline()))
+            await asyncio.sleep(0.05)
+        writer.close()
+        return found
+
+    assert served(play) == [ok("a", 1), ok("a", 2)]
 
 
 def test_a_request_in_pieces() -> None:
-    assert served(lambda endpoint: answer_to(endpoint, b'{"do": ', b'"echo"', b"}\n")) == {"ok": {"do": "echo"}}
+    assert served(lambda endpoint: answer_to(endpoint, b'{"do": ', b'"note", "text"', b': "a"}\n')) == ok("a")
+
+
+# ---------------------------------------------------------------------- following
+
+
+async def until(holds: Callable[[], bool]) -> None:
+    """Let the loop go on until something holds."""
+    async with asyncio.timeout(10):
+        while not holds():  # noqa: ASYNC110  the endpoint signals nothing
+            await asyncio.sleep(0.001)
+
+
+async def following(endpoint: ControlEndpoint, **fields: object) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, Any]:
+    reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
+    writer.write(json.dumps({"do": "follow", "id": "e", **fields}).encode() + b"\n")
+    return reader, writer, json.loads(await reader.readline())
+
+
+async def next_of(reader: asyncio.StreamReader) -> Any:
+    return json.loads(await asyncio.wait_for(reader.readline(), 10))
+
+
+def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_more() -> None:
+    async def play(endpoint: ControlEndpoint, desk: Desk) -> None:
+        reader, writer, answer = await following(endpoint)
+        assert answer["id"] == "e"
+        (plan,) = answer["ok"]["plans"]
+        assert (plan["kind"], plan["plan"]["base"]) == ("plan", 7)
+        desk.happen(2)
+        found = [await next_of(reader) for _ in range(2)]
+        assert [(one["id"], one["event"]["number"]) for one in found] == [("e", 0), ("e", 1)]
+        assert "missed" not in found[0]
+        writer.write(b'{"do": "unfollow", "follow": "e", "id": 2}\n')
+        assert (await next_of(reader))["id"] == 2
+        assert not desk.followers
+        writer.write(b'{"do": "unfollow", "follow": "e"}\n')
+        assert await next_of(reader) == misuse("nothing is followed with the id 'e'")
+        writer.close()
+
+    served(play)
+
+
+def test_what_one_follows_ends_with_the_connection() -> None:
+    async def play(endpoint: ControlEndpoint, desk: Desk) -> None:
+        _, writer, _ = await following(endpoint)
+        assert desk.followers
+        writer.close()
+        await until(lambda: not desk.followers)
+
+    served(play)
+
+
+def test_follows_need_an_id_of_their_own_and_are_not_too_many() -> None:
+    lines = b'{"do": "follow"}\n' + b"".join(b'{"do": "follow", "id": %d}\n' % (n % 17) for n in range(18))
+
+    async def play(endpoint: ControlEndpoint) -> Any:
+        reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
+        writer.write(lines)
+        found = [await next_of(reader) for _ in range(19)]
+        writer.close()
+        return found
+
+    found = served(play)
+    assert found[0]["error"]["message"] == "follow: give an id, with which its events come"
+    assert all("ok" in one for one in found[1:17])
+    assert found[17]["error"]["message"] == "follow: there are 16 already, which is the most for a client"
+    assert found[18]["error"]["message"] == "follow: the id 0 is in use"
+
+
+def test_a_reader_that_is_slow_misses_events_and_is_told_how_many() -> None:
+    async def play(endpoint: ControlEndpoint, desk: Desk) -> tuple[int, int, int]:
+        reader, writer, _ = await following(endpoint, bound=100)
+        happened = 0
+        while happened < 40_000:  # more than socket and buffers hold
+            desk.happen(1000)
+            happened += 1000
+            await asyncio.sleep(0)
+        waiting = max(conversation._transport.get_write_buffer_size() for conversation in endpoint._clients)
+        received = missed = 0
+        while received + missed < happened:
+            message = await next_of(reader)
+            received, missed = received + 1, missed + message.get("missed", 0)
+        writer.close()
+        return received, missed, waiting
+
+    received, missed, waiting = served(play)
+    assert received + missed == 40_000
+    assert missed > 0
+    assert waiting < 2 * control.MOST_WAITING_BYTES
+
+
+def test_a_reader_that_reads_nothing_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "TIMEOUT_S", 0.05)
+
+    async def play(endpoint: ControlEndpoint, desk: Desk) -> int:
+        _reader, writer = await asyncio.open_unix_connection(str(endpoint.path), limit=1024)
+        writer.write(b'{"do": "pause"}\n' * 100)
+        await until(lambda: desk.done > 0 and not endpoint._clients)
+        writer.transport.abort()
+        return desk.done
+
+    assert 0 < served(play) < 20
+
+
+def test_more_clients_than_there_may_be_are_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(control, "MOST_CLIENTS", 2)
+
+    async def play(endpoint: ControlEndpoint) -> Any:
+        clients = [await asyncio.open_unix_connection(str(endpoint.path)) for _ in range(3)]
+        found = json.loads(await clients[2][0].readline())
+        for _, writer in clients:
+            writer.close()
+        return found
+
+    assert served(play)["error"] == {"code": "failure", "message": "there are 2 clients already, which is the most"}
+
+
+# ---------------------------------------------------------------------- over TCP
+
+
+def by_tcp(*lines: bytes) -> list[Any]:
+    async def play(endpoint: ControlEndpoint) -> list[Any]:
+        assert endpoint.listening is not None
+        said = json.loads(endpoint.announcement.read_text())
+        assert (said["host"], said["port"]) == (endpoint.listening.host, endpoint.listening.port)
+        assert stat.S_IMODE(endpoint.announcement.stat().st_mode) == 0o600
+        reader, writer = await asyncio.open_connection(said["host"], said["port"])
+        for line in lines:
+            writer.write(line.replace(b"TOKEN", said["token"].encode()) + b"\n")
+        writer.write_eof()
+        found = [json.loads(line) for line in (await reader.read()).splitlines()]
+        writer.close()
+        return found
+
+    found = served(play, address=Address("127.0.0.1", 0))
+    assert isinstance(found, list)
+    return found
+
+
+def test_over_tcp_the_first_line_is_the_token() -> None:
+    assert by_tcp(b'{"token": "TOKEN"}', b'{"do": "note", "text": "a"}') == [{"ok": None}, ok("a")]
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        b'{"do": "note", "text": "a"}',
+        b'{"token": "0"}',
+        b'{"token": "\xc3\xa4"}',
+        b'{"token": "TOKENx"}',
+        b'{"token": 1}',
+        b"",
+        b"GET / HTTP/1.1",
+    ],
+)
+def test_without_the_token_nothing_is_done(first: bytes) -> None:
+    assert by_tcp(first, b'{"do": "note", "text": "a"}') == [misuse(TOKEN_FIRST)]
+
+
+def test_a_twin_without_local_sockets_is_found_by_its_announcement(monkeypatch: pytest.MonkeyPatch, own_directory: Path) -> None:
+    monkeypatch.setattr(control, "HAS_LOCAL_SOCKETS", False)
+    monkeypatch.setattr(remote, "HAS_LOCAL_SOCKETS", False)
+    assert asked(None, do.Note("a"), "one") == {"note": "a"}
+    assert list(own_directory.iterdir()) == []
+
+
+# ---------------------------------------------------------------------- coming and going
 
 
 def test_who_never_asks_does_not_hold_up_the_end() -> None:
     async def scene() -> list[bytes]:
-        endpoint = ControlEndpoint("twin", HANDLERS)
+        endpoint = ControlEndpoint("twin", Desk())
         await endpoint.open()
         silent = [await asyncio.open_unix_connection(str(endpoint.path)) for _ in range(3)]
         await turns()
@@ -178,13 +418,13 @@ def test_at_the_end_nothing_is_left(own_directory: Path) -> None:
 
 def test_a_name_has_one_twin() -> None:
     async def play(endpoint: ControlEndpoint) -> Any:
-        second = ControlEndpoint("twin", HANDLERS)
+        second = ControlEndpoint("twin", Desk())
         with pytest.raises(Misuse, match=rf"a twin named 'twin' is running already \(process {os.getpid()}\): give .* --name"):
             await second.open()
         await second.close()
-        return await answer_to(endpoint, b'{"do": "echo"}\n')
+        return await answer_to(endpoint, b'{"do": "note", "text": "a"}\n')
 
-    assert served(play) == {"ok": {"do": "echo"}}
+    assert served(play) == ok("a")
 
 
 def test_the_socket_of_a_killed_twin_is_replaced(own_directory: Path) -> None:
@@ -192,32 +432,14 @@ def test_the_socket_of_a_killed_twin_is_replaced(own_directory: Path) -> None:
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(own_directory / "twin.control"))
     assert running() == []
-    assert served(lambda endpoint: answer_to(endpoint, b'{"do": "echo"}\n')) == {"ok": {"do": "echo"}}
-
-
-def test_a_directory_that_is_none_or_somebody_elses(own_directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    elsewhere = own_directory.with_name("elsewhere")
-    elsewhere.mkdir()
-    own_directory.symlink_to(elsewhere)
-    with pytest.raises(Misuse, match="is no directory"):
-        private_directory(own_directory)
-    monkeypatch.setattr(os, "getuid", lambda: 12345)
-    with pytest.raises(Misuse, match="belongs to another user"):
-        private_directory(elsewhere)
-
-
-def test_a_directory_others_could_enter_is_closed_to_them(own_directory: Path) -> None:
-    own_directory.mkdir(mode=0o777)
-    own_directory.chmod(0o777)
-    private_directory(own_directory)
-    assert stat.S_IMODE(own_directory.stat().st_mode) == 0o700
+    assert served(lambda endpoint: answer_to(endpoint, b'{"do": "note", "text": "a"}\n')) == ok("a")
 
 
 def test_a_twin_in_a_directory_that_others_can_write_is_not_believed(own_directory: Path) -> None:
     own_directory.mkdir()
     own_directory.chmod(0o777)
     with pytest.raises(Misuse, match="can be written by other users, so a twin in it may be theirs"):
-        ask(None, {"do": "echo"})
+        ask(None, do.Note("a"))
 
 
 def test_a_twin_in_a_directory_of_another_user_is_not_believed(own_directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -228,23 +450,18 @@ def test_a_twin_in_a_directory_of_another_user_is_not_believed(own_directory: Pa
         running()
 
 
-def test_without_xdg_the_directory_is_the_users_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("XDG_RUNTIME_DIR")
-    assert runtime_directory().name == f"steptwin-{os.getuid()}"
-
-
 # ---------------------------------------------------------------------- asking
 
 
-def asked(name: str | None, request: Mapping[str, object], *names: str) -> Any:
+def asked(name: str | None, wanted: command.Command, *names: str) -> Any:
     """Ask while twins of these names are served."""
 
     async def scene() -> Any:
-        endpoints = [ControlEndpoint(each, HANDLERS) for each in names]
+        endpoints = [ControlEndpoint(each, Desk()) for each in names]
         for endpoint in endpoints:
             await endpoint.open()
         try:
-            return await asyncio.to_thread(ask, name, request)
+            return await asyncio.to_thread(ask, name, wanted)
         finally:
             await turns()
             for endpoint in endpoints:
@@ -255,40 +472,39 @@ def asked(name: str | None, request: Mapping[str, object], *names: str) -> Any:
 
 
 def test_the_only_twin_is_asked() -> None:
-    assert asked(None, {"do": "echo"}, "one") == {"do": "echo"}
+    assert asked(None, do.Note("a"), "one") == {"note": "a"}
 
 
 def test_a_twin_is_asked_by_name() -> None:
-    assert asked("two", {"do": "echo"}, "one", "two") == {"do": "echo"}
+    assert asked("two", do.Note("a"), "one", "two") == {"note": "a"}
 
 
 def test_what_the_twin_refuses() -> None:
     with pytest.raises(Misuse, match="not permitted: 7"):
-        asked(None, {"do": "refuse"}, "one")
+        asked(None, do.Note("refuse"), "one")
     with pytest.raises(Refusal, match="not now"):
-        asked(None, {"do": "deny"}, "one")
+        asked(None, do.Note("deny"), "one")
 
 
 @pytest.mark.parametrize(
     ("name", "names", "family", "text"),
     [
-        (None, (), LineFailure, "no twin is running: start one with 'steptwin serve' or 'steptwin up'"),
-        (None, ("one", "two"), Misuse, "several twins are running: choose one with --twin: one, two"),
+        (None, (), LineFailure, f"no twin is running: {START}"),
+        (None, ("one", "two"), Misuse, "several twins are running: name one: one, two"),
         ("three", ("one", "two"), LineFailure, "no twin named 'three' is running; running: one, two"),
         ("three", (), LineFailure, "no twin named 'three' is running; running: none"),
     ],
 )
 def test_which_twin_is_not_clear(name: str | None, names: tuple[str, ...], family: type[Exception], text: str) -> None:
     with pytest.raises(family) as failure:
-        asked(name, {"do": "echo"}, *names)
+        asked(name, do.Note("a"), *names)
     assert str(failure.value) == text
 
 
 def test_a_twin_that_hangs(own_directory: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(control, "TIMEOUT_S", 0.02)
     own_directory.mkdir(0o700)
     with socket.socket(socket.AF_UNIX) as hanging:
         hanging.bind(str(own_directory / "twin.control"))
         hanging.listen()
         with pytest.raises(LineFailure, match="the twin 'twin' does not answer: timed out"):
-            ask(None, {"do": "echo"})
+            ask(None, do.Note("a"), timeout_s=0.02)

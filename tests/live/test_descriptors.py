@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from steptwin.live import descriptors as module
+from steptwin.live.batches import batches
 from steptwin.live.descriptors import BATCH, LINGER_NS, TURN_NS, Descriptors, descriptors
 
 Run = Callable[..., Any]
@@ -55,13 +56,13 @@ def test_a_loop_has_one_set(run: Run) -> None:
 
 def test_what_is_ready_together_is_one_batch(run: Run) -> None:
     async def scene() -> tuple[list[int], int]:
-        watched, batches = descriptors(), []
+        watched, seen = descriptors(), []
         with pipes(BATCH + 2) as ends:
 
             def serve(read: int) -> Callable[[], None]:
                 def act() -> None:
                     os.read(read, 1)
-                    batches.append(watched.batch)
+                    seen.append(batches().current)
 
                 return act
 
@@ -70,10 +71,10 @@ def test_what_is_ready_together_is_one_batch(run: Run) -> None:
             await asyncio.sleep(0.01)
             for read, _ in ends:
                 watched.forget(read)
-        return batches, watched.batch
+        return seen, batches().current
 
-    batches, between = run(scene())
-    assert batches == [1] * BATCH + [2] * 2
+    found, between = run(scene())
+    assert found == [1] * BATCH + [2] * 2
     assert between == 0
 
 
@@ -149,7 +150,7 @@ def test_trouble_with_one_is_told_and_others_are_served() -> None:
             await asyncio.sleep(0.01)
             watched.forget(bad)
             watched.forget(good)
-        return told, served, watched.batch
+        return told, served, batches().current
 
     assert asyncio.run(scene()) == (["bad"], [1], 0)
 

@@ -12,13 +12,13 @@ import pytest
 from steptwin.live.cell import Cell
 from steptwin.live.links import Feed
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488]]
+Make = Callable[[], tuple[Cell, Mic488Device]]
 
 REQUEST = bytes.fromhex("010213880008FD62")
 ANSWER = bytes.fromhex("01020100A188")

@@ -57,7 +57,7 @@ def test_a_reader_that_stops_stops_nobody_and_is_told_what_he_missed(pipe: Pipe,
     while "left out" not in text:
         text += os.read(pipe.reading, 65536).decode()
     out.close()
-    assert text.splitlines() == [filling, *(f"line {number}" for number in range(10)), "(15 lines left out: nobody read them)"]
+    assert text.splitlines() == [filling, *(f"line {number}" for number in range(10)), "(15 lines left out: they were not read)"]
     os.close(pipe.reading)
 
 

@@ -14,15 +14,24 @@ from typing import Any
 import pytest
 
 from steptwin.errors import LineFailure, Misuse
+from steptwin.live import pty as module
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 from steptwin.world.kernel import Kernel
+
+
+@pytest.fixture(params=["epoll", "timer"], autouse=True)
+def waiting(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both ways of waiting for the next program do the same."""
+    monkeypatch.setattr(module, "HAS_EPOLL", request.param == "epoll")
+    monkeypatch.setattr(module, "LOOK_S", 0.002)
+
 
 INPUTS = bytes.fromhex("010213880008FD62")
 INPUTS_ANSWER = bytes.fromhex("01020100A188")
@@ -46,7 +55,7 @@ def on_link(path: Path, play: Callable[[PtyLink], Awaitable[Any]], *, timed: boo
 
 def make_link(path: Path, *, timed: bool = False) -> PtyLink:
     kernel = Kernel()
-    devices = {1: Mic488(ControllerConfig())}
+    devices = {1: Mic488Device(ControllerConfig())}
     kernel.add("1", devices[1])
     units = TimedUnits(devices, LineTiming(SerialLine(38400)))
     return PtyLink(Cell(kernel, Clock()), path, lambda: TimedRtuSlavePort(units) if timed else RtuSlavePort(devices))

@@ -17,12 +17,12 @@ from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.serialport import SerialLink
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.wire.slave import RtuSlavePort
 from steptwin.world.kernel import Kernel
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488]]
+Make = Callable[[], tuple[Cell, Mic488Device]]
 
 REQUEST = bytes.fromhex("010213880008FD62")
 ANSWER = bytes.fromhex("01020100A188")
@@ -58,7 +58,7 @@ class Adapter:
 
 def on_line(device: Path, play: Callable[[SerialLink, list[str]], Awaitable[Any]]) -> Any:
     async def scene() -> Any:
-        mic = Mic488(ControllerConfig())
+        mic = Mic488Device(ControllerConfig())
         kernel = Kernel()
         kernel.add("1", mic)
         notices: list[str] = []

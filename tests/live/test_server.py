@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import resource
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -13,15 +12,17 @@ from typing import Any
 import pytest
 
 from steptwin.errors import LineFailure, Misuse, Runaway
+from steptwin.files.world import World
 from steptwin.live.cell import Cell
-from steptwin.live.server import Server, allow_many_files, clear_ready_file
+from steptwin.live.server import Server, clear_ready_file
+from steptwin.live.transports import TRANSPORTS
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
+from steptwin.subject.world import WorldSubject
 from steptwin.wire.slave import TcpSlavePort
-from steptwin.world.addresses import Address
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488]]
+Make = Callable[[], tuple[Cell, Mic488Device]]
 
 
 def serving(run: Run, make_cell: Make, play: Callable[[Server, list[str]], Awaitable[Any]]) -> Any:
@@ -37,7 +38,7 @@ def serving(run: Run, make_cell: Make, play: Callable[[Server, list[str]], Await
 
 
 def port() -> TcpSlavePort:
-    return TcpSlavePort({1: Mic488(ControllerConfig())})
+    return TcpSlavePort({1: Mic488Device(ControllerConfig())})
 
 
 # ---------------------------------------------------------------------- ready file
@@ -47,17 +48,24 @@ def test_the_ready_file_names_every_end_point_and_is_gone_at_the_end(run: Run, m
     path = tmp_path / "new" / "ready.json"
 
     async def play(server: Server, told: list[str]) -> Any:
-        await server.open_pty(tmp_path / "line", "Modbus RTU", port)
-        await server.open_tcp("tcp", Address("127.0.0.1", 0), "Modbus TCP", port)
-        server.write_ready_file(path, "twin")
+        await server.open_control(
+            "twin",
+            WorldSubject(World.from_toml("[[mic488]]\nname = 'a'\n")),
+            lambda: [{"name": "table"}],
+            tmp_path / "machine.toml",
+        )
+        await server.open(TRANSPORTS["pty"], str(tmp_path / "line"), "Modbus RTU", port, line="bus")
+        await server.open(TRANSPORTS["tcp"], "127.0.0.1:0", "Modbus TCP", port)
+        server.write_ready_file(path)
         return json.loads(path.read_text())
 
     ready = serving(run, make_cell, play)
     pty, tcp = ready.pop("end_points")
-    assert ready == {"name": "twin", "pid": os.getpid()}
-    assert pty == {"kind": "pty", "protocol": "Modbus RTU", "path": str(tmp_path / "line")}
+    controllers = [{"name": "table"}]
+    assert ready == {"name": "twin", "pid": os.getpid(), "file": str(tmp_path / "machine.toml"), "controllers": controllers}
+    assert pty == {"kind": "pty", "protocol": "Modbus RTU", "path": str(tmp_path / "line"), "line": "bus"}
     assert tcp.pop("port") > 0
-    assert tcp == {"kind": "tcp", "protocol": "Modbus TCP", "host": "127.0.0.1"}
+    assert tcp == {"kind": "tcp", "protocol": "Modbus TCP", "host": "127.0.0.1", "line": None}
     assert list(tmp_path.rglob("*")) == [tmp_path / "new"]
 
 
@@ -65,7 +73,7 @@ def test_the_ready_file_of_another_server_is_left_to_it(run: Run, make_cell: Mak
     path = tmp_path / "ready.json"
 
     async def play(server: Server, told: list[str]) -> None:
-        server.write_ready_file(path, "one")
+        server.write_ready_file(path)
         path.write_text("two")
 
     serving(run, make_cell, play)
@@ -75,7 +83,7 @@ def test_the_ready_file_of_another_server_is_left_to_it(run: Run, make_cell: Mak
 def test_a_ready_file_that_cannot_be_written(run: Run, make_cell: Make, tmp_path: Path) -> None:
     async def play(server: Server, told: list[str]) -> None:
         with pytest.raises(LineFailure, match=f"cannot write the ready file {tmp_path}: "):
-            server.write_ready_file(tmp_path, "one")
+            server.write_ready_file(tmp_path)
 
     serving(run, make_cell, play)
     assert list(tmp_path.iterdir()) == []
@@ -125,9 +133,9 @@ def test_everything_is_closed_though_one_link_fails_to(run: Run, make_cell: Make
             raise LineFailure("will not close")
 
     async def play(server: Server, told: list[str]) -> None:
-        await server.open_pty(tmp_path / "line", "Modbus RTU", port)
+        await server.open(TRANSPORTS["pty"], str(tmp_path / "line"), "Modbus RTU", port)
         server._links.append(Stubborn())
-        server.write_ready_file(tmp_path / "ready.json", "twin")
+        server.write_ready_file(tmp_path / "ready.json")
 
     with pytest.raises(LineFailure, match="will not close"):
         serving(run, make_cell, play)
@@ -183,15 +191,3 @@ def test_a_lag_is_told(run: Run, make_cell: Make) -> None:
         return told
 
     assert serving(run, make_cell, play) == ["this process was held up for 61.2 s; the time of the twin was held up as long"]
-
-
-def test_as_many_clients_as_the_system_permits(monkeypatch: pytest.MonkeyPatch) -> None:
-    limits: list[tuple[int, int]] = [(1024, 4096)]
-    monkeypatch.setattr(resource, "getrlimit", lambda which: limits[-1])
-    monkeypatch.setattr(resource, "setrlimit", lambda which, wanted: limits.append(wanted))
-    assert (allow_many_files(), limits[1:]) == (4096, [(4096, 4096)])
-    assert (allow_many_files(), len(limits)) == (4096, 2)
-    limits.append((1024, resource.RLIM_INFINITY))
-    assert (allow_many_files(), limits[-1]) == (65536, (65536, resource.RLIM_INFINITY))
-    limits.append((resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-    assert allow_many_files() == 65536

@@ -6,14 +6,14 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from steptwin.live.batches import batches
 from steptwin.live.cell import Cell
-from steptwin.live.descriptors import descriptors
 from steptwin.live.sharedreads import share_reads
 from steptwin.machine import Nanos
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488]]
+Make = Callable[[], tuple[Cell, Mic488Device]]
 
 READ_USER, WRITE_USER = bytes.fromhex("0300640001"), bytes.fromhex("100064000102002a")
 READ_OUT, OUT_ON = bytes.fromhex("0117700001"), bytes.fromhex("051770ff00")
@@ -21,7 +21,7 @@ READ_POSITION = bytes.fromhex("0327240002")
 
 
 class Counted:
-    def __init__(self, device: Mic488) -> None:
+    def __init__(self, device: Mic488Device) -> None:
         self.executed = 0
         self._device = device
 
@@ -30,7 +30,7 @@ class Counted:
         return self._device.execute(pdu, now)
 
 
-def in_scene(run: Run, make_cell: Make, play: Callable[[Cell, Mic488, Counted, Any], Any]) -> Any:
+def in_scene(run: Run, make_cell: Make, play: Callable[[Cell, Mic488Device, Counted, Any], Any]) -> Any:
     async def scene() -> Any:
         cell, device = make_cell()
         counted = Counted(device)
@@ -44,20 +44,20 @@ def in_scene(run: Run, make_cell: Make, play: Callable[[Cell, Mic488, Counted, A
 
 
 def test_within_a_batch_a_read_is_executed_once(run: Run, make_cell: Make) -> None:
-    def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> tuple[set[bytes], int, int]:
-        descriptors().batch = 1
+    def play(cell: Cell, device: Mic488Device, counted: Counted, shared: Any) -> tuple[set[bytes], int, int]:
+        batches().current = 1
         answers = {shared.execute(READ_USER, cell.enter()) for _ in range(3)}
         once = counted.executed
-        descriptors().batch = 2
+        batches().current = 2
         shared.execute(READ_USER, cell.enter())
-        descriptors().batch = 0
+        batches().current = 0
         return answers, once, counted.executed
 
     assert in_scene(run, make_cell, play) == ({bytes.fromhex("03020000")}, 1, 2)
 
 
 def test_without_a_batch_every_read_is_executed(run: Run, make_cell: Make) -> None:
-    def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> int:
+    def play(cell: Cell, device: Mic488Device, counted: Counted, shared: Any) -> int:
         for _ in range(3):
             shared.execute(READ_USER, cell.enter())
         return counted.executed
@@ -66,10 +66,10 @@ def test_without_a_batch_every_read_is_executed(run: Run, make_cell: Make) -> No
 
 
 def test_what_is_written_is_read(run: Run, make_cell: Make) -> None:
-    def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> list[bytes]:
-        descriptors().batch = 1
+    def play(cell: Cell, device: Mic488Device, counted: Counted, shared: Any) -> list[bytes]:
+        batches().current = 1
         answers = [shared.execute(pdu, cell.enter()) for pdu in (READ_USER, READ_OUT, WRITE_USER, READ_USER, OUT_ON, READ_OUT)]
-        descriptors().batch = 0
+        batches().current = 0
         return answers
 
     user, out, _, written, _, on = in_scene(run, make_cell, play)
@@ -80,14 +80,13 @@ def test_what_is_written_is_read(run: Run, make_cell: Make) -> None:
 def test_what_signals_settle_to_is_read(run: Run, make_cell: Make) -> None:
     """Something other than a request changes the controller within a batch, and the kernel is told."""
 
-    def play(cell: Cell, device: Mic488, counted: Counted, shared: Any) -> list[bytes]:
-        descriptors().batch = 1
+    def play(cell: Cell, device: Mic488Device, counted: Counted, shared: Any) -> list[bytes]:
+        batches().current = 1
         answers = [shared.execute(READ_OUT, cell.enter())]
-        device.set_output(0, True)
-        device.touch()
+        device.command(lambda now: device.set_output(0, True, now), device.now)
         cell.leave()
         answers.append(shared.execute(READ_OUT, cell.enter()))
-        descriptors().batch = 0
+        batches().current = 0
         return answers
 
     assert in_scene(run, make_cell, play) == [bytes.fromhex("010100"), bytes.fromhex("010101")]
@@ -97,13 +96,13 @@ def test_a_batch_happens_at_one_moment(run: Run, make_cell: Make) -> None:
     async def scene() -> tuple[Nanos, Nanos, Nanos]:
         cell, _ = make_cell()
         loop: Any = asyncio.get_running_loop()
-        descriptors().batch = 1
+        batches().current = 1
         first = cell.enter()
         loop.hold_up(0.001)
         second = cell.enter()
-        descriptors().batch = 2
+        batches().current = 2
         third = cell.enter()
-        descriptors().batch = 0
+        batches().current = 0
         cell.close()
         return first, second, third
 

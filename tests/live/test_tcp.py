@@ -13,16 +13,19 @@ from typing import Any
 
 import pytest
 
-from steptwin.errors import LineFailure, Misuse
+from steptwin.errors import LineFailure
 from steptwin.live.cell import Cell
-from steptwin.live.tcp import RETRY_S, Clients, TcpLink
+from steptwin.live.clients import RETRY_S, Clients
+from steptwin.live.tcp import LISTENER, Listener, TcpLink
+from steptwin.live.tcp_asyncio import AsyncioListener
+from steptwin.live.tcp_epoll import EpollListener
 from steptwin.machine import Nanos
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
-from steptwin.world.addresses import Address, parse_address
+from steptwin.world.addresses import Address
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488]]
+Make = Callable[[], tuple[Cell, Mic488Device]]
 
 # Read user register 0, and 125 of them.
 READ_ONE = bytes.fromhex("000100000006010300000001")
@@ -30,41 +33,16 @@ ONE = bytes.fromhex("0001000000050103020000")
 READ_MANY = bytes.fromhex("00020000000601030000007D")
 
 
-# ---------------------------------------------------------------------- addresses
-
-
-@pytest.mark.parametrize(
-    ("text", "address"),
-    [
-        ("127.0.0.1:5020", Address("127.0.0.1", 5020)),
-        (":0", Address("127.0.0.1", 0)),
-        ("localhost:502", Address("127.0.0.1", 502)),
-        ("127.1.2.3:65535", Address("127.1.2.3", 65535)),
-        ("[::1]:5020", Address("::1", 5020)),
-    ],
-)
-def test_loopback_addresses(text: str, address: Address) -> None:
-    assert parse_address(text, listen_any=False) == address
-
-
-@pytest.mark.parametrize("text", ["5020", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:http", ""])
-def test_no_addresses(text: str) -> None:
-    with pytest.raises(Misuse, match=re.escape(f"{text!r} is no address: expected HOST:PORT with a port from 0 to 65535")):
-        parse_address(text, listen_any=True)
-
-
-@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "[::]", "example"])
-def test_other_addresses_need_permission(host: str) -> None:
-    with pytest.raises(Misuse, match=r"not a loopback address.*no authentication.*--listen-any"):
-        parse_address(f"{host}:5020", listen_any=False)
-    assert parse_address(f"{host}:5020", listen_any=True) == Address(host.strip("[]"), 5020)
-
-
-def test_an_address_is_written_as_it_is_read() -> None:
-    assert [str(Address("127.0.0.1", 1)), str(Address("::1", 2))] == ["127.0.0.1:1", "[::1]:2"]
-
-
 # ---------------------------------------------------------------------- over real sockets
+
+KINDS = {"epoll": EpollListener, "asyncio": AsyncioListener}
+
+
+@pytest.fixture(params=KINDS, autouse=True)
+def kind(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> type[Listener]:
+    """Both ways of serving clients do the same."""
+    monkeypatch.setattr(Scene, "kind", KINDS[request.param])
+    return Scene.kind
 
 
 Client = tuple[asyncio.StreamReader, asyncio.StreamWriter]
@@ -73,12 +51,14 @@ Client = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 class Scene:
     """A Modbus TCP link on a free port and clients of it."""
 
+    kind: type[Listener] = LISTENER
+
     def __init__(self, make_cell: Make, most: int = 100) -> None:
         self.cell, self.device = make_cell()
         self.notices: list[str] = []
         self.clients = Clients(most, self.notices.append)
         self.executed = 0
-        self.link = TcpLink(self.cell, Address("127.0.0.1", 0), lambda: TcpSlavePort({1: self}), self.clients)
+        self.link = TcpLink(self.cell, Address("127.0.0.1", 0), lambda: TcpSlavePort({1: self}), self.clients, self.kind)
         self._writers: list[asyncio.StreamWriter] = []
 
     async def __aenter__(self) -> Scene:
@@ -184,8 +164,8 @@ def test_clients_beyond_the_limit_are_turned_away_and_places_become_free(run: Ru
 
 def deafen(scene: Scene) -> socket.socket:
     """A client that reads only when it is told to, and little room for what it does not read."""
-    assert scene.link._listener is not None
-    scene.link._listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    assert isinstance(scene.link._listener, EpollListener | AsyncioListener)
+    scene.link._listener._listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     deaf.connect(scene.address)
@@ -301,19 +281,21 @@ def test_after_a_wrong_header_the_rest_of_a_flood_is_not_executed(run: Run, make
     assert in_scene(run, make_cell, play) == (1, 0)
 
 
+@pytest.mark.parametrize("kind", ["epoll"], indirect=True)
 def test_a_system_without_room_for_clients_is_asked_again(run: Run, make_cell: Make) -> None:
-    async def play(scene: Scene) -> tuple[list[str], bytes]:
-        listener = scene.link._listener
-        assert listener is not None
-        scene.link._listener = full = Full(listener)  # type: ignore[assignment]
+    async def play(scene: Scene) -> tuple[list[str], bytes, str]:
+        """asyncio waits and asks again by itself."""
+        assert isinstance(scene.link._listener, EpollListener)
+        full = Full(scene.link._listener._listening)
+        scene.link._listener._listening = full  # type: ignore[assignment]
         client = await scene.client()
         for _ in range(100):
             await asyncio.sleep(0)
         full.full = False
-        return scene.notices, await ask(client)
+        return scene.notices, await ask(client), str(scene.address)
 
-    notices, answer = in_scene(run, make_cell, play)
-    assert notices == [f"no client is accepted on 127.0.0.1:0 for {RETRY_S:g} s: too many open files"]
+    notices, answer, address = in_scene(run, make_cell, play)
+    assert notices == [f"no client is accepted on {address} for {RETRY_S:g} s: too many open files"]
     assert answer == ONE
 
 
@@ -389,7 +371,7 @@ def test_what_is_no_name_of_a_host(run: Run, make_cell: Make) -> None:
 def test_closing_the_link_ends_its_connections_and_no_others(run: Run, make_cell: Make) -> None:
     async def scene() -> tuple[bytes, bytes]:
         async with Scene(make_cell) as one:
-            line = TcpLink(one.cell, Address("127.0.0.1", 0), lambda: RtuSlavePort({1: one.device}), one.clients)
+            line = TcpLink(one.cell, Address("127.0.0.1", 0), lambda: RtuSlavePort({1: one.device}), one.clients, one.kind)
             rtu_reader, rtu_writer = await asyncio.open_connection(*await line.open())
             client = await one.client()
             await ask(client)

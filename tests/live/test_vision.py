@@ -1,20 +1,20 @@
-"""Records of a vision system on the RTU lines of a served controller and on a connection of their own."""
+"""Records of a vision system on the RTU lines of a controller and on a connection of their own."""
 
 from __future__ import annotations
 
 import struct
+from functools import partial
 
 import pytest
 from wbc_rig import loaded
 
-from steptwin.errors import Misuse
-from steptwin.files.programbanks import Banks
-from steptwin.machine import Port
-from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.files.world import World
+from steptwin.live.world import LiveWorld, PlacePort, VisionPort
+from steptwin.machine import MILLISECOND, Port
 from steptwin.mic488.vision import uses_vision
-from steptwin.served.mic488 import LineOptions, Mic488Line, state_of
 from steptwin.wire.crc import crc16
+from steptwin.words.mic488_state import state_of
+from steptwin.world.small import LINE, Whole, mic488_world
 
 #: Copies each new record, with the number of records before it in $I0.
 PICK = """\
@@ -39,44 +39,48 @@ def frame(pdu: bytes) -> bytes:
 READ = frame(b"\x03" + struct.pack(">HH", 0, 10))
 
 
-def served(text: str = PICK, options: LineOptions | None = None) -> tuple[Mic488Line, Mic488]:
-    line = Mic488Line(ControllerConfig(), [1], "1.70", Banks({0: loaded(text)[0]}), options=options)
-    device = line.devices[1]
-    device.program.command(1, 0)
-    device.touch()
-    return line, device
+def running(units: tuple[int, ...] = (1,), timing: str = "off") -> LiveWorld:
+    """Controllers that run the program."""
+    text = mic488_world(Whole(name="vision", line={"timing": timing}), units, {"program": "pick.prg"})
+    live = LiveWorld(World.from_toml(text, {"pick.prg": PICK.encode()}))
+    for view in live.world.mic488.values():
+        view.device.command(partial(view.device.program.command, 1), 0)
+    live.stale = True
+    return live
 
 
-def records(device: Mic488, now: int) -> tuple[int, list[float]]:
-    device.advance(now)
-    user = device.user
+def records(live: LiveWorld) -> tuple[int, list[float]]:
+    (view,) = live.world.mic488.values()
+    live.advance(live.now + 100 * MILLISECOND)
+    live.world.settle_all()
+    user = view.device.user
     return user[0], [struct.unpack("<f", user[n : n + 2])[0] for n in (2, 4, 6, 8)]
 
 
-@pytest.mark.parametrize("options", [{}, {"frames": True}, {"timing": True}, {"timing": True, "frames": True}])
-def test_wbc_15_records_and_frames_share_an_rtu_line(options: dict[str, bool]) -> None:
-    line, device = served(options=LineOptions(**options))
-    port = line.rtu_port("pty")
-    answered, now = b"", 0
+@pytest.mark.parametrize("timing", ["off", "real"])
+def test_wbc_15_records_and_frames_share_an_rtu_line(timing: str) -> None:
+    live = running(timing=timing)
+    port = PlacePort(live, LINE, "pty", "rtu")
+    answered = b""
     for data in (READ, RECORD, READ, RECORD[:9], RECORD[9:], READ):
-        now += 100_000_000
-        answered += port.exchange(data, now)
+        live.advance(live.now + 100 * MILLISECOND)
+        answered += port.exchange(data, live.now)
         for _ in range(100):
-            now += 1_000_000
-            answered += b"".join(piece for _, piece in port.to_send(now))
-    assert records(device, now) == (2, [7.0, 12.5, -3.25, 90.0])
+            live.advance(live.now + MILLISECOND)
+            answered += b"".join(piece for _, piece in port.to_send(live.now))
+    assert records(live) == (2, [7.0, 12.5, -3.25, 90.0])
     assert len(answered) == 3 * 25
     assert answered[:3] == b"\x01\x03\x14"
 
 
 def test_wbc_15_a_vision_system_on_its_own_connection() -> None:
-    line, device = served()
-    port: Port = line.vision_port()
+    live = running()
+    port: Port = VisionPort(live, "mic488")
     assert (port.broken, port.deadline()) == (None, None)
-    assert port.exchange(b"hello\r\nN1 X2 Y3 A4\nN2 X0 Y0 A", 5_000_000) == b""
-    assert records(device, 100_000_000) == (1, [1.0, 2.0, 3.0, 4.0])
-    port.exchange(b"-1\r", 200_000_000)
-    assert records(device, 300_000_000) == (2, [2.0, 0.0, 0.0, -1.0])
+    assert port.exchange(b"hello\r\nN1 X2 Y3 A4\nN2 X0 Y0 A", live.now) == b""
+    assert records(live) == (1, [1.0, 2.0, 3.0, 4.0])
+    port.exchange(b"-1\r", live.now)
+    assert records(live) == (2, [2.0, 0.0, 0.0, -1.0])
 
 
 def test_only_programs_that_ask_for_records_have_them_on_the_line() -> None:
@@ -86,23 +90,28 @@ def test_only_programs_that_ask_for_records_have_them_on_the_line() -> None:
 
 
 def test_a_vision_system_belongs_to_one_controller() -> None:
-    line = Mic488Line(ControllerConfig(), [1, 2], "1.70", Banks({0: loaded(PICK)[0]}))
-    with pytest.raises(Misuse, match="serve a single unit"):
-        line.vision_port()
-    line.rtu_port("pty").exchange(RECORD, 0)
+    """On a line of several a record is rubbish."""
+    live = running(units=(1, 2))
+    PlacePort(live, LINE, "pty", "rtu").exchange(RECORD, live.now)
+    live.advance(live.now + 100 * MILLISECOND)
+    live.world.settle_all()
+    assert [view.device.user[0] for view in live.world.mic488.values()] == [0, 0]
 
 
 def test_the_state_tells_where_a_program_is() -> None:
-    _, device = served()
-    device.advance(50_000_000)
-    shown = state_of(device, 50_000_000)["program"]
+    live = running()
+    live.advance(50 * MILLISECOND)
+    live.world.settle_all()
+    device = live.world.mic488["mic488"].device
+    shown = state_of(device, live.now)["program"]
     assert shown == {
         "state": "running",
         "program_bank": 0,
         "position_bank": 0,
-        "file": "program",
+        "file": "pick.prg",
         "line": 2,
         "text": "WAIT VisionNew = 1",
+        "variables": {},
     }
-    device.program.command(0, 50_000_000)
-    assert "line" not in state_of(device, 50_000_000)["program"]  # type: ignore[operator]
+    device.program.command(0, live.now)
+    assert "line" not in state_of(device, live.now)["program"]  # type: ignore[operator]

@@ -13,21 +13,27 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
+from steptwin.live.batches import batches
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
-from steptwin.live.descriptors import descriptors
-from steptwin.live.links import Feed, Port
+from steptwin.live.links import Feed
+from steptwin.live.sharedreads import share_reads
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort
 from steptwin.live.world_frames import follow_frames
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
-from steptwin.served.mic488 import LineOptions, Mic488Line
+from steptwin.mic488.device import Mic488Device
+from steptwin.wire.slave import FrameDirection, TcpSlavePort
 from steptwin.words.frames import FrameLine
 from steptwin.world import script as do
-from steptwin.world.actions import See
+from steptwin.world.actions import Bytes, See
+from steptwin.world.faults import Faults, FaultyPort
+from steptwin.world.faults import LineProtocol as FaultLine
+from steptwin.world.kernel import Kernel
 
 LINE = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "twin"\nline = "bus"\n'
 READ = bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 0a")
+RUBBISH = "9 bytes that belong to no frame"
 MORE_CALLS = 8
 """Of a read through a world: the world around the kernel, the place, its line."""
 
@@ -64,11 +70,12 @@ def test_a_read_through_a_world_takes_few_more_calls_than_one_of_a_served_contro
         live = LiveWorld(world)
         cell = Cell(live, Clock())
         live.share_reads(cell)
-        line = Mic488Line(ControllerConfig(), [1], "1.70")
-        served = Cell(line.kernel, Clock())
-        line.share_reads(served)
+        kernel, device = Kernel(), Mic488Device(ControllerConfig(), "1.70")
+        kernel.add("twin", device)
+        served = Cell(kernel, Clock())
+        port = FaultyPort(TcpSlavePort(share_reads({1: device}, served)), "tcp-1", Faults(), FaultLine.TCP)
         clients = Client(), Client()
-        feeds = Feed(served, line.tcp_port(), clients[0]), Feed(cell, PlacePort(live, "bus", "tcp-1", "tcp"), clients[1])
+        feeds = Feed(served, port, clients[0]), Feed(cell, PlacePort(live, "bus", "tcp-1", "tcp"), clients[1])
         for one, feed in zip((served, cell), feeds, strict=True):
             one.start()
             feed.take(READ)  # connects
@@ -94,7 +101,7 @@ def test_a_request_visits_no_other_kernel() -> None:
 
     read()
     found = calls(read)
-    assert found["Mic488.execute"] == 1
+    assert found["Mic488Device.execute"] == 1
     assert found["Kernel.deadline"] + found["Kernel.advance"] < 5, found
 
 
@@ -145,13 +152,13 @@ def test_clients_that_are_served_together_share_what_they_read() -> None:
         clients = [Client() for _ in range(3)]
         feeds = [Feed(cell, PlacePort(live, "bus", f"tcp-{i}", "tcp"), client) for i, client in enumerate(clients)]
         cell.start()
-        descriptors().batch = 7
-        assert calls(lambda: [feed.take(READ) for feed in feeds])["Mic488.execute"] == 1
+        batches().current = 7
+        assert calls(lambda: [feed.take(READ) for feed in feeds])["Mic488Device.execute"] == 1
         write = bytes.fromhex("00 01 00 00 00 06 01 05 17 70 ff 00")
         # A write of one may change what the next one reads; the first read is still that of all.
-        assert calls(lambda: [feed.take(request) for feed in feeds for request in (READ, write)])["Mic488.execute"] == 5
+        assert calls(lambda: [feed.take(request) for feed in feeds for request in (READ, write)])["Mic488Device.execute"] == 5
         assert len({client.heard for client in clients}) == 1
-        descriptors().batch = 0
+        batches().current = 0
         cell.close()
 
     asyncio.run(run())
@@ -199,37 +206,24 @@ def test_records_of_a_vision_system_are_inputs_of_the_session() -> None:
 
 
 @pytest.mark.parametrize("timing", ["off", "real", "strict"])
-def test_frames_of_a_world_are_shown_as_those_of_a_served_controller(timing: str) -> None:
+def test_frames_of_a_world_are_shown_in_words(timing: str) -> None:
     """Requests, answers and bytes that belong to no frame, on Modbus TCP and RTU."""
-    world = World.from_toml(LINE + "" if timing == "off" else LINE.replace("tcp =", f'timing = "{timing}"\ngap = 5\ntcp ='))
+    world = World.from_toml(LINE if timing == "off" else LINE.replace("tcp =", f'timing = "{timing}"\ngap = 5\ntcp ='))
     world.stop_recording()
     live = LiveWorld(world)
     shown: list[FrameLine] = []
     follow_frames(live, shown.append)
-    served = Mic488Line(
-        ControllerConfig(), [1], "1.70", options=LineOptions(timing=timing != "off", strict=timing == "strict", frames=True)
-    )
-    expected: list[FrameLine] = []
-    served.frames.sinks.append(expected.append)
-    gap = 5 * MILLISECOND if timing != "off" else 20 * MILLISECOND
-    ports: list[tuple[Port, Port]] = [
-        (PlacePort(live, "bus", "tcp-1", "tcp"), served.tcp_port()),
-        (PlacePort(live, "bus", "rtu-1", "rtu"), served.rtu_port("rtu-1", gap)),
-    ]
-    at = 0
+    places = PlacePort(live, "bus", "tcp-1", "tcp"), PlacePort(live, "bus", "rtu-1", "rtu")
     for number, data in ((0, READ), (1, bytes.fromhex("01 03 27 24 00 02 8e b4")), (1, b"rubbish!!!"), (0, READ)):
-        at += 100 * MILLISECOND
-        ours, theirs = ports[number]
-        live.advance(at)
-        ours.exchange(data, at)
-        served.kernel.advance(at)
-        theirs.exchange(data, at)
-        while (due := theirs.deadline()) is not None:
-            served.kernel.advance(due)
-            theirs.to_send(due)
-        live.advance(at + 90 * MILLISECOND)
-    assert [str(line) for line in shown] == [str(line) for line in expected]
-    assert len(shown) == 7
+        live.advance(live.now + 100 * MILLISECOND)
+        places[number].exchange(data, live.now)
+        live.advance(live.now + 90 * MILLISECOND)
+    told = [(frame.link, frame.direction, frame.meaning[:15]) for frame in shown]
+    rubbish = told.pop(4)
+    position = "read M1_POS_ACT"
+    asked = [(link, way, position) for link in ("tcp-1", "rtu-1", "tcp-1") for way in (FrameDirection.IN, FrameDirection.OUT)]
+    assert told == asked
+    assert (rubbish[0], shown[4].meaning) == ("rtu-1", RUBBISH)
 
 
 def test_characters_of_a_world_are_shown_with_the_line_where_there_are_several() -> None:
@@ -268,3 +262,39 @@ def test_a_real_serial_port_has_the_gap_of_a_uart() -> None:
     port = PlacePort(live, "bus", "serial", "serial")
     port.exchange(b"\x01\x03", live.now)
     assert live.deadline() == SECOND + 750_000
+
+
+@pytest.mark.parametrize("kind", ["tcp", "rtu"])
+def test_reads_that_change_nothing_are_not_recorded(kind: str) -> None:
+    """Neither in the session nor in the trace; the session replays to the same digest all the same. Writes are in both."""
+    read = READ if kind == "tcp" else bytes.fromhex("01 03 27 24 00 02 8e b4")
+    write = bytes.fromhex("00 01 00 00 00 06 01 05 07 d0 ff 00")
+    world = World.from_toml(LINE)
+    live = LiveWorld(world)
+    shown: list[FrameLine] = []
+    follow_frames(live, shown.append)
+    port, writer = PlacePort(live, "bus", f"{kind}-1", kind), PlacePort(live, "bus", "tcp-2", "tcp")
+    for step in range(20):
+        live.advance(live.now + 10 * MILLISECOND)
+        assert port.exchange(read, live.now)
+        if step == 10:
+            writer.exchange(write, live.now)
+    assert [given.what.data for given in world.inputs if isinstance(given.what, Bytes)] == [write]
+    assert [record.subject for record in world.trace.frames()] == ["tcp-2/in", "tcp-2/out"]
+    assert len(shown) == 42
+    session = session_of(world)
+    assert session.replay().trace.digest() == session.digest
+
+
+def test_a_read_in_pieces_or_under_a_fault_is_recorded() -> None:
+    world = World.from_toml(LINE)
+    live = LiveWorld(world)
+    port = PlacePort(live, "bus", "tcp-1", "tcp")
+    port.exchange(READ[:5], live.now)
+    port.exchange(READ[5:], live.now)
+    port.exchange(READ, live.now)
+    world.fault("exception code=6 nth=2")
+    port.exchange(READ, live.now)
+    assert [len(given.what.data) for given in world.inputs if isinstance(given.what, Bytes)] == [5, 7, 12]
+    session = session_of(world)
+    assert session.replay().trace.digest() == session.digest

@@ -5,13 +5,13 @@ the findings there anew, and the difference is for review.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from steptwin.diagnostics import Source, render
+from steptwin.diagnostics import SourceText, render
 from steptwin.m1486 import findings
 from steptwin.m1486.check import check
 from steptwin.m1486.lines import DUAL_DAC, STEP_DIRECTION, TWO_DACS, interface
@@ -37,7 +37,7 @@ def read(file: Path) -> tuple[str, str, str]:
 def findings_of(options: str, program: str) -> str:
     name, _, driver = options.removeprefix("# ").partition(" ")
     checked = check(program, variant(name), interface(driver))
-    return render(Source("program", program), checked.diagnostics) + "\n"
+    return render(SourceText("program", program), checked.diagnostics) + "\n"
 
 
 @pytest.mark.parametrize("file", sorted(GOLDEN.glob("*.golden")), ids=lambda file: file.stem)
@@ -329,3 +329,75 @@ if __name__ == "__main__":
     for golden in sorted(GOLDEN.glob("*.golden")):
         chosen, source, _ = read(golden)
         golden.write_text(f"{HEADER}\n{chosen}\n{PROGRAM}{source}{FINDINGS}{findings_of(chosen, source)}")
+
+
+moves = st.one_of(
+    st.tuples(st.sampled_from(["F", "B", "G", "="]), st.integers(1, 5).map(lambda n: 640 * n)),
+    st.tuples(st.sampled_from(["D", "R", "R", "H", "C100", "G+", "T3"]), st.none()),
+)
+bodies = st.recursive(
+    st.lists(moves, max_size=5),
+    lambda body: st.lists(st.one_of(moves, st.tuples(st.integers(1, 3), body)), max_size=5),
+    max_leaves=12,
+)
+
+
+class Walk:
+    """Loops unrolled, by recursion: where the counter is, and where G and H find it below 0."""
+
+    def __init__(self, body: list[Any]) -> None:
+        self.lines: list[str] = []
+        self.position: int | None = 0
+        self.distance: int | None = 64_000
+        self.passed: set[int] = set()
+        self.write(body)
+        self.do(body, 1)
+
+    def write(self, body: list[Any]) -> None:
+        for what, argument in body:
+            if isinstance(what, int):
+                self.lines.append(f"L{what}")
+                self.write(argument)
+                self.lines.append("E")
+            else:
+                self.lines.append(f"{what}{'' if argument is None else argument}")
+
+    def do(self, body: list[Any], line: int) -> int:
+        """From this line on; returns the line behind."""
+        for what, argument in body:
+            begin, line = line, line + 1
+            if isinstance(what, int):
+                for _ in range(what):
+                    line = self.do(argument, begin + 1)
+                line += 1
+                continue
+            if what in ("G", "H"):
+                if self.position is not None and self.position < 0:
+                    self.passed.add(begin)
+                self.distance = None if self.position is None else (argument or 0) - self.position % 2**24
+            elif what in ("F", "B"):
+                self.distance = argument if what == "F" else -argument
+            elif what == "D":
+                self.distance = None if self.distance is None else -self.distance
+            elif what == "G+":
+                self.distance = None
+            elif what == "R":
+                self.position = None if None in (self.position, self.distance) else self.position + self.distance  # type: ignore[operator]
+            elif what in ("=", "C100"):
+                self.position = argument or 0
+        return line
+
+
+@given(bodies)
+def test_where_the_counter_passes_0_is_found_through_all_loops(body: list[Any]) -> None:
+    """Loops stand inside one another up to four levels (M-5); the walk knows no levels."""
+    walk = Walk(body)
+    depth = most = 0
+    for line in walk.lines:
+        depth += line.startswith("L") - (line == "E")
+        most = max(most, depth)
+    assume(most <= 4)
+    text = "".join(f"{line}\n" for line in walk.lines)
+    source = SourceText("", text)
+    passed = {source.position(one.span.start)[0] for one in check(text, B, DUAL_DAC).diagnostics if one.code == "M221"}
+    assert passed == walk.passed

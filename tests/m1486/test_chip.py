@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 from m1486_rig import Bench
 
 from steptwin.errors import Misuse, TimeReversal
-from steptwin.m1486.chip import EVENT_CODES, M1486, SHUTDOWN_RESET_NS, Event
+from steptwin.m1486.chip import SHUTDOWN_RESET_NS, M1486Chip
 from steptwin.m1486.eeprom import image_of
-from steptwin.m1486.lines import DUAL_DAC, STEP_DIRECTION, TWO_DACS
+from steptwin.m1486.events import EVENTS, M1486Event
+from steptwin.m1486.lines import DUAL_DAC, STEP_DIRECTION, TWO_DACS, Interface
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import VARIANTS, Variant, variant
-from steptwin.machine import MILLISECOND, SECOND, Edge
+from steptwin.machine import MILLISECOND, SECOND, PinEdge
 
 
 def image(kind: str, *lines: str) -> bytes:
@@ -30,7 +31,7 @@ def image(kind: str, *lines: str) -> bytes:
 @pytest.mark.parametrize("v", VARIANTS, ids=lambda v: v.name)
 def test_defaults(v: Variant) -> None:
     for interface, m in ((STEP_DIRECTION, 1), (DUAL_DAC, 4), (TWO_DACS, 4)):
-        chip = M1486(v, interface=interface)
+        chip = M1486Chip(v, interface=interface)
         drive = chip.drive
         assert (drive.distance_u, drive.microstep, drive.qualification, drive.characteristic) == (64_000, m, 1, 1)
         assert (drive.velocity, drive.profile_speed, drive.start_stop, drive.acceleration) == (1000, 25_000, 200, 5000)
@@ -313,7 +314,7 @@ def test_baud_rates_are_read_with_rst(br1: int, br0: int, baud: int) -> None:
         assert bench.chip.uart.baud == 4800 * clock
         bench.pin(RST=1)
         assert bench.chip.uart.baud == baud * clock
-        assert M1486(variant(kind), baud=baud * clock).uart.baud == baud * clock
+        assert M1486Chip(variant(kind), baud=baud * clock).uart.baud == baud * clock
 
 
 def test_with_line_timing_characters_take_their_time() -> None:
@@ -348,8 +349,8 @@ def test_it_does_not_matter_in_which_pieces_characters_come(cuts: list[int], is_
 PROGRAM = (b":3\r", b"[\r@1\rl3\r+5\ri1l2\re\rc2\rf1280\rr\rt2\ru4\rw20\r@2\rz3\ro3\r(2\rj1\r]\r", b"k\r", b"u1\ru4\r", b"c75\r")
 
 
-def busy_chip(kind: str, is_timed: bool, statement_ns: int | None) -> M1486:
-    return M1486(variant(kind), is_timed=is_timed, statement_ns=statement_ns)
+def busy_chip(kind: str, is_timed: bool, statement_ns: int | None) -> M1486Chip:
+    return M1486Chip(variant(kind), is_timed=is_timed, statement_ns=statement_ns)
 
 
 class Action(NamedTuple):
@@ -360,16 +361,18 @@ class Action(NamedTuple):
     pin: str = ""
     level: int = 0
 
-    def do(self, chip: M1486) -> None:
+    def do(self, chip: M1486Chip) -> None:
         if self.pin:
             chip.set_pin(self.pin, self.level, self.at)
         else:
             chip.receive(self.data, self.at)
 
 
-def drive(chip: M1486, plan: list[Action], extra: list[int]) -> tuple[list[Event], list[Edge], list[tuple[int, bytes]]]:
+def drive(
+    chip: M1486Chip, plan: list[Action], extra: list[int]
+) -> tuple[list[M1486Event], list[PinEdge], list[tuple[int, bytes]]]:
     """Do what the plan says at its moments; look at the chip at ``extra`` moments too."""
-    edges: list[Edge] = []
+    edges: list[PinEdge] = []
     sent: list[tuple[int, bytes]] = []
     for moment in sorted({*extra, *(action.at for action in plan)}):
         chip.advance(moment)
@@ -470,7 +473,7 @@ def test_every_event_has_a_known_code() -> None:
     bench.do("[", "u20", "]", "f64", "r", "w1", "c2", "y", "k", "c75", "\\")
     bench.chip.power_cycle(bench.now)
     bench.pin(RST=1)
-    assert {event.code for event in bench.chip.events} <= EVENT_CODES.keys()
+    assert {event.code for event in bench.chip.events} <= EVENTS.keys()
     assert [event.time for event in bench.chip.events] == sorted(event.time for event in bench.chip.events)
 
 
@@ -479,16 +482,47 @@ def test_every_event_has_a_known_code() -> None:
 
 def test_what_a_chip_cannot_be() -> None:
     with pytest.raises(Misuse, match="address 16: four pins give 0 to 15"):
-        M1486(address=16)
+        M1486Chip(address=16)
     with pytest.raises(Misuse, match="9600 bit/s: M1486A has 300, 1200, 2400, 4800"):
-        M1486(baud=9600)
+        M1486Chip(baud=9600)
     with pytest.raises(Misuse, match="statement_ns = -1: must not be negative"):
-        M1486(statement_ns=-1)
+        M1486Chip(statement_ns=-1)
     with pytest.raises(Misuse, match="not the stored file of an M1486"):
-        M1486(variant("E1"), image=b"abc")
+        M1486Chip(variant("E1"), image=b"abc")
     with pytest.raises(Misuse, match=r"the snapshot is of M1486B .* M1486A"):
-        M1486(variant("A")).restore(M1486(variant("B")).snapshot())
-    snapshot = M1486().snapshot()
+        M1486Chip(variant("A")).restore(M1486Chip(variant("B")).snapshot())
+    snapshot = M1486Chip().snapshot()
     with pytest.raises(Misuse):
-        M1486(is_timed=True).restore(snapshot)
-    M1486().restore(replace(snapshot))
+        M1486Chip(is_timed=True).restore(snapshot)
+    M1486Chip().restore(replace(snapshot))
+
+
+@pytest.mark.parametrize("off", [True, False])
+def test_what_is_due_happens_before_the_power_goes(off: bool) -> None:
+    """Whether somebody looked before or not: a move of 40 ms, and a character that is on its way."""
+    found = []
+    for looks in (False, True):
+        bench = Bench("B", is_timed=True, baud=4800)
+        bench.do("f640")
+        bench.send("r", "u20")
+        end = bench.now + SECOND // 20
+        if looks:
+            bench.chip.advance(end)
+        if off:
+            bench.chip.power_off(end)
+        else:
+            bench.chip.power_cycle(end)
+        found.append((bench.chip.now, bench.true, [event.text for event in bench.chip.events], bench.chip.to_send(end)))
+    assert found[0] == found[1]
+    assert found[0][1] == 640
+
+
+@pytest.mark.parametrize(("driver", "levels"), [(STEP_DIRECTION, (0, 1)), (DUAL_DAC, (1, 0)), (TWO_DACS, (1, 1))])
+def test_a_driver_interface_is_tied_by_its_pins(driver: Interface, levels: tuple[int, int]) -> None:
+    """Chapter II: S&D low chooses Step & Direction, else DUAL low the DUAL DAC; read again when RST goes high."""
+    bench = Bench("B", interface=driver)
+    assert (bench.level("S&D"), bench.level("DUAL")) == levels
+    for level in (1, 0):
+        bench.pin(RST=level)
+        bench.run(ms=20)
+    assert bench.chip.interface is driver

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.m1486.eeprom import image_of, pack, unpack
-from steptwin.m1486.memory import Image
+from steptwin.m1486.memory import StoredFile
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import variant
 
@@ -19,12 +19,12 @@ labels = st.dictionaries(st.integers(1, 80), st.integers(0, 250), max_size=80)
 
 @given(codes, labels)
 def test_what_was_packed_is_unpacked(code: bytes, labels: dict[int, int]) -> None:
-    image = Image(code, {label: min(place, len(code)) for label, place in labels.items()})
+    image = StoredFile(code, {label: min(place, len(code)) for label, place in labels.items()})
     assert unpack(pack(image), E1) == image
 
 
 def test_a_label_beyond_byte_255() -> None:
-    image = Image(bytes(0x180), {1: 0x17F})
+    image = StoredFile(bytes(0x180), {1: 0x17F})
     assert unpack(pack(image), E2) == image
 
 
@@ -44,15 +44,15 @@ def test_any_bytes_are_a_file_or_refused(data: bytes) -> None:
 
 def test_a_file_that_does_not_fit_the_variant_is_refused() -> None:
     with pytest.raises(Misuse, match="takes 2008 bits: M1486E1 has 2000"):
-        unpack(pack(Image(bytes(251), {})), E1)
-    assert unpack(pack(Image(bytes(251), {})), E2) is not None
+        unpack(pack(StoredFile(bytes(251), {})), E1)
+    assert unpack(pack(StoredFile(bytes(251), {})), E2) is not None
     with pytest.raises(Misuse, match="labels that M1486C does not have: permitted are 1 to 15"):
-        unpack(pack(Image(b"R", {16: 0})), variant("C"))
+        unpack(pack(StoredFile(b"R", {16: 0})), variant("C"))
 
 
 def test_a_program_becomes_the_file_that_downloading_it_gives() -> None:
     for text in ("[\n@3\nR ; go\nj3\n]\n", "@3\nR\nj3"):
-        assert unpack(image_of(parse(text).program, E1), E1) == Image(b"RJ\x03", {3: 0})
+        assert unpack(image_of(parse(text).program, E1), E1) == StoredFile(b"RJ\x03", {3: 0})
 
 
 @pytest.mark.parametrize("text", ["[\nR\n]\n[\nR\n]", "x3\nR", "R\nk", "\\\nR", "R\nc75"])

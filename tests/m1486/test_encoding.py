@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.m1486.commands import TABLE, Kind, When, takes_variable
+from steptwin.m1486.commands import TABLE, ArgType, When, takes_variable
 from steptwin.m1486.encoding import LONGEST, SIZES, decode, encode
-from steptwin.m1486.syntax import Command, Condition, parse_line
+from steptwin.m1486.syntax import Command, JumpCondition, parse_line
 from steptwin.m1486.variants import variant
 
 B = variant("B")
@@ -33,12 +33,12 @@ def stored_commands() -> list[Command]:
     for spec in TABLE:
         if spec.when is not When.QUEUED:
             continue
-        if spec.kind is Kind.NONE:
+        if spec.kind is ArgType.NONE:
             cases.append(Command(spec.key))
             continue
         values = spec.permitted(B)
         cases += [
-            Command(spec.key, Condition(number, number % 2 == 0, 80) if spec.kind is Kind.CONDITION else number)
+            Command(spec.key, JumpCondition(number, number % 2 == 0, 80) if spec.kind is ArgType.CONDITION else number)
             for number in {values[0], values[-1], values[len(values) // 2]}
         ]
         if takes_variable(spec.key):
@@ -63,7 +63,7 @@ def test_m_24_g_plus_and_minus_take_as_much_as_g() -> None:
 @given(st.binary(min_size=LONGEST, max_size=LONGEST))
 def test_m_29_any_bytes_are_a_command_or_none(raw: bytes) -> None:
     stored = decode(raw)
-    if stored is not None and not isinstance(stored.command.argument, Condition):
+    if stored is not None and not isinstance(stored.command.argument, JumpCondition):
         assert encode(stored.command)[: stored.size] == raw[: stored.size] or stored.command.from_variable
 
 

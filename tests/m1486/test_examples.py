@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from m1486_rig import Bench
 
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
@@ -107,7 +107,7 @@ def test_example_5_bcd_digits_through_a_multiplexer(manual_examples: dict[int, s
 
 @pytest.mark.parametrize("is_timed", [False, True])
 def test_example_6_two_chips_joined_by_a_wire(manual_examples: dict[int, str], is_timed: bool) -> None:
-    chips = {n: M1486(variant("B"), address=n, is_timed=is_timed) for n in (0, 7)}
+    chips = {n: M1486Chip(variant("B"), address=n, is_timed=is_timed) for n in (0, 7)}
     world = Kernel()
     for n, chip in chips.items():
         world.add(f"chip {n}", chip)

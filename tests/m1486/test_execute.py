@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pytest
 from m1486_rig import Bench
 
-from steptwin.m1486.commands import TABLE, CommandSpec, Kind, When, find, takes_variable
+from steptwin.m1486.commands import TABLE, ArgType, CommandSpec, When, find, takes_variable
 from steptwin.m1486.encoding import decode
-from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 from steptwin.machine import MILLISECOND
 
@@ -27,26 +27,26 @@ every_variant = pytest.mark.parametrize("v", VARIANTS, ids=lambda v: v.name)
 
 def taken(spec: CommandSpec, v: Variant) -> Iterator[Command]:
     """A row's command with its least and largest number, and without one."""
-    if spec.kind is Kind.NONE:
+    if spec.kind is ArgType.NONE:
         yield Command(spec.key)
         return
     values = spec.permitted(v)
     for number in (values[0], values[-1]):
-        yield Command(spec.key, Condition(number, True, v.labels) if spec.kind is Kind.CONDITION else number)
+        yield Command(spec.key, JumpCondition(number, True, v.labels) if spec.kind is ArgType.CONDITION else number)
     if takes_variable(spec.key):
         yield Command(spec.key)
 
 
 def refused(spec: CommandSpec, v: Variant) -> Iterator[str]:
     """The same with the numbers next to the permitted ones, and with a number too many."""
-    if spec.kind is Kind.NONE:
+    if spec.kind is ArgType.NONE:
         yield f"{spec.key}1" if len(spec.key) == 1 and find(spec.key, 1, v) is None else f"{spec.key}x"
         return
     values = spec.permitted(v)
     for number in (values[0] - 1, values[-1] + 1):
         if number >= 0 and find(spec.key, number, v) is None:
-            yield f"{spec.key}{number}" + ("h1" if spec.kind is Kind.CONDITION else "")
-    if spec.kind is Kind.CONDITION:
+            yield f"{spec.key}{number}" + ("h1" if spec.kind is ArgType.CONDITION else "")
+    if spec.kind is ArgType.CONDITION:
         yield from (f"I1L{v.labels + 1}", "I1L0", "I1X1", "I1H")
 
 

@@ -12,7 +12,7 @@ from steptwin.m1486.commands import find
 from steptwin.m1486.flow import Settings, defaults, follow
 from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.structure import Stream, streams
-from steptwin.m1486.syntax import Condition, parse
+from steptwin.m1486.syntax import JumpCondition, parse
 from steptwin.m1486.variants import variant
 
 B = variant("B")
@@ -57,7 +57,7 @@ def walk(stream: Stream, chance: random.Random) -> Iterator[tuple[int, Settings]
         target: int | None = at + 1
         if key == "J":
             target = stream.resolve(at, number)
-        elif isinstance(command.argument, Condition):
+        elif isinstance(command.argument, JumpCondition):
             target = stream.resolve(at, command.argument.label) if chance.random() < 0.5 else target
         elif key == "'":
             target, home = (stream.resolve(at, number) if home < 0 else None), at

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.uart import MOST_WAITING
 from steptwin.m1486.variants import variant
@@ -15,7 +15,7 @@ from steptwin.machine import MILLISECOND, SECOND
 
 
 def chain(*addresses: int, kind: str = "B", baud: int = 4800, is_timed: bool = False) -> SerialChain:
-    return SerialChain(M1486(variant(kind), address=address, baud=baud, is_timed=is_timed) for address in addresses)
+    return SerialChain(M1486Chip(variant(kind), address=address, baud=baud, is_timed=is_timed) for address in addresses)
 
 
 def talk(line: SerialChain, *commands: str, now: int = 0) -> bytes:
@@ -150,6 +150,6 @@ def test_what_cannot_be_on_one_line() -> None:
     with pytest.raises(Misuse, match="at least one chip"):
         chain()
     with pytest.raises(Misuse, match="different baud rates on one line: 300, 4800 bit/s"):
-        SerialChain([M1486(address=1, baud=300), M1486(address=2, baud=4800)])
+        SerialChain([M1486Chip(address=1, baud=300), M1486Chip(address=2, baud=4800)])
     with pytest.raises(Misuse, match="with and without line timing"):
-        SerialChain([M1486(address=1), M1486(address=2, is_timed=True)])
+        SerialChain([M1486Chip(address=1), M1486Chip(address=2, is_timed=True)])

@@ -6,7 +6,7 @@ import pytest
 from m1486_rig import Bench
 
 from steptwin.m1486.commands import memory_bits
-from steptwin.m1486.memory import CommandMemory, FileState, Image
+from steptwin.m1486.memory import CommandMemory, FileState, StoredFile
 from steptwin.m1486.variants import VARIANTS, variant
 
 
@@ -64,7 +64,7 @@ def test_labels_of_a_file_are_there_when_the_file_is() -> None:
     memory.label(3)
     memory.store(b"R")
     assert memory.labels == {}
-    assert memory.close_file() == Image(b"R", {3: 0})
+    assert memory.close_file() == StoredFile(b"R", {3: 0})
     assert memory.labels == {3: 1}
 
 
@@ -89,7 +89,7 @@ def test_registers_1_to_8_are_the_last_128_bits_of_the_memory(kind: str) -> None
         assert memory.register(number) == 0x1100 * number + number
         assert memory.fetch(first + 2 * number - 2)[:2] == bytes((number, 0x11 * number))
     # Commands that come there are what the registers hold.
-    memory.load(Image(b"\xaa" * (first + 2), {}))
+    memory.load(StoredFile(b"\xaa" * (first + 2), {}))
     assert memory.register(1) == 0xAAAA
     assert memory.register(2) == 0
 
@@ -98,7 +98,7 @@ def test_registers_1_to_8_are_the_last_128_bits_of_the_memory(kind: str) -> None
 def test_other_variants_have_registers_of_their_own(kind: str) -> None:
     memory = memory_of(kind)
     memory.set_register(8, 0x12345)
-    memory.load(Image(b"\xaa" * memory.size, {}))
+    memory.load(StoredFile(b"\xaa" * memory.size, {}))
     assert memory.register(8) == 0x2345
     memory.reset()
     assert memory.register(8) == 0

@@ -91,7 +91,7 @@ def test_m_6_the_speed_is_the_integral_of_its_acceleration(start: int, knee: int
     steps = 2000
     # M-6: above P the acceleration at speed v is A √((V − v) / (V − P)).
     span = (top - start) / acc * 3 + 0.01
-    v, x, dt = float(top if top <= start else start), 0.0, span / steps
+    v, x, dt = float(min(top, start)), 0.0, span / steps
     for _ in range(steps):
 
         def slope(v: float) -> float:

@@ -8,7 +8,7 @@ import pytest
 from held import held
 from m1486_rig import Bench, seconds
 
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.program import BURST, BURST_NS
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
@@ -106,7 +106,7 @@ def test_a_label_given_anew_counts_for_commands_that_were_done_before() -> None:
 
 def test_commands_that_are_overwritten_in_the_ring_leave_nothing_behind() -> None:
     """A command that names a label is compiled again wherever the ring has brought it."""
-    chip = M1486(variant("B"), statement_ns=0)
+    chip = M1486Chip(variant("B"), statement_ns=0)
 
     def level(commands: int) -> int:
         for _ in range(commands):

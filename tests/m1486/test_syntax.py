@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.diagnostics import Fix, Span
-from steptwin.m1486.syntax import Command, Condition, Line, Program, format_program, parse, parse_line
+from steptwin.m1486.syntax import Command, JumpCondition, ProgramLine, ProgramText, format_program, parse, parse_line
 from steptwin.m1486.variants import Variant, variant
 
 if TYPE_CHECKING:
@@ -60,9 +60,9 @@ MANUAL = {
     "C85": Command("C", 85),
     "?14": Command("?", 14),
     "-10": Command("-", 10),
-    "i87H5": Command("I", Condition(87, True, 5)),
-    "i7h3": Command("I", Condition(7, True, 3)),
-    "i1l6": Command("I", Condition(1, False, 6)),
+    "i87H5": Command("I", JumpCondition(87, True, 5)),
+    "i7h3": Command("I", JumpCondition(7, True, 3)),
+    "i1l6": Command("I", JumpCondition(1, False, 6)),
     "<3": Command("<", 3),
     "+5": Command("+", 5),
     "*2": Command("*", 2),
@@ -106,7 +106,7 @@ def test_m_1_comments_and_line_feeds_are_ignored() -> None:
 def test_m_2_blanks_are_ignored() -> None:
     assert commands("  F\t640 \n i 2 H 3\nG +\nX G") == [
         Command("F", 640),
-        Command("I", Condition(2, True, 3)),
+        Command("I", JumpCondition(2, True, 3)),
         Command("G+"),
         Command("XG"),
     ]
@@ -130,7 +130,7 @@ def test_spans_point_into_the_text() -> None:
     forward, condition = parse(text).program.commands
     assert text[forward.span.start : forward.span.end] == "F 640"
     assert text[forward.argument_span.start : forward.argument_span.end] == "640"
-    assert isinstance(condition.argument, Condition)
+    assert isinstance(condition.argument, JumpCondition)
     assert text[condition.argument.label_span.start : condition.argument.label_span.end] == "13"
 
 
@@ -261,5 +261,5 @@ def test_any_text_is_read_and_survives_print(text: str) -> None:
 
 
 def test_equality_is_about_meaning_not_place() -> None:
-    assert parse("F640").program == parse("  f 640").program == Program((Line(Command("F", 640)),))
+    assert parse("F640").program == parse("  f 640").program == ProgramText((ProgramLine(Command("F", 640)),))
     assert parse("I2H3").program != parse("I2L3").program

@@ -6,6 +6,8 @@ import pytest
 
 from steptwin.errors import Misuse
 from steptwin.m1486 import functions, lines, microsteps, registers
+from steptwin.m1486.lines import SHARED_PINS
+from steptwin.m1486.pins import ALIASES
 
 
 def test_functions_have_the_names_and_defaults_of_the_manual() -> None:
@@ -58,3 +60,17 @@ def test_pairs_of_microsteps() -> None:
 def test_size_and_speed_limit_of_a_microstep(microstep: int, size: int, limit: float) -> None:
     assert microsteps.microstep_size(microstep) == size
     assert microsteps.low_range_limit(microstep) == limit
+
+
+def test_pins_of_lines_that_are_something_else_besides() -> None:
+    """Chapter VI: BR0, BR1 and ADDR0 to ADDR3 are read when RST goes high, JOG DIRECTION whenever JOG does."""
+    assert {line: text.partition(",")[0] for line, text in SHARED_PINS.items()} == {
+        5: "BR0",
+        6: "BR1",
+        7: "JOG DIRECTION",
+        18: "ADDR0",
+        19: "ADDR1",
+        20: "ADDR2",
+        21: "ADDR3",
+    }
+    assert {ALIASES[text.partition(",")[0]] for text in SHARED_PINS.values()} == {f"B{line}" for line in SHARED_PINS}

@@ -9,14 +9,14 @@ import pytest
 from mic488_rig import WORDS, Rig, word_pdu
 
 from steptwin.mic488.behaviour import BEHAVIOUR, Behaviour, Bit, OfAxis, OfDevice, checked
-from steptwin.mic488.registermap import Row, Space, Type
+from steptwin.mic488.registermap import MapRow, Space, Type
 from steptwin.mic488.registers import ROWS
 from steptwin.tables import IncompleteTable
 
 _OF_KEY = {row.key: row for row in ROWS}
 
 
-def _row(of: str, **changes: Any) -> Row:
+def _row(of: str, **changes: Any) -> MapRow:
     return replace(_OF_KEY[of], key="NEW", name="NEW{n}", **changes)
 
 
@@ -58,7 +58,7 @@ def _write(*_: object) -> None: ...
         ),
     ],
 )
-def test_a_register_without_what_it_does_is_refused(row: Row | None, behaviour: Behaviour | None, message: str) -> None:
+def test_a_register_without_what_it_does_is_refused(row: MapRow | None, behaviour: Behaviour | None, message: str) -> None:
     rows = ROWS if row is None else (*ROWS, row)
     with pytest.raises(IncompleteTable) as caught:
         checked(rows, BEHAVIOUR if behaviour is None else {**BEHAVIOUR, "NEW": behaviour})

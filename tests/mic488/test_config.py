@@ -232,7 +232,7 @@ def test_one_error(text: str, code: str, message: str, hint: str) -> None:
         ("[Axis0]\n[Vision]", "C005", "the section [Vision] is not known and has no effect"),
         ("[IN0]\n[IN20]\nLevel=1", "C005", "the section [IN20] is not known; did you mean [IN2]?"),
         ("[Axis0]\nsomething", "C001", "'something' has no effect"),
-        ("Gear=1\n[Axis0]", "C001", "'Gear=1' stands before the first [section] and has no effect"),
+        ("Gear=1\n[Axis0]", "C001", "'Gear=1' is before the first [section] and has no effect"),
         ("[Axis0]\nGear=1\ngear=2", "C003", "[Axis0] gear is repeated; the first one counts"),
         ("[Axis0]\n[AXIS0]", "C003", "the section [AXIS0] is repeated"),
         ("[Axis0]\nInKL=11\n[Axis1]\nPosCtrlMode=1", "C010", "[Axis0] InKL = 11 is channel C of encoder 2, which axis M2 uses"),

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.mic488.describe import Scale, Wording
+from steptwin.mic488.describe import AxisScale, Wording
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import FIRMWARES, register_map
 
-MM = Scale("mm", 100.0)
-REV = Scale("rev", 12800.0)
+MM = AxisScale("mm", 100.0)
+REV = AxisScale("rev", 12800.0)
 
 
-def wording(data_type: DataType = DataType.REAL, scales: tuple[Scale, ...] = (MM, MM, MM, MM), name: str = "1.70") -> Wording:
+def wording(data_type: DataType = DataType.REAL, scales: tuple[AxisScale, ...] = (MM, MM, MM, MM), name: str = "1.70") -> Wording:
     return Wording(register_map(name), scales, data_type)
 
 
@@ -128,7 +128,7 @@ def test_a_response_without_its_request_shows_what_can_be_known() -> None:
 
 def test_dint_shows_pulses_and_units() -> None:
     """Manual 4.9: 12800 imp/rev, 2.5 rev/s are 32000, 57600 imp are 4.5 rev."""
-    words = wording(DataType.DINT, (REV, REV, MM, Scale("imp", 1.0)))
+    words = wording(DataType.DINT, (REV, REV, MM, AxisScale("imp", 1.0)))
     assert words.request(pdu("10 2754 0002 04 7D00 0000")) == "write M1_VEL_ABS = 32000 imp/s (2.5 rev/s)"
     assert words.response(pdu("03 04 E100 0000"), pdu(READ_POSITION_1_70)) == "read M1_POS_ACT = 57600 imp (4.5 rev)"
     two = words.response(pdu("03 08 E100 0000 FFFF FFFF"), pdu("03 2726 0004"))

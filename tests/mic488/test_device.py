@@ -29,12 +29,12 @@ from mic488_rig import (
 )
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import MILLISECOND, SECOND, Edge, Nanos
+from steptwin.machine import MILLISECOND, SECOND, Nanos, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig, ProgramConfig
-from steptwin.mic488.device import Mic488, Snapshot, pause_observer
+from steptwin.mic488.device import ControllerSnapshot, Mic488Device, pause_observer
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program import ProgramControl
-from steptwin.mic488.vision import Record
+from steptwin.mic488.vision import VisionRecord
 from steptwin.state import Stateful
 
 BUSY = ControllerConfig(
@@ -76,7 +76,7 @@ def test_mic_27_parameters_come_from_the_configuration() -> None:
 
 def test_unknown_firmware_is_misuse() -> None:
     with pytest.raises(Misuse, match=r"unknown firmware '1\.71'; permitted: 1\.23, 1\.40, 1\.70"):
-        Mic488(ControllerConfig(), "1.71")
+        Mic488Device(ControllerConfig(), "1.71")
 
 
 def test_mic_27_power_cycle_forgets_everything_but_terminals_shafts_and_stored_registers() -> None:
@@ -107,7 +107,7 @@ def test_mic_27_power_cycle_forgets_everything_but_terminals_shafts_and_stored_r
     fresh = Rig(rig.device.config)
     for block, count in ((10000, 14), (10020, 40), (10100, 16), (10120, 16), (0, 125), (1000, 125)):
         assert rig.read_words(block, count) == fresh.read_words(block, count), block
-    assert set(rig.edges) == {Edge(SECOND, pin, 0.0) for pin in ("OUT5", "M1_EN", "M2_EN", "ERR")}
+    assert set(rig.edges) == {PinEdge(SECOND, pin, 0.0) for pin in ("OUT5", "M1_EN", "M2_EN", "ERR")}
     assert len(rig.edges) == 4
     assert (rig.pins()["IN7"], rig.pins()["AIN1"]) == (1.0, 2.5)
     assert rig.bits(2, 5006, 1) == [1]  # as it lies there, without waiting
@@ -159,7 +159,7 @@ def test_a_command_at_a_moment_comes_after_what_is_due_then() -> None:
 def test_events_due_at_one_moment_without_end_are_a_runaway(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = Rig()
     monkeypatch.setattr(ProgramControl, "deadline", lambda program: 5)
-    rig.device.touch()
+    rig.device.command(lambda now: None, 0)
     with pytest.raises(Runaway, match="more than 10000 events of one MIC488 at 5 ns"):
         rig.device.advance(10)
 
@@ -374,14 +374,14 @@ def test_hooks_are_no_part_of_a_snapshot() -> None:
 
 def test_a_snapshot_belongs_to_its_firmware_and_configuration() -> None:
     snapshot = Rig(firmware="1.40").device.snapshot()
-    assert isinstance(snapshot, Snapshot)
+    assert isinstance(snapshot, ControllerSnapshot)
     with pytest.raises(Misuse, match=r"the snapshot is of firmware 1\.40, this controller has 1\.70"):
         Rig().device.restore(snapshot)
     with pytest.raises(Misuse, match="another configuration"):
         Rig(controller(AxisConfig(gear=2.0)), "1.40").device.restore(snapshot)
 
 
-def parts_of(device: Mic488) -> list[Stateful]:
+def parts_of(device: Mic488Device) -> list[Stateful]:
     axis = device.axes[0]
     return [device, device.inputs, device.program, axis, axis.homing, axis.encoder, axis.control]
 
@@ -450,7 +450,7 @@ def test_a_store_that_fails_is_answered_with_exception_04_and_keeps_the_old_copy
 @pytest.mark.parametrize(("firmware", "memory", "permitted"), [("1.70", bytes(1999), 2000), ("1.23", bytes(2), 0)])
 def test_memory_of_the_wrong_size_is_misuse(firmware: str, memory: bytes, permitted: int) -> None:
     with pytest.raises(Misuse, match=f"firmware {firmware} take {permitted} bytes, not {len(memory)}"):
-        Mic488(ControllerConfig(), firmware, memory=memory)
+        Mic488Device(ControllerConfig(), firmware, memory=memory)
 
 
 # ---------------------------------------------------------------------- program control
@@ -462,7 +462,7 @@ def test_an_empty_bank_lights_err_and_mic_22_reads_stopped() -> None:
     rig.wait(1.0)
     rig.word("PROGRAM_CTRL", 1)
     assert (rig.word("PROGRAM_CTRL"), rig.word("M_STATUS"), rig.pins()["ERR"]) == (0, 2, 1.0)
-    assert rig.edges == [Edge(SECOND, "ERR", 1.0)]
+    assert rig.edges == [PinEdge(SECOND, "ERR", 1.0)]
     assert [event.text for event in rig.events("program-error")] == ["program bank 4 is empty"]
 
 
@@ -503,12 +503,12 @@ def test_an_unexpected_failure_of_a_request_is_answered_and_told() -> None:
 @pytest.mark.parametrize(("firmware", "status"), [("1.70", 3), ("1.40", 0)])
 def test_wbc_13_an_error_of_the_modbus_master_is_shown_after_all_others(firmware: str, status: int) -> None:
     rig = Rig(firmware=firmware)
-    rig.device.master_error = True
+    rig.device.set_master_error(True, rig.now)
     assert rig.word("M_STATUS") == status
     rig.word("PROGRAM_CTRL", 1)
     assert rig.word("M_STATUS") == (2 if status else 0)
     rig.word("PROGRAM_CTRL", 0)
-    rig.device.master_error = False
+    rig.device.set_master_error(False, rig.now)
     assert rig.word("M_STATUS") == 0
 
 
@@ -548,8 +548,8 @@ def test_events_are_told_and_the_last_ones_kept() -> None:
 
 
 def test_an_idle_controller_is_small() -> None:
-    def some(number: int) -> Iterable[Mic488]:
-        return [Mic488(config) for _ in range(number)]
+    def some(number: int) -> Iterable[Mic488Device]:
+        return [Mic488Device(config) for _ in range(number)]
 
     config = ControllerConfig()
     some(1)
@@ -577,7 +577,7 @@ def test_a_controller_at_rest_has_nothing_to_do() -> None:
 
 @pytest.mark.parametrize(("unit", "told"), [(0, [3, 7]), (3, [3]), (7, [7])])
 def test_mic_15_a_pause_inside_a_request_is_an_event_of_those_it_was_for(unit: int, told: list[int]) -> None:
-    devices = {3: Mic488(ControllerConfig()), 7: Mic488(ControllerConfig())}
+    devices = {3: Mic488Device(ControllerConfig()), 7: Mic488Device(ControllerConfig())}
     pause_observer(devices)(unit, 1_250_000)
     text = "a request had a pause of 1.2 ms inside: the controller drops a frame at 0.75 ms (MIC-15)"
     assert {n: [(e.code, e.text) for e in d.events] for n, d in devices.items()} == {
@@ -590,7 +590,7 @@ def test_mic_15_a_pause_inside_a_request_is_an_event_of_those_it_was_for(unit: i
     [
         lambda device, now: device.set_pin("IN1", 1.0, now),
         lambda device, now: device.set_pin("AIN1", 5.0, now),
-        lambda device, now: device.see(Record(1.0, 2.0, 3.0, 4.0), now),
+        lambda device, now: device.see(VisionRecord(1.0, 2.0, 3.0, 4.0), now),
         lambda device, now: device.turn_encoder(1, 30, now),
         lambda device, now: device.couple_encoder(1, Coupling.BLOCKED, now),
         lambda device, now: device.follow_shaft(1, None, now),
@@ -600,11 +600,11 @@ def test_mic_15_a_pause_inside_a_request_is_an_event_of_those_it_was_for(unit: i
         lambda device, now: device.power_off(now),
     ],
 )
-def test_an_input_comes_after_all_that_is_due_at_its_moment(act: Callable[[Mic488, int], object]) -> None:
+def test_an_input_comes_after_all_that_is_due_at_its_moment(act: Callable[[Mic488Device, int], object]) -> None:
     """Rule 1 of the time contract: nobody need advance the controller before."""
     states = []
     for advanced in (True, False):
-        device = Mic488(controller(AxisConfig(pos_ctrl_mode=1, enc_settle_ms=20)))
+        device = Mic488Device(controller(AxisConfig(pos_ctrl_mode=1, enc_settle_ms=20)))
         device.execute(word_pdu(10014, 1), 0)
         device.execute(words_pdu(10092, 0, 0x447A), 0)  # M1_POS_REL 1000
         device.turn_encoder(1, -50, SECOND)

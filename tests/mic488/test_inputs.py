@@ -8,7 +8,7 @@ import pytest
 from mic488_rig import OUT, Rig, controller
 
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Edge
+from steptwin.machine import MILLISECOND, PinEdge
 from steptwin.mic488.config import AnalogConfig, ControllerConfig, InputConfig
 
 
@@ -150,8 +150,8 @@ def test_outputs_are_set_read_and_told_as_edges() -> None:
     rig.coil(OUT + 2, False)
     second = 1000 * MILLISECOND
     assert rig.edges == [
-        Edge(second, "OUT1", 1.0),
-        Edge(2 * second, "OUT3", 1.0),
-        Edge(3 * second, "OUT8", 1.0),
-        Edge(3 * second, "OUT3", 0.0),
+        PinEdge(second, "OUT1", 1.0),
+        PinEdge(2 * second, "OUT3", 1.0),
+        PinEdge(3 * second, "OUT8", 1.0),
+        PinEdge(3 * second, "OUT3", 0.0),
     ]

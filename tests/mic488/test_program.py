@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from mic488_rig import Rig, controller
@@ -11,10 +12,11 @@ from wbc_rig import PAUSED, RUNNING, STOPPED, ProgramRig, loaded
 
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND, Edge
+from steptwin.machine import MILLISECOND, SECOND, PinEdge
+from steptwin.mic488.axis_motion import MAX_SPEED_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
-from steptwin.mic488.device import Mic488
-from steptwin.mic488.program import load
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.program import load, setup_of
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
 from steptwin.world.kernel import Kernel, PinName, Wire
@@ -79,10 +81,10 @@ def test_a_program_with_errors_cannot_be_loaded() -> None:
 
 def test_a_program_longer_than_the_firmware_holds_is_refused() -> None:
     long = "OUT1 = ON\n" * 1001
-    device = Mic488(ControllerConfig(), "1.40")
+    device = Mic488Device(ControllerConfig(), "1.40")
     with pytest.raises(Misuse, match=r"long\.prg: 1001 executable lines, firmware 1\.40 holds 1000"):
         device.load_program(0, load(check(long), "long.prg"))
-    Mic488(ControllerConfig(), "1.70").load_program(0, load(check(long)))
+    Mic488Device(ControllerConfig(), "1.70").load_program(0, load(check(long)))
 
 
 @pytest.mark.parametrize("rows", ["", None])
@@ -188,9 +190,7 @@ def test_status_is_that_of_the_controller_from_1_70_on(firmware: str, status: in
     rig = ProgramRig("WAIT IN1 = ON\n$I0 = STATUS\nWAIT 1 = 2\n", "", None, firmware)
     rig.start()
     rig.wait(0.1)
-    for axis in rig.device.axes[:1]:
-        axis.position_lost(rig.now)
-    rig.device.touch()
+    rig.device.command(rig.device.axes[0].position_lost, rig.now)
     rig.start()
     rig.pin("IN1", 1)
     rig.wait(0.1)
@@ -231,17 +231,16 @@ BUSY = "M1 = ON\nL:\nPREL M1 30\nWAITPOS\nDELAY 0.1\nn = n + 1\n$R0 = n\nWHILE T
 def test_a_snapshot_in_the_middle_of_any_statement_goes_on_elsewhere() -> None:
     program, table = loaded(BUSY)
 
-    def new() -> Mic488:
-        return Mic488(ControllerConfig(), programs={0: program}, positions={0: table})
+    def new() -> Mic488Device:
+        return Mic488Device(ControllerConfig(), programs={0: program}, positions={0: table})
 
     one = new()
-    one.program.command(1, 0)
-    one.touch()
+    one.command(partial(one.program.command, 1), 0)
     for step in range(60):
         one.advance(step * 17 * MILLISECOND)
         other = new()
         other.restore(pickle.loads(pickle.dumps(one.snapshot())))
-        assert other.program.statement == one.program.statement
+        assert other.program.statement(other.now) == one.program.statement(one.now)
         end = one.now + 2 * SECOND
         ahead = new()
         ahead.restore(one.snapshot())
@@ -278,16 +277,15 @@ def test_outputs_of_programs_travel_over_wires_and_back_in_one_world() -> None:
     ping, table = loaded("L:\nOUT1 = ON\nWAIT IN1 = ON\nOUT1 = OFF\nWAIT IN1 = OFF\nn = n + 1\n$R0 = n\nJUMP L\n")
     pong, _ = loaded("L:\nWAIT IN1 = ON\nOUT1 = ON\nWAIT IN1 = OFF\nOUT1 = OFF\nJUMP L\n")
     kernel = Kernel()
-    one, other = (Mic488(ControllerConfig(), programs={0: program}, positions={0: table}) for program in (ping, pong))
+    one, other = (Mic488Device(ControllerConfig(), programs={0: program}, positions={0: table}) for program in (ping, pong))
     kernel.add("one", one)
     kernel.add("other", other)
     kernel.connect(Wire(PinName("one", "OUT1"), PinName("other", "IN1")))
     kernel.connect(Wire(PinName("other", "OUT1"), PinName("one", "IN1")))
-    seen: list[Edge] = []
+    seen: list[PinEdge] = []
     kernel.observers.append(lambda name, edge: seen.append(edge))
     for device in (one, other):
-        device.program.command(1, 0)
-        device.touch()
+        device.command(partial(device.program.command, 1), 0)
     kernel.advance(SECOND)
     rounds = one.program.machine.cells[0]
     # Every way takes the filter of the input and a statement or two.
@@ -362,6 +360,31 @@ def test_behind_the_last_line_a_program_stands_at_the_end_of_its_text() -> None:
     rig.start()
     places = []
     for _ in range(4):
-        places.append(rig.device.program.statement)
+        places.append(rig.device.program.statement(rig.device.now))
         rig.wait(0.001)
     assert places == [Span(0, 9), Span(10, 19), Span(len(text), len(text)), None]
+
+
+@pytest.mark.parametrize(
+    ("axis", "ends"),
+    [
+        (AxisConfig(), (False, False)),
+        (AxisConfig(in_kl=3), (True, False)),
+        (AxisConfig(in_kr=4), (False, True)),
+        (AxisConfig(in_kl=3, in_kr=4), (True, True)),
+        (AxisConfig(home_mode=3), (True, True)),
+        (AxisConfig(home_mode=2), (False, False)),
+    ],
+)
+def test_what_the_checker_is_told_of_a_configuration(axis: AxisConfig, ends: tuple[bool, bool]) -> None:
+    """A homing ends at a switch that has an input; HOME3 looks for the index only."""
+    plain = AxisConfig()
+    inputs = tuple(replace(one, interrupt=n % 4) for n, one in enumerate(ControllerConfig().inputs))
+    first = replace(axis, gear=2.5, acc=30.0, dec=40.0)
+    setup = setup_of(ControllerConfig(axes=(first, plain, plain, plain), inputs=inputs))
+    assert setup.gears == (2.5, *[plain.gear] * 3)
+    assert setup.accelerations == (30.0, *[plain.acc] * 3)
+    assert setup.decelerations == (40.0, *[plain.dec] * 3)
+    assert setup.input_interrupts == tuple(n % 4 for n in range(20))
+    assert setup.homing_ends == (ends, *[(False, False)] * 3)
+    assert setup.most_speed_p == MAX_SPEED_P

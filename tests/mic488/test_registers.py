@@ -12,18 +12,18 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import (
     DataType,
-    Effect,
     Firmware,
-    Kind,
+    MapRow,
     Per,
-    Piece,
+    Quantity,
     Register,
     RegisterMap,
     RegisterMapError,
-    Row,
+    RequestPart,
     Space,
     Type,
     UnknownRegister,
+    WriteEffect,
 )
 from steptwin.mic488.registers import DEFAULT_FIRMWARE, FIRMWARES, ROWS, axes_of_mask, firmware, register_map
 
@@ -236,11 +236,11 @@ def test_mic_24_what_cannot_be_written_accepts_no_function() -> None:
     assert names == {f"IN{n}" for n in range(1, 21)} | {"M_STATUS"} | {f"M{n}_STATUS" for n in axes} | {
         f"M{n}_VEL_ACT" for n in axes
     }
-    assert all((r.effect is Effect.NONE) == (not r.accepts) for r in register_map())
+    assert all((r.effect is WriteEffect.NONE) == (not r.accepts) for r in register_map())
 
 
 def test_mic_25_upper_bits_of_masks_are_accepted_and_ignored() -> None:
-    masks = [r for r in register_map() if r.kind is Kind.MASK]
+    masks = [r for r in register_map() if r.kind is Quantity.MASK]
     assert [r.name for r in masks] == [
         "AXIS_VEL_ABS_TRIG",
         "AXIS_VEL_REL_TRIG",
@@ -378,12 +378,15 @@ def test_unknown_keys_raise() -> None:
 def test_pieces_cut_a_request_at_register_borders() -> None:
     chart = register_map()
     assert list(chart.pieces(Space.HOLDING, 10017, 4)) == [
-        Piece(chart.named("JOG_SPEED"), 10017, 2),
-        Piece(None, 10019, 1),
-        Piece(chart.named("M1_POS_ACT"), 10020, 1),
+        RequestPart(chart.named("JOG_SPEED"), 10017, 2),
+        RequestPart(None, 10019, 1),
+        RequestPart(chart.named("M1_POS_ACT"), 10020, 1),
     ]
-    assert list(chart.pieces(Space.HOLDING, 1990, 20)) == [Piece(chart.named("USER_REGISTER"), 1990, 10), Piece(None, 2000, 10)]
-    assert list(chart.pieces(Space.COIL, 6007, 9)) == [Piece(chart.named("OUT8"), 6007, 1), Piece(None, 6008, 8)]
+    assert list(chart.pieces(Space.HOLDING, 1990, 20)) == [
+        RequestPart(chart.named("USER_REGISTER"), 1990, 10),
+        RequestPart(None, 2000, 10),
+    ]
+    assert list(chart.pieces(Space.COIL, 6007, 9)) == [RequestPart(chart.named("OUT8"), 6007, 1), RequestPart(None, 6008, 8)]
 
 
 def test_unknown_firmware() -> None:
@@ -397,7 +400,7 @@ def test_unknown_firmware() -> None:
 # ---------------------------------------------------------------------- the map checks itself and is frozen
 
 SMALL = Firmware("9.9", "1.70", control_base=10000, user_registers=2000, stored_user_registers=None, banks=6)
-GOOD = Row(
+GOOD = MapRow(
     key="GOOD",
     name="GOOD",
     space=Space.HOLDING,
@@ -406,14 +409,14 @@ GOOD = Row(
     type=Type.VALUE,
     reads=(3,),
     writes=(16,),
-    kind=Kind.POSITION,
-    effect=Effect.STORE,
+    kind=Quantity.POSITION,
+    effect=WriteEffect.STORE,
     meaning="Good.",
     sections={"1.70": "3.2"},
 )
 
 
-def _with(**changes: Any) -> Row:
+def _with(**changes: Any) -> MapRow:
     return dataclasses.replace(GOOD, **changes)
 
 
@@ -452,7 +455,7 @@ def _with(**changes: Any) -> Row:
         ),
     ],
 )
-def test_a_table_that_contradicts_itself_names_the_culprit(rows: list[Row], message: str) -> None:
+def test_a_table_that_contradicts_itself_names_the_culprit(rows: list[MapRow], message: str) -> None:
     with pytest.raises(RegisterMapError) as caught:
         RegisterMap(SMALL, rows)
     assert str(caught.value) == message

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.mic488.registermap import DataType, Space, Type
 from steptwin.mic488.registers import register_map
-from steptwin.mic488.values import FORM, Item, View, decoded, encoded, moves, named, plan, repeatable, user_item, value_of
+from steptwin.mic488.values import FORM, RegisterItem, View, decoded, encoded, moves, named, plan, repeatable, user_item, value_of
 from steptwin.wire import pdu
 
 MAP = register_map("1.70")
-READABLE = [Item(register) for register in MAP if register.reads and register.type is not Type.MEMORY]
+READABLE = [RegisterItem(register) for register in MAP if register.reads and register.type is not Type.MEMORY]
 
 
 def test_the_reads_of_a_status() -> None:
@@ -30,7 +30,7 @@ def test_the_reads_of_a_status() -> None:
 
 
 @given(st.lists(st.sampled_from(READABLE), min_size=1, max_size=40))
-def test_every_value_is_in_one_block_and_no_block_touches_what_may_not_be_read(items: list[Item]) -> None:
+def test_every_value_is_in_one_block_and_no_block_touches_what_may_not_be_read(items: list[RegisterItem]) -> None:
     blocks = plan(MAP, items)
     assert sorted(item for block in blocks for item, _ in block.items) == sorted(set(items))
     assert len(blocks) <= len(set(items))
@@ -53,7 +53,7 @@ def test_a_value_is_found_at_its_place() -> None:
 def test_what_can_only_be_written_is_not_read() -> None:
     only = next(register for register in MAP if not register.reads)
     with pytest.raises(Misuse, match=f"{only.name} can only be written"):
-        plan(MAP, [Item(only)])
+        plan(MAP, [RegisterItem(only)])
 
 
 def test_values_as_people_type_them() -> None:
@@ -73,27 +73,27 @@ def test_values_as_people_type_them() -> None:
 
 
 REPEATED = [
-    pdu.Read(3, 10020, 2),
-    pdu.WriteCoil(2000, True),  # M1_EN
-    pdu.WriteCoil(2004, True),  # M1_STOP
-    pdu.WriteCoil(2008, True),  # M1 JOG_PLUS
-    pdu.WriteRegister(10003, 0),  # PROGRAM_CTRL: stop
-    pdu.WriteRegister(10016, 15),  # M_STOP
-    pdu.WriteRegisters(10036, (0, 0)),  # M1_ACC
-    pdu.WriteRegisters(10068, (0, 0)),  # M1_VEL_ABS
-    pdu.WriteRegisters(10084, (0, 0)),  # M1_POS_ABS
-    pdu.WriteRegisters(100, (1, 2, 3)),  # user registers
+    pdu.ReadRequest(3, 10020, 2),
+    pdu.WriteCoilRequest(2000, True),  # M1_EN
+    pdu.WriteCoilRequest(2004, True),  # M1_STOP
+    pdu.WriteCoilRequest(2008, True),  # M1 JOG_PLUS
+    pdu.WriteRegisterRequest(10003, 0),  # PROGRAM_CTRL: stop
+    pdu.WriteRegisterRequest(10016, 15),  # M_STOP
+    pdu.WriteRegistersRequest(10036, (0, 0)),  # M1_ACC
+    pdu.WriteRegistersRequest(10068, (0, 0)),  # M1_VEL_ABS
+    pdu.WriteRegistersRequest(10084, (0, 0)),  # M1_POS_ABS
+    pdu.WriteRegistersRequest(100, (1, 2, 3)),  # user registers
 ]
 ONCE = [
-    pdu.WriteRegister(10003, 1),  # PROGRAM_CTRL: start
-    pdu.WriteRegister(10003, 2),  # pause
-    pdu.WriteRegister(10005, 1),  # AXIS_VEL_ABS_TRIG
-    pdu.WriteRegister(10007, 1),  # AXIS_POS_ABS_TRIG
-    pdu.WriteRegisters(10060, (0, 0)),  # M1_HOME
-    pdu.WriteRegisters(10076, (0, 0)),  # M1_VEL_REL
-    pdu.WriteRegisters(10092, (0, 0)),  # M1_POS_REL
-    pdu.WriteRegisters(10090, (0, 0, 0, 0)),  # M4_POS_ABS and M1_POS_REL
-    pdu.WriteRegister(9000, 1),  # nobody knows what that is
+    pdu.WriteRegisterRequest(10003, 1),  # PROGRAM_CTRL: start
+    pdu.WriteRegisterRequest(10003, 2),  # pause
+    pdu.WriteRegisterRequest(10005, 1),  # AXIS_VEL_ABS_TRIG
+    pdu.WriteRegisterRequest(10007, 1),  # AXIS_POS_ABS_TRIG
+    pdu.WriteRegistersRequest(10060, (0, 0)),  # M1_HOME
+    pdu.WriteRegistersRequest(10076, (0, 0)),  # M1_VEL_REL
+    pdu.WriteRegistersRequest(10092, (0, 0)),  # M1_POS_REL
+    pdu.WriteRegistersRequest(10090, (0, 0, 0, 0)),  # M4_POS_ABS and M1_POS_REL
+    pdu.WriteRegisterRequest(9000, 1),  # nobody knows what that is
 ]
 
 
@@ -113,7 +113,7 @@ MOVING = {10005, 10007, 10060, 10068, 10076, 10084, 10090, 10092, 2008, 9000}
 
 @pytest.mark.parametrize("request_", [*REPEATED, *ONCE], ids=str)
 def test_what_may_begin_a_motion(request_: pdu.Request) -> None:
-    starts_program = request_ in (pdu.WriteRegister(10003, 1), pdu.WriteRegister(10003, 2))
+    starts_program = request_ in (pdu.WriteRegisterRequest(10003, 1), pdu.WriteRegisterRequest(10003, 2))
     assert moves(MAP, request_) == (request_.address in MOVING or starts_program)
 
 
@@ -179,18 +179,18 @@ def test_items_of_one_register_and_view_are_one() -> None:
 
 WRITTEN = [
     # value, DATA_TYPE, request (manual 3.2: the low word comes first)
-    ("M1_EN", 1, DataType.REAL, pdu.WriteCoil(2000, True)),
-    ("OUT8", 0, DataType.DINT, pdu.WriteCoil(6007, False)),
-    ("M_ENABLE", 15, DataType.REAL, pdu.WriteRegister(10014, 15)),
-    ("M2_POS_ABS", 12.5, DataType.REAL, pdu.WriteRegisters(10086, (0, 0x4148))),
-    ("M2_POS_ABS", -2, DataType.DINT, pdu.WriteRegisters(10086, (0xFFFE, 0xFFFF))),
-    ("JOG_SPEED", 1.0, DataType.DINT, pdu.WriteRegisters(10017, (0, 0x3F80))),
-    ("ENC1_IMP", 65537, DataType.REAL, pdu.WriteRegisters(10100, (1, 1))),
-    ("USER_REGISTER[3]", 65535, DataType.REAL, pdu.WriteRegister(3, 0xFFFF)),
-    ("USER_REGISTER[3]:int", -32768, DataType.REAL, pdu.WriteRegister(3, 0x8000)),
-    ("USER_REGISTER[3]:int", 32767, DataType.REAL, pdu.WriteRegister(3, 0x7FFF)),
-    ("USER_REGISTER[4]:dint", 65536, DataType.REAL, pdu.WriteRegisters(4, (0, 1))),
-    ("USER_REGISTER[4]:real", -12.5, DataType.DINT, pdu.WriteRegisters(4, (0, 0xC148))),
+    ("M1_EN", 1, DataType.REAL, pdu.WriteCoilRequest(2000, True)),
+    ("OUT8", 0, DataType.DINT, pdu.WriteCoilRequest(6007, False)),
+    ("M_ENABLE", 15, DataType.REAL, pdu.WriteRegisterRequest(10014, 15)),
+    ("M2_POS_ABS", 12.5, DataType.REAL, pdu.WriteRegistersRequest(10086, (0, 0x4148))),
+    ("M2_POS_ABS", -2, DataType.DINT, pdu.WriteRegistersRequest(10086, (0xFFFE, 0xFFFF))),
+    ("JOG_SPEED", 1.0, DataType.DINT, pdu.WriteRegistersRequest(10017, (0, 0x3F80))),
+    ("ENC1_IMP", 65537, DataType.REAL, pdu.WriteRegistersRequest(10100, (1, 1))),
+    ("USER_REGISTER[3]", 65535, DataType.REAL, pdu.WriteRegisterRequest(3, 0xFFFF)),
+    ("USER_REGISTER[3]:int", -32768, DataType.REAL, pdu.WriteRegisterRequest(3, 0x8000)),
+    ("USER_REGISTER[3]:int", 32767, DataType.REAL, pdu.WriteRegisterRequest(3, 0x7FFF)),
+    ("USER_REGISTER[4]:dint", 65536, DataType.REAL, pdu.WriteRegistersRequest(4, (0, 1))),
+    ("USER_REGISTER[4]:real", -12.5, DataType.DINT, pdu.WriteRegistersRequest(4, (0, 0xC148))),
 ]
 
 
@@ -199,14 +199,14 @@ def test_values_that_are_written_and_read(name: str, value: float, data_type: Da
     item = named(MAP, name)
     assert encoded(item, value, data_type) == request_
     match request_:
-        case pdu.WriteCoil(on=on):
+        case pdu.WriteCoilRequest(on=on):
             words: tuple[int, ...] = (int(on),)
-        case pdu.WriteRegister(value=word):
+        case pdu.WriteRegisterRequest(value=word):
             words = (word,)
         case _:
             words = request_.values  # type: ignore[union-attr]
     assert decoded(item, words, data_type) == value
-    assert isinstance(decoded(item, words, data_type), bool) == isinstance(request_, pdu.WriteCoil)
+    assert isinstance(decoded(item, words, data_type), bool) == isinstance(request_, pdu.WriteCoilRequest)
 
 
 @pytest.mark.parametrize(

@@ -6,20 +6,20 @@ import pytest
 from mic488_rig import read_pdu
 from wbc_rig import ProgramRig
 
-from steptwin.mic488.vision import Com1Port, Record, VisionReceiver
+from steptwin.mic488.vision import Com1Port, VisionReceiver, VisionRecord
 from steptwin.wire.rtu import encode_frame
-from steptwin.wire.slave import Direction, RtuSlavePort
+from steptwin.wire.slave import FrameDirection, RtuSlavePort
 
 RECORDS = [
-    (b"N1 X2 Y3 A4\r", Record(1, 2, 3, 4)),
-    (b"N12 X-2.5 Y+3,25 A-180\r\n", Record(12, -2.5, 3.25, -180)),
-    (b"n7x1y2a3\n", Record(7, 1, 2, 3)),
-    (b"rubbish N7 X1 Y2 A3\n", Record(7, 1, 2, 3)),
+    (b"N1 X2 Y3 A4\r", VisionRecord(1, 2, 3, 4)),
+    (b"N12 X-2.5 Y+3,25 A-180\r\n", VisionRecord(12, -2.5, 3.25, -180)),
+    (b"n7x1y2a3\n", VisionRecord(7, 1, 2, 3)),
+    (b"rubbish N7 X1 Y2 A3\n", VisionRecord(7, 1, 2, 3)),
 ]
 
 
 @pytest.mark.parametrize(("data", "record"), RECORDS)
-def test_wbc_27_a_record_whole_byte_by_byte_and_with_what_follows(data: bytes, record: Record) -> None:
+def test_wbc_27_a_record_whole_byte_by_byte_and_with_what_follows(data: bytes, record: VisionRecord) -> None:
     assert VisionReceiver().feed(data) == [record]
     receiver = VisionReceiver()
     assert [found for byte in data for found in receiver.feed(bytes((byte,)))] == [record]
@@ -42,7 +42,7 @@ def test_wbc_27_a_line_that_is_no_record_is_passed_over(data: bytes) -> None:
     receiver = VisionReceiver()
     assert receiver.feed(data) == []
     receiver.feed(b"\r")
-    assert receiver.feed(b"N1 X2 Y3 A4\r") == [Record(1, 2, 3, 4)]
+    assert receiver.feed(b"N1 X2 Y3 A4\r") == [VisionRecord(1, 2, 3, 4)]
 
 
 PROGRAM = """
@@ -76,7 +76,7 @@ def test_wbc_15_modbus_and_records_on_one_port() -> None:
     rig = ProgramRig(PROGRAM)
     rig.start()
     modbus = RtuSlavePort({1: rig.device})
-    frames: list[Direction] = []
+    frames: list[FrameDirection] = []
     modbus.on_frame = lambda now, direction, frame: frames.append(direction)
     port = Com1Port(rig.device, modbus)
     ask = encode_frame(1, read_pdu(3, 0, 2))
@@ -95,5 +95,5 @@ def test_wbc_15_modbus_and_records_on_one_port() -> None:
         assert port.to_send(rig.now) == []
         answers.append(answered)
     assert answers == [1] * 5
-    assert frames.count(Direction.IN) == 5
+    assert frames.count(FrameDirection.IN) == 5
     assert (rig.r(0), rig.r(8)) == (3, 1)

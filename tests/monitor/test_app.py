@@ -15,7 +15,7 @@ from textual.widgets import DataTable, Input, RichLog, Static
 
 from steptwin.drivers import stale
 from steptwin.drivers.stale import QUIET_S
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 from steptwin.monitor import session
 from steptwin.monitor.app import HELP, Monitor
 from steptwin.monitor.session import KEY_S, session_at
@@ -172,7 +172,7 @@ def test_homing(mic488: Mic488Rig) -> None:
         await screen.until(lambda: screen.cell("axes", "1", "drive") == "on", "the drive is on")
         await screen.press("h")
         await screen.type("-10")
-        await screen.until(lambda: mic488.axis(1).status is Status.REACHED, "it is home")
+        await screen.until(lambda: mic488.axis(1).status is AxisStatus.REACHED, "it is home")
 
     run(mic488, scenario)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.motion import MotionState, Profile, at_rest, plan_position
-from steptwin.motion.divisions import Division, Microstepping, StepTrain, forced_stop, step_train
+from steptwin.motion.divisions import Division, Microstepping, StepTrain, forced_stop, profile_of, step_train
 from steptwin.motion.pulses import step_times
 from steptwin.motion.ramps import SpeedCurve, plan_distance, plan_endless
 
@@ -220,6 +220,38 @@ def test_m_26_a_stop_before_the_next_coarse_position_goes_on_to_it(begin: int, d
     assert stopped.profile.end is not None
     assert stopped.count(stopped.profile.end) == begin + direction * 64
     assert step_times(stopped, now, stopped.profile.end).tolist() == [stopped.profile.end]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_stop_on_the_coarse_grid_goes_on_to_its_landing_position(direction: int) -> None:
+    """A little above the start speed the ramp ends before the next coarse position; the next multiple of 256 u is far behind."""
+    micro = Microstepping(2, 64, 375 * 64.0)
+    curve = SpeedCurve(376 * 64, 100_000 * 64, 1e9, 377 * 64)
+    train = step_train(plan_endless(0, 0, direction, curve), 0, micro)
+    now = train.profile.pulse_time(direction * 70, 0)
+    assert now is not None
+    assert train.count(now) == direction * 64
+    stopped = forced_stop(train, now, curve, 256)
+    assert stopped.profile.end is not None
+    assert stopped.count(stopped.profile.end) == direction * 256
+    assert step_times(stopped, now, stopped.profile.end).size == 3
+
+
+def test_trains_are_compared_by_all_they_are_made_of() -> None:
+    curve = SpeedCurve(100.0, 100.0, 1e9, 1000.0)
+    profile = plan_endless(0, 0, 1, curve)
+    micro = Microstepping(2, 64, 100.0)
+    train = StepTrain(profile, micro, (Division(0, 2),))
+    assert train == StepTrain(plan_endless(0, 0, 1, curve), micro, (Division(0, 2),))
+    assert hash(train) == hash(StepTrain(plan_endless(0, 0, 1, curve), micro, (Division(0, 2),)))
+    for other in (
+        StepTrain(plan_endless(1, 0, 1, curve), micro, (Division(0, 2),)),
+        StepTrain(profile, Microstepping(2, 64, 101.0), (Division(0, 2),)),
+        StepTrain(profile, micro, (Division(0, 64),)),
+        profile,
+    ):
+        assert train != other
+    assert profile_of(train) is profile_of(profile) is profile
 
 
 def test_grids_and_profiles_that_do_not_fit_are_refused() -> None:

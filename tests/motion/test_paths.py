@@ -324,3 +324,48 @@ def test_paths_are_plain_data() -> None:
     assert copy.deepcopy(run.x) == run.x
     assert run.x != run.y
     assert ceil(run.arc.length) == 19
+
+
+@pytest.mark.parametrize("sweep_q", [4000.0, -4000.0])
+def test_an_arc_has_at_most_a_thousand_turns(sweep_q: float) -> None:
+    assert circle(5.0, 5.0, 2.0, sweep_q).sweep_q == sweep_q
+    with pytest.raises(Misuse) as caught:
+        circle(5.0, 5.0, 2.0, sweep_q * 1.001)
+    assert str(caught.value) == f"angle = {90 * sweep_q * 1.001:g}°: must be within ±360000°"
+    with pytest.raises(Misuse, match="angle = nan°"):
+        circle(5.0, 5.0, 2.0, float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("radius", "slack", "message"),
+    [
+        (0.0, 10.0, "radius = 0: must be greater than 0"),
+        (-1.0, 10.0, "radius = -1: must be greater than 0"),
+        (4.5, 0.25, "radius = 4.5: must be at least 5, half the distance of the ends"),
+        (float("inf"), 0.0, "radius = inf: must be greater than 0"),
+        (float("nan"), 0.0, "radius = nan: must be greater than 0"),
+    ],
+)
+def test_radii_of_arcs_that_do_not_exist(radius: float, slack: float, message: str) -> None:
+    with pytest.raises(Misuse) as caught:
+        arc_between(0.0, 0.0, 10.0, 0.0, radius, outward=True, slack=slack)
+    assert str(caught.value) == message
+
+
+def test_the_slack_of_a_radius_is_permitted_whole() -> None:
+    assert arc_between(0.0, 0.0, 10.0, 0.0, 4.5, outward=True, slack=0.5).radius == 5.0
+    assert arc_between(0.0, 0.0, 10.0, 0.0, 5.0, outward=True).sweep_q == -2.0
+
+
+def test_an_axis_along_a_line_that_stops_under_way_stops_with_it() -> None:
+    way = way_of(100.0, 1000.0, 1000.0, 50.0)
+    now = 10**9
+    stop = plan_stop(MotionState.of(way, now), 500.0)
+    assert stop.end is not None
+    course = Straight(7.0, 2.5)
+    profile = course.profile(stop, round(course.position(way.position(now))), None)
+    assert profile.end == stop.end
+    assert profile.position(stop.end) == pytest.approx(course.position(stop.position(stop.end)))
+    assert profile.position(now) == pytest.approx(course.position(way.position(now)))
+    still = Straight(7.5, 0.0).profile(stop, 8, None)
+    assert (still.end, still.position(now), still.count(now)) == (now, 7.5, 8)

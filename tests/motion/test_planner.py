@@ -322,3 +322,25 @@ def test_no_permitted_parameter_overflows(*, v: float, to: float, distance: int,
             assert profile.count(now) - 1 <= profile.position(now) <= profile.count(now) + 1 or abs(profile.position(now)) > 2**50
             assert abs(profile.velocity(now)) < inf
         profile.pulse_time(2**53, 0)
+
+
+@pytest.mark.parametrize("value", [1e-60, 1e60])
+def test_the_ends_of_the_ranges_are_permitted(value: float) -> None:
+    state = MotionState(0, 0, 0.0, 0.0)
+    for name in ("acc", "dec", "vmax"):
+        plan_position(state, 10, **{"acc": 1.0, "dec": 1.0, "vmax": 1.0, name: value})
+    for name in ("acc", "dec"):
+        plan_velocity(state, 10.0, **{"acc": 1.0, "dec": 1.0, name: value})
+    for velocity in (value, -value):
+        plan_position(state._replace(velocity=velocity), 10, 1.0, 1.0, 1.0)
+        endless = plan_velocity(state, velocity, 1.0, 1.0)
+        assert (endless.end, endless.segments[-1].c1) == (None, velocity), "no velocity but less than this is 0"
+    assert plan_velocity(state, 0.99e-60, 1.0, 1.0).end == 0
+
+
+@pytest.mark.parametrize("begin", [2**48 - 1, -(2**48) + 1])
+def test_distances_are_counted_from_where_the_motion_begins(begin: int) -> None:
+    for target in (begin - 2**48, begin + 2**48):
+        profile = plan_position(MotionState(0, begin, 0.0, 0.0), target, 1e30, 1e30, 1e30)
+        assert profile.end is not None
+        assert profile.count(profile.end) == target

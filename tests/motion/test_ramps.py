@@ -288,3 +288,14 @@ def test_the_manuals_curve() -> None:
     # From there 2 (V − P) / A = 1 s to the top, three quarters of the speed gained in the first half.
     assert profile.velocity(linear_ns + 5 * 10**8) / 64 == pytest.approx(2500 + 7500)
     assert profile.velocity(linear_ns + 10**9) / 64 == pytest.approx(12_500)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_distances_too_far_to_be_exact_are_refused(direction: int) -> None:
+    fast = SpeedCurve(1e9, 1e12, 1e12, 1e12)
+    profile = plan_distance(0, 5, 5 + direction * 2**48, fast)
+    assert profile.end is not None
+    assert profile.count(profile.end) == 5 + direction * 2**48
+    with pytest.raises(Misuse) as caught:
+        plan_distance(0, 5, 5 + direction * (2**48 + 1), fast)
+    assert str(caught.value) == f"distance = {direction * (2**48 + 1)} u: must be within ±{2**48}"

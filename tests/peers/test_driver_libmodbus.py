@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.drivers import AsyncMic488, Mic488, Reason, Refused
-from steptwin.wire.pdu import Read
+from steptwin.drivers import AsyncMic488, Mic488, ModbusRefusal, Reason
+from steptwin.wire.pdu import ReadRequest
 
 SOURCE = Path(__file__).with_name("slave.c")
 
@@ -90,8 +90,8 @@ def test_a_session(address: str) -> None:
         kept = mic.take_snapshot()
         mic.axis(3).set_ramp(acc=7.0)
         assert [str(change) for change in mic.restore_snapshot(kept, dry_run=True)] == ["M3_ACC: 7 → 5"]
-        with pytest.raises(Refused, match="exception 02"):
-            mic.request(Read(3, 11999, 2))
+        with pytest.raises(ModbusRefusal, match="exception 02"):
+            mic.request(ReadRequest(3, 11999, 2))
 
 
 def test_a_session_of_several_tasks(address: str) -> None:

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from steptwin.drivers import AsyncMic488, LineLost, Mic488, ModbusLine, Reason, Untold
-from steptwin.mic488.status import Status
+from steptwin.drivers import AsyncMic488, LineLost, Mic488, ModbusLine, Reason, Unconfirmed
+from steptwin.mic488.status import AxisStatus
 
 
 def place(twin: Any, way: str) -> str:
@@ -37,7 +37,7 @@ def test_a_session(serve: Callable[..., Any], way: str) -> None:
         assert mic.axis(2).wait().ok
         mic.axis(2).home(-20.0)
         assert mic.axis(2).wait().reason is Reason.TARGET
-        assert mic.status().axes == (Status.REACHED, Status.REACHED, Status.OFF, Status.OFF)
+        assert mic.status().axes == (AxisStatus.REACHED, AxisStatus.REACHED, AxisStatus.OFF, AxisStatus.OFF)
 
 
 def test_a_session_of_tasks(serve: Callable[..., Any]) -> None:
@@ -109,11 +109,11 @@ def test_a_client_that_is_killed_leaves_the_axis_stopping(serve: Callable[..., A
         assert end.position_u is not None
         # At most what it goes in the hold time, and to brake.
         assert end.position_u - killed_at <= 5.0 * 2.0 + 5.0**2 / (2 * 50.0) + 0.02
-        assert mic.axis(1).status() == Status.REACHED
+        assert mic.axis(1).status() == AxisStatus.REACHED
 
 
 def test_a_twin_that_ends_during_a_jog(serve: Callable[..., Any]) -> None:
-    """The line is gone: the driver says that the controller cannot be told, and what it does then."""
+    """The line is gone: the driver says that the controller cannot be reached, and what it does then."""
     twin = serve("--demo")
     with Mic488(place(twin, "tcp")) as mic:
         mic.enable(1)
@@ -121,7 +121,7 @@ def test_a_twin_that_ends_during_a_jog(serve: Callable[..., Any]) -> None:
         jog.__enter__()
         assert jog.hold()
         twin.end()
-        with pytest.raises(Untold, match=r"cannot be told .*connection.*It stops by itself, at most 5.25 u"):  # noqa: PT012
+        with pytest.raises(Unconfirmed, match=r"cannot be held any more: .*connection.*It stops by itself, at most 5.25 u"):  # noqa: PT012
             while jog.hold():
                 pass
         with pytest.raises(LineLost, match="connection refused"):

@@ -19,7 +19,8 @@ from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import MILLISECOND
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes
-from steptwin.world.lines import SCRIPTS, ModbusLine
+from steptwin.world.kinds.mic488.line import ModbusBus
+from steptwin.world.lines import SCRIPTS
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_RTU = bytes.fromhex("01 03 27 24 00 02 8e b4")
@@ -87,7 +88,7 @@ def test_answers_that_scripts_do_not_fetch_are_dropped() -> None:
         live.outside(step)
         live.advance(live.now + 20 * MILLISECOND)
     line = live.world.lines["bus"]
-    assert isinstance(line, ModbusLine)
+    assert isinstance(line, ModbusBus)
     assert (len(line.places[SCRIPTS].received), line.master.answers, line.master.deadline()) == (0, {}, None)
 
 
@@ -97,7 +98,7 @@ def test_a_recorded_session_ends_where_it_is_full(monkeypatch: pytest.MonkeyPatc
     live = live_world(keep_inputs=True)
     live = LiveWorld(live.world, told.append)
     with clients(live) as work:
-        for _ in range(120):
+        for _ in range(320):
             work()
     session = live.session()
     assert told == [f"the session is full and ends at {session.until / 10**9:g} s, after 300 inputs"]

@@ -16,7 +16,7 @@ from host_rig import MemoryEndpoint, VirtualLoop
 
 from steptwin.drivers.m1486 import sync
 from steptwin.drivers.m1486.lines import TALK, talking
-from steptwin.drivers.m1486.talk import Say
+from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486 import chip as twin
@@ -68,11 +68,12 @@ class ChipWire:
     def __init__(self, kind: str = "B", addresses: tuple[int, ...] = (15,), *, is_timed: bool = True, **options: Any) -> None:
         self.now = 1000 * SECOND
         self.chips = {
-            address: twin.M1486(variant(kind), address=address, is_timed=is_timed, baud=BAUD, **options) for address in addresses
+            address: twin.M1486Chip(variant(kind), address=address, is_timed=is_timed, baud=BAUD, **options)
+            for address in addresses
         }
         self.chain = SerialChain(self.chips.values())
         self._port = self.chain.port()
-        self.happened: list[tuple[int, twin.Event]] = []
+        self.happened: list[tuple[int, twin.M1486Event]] = []
         for address, chip in self.chips.items():
             chip.advance(self.now)
             chip.on_event = lambda event, address=address: self.happened.append((address, event))
@@ -91,7 +92,7 @@ class ChipWire:
         self._plans: list[tuple[int, int, Callable[[], None]]] = []
 
     @property
-    def chip(self) -> twin.M1486:
+    def chip(self) -> twin.M1486Chip:
         return next(iter(self.chips.values()))
 
     def open(self) -> None:
@@ -200,25 +201,25 @@ class ChipWire:
     def moving(self, address: int | None = None) -> bool:
         return self._one(address).drive.is_busy
 
-    def _one(self, address: int | None) -> twin.M1486:
+    def _one(self, address: int | None) -> twin.M1486Chip:
         return self.chip if address is None else self.chips[address]
 
     def codes(self, address: int | None = None) -> list[str]:
         return [event.code for one, event in self.happened if address in (None, one)]
 
 
-def chip_line(wire: ChipWire, log: Callable[[str], object] | None = None) -> ThreadLine[Say, bytes]:
+def chip_line(wire: ChipWire, log: Callable[[str], object] | None = None) -> ThreadLine[ChipRequest, bytes]:
     endpoint: Any = MemoryEndpoint(wire)  # type: ignore[arg-type]
     exchanger, talk = talking(endpoint, BAUD, log)
-    line: ThreadLine[Say, bytes] = ThreadLine(endpoint, exchanger, clock=wire.clock, sleeping=wire.sleep)
+    line: ThreadLine[ChipRequest, bytes] = ThreadLine(endpoint, exchanger, clock=wire.clock, sleeping=wire.sleep)
     line.notes[TALK] = talk
     return line
 
 
-def chip_task_line(wire: ChipWire) -> TaskLine[Say, bytes]:
+def chip_task_line(wire: ChipWire) -> TaskLine[ChipRequest, bytes]:
     endpoint: Any = MemoryEndpoint(wire)  # type: ignore[arg-type]
     exchanger, talk = talking(endpoint, BAUD, None)
-    line: TaskLine[Say, bytes] = TaskLine(endpoint, exchanger)
+    line: TaskLine[ChipRequest, bytes] = TaskLine(endpoint, exchanger)
     line.notes[TALK] = talk
     return line
 

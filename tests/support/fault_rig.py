@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.wire.gateway import Gateway, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
-from steptwin.world.faults import Active, Faults, FaultyPort, Line, Mic488Body, read, rig
+from steptwin.world.faults import Active, Faults, FaultyPort, LineProtocol, read, rig
 from steptwin.world.kernel import Kernel, PinName
-from steptwin.world.trace import Record
+from steptwin.world.kinds.mic488.faults import Mic488Body
+from steptwin.world.trace import TraceRecord
 
 READ = bytes.fromhex("03 00 63 00 02")
 """Two user registers from 99 on; 100 holds 1234H."""
@@ -47,7 +48,7 @@ class FaultRig:
     def __init__(
         self,
         *faults: str,
-        line: Line = Line.RTU,
+        line: LineProtocol = LineProtocol.RTU,
         units: tuple[int, ...] = (1,),
         seed: int = 0,
         is_timed: bool = False,
@@ -55,16 +56,16 @@ class FaultRig:
     ) -> None:
         self.kernel = Kernel()
         self.faults = Faults(seed)
-        self.devices = {unit: Mic488(config or ControllerConfig()) for unit in units}
+        self.devices = {unit: Mic488Device(config or ControllerConfig()) for unit in units}
         for unit, device in self.devices.items():
             device.execute(bytes.fromhex("06 00 64 12 34"), 0)
             self.kernel.add(str(unit), device)
             rig(self.kernel, str(unit), self.faults, Mic488Body(device, unit))
-        self.records: list[Record] = []
+        self.records: list[TraceRecord] = []
         self.faults.sinks.append(self.records.append)
-        if line is Line.TCP and is_timed:
+        if line is LineProtocol.TCP and is_timed:
             self.inner = TcpGatewayPort(Gateway(TimedUnits(self.devices, LineTiming(SerialLine(9600)))))
-        elif line is Line.TCP:
+        elif line is LineProtocol.TCP:
             self.inner = TcpSlavePort(self.devices)
         elif is_timed:
             self.inner = TimedRtuSlavePort(TimedUnits(self.devices, LineTiming(SerialLine(9600))))
@@ -77,7 +78,7 @@ class FaultRig:
         self.add(*faults)
 
     @property
-    def device(self) -> Mic488:
+    def device(self) -> Mic488Device:
         return next(iter(self.devices.values()))
 
     def add(self, *faults: str) -> list[Active]:
@@ -96,7 +97,7 @@ class FaultRig:
     def ask(self, pdu: bytes = READ, unit: int = 1, ms: float = 10.0) -> bytes:
         """A request; its answer, if it comes at once. Then time passes."""
         self.transaction += 1
-        answer = self.send(tcp(self.transaction, unit, pdu) if self.line is Line.TCP else rtu(unit, pdu))
+        answer = self.send(tcp(self.transaction, unit, pdu) if self.line is LineProtocol.TCP else rtu(unit, pdu))
         self.now += round(ms * MILLISECOND)
         return answer
 

@@ -18,11 +18,11 @@ from pathlib import Path
 from mic488_rig import coil_pdu, controller, word_pdu
 from wbc_rig import RUNNING, ProgramRig
 
-from steptwin.machine import SECOND, Edge
+from steptwin.machine import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.mic488.device import Event
+from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.encoder import Coupling
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 
 CASE, RESULT = "=== ", "---"
 
@@ -50,7 +50,7 @@ class Case:
         """What the script does, in words."""
         return "\n".join(self._run(in_one_go=False)[0])
 
-    def ends(self, *, in_one_go: bool) -> tuple[list[Edge], list[Event], list[str]]:
+    def ends(self, *, in_one_go: bool) -> tuple[list[PinEdge], list[Mic488Event], list[str]]:
         """Edges, events and what can be seen after the script; ``in_one_go``: without stopping at the events of a wait."""
         rig = self._run(in_one_go=in_one_go)[1]
         end = _Trace(rig, 4, program=True, in_one_go=in_one_go)
@@ -163,12 +163,12 @@ class _Trace:
 
     def _axis(self, axis: int) -> str:
         rig = self.rig
-        status = Status(rig.status(axis)).name
+        status = AxisStatus(rig.status(axis)).name
         return f"M{axis} {status} {rig.position(axis):.7g} v {rig.velocity(axis):.6g} e {rig.get('ENC_IMP', axis)};"
 
     def _place(self) -> str:
         control = self.rig.device.program
-        span = control.statement
+        span = control.statement(self.rig.device.now)
         running = control.running
         if span is None or running is None:
             return f"line – state {self.rig.state}"

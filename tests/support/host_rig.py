@@ -21,7 +21,7 @@ from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.mic488.device import Mic488 as Twin
+from steptwin.mic488.device import Mic488Device
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 
 T = TypeVar("T")
@@ -83,7 +83,7 @@ class Wire:
         self.tcp = tcp
         self.latency = latency
         self.config = config or spindles()
-        self.twins = {unit: Twin(self.config, firmware, lenient=lenient) for unit in units}
+        self.twins = {unit: Mic488Device(self.config, firmware, lenient=lenient) for unit in units}
         self._switches = [(axis, high) for axis in range(4) for high in (False, True)] if switches else []
         for twin in self.twins.values():
             twin.advance(self.now)
@@ -107,7 +107,7 @@ class Wire:
         self.opened = 0
 
     @property
-    def twin(self) -> Twin:
+    def twin(self) -> Mic488Device:
         return next(iter(self.twins.values()))
 
     def open(self) -> None:
@@ -195,7 +195,7 @@ class Wire:
                 self._set_switches(twin)
             twin.advance(self.now)
 
-    def _next_event(self, twin: Twin) -> int | None:
+    def _next_event(self, twin: Mic488Device) -> int | None:
         dues = [twin.deadline()]
         for axis, high in self._switches:
             profile = twin.axes[axis].profile
@@ -204,7 +204,7 @@ class Wire:
                 dues += [profile.pulse_time(edge, twin.now) for edge in edges]
         return min((due for due in dues if due is not None), default=None)
 
-    def _set_switches(self, twin: Twin) -> None:
+    def _set_switches(self, twin: Mic488Device) -> None:
         for axis, high in self._switches:
             count = twin.axes[axis].profile.count(twin.now)
             twin.set_pin(f"IN{axis + 1 + 4 * high}", float(count >= KR_P if high else count <= KL_P), twin.now)

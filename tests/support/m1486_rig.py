@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from steptwin.m1486.chip import M1486, Event
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.events import M1486Event
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND, Edge
+from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.pulses import step_times
 
@@ -15,9 +16,9 @@ class Bench:
     """One chip. Commands take 1 ms unless ``statement_ns`` says otherwise; characters take no time unless ``is_timed``."""
 
     def __init__(self, kind: str = "B", **options: Any) -> None:
-        self.chip = M1486(variant(kind), **options)
+        self.chip = M1486Chip(variant(kind), **options)
         self.trains: list[tuple[int, StepTrain]] = []
-        self.edges: list[Edge] = []
+        self.edges: list[PinEdge] = []
         self._revision = 0
         self.chip.changed = self._changed
         self._changed()
@@ -88,7 +89,7 @@ class Bench:
     def variable(self) -> int:
         return self.chip.unit.variable
 
-    def events(self, code: str) -> list[Event]:
+    def events(self, code: str) -> list[M1486Event]:
         return [event for event in self.chip.events if event.code == code]
 
     @property
@@ -113,5 +114,5 @@ def way_u(train: StepTrain, after: int, until: int) -> int:
     return total * train.direction
 
 
-def seconds(events: list[Event]) -> list[float]:
+def seconds(events: list[M1486Event]) -> list[float]:
     return [event.time / SECOND for event in events]

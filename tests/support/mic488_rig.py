@@ -9,9 +9,10 @@ import struct
 from collections.abc import Mapping
 from dataclasses import replace
 
-from steptwin.machine import SECOND, Edge
+from steptwin.machine import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.mic488.device import Event, Mic488
+from steptwin.mic488.core import Mic488Event
+from steptwin.mic488.device import Mic488Device
 from steptwin.world.contacts import PositionSwitch, place
 from steptwin.world.kernel import Kernel, PinName
 
@@ -68,11 +69,11 @@ class Rig:
     """A controller in a kernel, its present moment, and everything that came out of it."""
 
     def __init__(self, config: ControllerConfig | None = None, firmware: str = "1.70", **options: object) -> None:
-        self.device = Mic488(config or ControllerConfig(), firmware, **options)  # type: ignore[arg-type]
+        self.device = Mic488Device(config or ControllerConfig(), firmware, **options)  # type: ignore[arg-type]
         self.base = OFFSETS[firmware]
         self.kernel = Kernel()
         self.kernel.add("m", self.device)
-        self.edges: list[Edge] = []
+        self.edges: list[PinEdge] = []
         self.kernel.observers.append(lambda name, edge: self.edges.append(edge))
         self.now = 0
         self.dint = False
@@ -109,7 +110,7 @@ class Rig:
         place(self.kernel, PositionSwitch("m", axis, low, high, PinName("m", pin), normally_closed))
         self.kernel.deadline()
 
-    def events(self, code: str) -> list[Event]:
+    def events(self, code: str) -> list[Mic488Event]:
         return [event for event in self.device.events if event.code == code]
 
     # -------------------------------------------------------------- requests

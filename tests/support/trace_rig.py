@@ -6,25 +6,34 @@ from typing import NamedTuple
 
 from mic488_rig import EN, OUT, STOP, Rig
 
-from steptwin.commands.m1486_bench import Bench as M1486Bench
-from steptwin.files.export import AxisView, axis_views
-from steptwin.m1486.chip import M1486
+from steptwin.files.export import AxisLane, axis_views, controller_views
+from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.machine import SECOND, Nanos
-from steptwin.mic488.device import Event
-from steptwin.served.demo import demo_config
-from steptwin.world.trace import Record, Trace
+from steptwin.machine import Nanos
+from steptwin.mic488.config import AxisConfig, ControllerConfig
+from steptwin.mic488.core import Mic488Event
+from steptwin.world.kinds import MIC488
+from steptwin.world.small import Whole, m1486_world
+from steptwin.world.trace import Trace, TraceRecord
+
+SPINDLES = ControllerConfig(
+    axes=tuple(
+        AxisConfig(unit=3, gear=100.0, acc=50.0, dec=50.0, vel=25.0, home_mode=1, limit_mode=3, in_kl=axis, in_kr=axis + 4)
+        for axis in range(4)
+    )
+)
+"""Millimetres; KL on IN1-IN4, KR on IN5-IN8; homing backs off the switch."""
 
 
 class TracedRig(Rig):
     """A `Rig` that writes down what happens: plans, edges of all pins, frames, events."""
 
     def __init__(self) -> None:
-        super().__init__(demo_config())
+        super().__init__(SPINDLES)
         self.trace = Trace(["m"])
         self._levels: dict[str, float] = {}
         self._revisions = [-1] * 4
-        self._events: list[Event] = []
+        self._events: list[Mic488Event] = []
         self.device.on_event = self._events.append
         for axis in range(1, 5):
             self.switch(axis, None, -1000, f"IN{axis}")
@@ -47,7 +56,7 @@ class TracedRig(Rig):
         self._events.clear()
 
     def _note(self, time: Nanos, kind: str, subject: str, value: object) -> None:
-        self.trace.add(Record(time, "m", kind, subject, value))
+        self.trace.add(TraceRecord(time, "m", kind, subject, value))
 
     def wait_ns(self, nanoseconds: int) -> None:
         end = self.now + nanoseconds
@@ -71,7 +80,7 @@ class TracedRig(Rig):
 
 class Run(NamedTuple):
     trace: Trace
-    views: dict[tuple[str, str], AxisView]
+    views: dict[tuple[str, str], AxisLane]
     until: Nanos
 
 
@@ -101,7 +110,7 @@ def mic488_run() -> Run:
     rig.wait(0.4)
     rig.pin("IN20", 0.0)
     rig.wait(1.0)
-    return Run(rig.trace, axis_views({"m": rig.device}), rig.now)
+    return Run(rig.trace, controller_views("m", MIC488, rig.device), rig.now)
 
 
 M1486_PROGRAM = (
@@ -112,8 +121,8 @@ M1486_PROGRAM = (
 
 def m1486_run(interface: Interface = STEP_DIRECTION) -> Run:
     """An indexer goes 1000 steps forward, changing its microstep in flight, 300 back, and home."""
-    chip = M1486(interface=interface)
-    trace = Trace(["i"])
-    bench = M1486Bench({"i": chip}, "\r".join(M1486_PROGRAM), trace=trace)
-    ending = bench.run([], 60 * SECOND, lambda: None, until_idle=True)
-    return Run(trace, axis_views({"i": chip}), ending.at)
+    text = m1486_world(Whole(name="i"), [15], {"interface": interface.name, "variant": "A"}, typed=M1486_PROGRAM)
+    world = World.from_toml(text.replace("chipF", "i"))
+    while (due := world.due()) is not None:
+        world.run_to(due)
+    return Run(world.trace, dict(axis_views(world)), world.now)

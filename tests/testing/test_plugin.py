@@ -18,6 +18,12 @@ EXAMPLE = ROOT / "examples" / "testing"
 WORLD = ROOT / "examples" / "worlds" / "feeder.toml"
 
 
+@pytest.fixture(autouse=True)
+def without_asyncio_plugin(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    """pytest-lsp brings pytest-asyncio, which warns in runs whose configuration does not set its loop scope."""
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-p no:asyncio")
+
+
 @pytest.fixture
 def run(pytester: pytest.Pytester) -> Callable[..., pytest.RunResult]:
     """``run(text, *options)``: pytest on a file with that text; a warning fails its test, as here."""
@@ -193,7 +199,7 @@ def test_with_a_configuration_and_a_program_the_twin_is_that_machine(run: Run, p
         ("speed=0", "speed = 0: permitted are 0.001 to 1000"),
         ("firmware='9'", "1.23, 1.40, 1.70"),
         ("config='no.cfg'", "cannot read "),
-        ("faults=['crc nth=3']", "fault crc happens on Modbus RTU: this twin serves Modbus TCP"),
+        ("faults=['crc nth=3']", "fault crc happens on Modbus RTU: line 'bus' carries Modbus TCP"),
         ("faults=['nonsense']", "nonsense"),
         ("3", "3 needs a name"),
     ],
@@ -291,6 +297,7 @@ def test_a_world(run: Run, pytester: pytest.Pytester, time: str) -> None:
     shutil.copy(WORLD, pytester.path)
     run(f"""
         import pytest
+        from steptwin.subject.commands import ListFaults
 
         @pytest.mark.steptwin_world("feeder.toml", time={time!r}, speed=50.0)
         def test_it(steptwin_world):
@@ -305,6 +312,7 @@ def test_a_world(run: Run, pytester: pytest.Pytester, time: str) -> None:
             world.fault("no-answer lost=answer count=1")
             assert world.driver("table").inputs()[8]
             assert world.axis("x").lost == 0
+            assert world.do(ListFaults())[0]["fault"] == "no-answer lost=answer count=1"
             world.channel("chips").write(b"x3\\rU20\\r")
             received = []
             world.until(lambda: received.append(world.channel("chips").read(0.0)) or b"B" in received, within_s=20)
@@ -410,7 +418,7 @@ def test_axes_of_a_device_are_stopped_after_the_test(run: Run, serve: Callable[.
         "-rs",
     )
     result.assert_outcomes(failed=1, skipped=3)
-    result.stdout.fnmatch_lines(["*axis(1) is there on a twin only, and --device says tcp:*"])
+    result.stdout.fnmatch_lines(["*axis(1) exists on a twin only, and --device names tcp:*"])
     result.stdout.fnmatch_lines(["*this test is for firmware 1.23, tcp:* has 1.70"])
     axis = served.state()["axes"][0]
     assert axis["enabled"]
@@ -475,7 +483,7 @@ def test_a_world_of_several_controllers_asks_which_of_them_is_there(
             steptwin_world.axis("x")
     """
     named = run(text, "--device", f"table={address}", "-rs")
-    named.stdout.fnmatch_lines(["*the world is there on a twin only, and --device says tcp:*"])
+    named.stdout.fnmatch_lines(["*the world exists on a twin only, and --device names tcp:*"])
     assert served.state()["axes"][0]["enabled"]
     run(text, "--device", address, "-rs").stdout.fnmatch_lines(["*a world of several controllers (--device NAME=ADDRESS*"])
 

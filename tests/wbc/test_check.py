@@ -59,20 +59,20 @@ def test_steps_are_resolved() -> None:
     assert steps.variables == ("x",)
     assert steps.labels == {"L": 1, "INT_TICK": 7}
     assert [(event.name, number) for event, number in steps.entries.items()] == [("TICK", 7)]
-    condition = s.Comparison(x, "<=", s.Register(ROWS["POSM"], 1))
+    condition = s.StepCondition(x, "<=", s.RegisterOperand(ROWS["POSM"], 1))
     assert steps.steps[:7] == (
-        s.Set(0, 0, x, s.Literal(5)),
-        s.If(0, 0, condition, 3, 5),
-        s.Set(0, 0, s.Register(ROWS["OUT"], 3), s.Literal(1)),
-        s.Else(0, 0, 5),
-        s.RowMotion(0, 0, "MOVEPTP", s.Literal(1)),
-        s.EndIf(0, 0),
-        s.Jump(0, 0, 1),
+        s.SetStep(0, 0, x, s.Literal(5)),
+        s.IfStep(0, 0, condition, 3, 5),
+        s.SetStep(0, 0, s.RegisterOperand(ROWS["OUT"], 3), s.Literal(1)),
+        s.ElseStep(0, 0, 5),
+        s.RowMotionStep(0, 0, "MOVEPTP", s.Literal(1)),
+        s.EndIfStep(0, 0),
+        s.JumpStep(0, 0, 1),
     )
     assert text[steps.steps[2].start : steps.steps[2].end] == "pump = ON"
-    assert isinstance(steps.steps[7], s.Entry)
-    assert s.If(0, 0, condition, 3, 5).otherwise == 4
-    assert s.If(0, 0, condition, None, 5).otherwise == 6
+    assert isinstance(steps.steps[7], s.InterruptStep)
+    assert s.IfStep(0, 0, condition, 3, 5).otherwise == 4
+    assert s.IfStep(0, 0, condition, None, 5).otherwise == 6
 
 
 def test_a_program_with_errors_or_unknown_positions_is_not_given_out() -> None:
@@ -87,9 +87,9 @@ def test_a_program_with_errors_or_unknown_positions_is_not_given_out() -> None:
 )
 def test_conditions_on_an_input(sign: str, value: float, expected: bool | None) -> None:
     mirrored = {"=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
-    bit = s.Register(ROWS["IN"], 1)
-    assert outcome(s.Comparison(bit, sign, s.Literal(value))) is expected
-    assert outcome(s.Comparison(s.Literal(value), mirrored[sign], bit)) is expected
+    bit = s.RegisterOperand(ROWS["IN"], 1)
+    assert outcome(s.StepCondition(bit, sign, s.Literal(value))) is expected
+    assert outcome(s.StepCondition(s.Literal(value), mirrored[sign], bit)) is expected
 
 
 def long_program(lines: int) -> str:

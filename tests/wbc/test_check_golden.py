@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.diagnostics import Diagnostic, Source, render
+from steptwin.diagnostics import Diagnostic, SourceText, render
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.findings import FINDINGS
@@ -39,7 +39,7 @@ class Case:
         return "".join(line for line in self.text.splitlines(keepends=True) if not line.startswith("@ "))
 
     def found(self) -> str:
-        return render(Source(self.name, self.program), self.check(self.program)) or NO_FINDING
+        return render(SourceText(self.name, self.program), self.check(self.program)) or NO_FINDING
 
     def check(self, text: str) -> list[Diagnostic]:
         rows = self.settings("row")

@@ -14,13 +14,13 @@ from steptwin.tables import IncompleteTable
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import check
 from steptwin.wbc.compile import compile_program
-from steptwin.wbc.controller import Access, complete_access
+from steptwin.wbc.controller import RegisterFamily, complete_access
 from steptwin.wbc.positions import parse_positions
 from steptwin.wbc.registers import REAL, REGISTERS, ROWS, RegisterRow
 from steptwin.wbc.statements import STATEMENTS
 
 _NEW = RegisterRow("NEW", 0, REAL, REAL, "")
-_READABLE, _WRITABLE = Access(lambda number: lambda c, at: 0.0), ACCESS["OUT"]
+_READABLE, _WRITABLE = RegisterFamily(lambda number: lambda c, at: 0.0), ACCESS["OUT"]
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ _READABLE, _WRITABLE = Access(lambda number: lambda c, at: 0.0), ACCESS["OUT"]
     ],
 )
 def test_a_register_of_the_language_that_no_controller_gives_is_refused(
-    row: RegisterRow | None, access: Access | None, message: str
+    row: RegisterRow | None, access: RegisterFamily | None, message: str
 ) -> None:
     rows = ROWS if row is None else {**ROWS, "NEW": row}
     with pytest.raises(IncompleteTable) as caught:
@@ -82,6 +82,6 @@ def test_code_that_writes_a_read_only_register_is_not_made() -> None:
     executable = check("OUT1 = ON\n").executable
     assert executable is not None
     row = next(row for row in REGISTERS if row.key == "INPUTS")
-    wrong = s.Executable((s.Set(0, 0, s.Register(row, 0), s.Literal(1.0)),), (), {}, {}, {})
+    wrong = s.Executable((s.SetStep(0, 0, s.RegisterOperand(row, 0), s.Literal(1.0)),), (), {}, {}, {})
     with pytest.raises(ValueError, match="INPUTS cannot be written"):
         compile_program(wrong, ACCESS)

@@ -110,6 +110,19 @@ def test_wbc_3_a_jump_in_a_handler_lets_interrupts_in_and_returns_come_back() ->
     assert rig.changes("OUT3") == [(3.003, 1.0)]
 
 
+def test_wbc_3_what_waits_is_served_before_the_first_line_a_handler_jumps_to() -> None:
+    rig = started(
+        "CFGINT_IN1 = RIS\nCFGINT_IN2 = RIS\nWAIT 1 = 2\n"
+        "INT_IN1:\nDELAY 1\nJUMP SUB\nRETURN\nSUB:\n$I2 = $I0\nRETURN\nINT_IN2:\n$I0 = 7\nRETURN\n"
+    )
+    rig.wait(0.1)
+    pulse(rig, "IN1")
+    pulse(rig, "IN2")
+    assert rig.i(0) == 0
+    rig.wait(2)
+    assert (rig.i(0), rig.i(2)) == (7, 7)
+
+
 def test_wbc_3_a_handler_may_leave_for_good() -> None:
     rig = started("CFGINT_IN1 = RIS\nMAIN:\nn = n + 1\n$I0 = n\nWAIT 1 = 2\nINT_IN1:\nIF IN2 = ON\nRETURN\nENDIF\nJUMP MAIN\n")
     rig.wait(0.1)

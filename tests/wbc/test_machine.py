@@ -459,7 +459,7 @@ def test_a_paused_program_can_be_stopped_and_a_stopped_one_not_paused() -> None:
     rig.halt()
     assert (rig.state, rig.out(1)) == (STOPPED, False)
     rig.pause()
-    assert (rig.state, rig.device.program.statement) == (STOPPED, None)
+    assert (rig.state, rig.device.program.statement(rig.device.now)) == (STOPPED, None)
 
 
 def test_where_a_program_stands_can_be_seen() -> None:
@@ -467,7 +467,7 @@ def test_where_a_program_stands_can_be_seen() -> None:
     source = rig.device.program.programs[0].source
 
     def line() -> int:
-        span = rig.device.program.statement
+        span = rig.device.program.statement(rig.device.now)
         assert span is not None
         return source.position(span.start)[0]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -13,7 +14,7 @@ from hypothesis.strategies import SearchStrategy
 
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program import LoadedProgram, load
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import PositionTable, parse_positions
@@ -46,16 +47,17 @@ def ready(text: str, rows: str) -> tuple[LoadedProgram, PositionTable]:
     return load(check(text, table)), table
 
 
-def started(loaded: tuple[LoadedProgram, PositionTable], statement_time: Nanos = MILLISECOND, *, rests: bool = True) -> Mic488:
+def started(
+    loaded: tuple[LoadedProgram, PositionTable], statement_time: Nanos = MILLISECOND, *, rests: bool = True
+) -> Mic488Device:
     program, table = loaded
-    device = Mic488(CONFIG, programs={0: program}, positions={0: table}, statement_time=statement_time)
+    device = Mic488Device(CONFIG, programs={0: program}, positions={0: table}, statement_time=statement_time)
     device.program.machine.rests = rests
-    device.program.command(1, 0)
-    device.touch()
+    device.command(partial(device.program.command, 1), 0)
     return device
 
 
-def act(device: Mic488, one: Act) -> None:
+def act(device: Mic488Device, one: Act) -> None:
     now, what, value = one
     if what == "pin":
         device.set_pin(f"IN{value[0]}", float(value[1]), now)
@@ -64,18 +66,16 @@ def act(device: Mic488, one: Act) -> None:
     elif what == "volts":
         device.set_pin("AIN1", float(value), now)
     else:
-        device.advance(now)
-        device.program.command(value, now)
-        device.touch()
+        device.command(partial(device.program.command, value), now)
 
 
-def seen(device: Mic488) -> dict[str, Any]:
+def seen(device: Mic488Device) -> dict[str, Any]:
     """What there is to see of a controller, inside and outside, by name: a failure shows which of it differs."""
     control, now = device.program, device.now
     shown: dict[str, Any] = {
         "edges": device.take_edges(),
         "state": control.state,
-        "statement": control.statement,
+        "statement": control.statement(now),
         "fault": control.fault,
         "user registers": {number: word for number, word in enumerate(device.user) if word},
         "events": [(event.time, event.code, event.text) for event in device.events],
@@ -167,7 +167,7 @@ def test_wbc_18_polling_loops_rest_and_nobody_notices(text: str, happening: list
     for one in happening:
         act(resting, one)
         act(looking, one)
-        assert resting.program.statement == looking.program.statement
+        assert resting.program.statement(resting.now) == looking.program.statement(looking.now)
     resting.advance(END)
     looking.advance(END)
     assert seen(resting) == seen(looking)
@@ -197,7 +197,7 @@ def test_wbc_18_a_loop_that_acts_never_rests(body: list[str], closed: str, happe
     for one in happening:
         act(resting, one)
         act(looking, one)
-        assert resting.program.statement == looking.program.statement, one
+        assert resting.program.statement(resting.now) == looking.program.statement(looking.now), one
     resting.advance(END)
     looking.advance(END)
     assert seen(resting) == seen(looking)
@@ -213,7 +213,7 @@ def test_one_jump_is_many_steps(data: st.DataObject, cases: SearchStrategy[Any])
     for moment, one in sorted([*((one[0], one) for one in happening), *((look, None) for look in looks)], key=lambda a: a[0]):
         stepping.advance(moment)
         assert stepping.deadline() is None or stepping.deadline() > moment  # type: ignore[operator]
-        _ = stepping.program.statement
+        _ = stepping.program.statement(stepping.now)
         if one is not None:
             act(stepping, one)
             act(jumping, one)

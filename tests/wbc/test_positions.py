@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.diagnostics import Source
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.wbc.dialect import MAX_POSITIONS
 from steptwin.wbc.positions import PositionTable, number_text, parse_positions, table_of
@@ -18,7 +18,7 @@ TEXT = "home;0;0;x;x\r\nTop ; 10,5; -20.25;X;\t7\r\n;1;2;3;4;\r\n\r\n"
 
 def found(text: str) -> list[tuple[str, int, int]]:
     """Code, row and column of every message."""
-    return [(d.code, *Source("t", text).position(d.span.start)) for d in parse_positions(text)[1]]
+    return [(d.code, *SourceText("t", text).position(d.span.start)) for d in parse_positions(text)[1]]
 
 
 def test_rows() -> None:

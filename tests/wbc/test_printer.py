@@ -11,7 +11,7 @@ from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
 from steptwin.wbc.printer import format_text
 from steptwin.wbc.syntax import parse
-from steptwin.wbc.tree import Line
+from steptwin.wbc.tree import SourceLine
 
 UGLY = """\
   // feeder
@@ -175,7 +175,7 @@ ARRANGED = (
 )
 
 
-def said(text: str) -> list[Line]:
+def said(text: str) -> list[SourceLine]:
     lines = list(parse(text)[0].lines)
     while lines and lines[-1].statement is None and lines[-1].comment is None:
         lines.pop()
@@ -209,3 +209,9 @@ def test_valid_programs_check_clean_before_and_after(programs: SearchStrategy, d
     assert after.diagnostics == []
     assert after.executable == before.executable
     assert format_text(printed) == printed
+
+
+def test_deep_blocks_do_not_move_right_for_ever() -> None:
+    text = format_text("IF IN1 = ON\n" * 2000)
+    assert max(map(len, text.splitlines())) < 200
+    assert format_text(text) == text

@@ -15,29 +15,29 @@ from steptwin.wbc.tree import (
     Assign,
     Binary,
     Broken,
-    Call,
-    Command,
-    Condition,
-    Constant,
+    ConstantDefinition,
+    DecimalNumber,
+    FunctionCall,
+    Identifier,
+    ImageRecord,
+    KeywordStatement,
     Label,
-    Name,
     Node,
-    Number,
     Position,
     PositionRecord,
-    Record,
+    Relation,
     Statement,
 )
 
 PLACE = (0, 0)
 
 
-def name(text: str) -> Name:
-    return Name(*PLACE, text, text.upper())
+def name(text: str) -> Identifier:
+    return Identifier(*PLACE, text, text.upper())
 
 
-def number(text: str, value: float) -> Number:
-    return Number(*PLACE, text, value)
+def number(text: str, value: float) -> DecimalNumber:
+    return DecimalNumber(*PLACE, text, value)
 
 
 def only(text: str) -> Statement:
@@ -50,10 +50,10 @@ def only(text: str) -> Statement:
 
 # fmt: off
 STATEMENTS_READ: list[tuple[str, Statement]] = [
-    ("#speed 60", Constant(*PLACE, name("speed"), number("60", 60))),
-    ("#home -70", Constant(*PLACE, name("home"), number("-70", -70))),
-    ("#pump OUT3", Constant(*PLACE, name("pump"), name("OUT3"))),
-    ("# pump OUT3", Constant(*PLACE, name("pump"), name("OUT3"))),
+    ("#speed 60", ConstantDefinition(*PLACE, name("speed"), number("60", 60))),
+    ("#home -70", ConstantDefinition(*PLACE, name("home"), number("-70", -70))),
+    ("#pump OUT3", ConstantDefinition(*PLACE, name("pump"), name("OUT3"))),
+    ("# pump OUT3", ConstantDefinition(*PLACE, name("pump"), name("OUT3"))),
     ("MAIN:", Label(*PLACE, name("MAIN"))),
     ("MAIN :", Label(*PLACE, name("MAIN"))),
     ("SET X = 20,5", Assign(*PLACE, True, name("X"), number("20,5", 20.5))),
@@ -68,26 +68,29 @@ STATEMENTS_READ: list[tuple[str, Statement]] = [
     ("X = a & b", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("a"), "&", name("b")))),
     ("X = a || b", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("a"), "||", name("b")))),
     ("X = a % 3", Assign(*PLACE, False, name("X"), Binary(*PLACE, name("a"), "%", number("3", 3)))),
-    ("X = sin(30)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("sin"), (number("30", 30),)))),
-    ("X = min(a,b)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("min"), (name("a"), name("b"))))),
-    ("X = max(1,5, 2)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("max"), (number("1,5", 1.5), number("2", 2))))),
-    ("X = max(a,1,5)", Assign(*PLACE, False, name("X"), Call(*PLACE, name("max"), (name("a"), number("1,5", 1.5))))),
-    ("IF IN1 = 1", Command(*PLACE, "IF", (Condition(*PLACE, name("IN1"), "=", number("1", 1)),))),
-    ("while x>=-5", Command(*PLACE, "WHILE", (Condition(*PLACE, name("x"), ">=", number("-5", -5)),))),
-    ("Wait PosM1 <= y", Command(*PLACE, "WAIT", (Condition(*PLACE, name("PosM1"), "<=", name("y")),))),
-    ("ELSE", Command(*PLACE, "ELSE", ())),
-    ("DELAY 0,5", Command(*PLACE, "DELAY", (number("0,5", 0.5),))),
-    ("JUMP main", Command(*PLACE, "JUMP", (name("main"),))),
-    ("HOME M1 -20", Command(*PLACE, "HOME", (name("M1"), number("-20", -20)))),
-    ("PABS M1 x", Command(*PLACE, "PABS", (name("M1"), name("x")))),
-    ("BRAKE M2", Command(*PLACE, "BRAKE", (name("M2"),))),
-    ("MOVEPTP @top", Command(*PLACE, "MOVEPTP", (Position(*PLACE, name("top")),))),
-    ("MOVEPTP @ top", Command(*PLACE, "MOVEPTP", (Position(*PLACE, name("top")),))),
-    ("MOVEPTP 5", Command(*PLACE, "MOVEPTP", (number("5", 5),))),
-    ("MOVELIN_REL n", Command(*PLACE, "MOVELIN_REL", (name("n"),))),
-    ("PULSE(OUT1,0,5)", Command(*PLACE, "PULSE", (name("OUT1"), number("0,5", 0.5)))),
-    ("pulse ( OUT1 , t )", Command(*PLACE, "PULSE", (name("OUT1"), name("t")))),
-    ("//!record " + "0a" * 16, Record(*PLACE, b"\n" * 16)),
+    ("X = sin(30)", Assign(*PLACE, False, name("X"), FunctionCall(*PLACE, name("sin"), (number("30", 30),)))),
+    ("X = min(a,b)", Assign(*PLACE, False, name("X"), FunctionCall(*PLACE, name("min"), (name("a"), name("b"))))),
+    (
+        "X = max(1,5, 2)",
+        Assign(*PLACE, False, name("X"), FunctionCall(*PLACE, name("max"), (number("1,5", 1.5), number("2", 2)))),
+    ),
+    ("X = max(a,1,5)", Assign(*PLACE, False, name("X"), FunctionCall(*PLACE, name("max"), (name("a"), number("1,5", 1.5))))),
+    ("IF IN1 = 1", KeywordStatement(*PLACE, "IF", (Relation(*PLACE, name("IN1"), "=", number("1", 1)),))),
+    ("while x>=-5", KeywordStatement(*PLACE, "WHILE", (Relation(*PLACE, name("x"), ">=", number("-5", -5)),))),
+    ("Wait PosM1 <= y", KeywordStatement(*PLACE, "WAIT", (Relation(*PLACE, name("PosM1"), "<=", name("y")),))),
+    ("ELSE", KeywordStatement(*PLACE, "ELSE", ())),
+    ("DELAY 0,5", KeywordStatement(*PLACE, "DELAY", (number("0,5", 0.5),))),
+    ("JUMP main", KeywordStatement(*PLACE, "JUMP", (name("main"),))),
+    ("HOME M1 -20", KeywordStatement(*PLACE, "HOME", (name("M1"), number("-20", -20)))),
+    ("PABS M1 x", KeywordStatement(*PLACE, "PABS", (name("M1"), name("x")))),
+    ("BRAKE M2", KeywordStatement(*PLACE, "BRAKE", (name("M2"),))),
+    ("MOVEPTP @top", KeywordStatement(*PLACE, "MOVEPTP", (Position(*PLACE, name("top")),))),
+    ("MOVEPTP @ top", KeywordStatement(*PLACE, "MOVEPTP", (Position(*PLACE, name("top")),))),
+    ("MOVEPTP 5", KeywordStatement(*PLACE, "MOVEPTP", (number("5", 5),))),
+    ("MOVELIN_REL n", KeywordStatement(*PLACE, "MOVELIN_REL", (name("n"),))),
+    ("PULSE(OUT1,0,5)", KeywordStatement(*PLACE, "PULSE", (name("OUT1"), number("0,5", 0.5)))),
+    ("pulse ( OUT1 , t )", KeywordStatement(*PLACE, "PULSE", (name("OUT1"), name("t")))),
+    ("//!record " + "0a" * 16, ImageRecord(*PLACE, b"\n" * 16)),
     ("//!position 3 " + "0A" * 18, PositionRecord(*PLACE, 3, b"\n" * 18)),
 ]
 # fmt: on
@@ -103,7 +106,7 @@ def test_statement(text: str, expected: Statement) -> None:
 def test_every_statement_without_operands_is_read() -> None:
     for row in STATEMENTS.values():
         if not row.operands:
-            assert only(row.keyword.lower()) == Command(*PLACE, row.keyword, ())
+            assert only(row.keyword.lower()) == KeywordStatement(*PLACE, row.keyword, ())
 
 
 def test_every_function_is_read() -> None:
@@ -111,7 +114,7 @@ def test_every_function_is_read() -> None:
         arguments = ", ".join(["a", "b"][: row.arguments])
         statement = only(f"X = {row.name}({arguments})")
         assert isinstance(statement, Assign)
-        assert isinstance(statement.value, Call)
+        assert isinstance(statement.value, FunctionCall)
 
 
 def test_spans_are_the_words() -> None:
@@ -119,8 +122,8 @@ def test_spans_are_the_words() -> None:
     first, second = parse(text)[0].lines
     assert isinstance(first.statement, Assign)
     call = first.statement.value
-    assert isinstance(call, Call)
-    assert isinstance(second.statement, Command)
+    assert isinstance(call, FunctionCall)
+    assert isinstance(second.statement, KeywordStatement)
 
     def words(node: Node) -> str:
         return text[node.start : node.end]
@@ -143,7 +146,7 @@ def test_a_comma_divides_two_numbers_where_two_are_needed() -> None:
     program, diagnostics = parse(text)
     statement = program.lines[0].statement
     assert isinstance(statement, Assign)
-    assert isinstance(statement.value, Call)
+    assert isinstance(statement.value, FunctionCall)
     assert [text[a.start : a.end] for a in statement.value.arguments] == ["-1", "25"]
     assert statement.value.arguments == (number("-1", -1), number("25", 25))
     assert [d.code for d in diagnostics] == ["W214"]

@@ -27,24 +27,26 @@ class RegisterBank:
 
     def _respond(self, request: modbus.Request) -> modbus.Response:
         match request:
-            case modbus.Read(function, address, count):
+            case modbus.ReadRequest(function, address, count):
                 self._check(function, address, count)
                 if function == modbus.READ_HOLDING_REGISTERS:
-                    return modbus.Registers(tuple(self.registers[address : address + count]))
+                    return modbus.RegistersResponse(tuple(self.registers[address : address + count]))
                 inverted = function == modbus.READ_DISCRETE_INPUTS
-                return modbus.Bits(function, modbus.pack_bits(on != inverted for on in self.coils[address : address + count]))
-            case modbus.WriteCoil(address, on):
+                return modbus.BitsResponse(
+                    function, modbus.pack_bits(on != inverted for on in self.coils[address : address + count])
+                )
+            case modbus.WriteCoilRequest(address, on):
                 self._check(5, address, 1)
                 self.coils[address] = on
                 return request
-            case modbus.WriteRegister(address, value):
+            case modbus.WriteRegisterRequest(address, value):
                 self._check(6, address, 1)
                 self.registers[address] = value
                 return request
-            case modbus.WriteRegisters(address, values):
+            case modbus.WriteRegistersRequest(address, values):
                 self._check(16, address, len(values))
                 self.registers[address : address + len(values)] = values
-                return modbus.Written(address, len(values))
+                return modbus.WriteResponse(address, len(values))
 
     def _check(self, function: int, address: int, count: int) -> None:
         if address + count > 3000:
@@ -68,28 +70,28 @@ class Example(NamedTuple):
 # Printed in the Modbus application protocol V1.1b3, sections 6.1 to 6.12 (addresses there count from 1 in the text).
 EXAMPLES = [
     Example(
-        "01 00 13 00 13", modbus.Read(1, 0x13, 19),
-        "01 03 CD 6B 05", modbus.Bits(1, bytes.fromhex("CD6B05")),
+        "01 00 13 00 13", modbus.ReadRequest(1, 0x13, 19),
+        "01 03 CD 6B 05", modbus.BitsResponse(1, bytes.fromhex("CD6B05")),
     ),
     Example(
-        "02 00 C4 00 16", modbus.Read(2, 0xC4, 22),
-        "02 03 AC DB 35", modbus.Bits(2, bytes.fromhex("ACDB35")),
+        "02 00 C4 00 16", modbus.ReadRequest(2, 0xC4, 22),
+        "02 03 AC DB 35", modbus.BitsResponse(2, bytes.fromhex("ACDB35")),
     ),
     Example(
-        "03 00 6B 00 03", modbus.Read(3, 0x6B, 3),
-        "03 06 02 2B 00 00 00 64", modbus.Registers((0x022B, 0, 0x64)),
+        "03 00 6B 00 03", modbus.ReadRequest(3, 0x6B, 3),
+        "03 06 02 2B 00 00 00 64", modbus.RegistersResponse((0x022B, 0, 0x64)),
     ),
     Example(
-        "05 00 AC FF 00", modbus.WriteCoil(0xAC, True),
-        "05 00 AC FF 00", modbus.WriteCoil(0xAC, True),
+        "05 00 AC FF 00", modbus.WriteCoilRequest(0xAC, True),
+        "05 00 AC FF 00", modbus.WriteCoilRequest(0xAC, True),
     ),
     Example(
-        "06 00 01 00 03", modbus.WriteRegister(1, 3),
-        "06 00 01 00 03", modbus.WriteRegister(1, 3),
+        "06 00 01 00 03", modbus.WriteRegisterRequest(1, 3),
+        "06 00 01 00 03", modbus.WriteRegisterRequest(1, 3),
     ),
     Example(
-        "10 00 01 00 02 04 00 0A 01 02", modbus.WriteRegisters(1, (10, 0x102)),
-        "10 00 01 00 02", modbus.Written(1, 2),
+        "10 00 01 00 02 04 00 0A 01 02", modbus.WriteRegistersRequest(1, (10, 0x102)),
+        "10 00 01 00 02", modbus.WriteResponse(1, 2),
     ),
 ]  # fmt: skip
 
@@ -101,10 +103,10 @@ def example(request: pytest.FixtureRequest) -> Example:
 
 # Printed in the MIC488 manuals, with the misprinted CRC of the last one corrected (8E B4 instead of 04 7F).
 GOLDEN = {
-    "01 02 13 88 00 08 FD 62": modbus.Read(2, 5000, 8),
-    "01 05 17 71 00 00 98 65": modbus.WriteCoil(6001, False),
-    "01 03 03 FC 00 02 04 7F": modbus.Read(3, 1020, 2),
-    "01 03 27 24 00 02 8E B4": modbus.Read(3, 10020, 2),
+    "01 02 13 88 00 08 FD 62": modbus.ReadRequest(2, 5000, 8),
+    "01 05 17 71 00 00 98 65": modbus.WriteCoilRequest(6001, False),
+    "01 03 03 FC 00 02 04 7F": modbus.ReadRequest(3, 1020, 2),
+    "01 03 27 24 00 02 8E B4": modbus.ReadRequest(3, 10020, 2),
 }
 
 

@@ -10,7 +10,7 @@ from steptwin.wire.crc import with_crc
 from steptwin.wire.gateway import QUEUE_REQUESTS, Gateway, GatewayPort, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.rtu import BURSTY_GAP_NS
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 from steptwin.wire.timed import FRAME_INTERVAL_NS, LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
@@ -152,12 +152,12 @@ def test_a_wrong_header_breaks_the_connection(bank: Any) -> None:
 
 
 def test_an_observer_sees_requests_when_they_come_and_responses_when_they_leave(bank: Any) -> None:
-    seen: list[tuple[int, Direction, bytes]] = []
+    seen: list[tuple[int, FrameDirection, bytes]] = []
     gateway = Gateway(TimedUnits({1: bank}, TIMING))
     port = TcpGatewayPort(gateway, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     port.exchange(ask(1), 5)
     run(10**9, port)
-    assert seen == [(5, Direction.IN, ask(1)), (5 + SENT, Direction.OUT, answered(1))]
+    assert seen == [(5, FrameDirection.IN, ask(1)), (5 + SENT, FrameDirection.OUT, answered(1))]
 
 
 def test_mic_15_a_frame_of_unknown_length_from_a_script_comes_after_the_gap(bank: Any) -> None:
@@ -200,9 +200,9 @@ def test_a_snapshot_continues_as_the_original(new_bank: NewBank, kind: type[TcpG
 
 
 def test_an_observer_of_scripts_sees_requests_when_they_are_executed(bank: Any) -> None:
-    seen: list[tuple[int, Direction, bytes]] = []
+    seen: list[tuple[int, FrameDirection, bytes]] = []
     script = ScriptPort(Gateway(TimedUnits({1: bank}, TIMING)), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     request, response = with_crc(b"\x01" + READ), with_crc(b"\x01" + TOLD)
     script.exchange(request, 5)
     run(10**9, script)
-    assert seen == [(5 + REQUEST_NS, Direction.IN, request), (5 + SENT, Direction.OUT, response)]
+    assert seen == [(5 + REQUEST_NS, FrameDirection.IN, request), (5 + SENT, FrameDirection.OUT, response)]

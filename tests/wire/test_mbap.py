@@ -89,3 +89,12 @@ def test_frames_that_cannot_be(transaction: int, unit: int, size: int, message: 
     with pytest.raises(Misuse) as misuse:
         encode_frame(transaction, unit, bytes(size))
     assert str(misuse.value) == message
+
+
+@pytest.mark.parametrize("length", [2, 254, 262])
+def test_lengths_that_are_none_too_many(length: int) -> None:
+    """262: a request to write 123 registers that says it has 255 bytes."""
+    frame = bytes((0, 1, 0, 0, *length.to_bytes(2, "big"), 1)) + bytes(length - 1)
+    framer = TcpFramer()
+    assert framer.feed(frame) == [TcpFrame(frame)]
+    assert framer.broken is None

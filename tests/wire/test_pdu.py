@@ -13,17 +13,17 @@ from pymodbus.pdu import register_message as peer_registers
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.wire.pdu import (
     BadResponse,
-    Bits,
+    BitsResponse,
+    ExceptionResponse,
     ModbusException,
-    Read,
-    Refused,
-    Registers,
+    ReadRequest,
+    RegistersResponse,
     Request,
     Response,
-    WriteCoil,
-    WriteRegister,
-    WriteRegisters,
-    Written,
+    WriteCoilRequest,
+    WriteRegisterRequest,
+    WriteRegistersRequest,
+    WriteResponse,
     answer,
     decode_request,
     decode_response,
@@ -43,11 +43,13 @@ def spans(most: int) -> st.SearchStrategy[tuple[int, int]]:
 
 
 requests: st.SearchStrategy[Request] = st.one_of(
-    st.builds(lambda f, span: Read(f, *span), st.sampled_from([1, 2]), spans(2000)),
-    st.builds(lambda span: Read(3, *span), spans(125)),
-    st.builds(WriteCoil, addresses, st.booleans()),
-    st.builds(WriteRegister, addresses, words),
-    spans(123).flatmap(lambda span: st.builds(WriteRegisters, st.just(span[0]), st.tuples(*[st.just(7)] * (span[1] - 1), words))),
+    st.builds(lambda f, span: ReadRequest(f, *span), st.sampled_from([1, 2]), spans(2000)),
+    st.builds(lambda span: ReadRequest(3, *span), spans(125)),
+    st.builds(WriteCoilRequest, addresses, st.booleans()),
+    st.builds(WriteRegisterRequest, addresses, words),
+    spans(123).flatmap(
+        lambda span: st.builds(WriteRegistersRequest, st.just(span[0]), st.tuples(*[st.just(7)] * (span[1] - 1), words))
+    ),
 )
 
 
@@ -68,8 +70,8 @@ def test_golden_requests_of_the_manual(golden: tuple[bytes, Request]) -> None:
 
 def test_example_of_an_exception_response() -> None:
     # Section 7 of the specification: a read of coil 1185 that does not exist.
-    assert decode_response(bytes.fromhex("81 02")) == Refused(1, 2)
-    assert encode_response(Refused(1, 2)) == bytes.fromhex("81 02")
+    assert decode_response(bytes.fromhex("81 02")) == ExceptionResponse(1, 2)
+    assert encode_response(ExceptionResponse(1, 2)) == bytes.fromhex("81 02")
     assert ModbusException(1, 2).pdu == bytes.fromhex("81 02")
 
 
@@ -102,31 +104,31 @@ def test_requests_survive_the_wire(request: Request) -> None:
 @given(requests)
 def test_requests_are_those_of_pymodbus(request: Request) -> None:
     match request:
-        case Read(1, address, count):
+        case ReadRequest(1, address, count):
             peer: Any = peer_bits.ReadCoilsRequest(address=address, count=count)
-        case Read(2, address, count):
+        case ReadRequest(2, address, count):
             peer = peer_bits.ReadDiscreteInputsRequest(address=address, count=count)
-        case Read(_, address, count):
+        case ReadRequest(_, address, count):
             peer = peer_registers.ReadHoldingRegistersRequest(address=address, count=count)
-        case WriteCoil(address, on):
+        case WriteCoilRequest(address, on):
             peer = peer_bits.WriteSingleCoilRequest(address=address, bits=[on])
-        case WriteRegister(address, value):
+        case WriteRegisterRequest(address, value):
             peer = peer_registers.WriteSingleRegisterRequest(address=address, registers=[value])
-        case WriteRegisters(address, values):
+        case WriteRegistersRequest(address, values):
             peer = peer_registers.WriteMultipleRegistersRequest(address=address, count=len(values), registers=list(values))
     assert bytes((peer.function_code,)) + peer.encode() == encode_request(request)
 
 
 @given(st.lists(words, min_size=1, max_size=125))
 def test_register_responses_are_read_by_pymodbus(values: list[int]) -> None:
-    peer = DecodePDU(False).decode(encode_response(Registers(tuple(values))))
+    peer = DecodePDU(False).decode(encode_response(RegistersResponse(tuple(values))))
     assert peer is not None
     assert peer.registers == values
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=2000))
 def test_bit_responses_are_read_by_pymodbus(values: list[bool]) -> None:
-    peer = DecodePDU(False).decode(encode_response(Bits(2, pack_bits(values))))
+    peer = DecodePDU(False).decode(encode_response(BitsResponse(2, pack_bits(values))))
     assert peer is not None
     assert peer.bits[: len(values)] == values
 
@@ -205,24 +207,24 @@ def test_any_pdu_is_a_response_or_a_bad_one(pdu: bytes) -> None:
         assert encode_response(response) == pdu
     except Misuse:
         # Right in form, outside the protocol's range: no answer to any request that can be sent.
-        assert isinstance(response, Bits | Registers | Written | Refused)
+        assert isinstance(response, BitsResponse | RegistersResponse | WriteResponse | ExceptionResponse)
 
 
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (Read(4, 0, 1), "function 4 (04h) does not read: permitted are 1, 2 and 3"),
-        (Read(3, 0, 0), "number of registers 0 is outside 1 to 125"),
-        (Read(3, 0, 126), "number of registers 126 is outside 1 to 125"),
-        (Read(1, 0, 2001), "number of bits 2001 is outside 1 to 2000"),
-        (Read(3, 65536, 1), "address 65536 is outside 0 to 65535"),
-        (Read(3, 65530, 7), "7 registers from address 65530 end above 65535"),
-        (WriteCoil(-1, True), "address -1 is outside 0 to 65535"),
-        (WriteRegister(70000, 1), "address 70000 is outside 0 to 65535"),
-        (WriteRegister(0, 65536), "register value 65536 is outside 0 to 65535"),
-        (WriteRegisters(0, ()), "number of registers 0 is outside 1 to 123"),
-        (WriteRegisters(0, (0,) * 124), "number of registers 124 is outside 1 to 123"),
-        (WriteRegisters(0, (1, -1)), "register value -1 is outside 0 to 65535"),
+        (ReadRequest(4, 0, 1), "function 4 (04h) does not read: permitted are 1, 2 and 3"),
+        (ReadRequest(3, 0, 0), "number of registers 0 is outside 1 to 125"),
+        (ReadRequest(3, 0, 126), "number of registers 126 is outside 1 to 125"),
+        (ReadRequest(1, 0, 2001), "number of bits 2001 is outside 1 to 2000"),
+        (ReadRequest(3, 65536, 1), "address 65536 is outside 0 to 65535"),
+        (ReadRequest(3, 65530, 7), "7 registers from address 65530 end above 65535"),
+        (WriteCoilRequest(-1, True), "address -1 is outside 0 to 65535"),
+        (WriteRegisterRequest(70000, 1), "address 70000 is outside 0 to 65535"),
+        (WriteRegisterRequest(0, 65536), "register value 65536 is outside 0 to 65535"),
+        (WriteRegistersRequest(0, ()), "number of registers 0 is outside 1 to 123"),
+        (WriteRegistersRequest(0, (0,) * 124), "number of registers 124 is outside 1 to 123"),
+        (WriteRegistersRequest(0, (1, -1)), "register value -1 is outside 0 to 65535"),
     ],
 )
 def test_what_cannot_be_asked(request_: Request, message: str) -> None:
@@ -234,11 +236,11 @@ def test_what_cannot_be_asked(request_: Request, message: str) -> None:
 @pytest.mark.parametrize(
     ("response", "message"),
     [
-        (Bits(3, b"\0"), "function 3 (03h) does not answer with bits: permitted are 1 and 2"),
-        (Bits(1, bytes(251)), "number of bytes 251 is outside 1 to 250"),
-        (Registers(()), "number of registers 0 is outside 1 to 125"),
-        (Refused(0x83, 2), "function 131 is outside 1 to 127"),
-        (Refused(3, 0), "exception code 0 is outside 1 to 255"),
+        (BitsResponse(3, b"\0"), "function 3 (03h) does not answer with bits: permitted are 1 and 2"),
+        (BitsResponse(1, bytes(251)), "number of bytes 251 is outside 1 to 250"),
+        (RegistersResponse(()), "number of registers 0 is outside 1 to 125"),
+        (ExceptionResponse(0x83, 2), "function 131 is outside 1 to 127"),
+        (ExceptionResponse(3, 0), "exception code 0 is outside 1 to 255"),
     ],
 )
 def test_what_cannot_be_answered(response: Response, message: str) -> None:
@@ -270,16 +272,16 @@ def test_responses_without_form(text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("request_", "text"),
     [
-        (Read(3, 0, 2), "03 02 00 00"),
-        (Read(3, 0, 2), "02 04 00 00 00 00"),
-        (Read(1, 0, 9), "01 01 00"),
-        (Read(1, 0, 8), "02 01 00"),
-        (Read(1, 0, 8), "82 02"),
-        (WriteCoil(5, True), "05 00 05 00 00"),
-        (WriteRegister(5, 1), "06 00 06 00 01"),
-        (WriteRegister(5, 0xFF00), "05 00 05 FF 00"),
-        (WriteRegisters(5, (1, 2)), "10 00 05 00 01"),
-        (WriteRegisters(5, (1, 2)), "10 00 04 00 02"),
+        (ReadRequest(3, 0, 2), "03 02 00 00"),
+        (ReadRequest(3, 0, 2), "02 04 00 00 00 00"),
+        (ReadRequest(1, 0, 9), "01 01 00"),
+        (ReadRequest(1, 0, 8), "02 01 00"),
+        (ReadRequest(1, 0, 8), "82 02"),
+        (WriteCoilRequest(5, True), "05 00 05 00 00"),
+        (WriteRegisterRequest(5, 1), "06 00 06 00 01"),
+        (WriteRegisterRequest(5, 0xFF00), "05 00 05 FF 00"),
+        (WriteRegistersRequest(5, (1, 2)), "10 00 05 00 01"),
+        (WriteRegistersRequest(5, (1, 2)), "10 00 04 00 02"),
     ],
 )
 def test_answers_to_something_else(request_: Request, text: str) -> None:
@@ -288,7 +290,14 @@ def test_answers_to_something_else(request_: Request, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "request_", [Read(1, 0, 1), Read(3, 0, 1), WriteCoil(0, True), WriteRegister(0, 0), WriteRegisters(0, (1,))]
+    "request_",
+    [
+        ReadRequest(1, 0, 1),
+        ReadRequest(3, 0, 1),
+        WriteCoilRequest(0, True),
+        WriteRegisterRequest(0, 0),
+        WriteRegistersRequest(0, (1,)),
+    ],
 )
 def test_a_refusal_is_raised_as_one(request_: Request) -> None:
     with pytest.raises(ModbusException) as refusal:
@@ -306,6 +315,6 @@ def test_an_exception_code_nobody_knows_is_shown() -> None:
 
 
 def test_values_of_different_kinds_differ() -> None:
-    alike: Sequence[object] = (WriteCoil(1, True), WriteRegister(1, 1), Written(1, 1))
+    alike: Sequence[object] = (WriteCoilRequest(1, True), WriteRegisterRequest(1, 1), WriteResponse(1, 1))
     assert len({repr(value) for value in alike}) == 3
     assert all(a != b for i, a in enumerate(alike) for b in alike[i + 1 :])

@@ -12,8 +12,17 @@ from pymodbus.pdu import DecodePDU
 from steptwin.errors import Misuse
 from steptwin.wire import rtu
 from steptwin.wire.crc import crc16, with_crc
-from steptwin.wire.pdu import Read, Request, WriteRegister, WriteRegisters, decode_request, encode_request
-from steptwin.wire.rtu import BURSTY_GAP_NS, PAUSE_NS, Role, RtuFrame, RtuFramer, encode_frame, request_length, response_length
+from steptwin.wire.pdu import ReadRequest, Request, WriteRegisterRequest, WriteRegistersRequest, decode_request, encode_request
+from steptwin.wire.rtu import (
+    BURSTY_GAP_NS,
+    PAUSE_NS,
+    FrameRole,
+    RtuFrame,
+    RtuFramer,
+    encode_frame,
+    request_length,
+    response_length,
+)
 
 GAP = BURSTY_GAP_NS
 
@@ -23,37 +32,37 @@ def hexed(text: str) -> bytes:
     return with_crc(bytes.fromhex(text))
 
 
-def cut(framer: RtuFramer, data: bytes, now: int = 0) -> list[tuple[str, Role]]:
+def cut(framer: RtuFramer, data: bytes, now: int = 0) -> list[tuple[str, FrameRole]]:
     return [(frame.raw[:-2].hex(" "), frame.role) for frame in framer.feed(data, now)]
 
 
 # A line with three slaves as it sounds: requests to others, their responses, refusals, a broadcast, and requests to unit 1.
 CONVERSATION = [
-    (hexed("02 03 27 24 00 04"), Role.REQUEST),
-    (hexed("02 03 08 00 01 00 02 00 03 00 04"), Role.RESPONSE),
-    (hexed("01 03 27 24 00 02"), Role.REQUEST),
-    (hexed("03 06 00 10 00 07"), Role.REQUEST),
-    (hexed("03 06 00 10 00 07"), Role.RESPONSE),
-    (hexed("00 05 17 71 FF 00"), Role.REQUEST),
-    (hexed("02 01 00 00 00 05"), Role.REQUEST),
-    (hexed("02 01 01 15"), Role.RESPONSE),
-    (hexed("02 01 00 00 00 18"), Role.REQUEST),
-    (hexed("02 01 03 15 AA 55"), Role.RESPONSE),
-    (hexed("01 10 27 38 00 02 04 41 20 00 00"), Role.REQUEST),
-    (hexed("03 10 00 10 00 02 04 00 01 00 02"), Role.REQUEST),
-    (hexed("03 10 00 10 00 02"), Role.RESPONSE),
-    (hexed("03 03 FF F0 00 01"), Role.REQUEST),
-    (hexed("03 83 02"), Role.RESPONSE),
-    (hexed("02 03 00 00 00 01"), Role.REQUEST),
-    (hexed("02 03 02 00 00"), Role.RESPONSE),
-    (hexed("00 06 00 01 00 02"), Role.REQUEST),
-    (hexed("03 11"), Role.REQUEST),
-    (hexed("03 11 05 41 42 43 44 FF"), Role.RESPONSE),
-    (hexed("02 18 00 10"), Role.REQUEST),
-    (hexed("02 18 00 06 00 02 01 B8 12 84"), Role.RESPONSE),
-    (hexed("03 17 00 03 00 06 00 0E 00 03 06 00 FF 00 FF 00 FF"), Role.REQUEST),
-    (hexed("03 17 0C 00 FE 0A CD 00 01 00 03 00 0D 00 FF"), Role.RESPONSE),
-    (hexed("01 01 17 70 00 08"), Role.REQUEST),
+    (hexed("02 03 27 24 00 04"), FrameRole.REQUEST),
+    (hexed("02 03 08 00 01 00 02 00 03 00 04"), FrameRole.RESPONSE),
+    (hexed("01 03 27 24 00 02"), FrameRole.REQUEST),
+    (hexed("03 06 00 10 00 07"), FrameRole.REQUEST),
+    (hexed("03 06 00 10 00 07"), FrameRole.RESPONSE),
+    (hexed("00 05 17 71 FF 00"), FrameRole.REQUEST),
+    (hexed("02 01 00 00 00 05"), FrameRole.REQUEST),
+    (hexed("02 01 01 15"), FrameRole.RESPONSE),
+    (hexed("02 01 00 00 00 18"), FrameRole.REQUEST),
+    (hexed("02 01 03 15 AA 55"), FrameRole.RESPONSE),
+    (hexed("01 10 27 38 00 02 04 41 20 00 00"), FrameRole.REQUEST),
+    (hexed("03 10 00 10 00 02 04 00 01 00 02"), FrameRole.REQUEST),
+    (hexed("03 10 00 10 00 02"), FrameRole.RESPONSE),
+    (hexed("03 03 FF F0 00 01"), FrameRole.REQUEST),
+    (hexed("03 83 02"), FrameRole.RESPONSE),
+    (hexed("02 03 00 00 00 01"), FrameRole.REQUEST),
+    (hexed("02 03 02 00 00"), FrameRole.RESPONSE),
+    (hexed("00 06 00 01 00 02"), FrameRole.REQUEST),
+    (hexed("03 11"), FrameRole.REQUEST),
+    (hexed("03 11 05 41 42 43 44 FF"), FrameRole.RESPONSE),
+    (hexed("02 18 00 10"), FrameRole.REQUEST),
+    (hexed("02 18 00 06 00 02 01 B8 12 84"), FrameRole.RESPONSE),
+    (hexed("03 17 00 03 00 06 00 0E 00 03 06 00 FF 00 FF 00 FF"), FrameRole.REQUEST),
+    (hexed("03 17 0C 00 FE 0A CD 00 01 00 03 00 0D 00 FF"), FrameRole.RESPONSE),
+    (hexed("01 01 17 70 00 08"), FrameRole.REQUEST),
 ]
 STREAM = b"".join(frame for frame, _ in CONVERSATION)
 
@@ -61,7 +70,7 @@ STREAM = b"".join(frame for frame, _ in CONVERSATION)
 def test_golden_frames_are_whole_requests(golden: tuple[bytes, Request]) -> None:
     raw, request = golden
     (frame,) = RtuFramer(own={1}).feed(raw, 0)
-    assert frame == RtuFrame(raw, Role.REQUEST, 8)
+    assert frame == RtuFrame(raw, FrameRole.REQUEST, 8)
     assert frame.unit == 1
     assert decode_request(frame.pdu) == request
     assert encode_frame(1, frame.pdu) == raw
@@ -96,9 +105,9 @@ def test_splits_do_not_matter(places: list[int]) -> None:
 
 words = st.integers(0, 0xFFFF)
 requests = st.one_of(
-    st.builds(Read, st.just(3), st.integers(0, 0xFF00), st.integers(1, 125)),
-    st.builds(WriteRegister, words, words),
-    st.builds(WriteRegisters, st.integers(0, 0xFF00), st.lists(words, min_size=1, max_size=123).map(tuple)),
+    st.builds(ReadRequest, st.just(3), st.integers(0, 0xFF00), st.integers(1, 125)),
+    st.builds(WriteRegisterRequest, words, words),
+    st.builds(WriteRegistersRequest, st.integers(0, 0xFF00), st.lists(words, min_size=1, max_size=123).map(tuple)),
 )
 
 
@@ -111,7 +120,7 @@ def test_any_requests_in_any_pieces(sent: list[tuple[int, Request]], random: Any
         found += framer.feed(stream[:size], 0)
         stream = stream[size:]
     assert [frame.raw for frame in found] == frames
-    assert {frame.role for frame in found} <= {Role.REQUEST}
+    assert {frame.role for frame in found} <= {FrameRole.REQUEST}
 
 
 @pytest.mark.parametrize(
@@ -120,7 +129,7 @@ def test_any_requests_in_any_pieces(sent: list[tuple[int, Request]], random: Any
 def test_a_frame_right_behind_rubbish_is_found_at_once(rubbish: str) -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
-    assert cut(framer, bytes.fromhex(rubbish) + good) == [("01 03 27 24 00 02", Role.REQUEST)]
+    assert cut(framer, bytes.fromhex(rubbish) + good) == [("01 03 27 24 00 02", FrameRole.REQUEST)]
     assert framer.rubbish == len(bytes.fromhex(rubbish))
     assert framer.deadline() is None
 
@@ -128,7 +137,7 @@ def test_a_frame_right_behind_rubbish_is_found_at_once(rubbish: str) -> None:
 def test_a_wrong_crc_costs_the_frame_and_not_the_next() -> None:
     framer = RtuFramer({1})
     good = hexed("01 03 27 24 00 02")
-    assert framer.feed(good[:-1] + b"\0" + good, 0) == [RtuFrame(good, Role.REQUEST, 16)]
+    assert framer.feed(good[:-1] + b"\0" + good, 0) == [RtuFrame(good, FrameRole.REQUEST, 16)]
     assert framer.rubbish == 8
 
 
@@ -137,10 +146,10 @@ def test_what_may_be_the_response_of_another_unit_delays_the_next_frame_by_a_gap
     wrong, good = bytes.fromhex("01 03 27 24 00 02 04 7F"), hexed("01 03 27 24 00 02")
     framer = RtuFramer({1})
     assert framer.feed(wrong + good, 0) == []
-    assert framer.expire(GAP) == [RtuFrame(good, Role.REQUEST, 16)]
+    assert framer.expire(GAP) == [RtuFrame(good, FrameRole.REQUEST, 16)]
     framer = RtuFramer({1})
     framer.feed(wrong, 0)
-    assert framer.feed(good, GAP) == [RtuFrame(good, Role.REQUEST, 16, begin=GAP)]
+    assert framer.feed(good, GAP) == [RtuFrame(good, FrameRole.REQUEST, 16, begin=GAP)]
 
 
 def test_mic_15_a_pause_does_not_cut_a_frame() -> None:
@@ -179,7 +188,7 @@ def test_mic_15_a_request_in_pieces_is_one_frame(sizes: tuple[int, ...], pause_m
         deadline = framer.deadline()
         if deadline is not None and deadline < now:
             frames += framer.expire(deadline)
-    assert frames == [RtuFrame(good, Role.REQUEST, 8, begin=5, pause=pause_ms * 1_000_000)]
+    assert frames == [RtuFrame(good, FrameRole.REQUEST, 8, begin=5, pause=pause_ms * 1_000_000)]
 
 
 @pytest.mark.parametrize("pause_ms", [0, 5, 30, 200, 1500, 3000])
@@ -275,7 +284,7 @@ def test_a_rest_with_a_right_crc_is_a_frame_of_unknown_length(body: str) -> None
     raw = hexed(body)
     before = hexed("02 03 27 24 00 04")
     assert [frame.raw for frame in framer.feed(before + raw, 0)] == [before]
-    assert framer.expire(GAP) == [RtuFrame(raw, Role.UNKNOWN, len(before + raw))]
+    assert framer.expire(GAP) == [RtuFrame(raw, FrameRole.UNKNOWN, len(before + raw))]
     assert framer.rubbish == 0
 
 
@@ -302,7 +311,7 @@ def test_an_unknown_frame_after_a_beginning_given_up() -> None:
 def test_lengths_of_the_requests_of_the_specification(body: str, length: int) -> None:
     raw = hexed(body)
     assert request_length(raw) == length == len(raw)
-    assert RtuFramer({1}).feed(raw, 0) == [RtuFrame(raw, Role.REQUEST, length)]
+    assert RtuFramer({1}).feed(raw, 0) == [RtuFrame(raw, FrameRole.REQUEST, length)]
 
 
 @pytest.mark.parametrize(
@@ -354,7 +363,7 @@ def test_a_request_to_this_side_is_not_taken_for_a_shorter_response() -> None:
         assert decode_request(raw[1:-2])
         framer = RtuFramer({raw[0]})
         frames = [frame for byte in raw for frame in framer.feed(bytes((byte,)), 0)]
-        assert frames == RtuFramer({raw[0]}).feed(raw, 0) == [RtuFrame(raw, Role.REQUEST, 8)]
+        assert frames == RtuFramer({raw[0]}).feed(raw, 0) == [RtuFrame(raw, FrameRole.REQUEST, 8)]
 
 
 def test_a_request_inside_the_response_of_another_unit_is_data() -> None:
@@ -364,14 +373,14 @@ def test_a_request_inside_the_response_of_another_unit_is_data() -> None:
         framer = RtuFramer({1})
         stream = hexed("02 03 00 00 00 05") + outer
         frames = [frame for at in range(0, len(stream), size) for frame in framer.feed(stream[at : at + size], 0)]
-        assert [(frame.raw, frame.role) for frame in frames[1:]] == [(outer, Role.RESPONSE)]
+        assert [(frame.raw, frame.role) for frame in frames[1:]] == [(outer, FrameRole.RESPONSE)]
 
 
 def test_a_response_without_its_request_waits_for_what_tells_it_from_one() -> None:
     framer = RtuFramer({1})
     response = hexed("02 01 01 15")
     assert framer.feed(response, 0) == []
-    assert framer.expire(GAP) == [RtuFrame(response, Role.RESPONSE, 6)]
+    assert framer.expire(GAP) == [RtuFrame(response, FrameRole.RESPONSE, 6)]
 
 
 @pytest.mark.parametrize("unit", [248, 255])
@@ -408,7 +417,7 @@ def test_a_flood_of_rubbish_costs_a_bounded_number_of_looks_per_byte(pattern: st
     looks = 0
     look = RtuFramer._look
 
-    def counted(self: RtuFramer, start: int, *, waiting: bool) -> tuple[int, Role]:
+    def counted(self: RtuFramer, start: int, *, waiting: bool) -> tuple[int, FrameRole]:
         nonlocal looks
         looks += 1
         return look(self, start, waiting=waiting)

@@ -15,16 +15,16 @@ from steptwin.wire.crc import is_intact, with_crc
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import (
     ModbusException,
-    Read,
+    ReadRequest,
     Request,
     Response,
-    WriteCoil,
-    WriteRegister,
-    WriteRegisters,
+    WriteCoilRequest,
+    WriteRegisterRequest,
+    WriteRegistersRequest,
     answer,
     encode_request,
 )
-from steptwin.wire.slave import Device, Direction, RtuSlavePort, TcpSlavePort
+from steptwin.wire.slave import Device, FrameDirection, RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
@@ -71,12 +71,12 @@ def test_golden_requests_beyond_the_memory_of_the_bank_are_refused(bank: Any, te
 @pytest.mark.parametrize(
     "request_",
     [
-        Read(1, 3, 10),
-        Read(2, 0, 2000),
-        Read(3, 0, 125),
-        WriteCoil(7, True),
-        WriteRegister(9, 0xABCD),
-        WriteRegisters(100, tuple(range(123))),
+        ReadRequest(1, 3, 10),
+        ReadRequest(2, 0, 2000),
+        ReadRequest(3, 0, 125),
+        WriteCoilRequest(7, True),
+        WriteRegisterRequest(9, 0xABCD),
+        WriteRegistersRequest(100, tuple(range(123))),
     ],
     ids=str,
 )
@@ -94,7 +94,7 @@ def test_two_ends_joined(new_bank: NewBank, request_: Request) -> None:
 
 def test_a_refusal_of_the_device_reaches_the_master(bank: Any) -> None:
     with pytest.raises(ModbusException) as refusal:
-        over_rtu(RtuSlavePort({1: bank}), 1, Read(3, 2999, 2))
+        over_rtu(RtuSlavePort({1: bank}), 1, ReadRequest(3, 2999, 2))
     assert refusal.value.code == 2
 
 
@@ -138,7 +138,7 @@ def test_mic_1_silence(bank: Any, data: bytes) -> None:
     assert port.exchange(data, 0) == b""
     assert port.to_send(GAP) == []
     assert bank.executed == []
-    assert over_rtu(port, 1, Read(3, 5, 1), 2 * GAP) is not None
+    assert over_rtu(port, 1, ReadRequest(3, 5, 1), 2 * GAP) is not None
 
 
 def test_frames_longer_than_256_bytes_are_none(bank: Any) -> None:
@@ -153,7 +153,7 @@ def test_frames_longer_than_256_bytes_are_none(bank: Any) -> None:
 def test_mic_2_broadcast_writes_are_executed_everywhere_and_never_answered(new_bank: NewBank) -> None:
     banks = {1: new_bank(), 5: new_bank()}
     port = RtuSlavePort(banks)
-    for request in (WriteCoil(3, True), WriteRegister(4, 44), WriteRegisters(5, (55, 66))):
+    for request in (WriteCoilRequest(3, True), WriteRegisterRequest(4, 44), WriteRegistersRequest(5, (55, 66))):
         assert port.exchange(rtu.encode_frame(0, encode_request(request)), 9) == b""
     for bank in banks.values():
         assert bank.coils[3]
@@ -175,7 +175,7 @@ def test_several_units_on_one_line(new_bank: NewBank) -> None:
     banks = {unit: new_bank() for unit in (1, 2, 247)}
     port = RtuSlavePort(banks)
     for unit in banks:
-        over_rtu(port, unit, WriteRegister(0, unit))
+        over_rtu(port, unit, WriteRegisterRequest(0, unit))
     assert {unit: bank.registers[0] for unit, bank in banks.items()} == {1: 1, 2: 2, 247: 247}
 
 
@@ -245,15 +245,16 @@ def test_no_rubbish_breaks_a_line(bank: Any) -> None:
 
 
 def test_an_observer_sees_every_frame_on_the_line(bank: Any) -> None:
-    seen: list[tuple[int, Direction, bytes]] = []
+    seen: list[tuple[int, FrameDirection, bytes]] = []
     port = RtuSlavePort({1: bank}, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     ask, told = hexed("01 03 00 05 00 01"), hexed("01 03 02 00 05")
     foreign, broadcast = hexed("02 06 00 01 00 01"), hexed("00 06 00 01 00 01")
     port.exchange(ask, 1)
     port.exchange(foreign + broadcast + ask, 2)
     assert seen == [
-        (1, Direction.IN, ask), (1, Direction.OUT, told),
-        (2, Direction.IN, foreign), (2, Direction.IN, broadcast), (2, Direction.IN, ask), (2, Direction.OUT, told),
+        (1, FrameDirection.IN, ask), (1, FrameDirection.OUT, told),
+        (2, FrameDirection.IN, foreign), (2, FrameDirection.IN, broadcast),
+        (2, FrameDirection.IN, ask), (2, FrameDirection.OUT, told),
     ]  # fmt: skip
     port.on_frame = None
     port.exchange(ask, 3)
@@ -261,16 +262,16 @@ def test_an_observer_sees_every_frame_on_the_line(bank: Any) -> None:
 
 
 def test_an_observer_sees_tcp_frames_with_their_header(bank: Any) -> None:
-    seen: list[tuple[int, Direction, bytes]] = []
+    seen: list[tuple[int, FrameDirection, bytes]] = []
     port = TcpSlavePort({1: bank}, on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     ask = mbap.encode_frame(3, 1, bytes.fromhex("03 00 05 00 01"))
     told = port.exchange(ask, 4)
-    assert seen == [(4, Direction.IN, ask), (4, Direction.OUT, told)]
+    assert seen == [(4, FrameDirection.IN, ask), (4, FrameDirection.OUT, told)]
 
 
 def test_tcp_requests_are_answered_in_order_with_their_transactions(bank: Any) -> None:
     port = TcpSlavePort({1: bank})
-    ask = b"".join(mbap.encode_frame(0xFF00 + n, 1, encode_request(Read(3, n, 1))) for n in range(30))
+    ask = b"".join(mbap.encode_frame(0xFF00 + n, 1, encode_request(ReadRequest(3, n, 1))) for n in range(30))
     told = b"".join(mbap.encode_frame(0xFF00 + n, 1, bytes((3, 2, 0, n))) for n in range(30))
     for size in (1, 7, 12, 13, 1000):
         assert b"".join(port.exchange(ask[at : at + size], 0) for at in range(0, len(ask), size)) == told
@@ -278,7 +279,7 @@ def test_tcp_requests_are_answered_in_order_with_their_transactions(bank: Any) -
 
 @pytest.mark.parametrize("unit", [0, 255, 17])
 def test_mic_23_a_single_device_is_addressed_by_0_and_255_too(bank: Any, unit: int) -> None:
-    assert over_tcp(TcpSlavePort({17: bank}), unit, WriteRegister(0, 9)) == WriteRegister(0, 9)
+    assert over_tcp(TcpSlavePort({17: bank}), unit, WriteRegisterRequest(0, 9)) == WriteRegisterRequest(0, 9)
     assert bank.registers[0] == 9
 
 
@@ -286,21 +287,21 @@ def test_mic_23_a_single_device_is_addressed_by_0_and_255_too(bank: Any, unit: i
 def test_mic_23_any_other_unit_is_refused_as_a_gateway_does(new_bank: NewBank, units: list[int], asked: int) -> None:
     banks = {unit: new_bank() for unit in units}
     with pytest.raises(ModbusException) as refusal:
-        over_tcp(TcpSlavePort(banks), asked, WriteRegister(0, 9))
+        over_tcp(TcpSlavePort(banks), asked, WriteRegisterRequest(0, 9))
     assert refusal.value.code == 0x0B
     assert not any(bank.executed for bank in banks.values())
 
 
 def test_mic_2_unit_0_on_tcp_is_a_broadcast_where_there_are_several_units(new_bank: NewBank) -> None:
     banks = {unit: new_bank() for unit in (1, 2)}
-    seen: list[Direction] = []
+    seen: list[FrameDirection] = []
     port = TcpSlavePort(banks, on_frame=lambda now, way, raw: seen.append(way))
     write = bytes.fromhex("06 00 05 00 63")
     assert port.exchange(mbap.encode_frame(1, 0, write), 4) == b""
     assert [bank.executed for bank in banks.values()] == [[(4, write)], [(4, write)]]
     assert port.exchange(mbap.encode_frame(2, 0, bytes.fromhex("03 00 05 00 01")), 5) == b""
     assert [len(bank.executed) for bank in banks.values()] == [1, 1]
-    assert seen == [Direction.IN, Direction.IN]
+    assert seen == [FrameDirection.IN, FrameDirection.IN]
 
 
 @pytest.mark.parametrize("line", [None, SerialLine(9600)])
@@ -368,7 +369,9 @@ good_frames = st.builds(
     lambda unit, body: with_crc(bytes((unit,)) + body),
     st.sampled_from([0, 1, 2]),
     st.one_of(
-        st.sampled_from([encode_request(r) for r in (Read(3, 5, 1), WriteRegisters(1, (10, 258)), WriteCoil(1, True))]),
+        st.sampled_from(
+            [encode_request(r) for r in (ReadRequest(3, 5, 1), WriteRegistersRequest(1, (10, 258)), WriteCoilRequest(1, True))]
+        ),
         st.binary(min_size=1, max_size=30),
     ),
 )
@@ -408,3 +411,38 @@ def test_tcp_takes_anything(new_bank: NewBank, stream: list[bytes]) -> None:
     framer = mbap.TcpFramer()
     framer.feed(answered)
     assert (framer.broken, framer.held) == (None, b"")
+
+
+pdus = st.one_of(
+    st.builds(ReadRequest, st.sampled_from([1, 2, 3]), st.integers(0, 3100), st.integers(1, 120)).map(encode_request),
+    st.builds(WriteCoilRequest, st.integers(0, 3100), st.booleans()).map(encode_request),
+    st.builds(WriteRegisterRequest, st.integers(0, 3100), st.integers(0, 0xFFFF)).map(encode_request),
+    st.builds(WriteRegistersRequest, st.integers(0, 3100), st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=123)).map(
+        encode_request
+    ),
+    st.binary(min_size=1, max_size=30),
+)
+
+
+@given(
+    unit=st.integers(0, 3),
+    pdu=pdus,
+    damage=st.none() | st.tuples(st.integers(0, 300), st.integers(1, 255)),
+    behind=st.sampled_from([b"", b"\x00", b"\x01\x03"]),
+)
+def test_a_burst_is_answered_as_its_bytes_one_by_one(
+    new_bank: NewBank, unit: int, pdu: bytes, damage: tuple[int, int] | None, behind: bytes
+) -> None:
+    """Whatever is the usual request has a way of its own through the port."""
+    data = bytearray(rtu.encode_frame(unit, pdu) + behind)
+    if damage is not None:
+        data[damage[0] % len(data)] ^= damage[1]
+    found = []
+    for pieces in ([bytes(data)], [bytes((byte,)) for byte in data]):
+        banks = {1: new_bank(), 2: new_bank()}
+        seen: list[tuple[FrameDirection, bytes]] = []
+        port = RtuSlavePort(banks, on_frame=lambda _, way, raw, seen=seen: seen.append((way, raw)))
+        out = b"".join(port.exchange(piece, 5) for piece in pieces)
+        out += b"".join(sent for _, sent in port.to_send(5 + GAP))
+        found.append((out, seen, [[body for _, body in bank.executed] for bank in banks.values()], port.rubbish))
+    assert found[0] == found[1]

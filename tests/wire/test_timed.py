@@ -12,7 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 from steptwin.wire.timed import FRAME_INTERVAL_NS, LINE_CHARACTERS, LineTiming, TimedRtuSlavePort, TimedUnits
 
 NewBank = Callable[[], Any]
@@ -262,15 +262,15 @@ def test_mic_15_frames_of_unknown_length_come_after_the_gap(bank: Any) -> None:
 
 
 def test_an_observer_sees_frames_at_their_wire_time(bank: Any) -> None:
-    seen: list[tuple[int, Direction, bytes]] = []
+    seen: list[tuple[int, FrameDirection, bytes]] = []
     port = TimedRtuSlavePort(TimedUnits({1: bank}, TIMING), on_frame=lambda now, way, raw: seen.append((now, way, raw)))
     foreign = with_crc(bytes.fromhex("02 06 00 00 00 01"))
     port.exchange(READ + foreign, 0)
     run(port, 10**9)
     assert seen == [
-        (READ_NS, Direction.IN, READ),
-        (LINE.duration(16), Direction.IN, foreign),
-        (READ_NS + TURN + TOLD_NS, Direction.OUT, TOLD),
+        (READ_NS, FrameDirection.IN, READ),
+        (LINE.duration(16), FrameDirection.IN, foreign),
+        (READ_NS + TURN + TOLD_NS, FrameDirection.OUT, TOLD),
     ]
 
 
@@ -319,7 +319,7 @@ def test_what_is_executed_at_the_moment_of_an_arrival_is_executed_first(bank: An
     timing = LineTiming(LINE, interval_ns=second + later)
     port = TimedRtuSlavePort(
         TimedUnits({1: bank}, timing),
-        on_frame=lambda now, way, raw: seen.append((now, len(bank.executed))) if way is Direction.IN else None,
+        on_frame=lambda now, way, raw: seen.append((now, len(bank.executed))) if way is FrameDirection.IN else None,
     )
     port.exchange(READ, 0)
     run(port, second)
@@ -330,3 +330,24 @@ def test_what_is_executed_at_the_moment_of_an_arrival_is_executed_first(bank: An
     both = second + later + READ_NS
     assert bank.executed == [(READ_NS, READ[1:-2]), (both, READ[1:-2])]
     assert seen == [(READ_NS, 0), (second + READ_NS, 1), (both, 2)]
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_what_arrives_before_an_execution_is_due_is_seen_before_it(new_bank: NewBank, late: bool) -> None:
+    """A request to unit 1 waits for its slot; one to unit 3, whom nobody is, arrives meanwhile. A late look finds the same."""
+    bank = new_bank()
+    seen: list[tuple[int, int]] = []
+    port = TimedRtuSlavePort(
+        TimedUnits({1: bank}, LineTiming(LINE, interval_ns=40_000_000)),
+        on_frame=lambda now, way, raw: seen.append((now, len(bank.executed))) if way is FrameDirection.IN else None,
+    )
+    port.exchange(READ, 0)
+    run(port, 10_000_000)
+    port.exchange(READ, 10_000_000)
+    port.exchange(with_crc(bytes.fromhex("03 06 00 00 00 01")), 20_000_000)
+    if late:
+        port.to_send(10**9)
+    else:
+        run(port, 10**9)
+    assert seen == [(READ_NS, 0), (10_000_000 + READ_NS, 1), (20_000_000 + READ_NS, 1)]
+    assert len(bank.executed) == 2

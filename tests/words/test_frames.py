@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.mic488.device import Mic488
-from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Direction, RtuSlavePort, TcpSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
-from steptwin.words.frames import FrameLine, FrameLog, WatchedRtuPort
+from steptwin.mic488.device import Mic488Device
+from steptwin.wire.slave import FrameDirection, RtuSlavePort, TcpSlavePort
+from steptwin.words.frames import FrameLine, FrameLog
 
 IN_MM = ControllerConfig(axes=tuple(AxisConfig(unit=3, gear=100.0) for _ in range(4)))
 NOW: Nanos = 1_234_567_890
@@ -18,7 +16,7 @@ NOW: Nanos = 1_234_567_890
 
 def logged(*frames: str, units: tuple[int, ...] = (1,), tcp: bool = False) -> list[str]:
     """What is said of these frames and of the answers of MIC488s in mm to them."""
-    devices = {unit: Mic488(IN_MM) for unit in units}
+    devices = {unit: Mic488Device(IN_MM) for unit in units}
     log = FrameLog(devices)
     lines: list[FrameLine] = []
     log.sinks.append(lines.append)
@@ -95,39 +93,9 @@ def test_frames_of_others_on_the_line_are_shown_and_not_interpreted() -> None:
     assert logged("09 03 27 24 00 02 8F FC") == ["    1.234568 s  pty     → 09 03 27 24 00 02 8f fc  unit 9 is not served here"]
 
 
-@pytest.mark.parametrize("timed", [False, True])
-def test_bytes_that_belong_to_no_frame_are_counted(timed: bool) -> None:
-    """A Modbus TCP request on an RTU line, then a frame."""
-    devices = {1: Mic488(IN_MM)}
-    log = FrameLog(devices)
-    lines: list[FrameLine] = []
-    log.sinks.append(lines.append)
-    observer = log.observer("rtu-1", tcp=False)
-    timing = LineTiming(SerialLine(115200))
-    port = WatchedRtuPort(
-        TimedRtuSlavePort(TimedUnits(devices, timing), on_frame=observer) if timed else RtuSlavePort(devices, on_frame=observer),
-        log,
-        "rtu-1",
-    )
-    assert port.exchange(bytes.fromhex("000100000006010327240002"), NOW) == b""
-    due = port.deadline()
-    while due is not None:
-        port.to_send(due)
-        due = port.deadline()
-    assert str(lines[0]).endswith("s  rtu-1   → 5 bytes that belong to no frame")
-    # The other seven could have been the beginning of a frame until now.
-    port.exchange(bytes.fromhex("01 03 27 24 00 02 8E B4"), NOW + SECOND)
-    port.to_send(NOW + 2 * SECOND)
-    assert sorted(line.meaning for line in lines[1:]) == [
-        "7 bytes that belong to no frame",
-        "read M1_POS_ACT",
-        "read M1_POS_ACT = 0 mm",
-    ]
-
-
-@pytest.mark.parametrize("direction", list(Direction))
-def test_what_makes_no_sense_is_said_to(direction: Direction) -> None:
-    log = FrameLog({1: Mic488(IN_MM)})
+@pytest.mark.parametrize("direction", list(FrameDirection))
+def test_what_makes_no_sense_is_said_to(direction: FrameDirection) -> None:
+    log = FrameLog({1: Mic488Device(IN_MM)})
     lines: list[FrameLine] = []
     log.sinks.append(lines.append)
     log.observer("pty", tcp=False)(NOW, direction, bytes.fromhex("01 03 00"))

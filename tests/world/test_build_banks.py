@@ -47,7 +47,7 @@ def test_programs_go_into_their_banks(keys: str, banks: dict[int, str]) -> None:
         ("programs = [1]", "1: expected a text"),
         ('program = "one.prg"\nprograms = "two.prg"', "program and programs exclude each other"),
         ('programs = ["one.prg", "none.prg"]', "the content of the file 'none.prg' is not given"),
-        ('programs = ["one.prg", "wrong.prg"]', "the program does not check"),
+        ('programs = ["one.prg", "wrong.prg"]', "wrong.prg:1:1: error W1"),
     ],
 )
 def test_banks_that_cannot_be_filled_are_errors_of_the_description(keys: str, message: str) -> None:

@@ -44,3 +44,9 @@ def test_a_published_vector() -> None:
 def test_what_is_certain(probability: float, happens: bool) -> None:
     chance = Chance(1, "a")
     assert {chance.happens(probability) for _ in range(200)} == {happens}
+
+
+def test_a_probability_is_the_share_of_53_bits() -> None:
+    drawn = Chance(7, "x").draw() >> 11
+    assert not Chance(7, "x").happens(drawn / 2**53)
+    assert Chance(7, "x").happens((drawn + 1) / 2**53)

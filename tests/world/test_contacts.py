@@ -7,18 +7,21 @@ from itertools import pairwise
 from math import floor
 
 import pytest
+from driven import changes
 from hypothesis import given
 from hypothesis import strategies as st
 from mic488_rig import controller
+from toy import ToyAxis
 
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND, Edge
+from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
+from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Button, Circuit, CountedPosition, Switch, Zone
 from steptwin.world.kernel import Kernel, PinName
-from steptwin.world.trace import Record
+from steptwin.world.trace import TraceRecord
 
 LIMITS = st.one_of(st.none(), st.integers(-30, 30))
 
@@ -64,9 +67,9 @@ def test_a_repeated_zone_is_at_every_turn_to_the_nearest_pulse(low: int, width: 
 @pytest.mark.parametrize("in_series", [False, True])
 def test_contacts_of_one_input_are_joined(in_series: bool) -> None:
     """Two buttons, one of them NC: an input has what its contacts give it together, and only its changes are edges."""
-    edges: list[Record] = []
+    edges: list[TraceRecord] = []
     kernel = Kernel(record=edges.append)
-    device = Mic488(controller())
+    device = Mic488Device(controller())
     kernel.add("m", device)
     circuit = Circuit(kernel, PinName("m", "IN3"), in_series=in_series)
     buttons = [
@@ -111,9 +114,9 @@ def test_zones_that_cannot_be_are_misuse(arguments: tuple, message: str) -> None
 
 def test_a_bouncing_switch_comes_to_rest_within_its_time_and_the_same_way_again() -> None:
     def run(seed: int) -> list[tuple[int, float]]:
-        edges: list[Record] = []
+        edges: list[TraceRecord] = []
         kernel = Kernel(record=edges.append)
-        device = Mic488(controller(AxisConfig(acc=1e4, vel=1e4)))
+        device = Mic488Device(controller(AxisConfig(acc=1e4, vel=1e4)))
         kernel.add("m", device)
         circuit = Circuit(kernel, PinName("m", "IN1"))
         chance = Chance(seed, "x")
@@ -137,9 +140,9 @@ def test_a_bouncing_switch_comes_to_rest_within_its_time_and_the_same_way_again(
 
 def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
     kernel = Kernel()
-    device = Mic488(controller())
+    device = Mic488Device(controller())
     kernel.add("m", device)
-    seen: list[Edge] = []
+    seen: list[PinEdge] = []
     kernel.observers.append(lambda name, edge: seen.append(edge))
     circuit = Circuit(kernel, PinName("m", "IN3"))
     button = Button(circuit, normally_closed=True, bounce_ns=0, bounces=0, chance=Chance(0, "b"))
@@ -153,9 +156,9 @@ def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
 
 def test_the_bouncing_of_a_contact_that_changes_nothing_for_its_input_is_awaited_all_the_same() -> None:
     """Beside a closed contact: the input stays 1, and the lane of the contact shows it."""
-    edges: list[Record] = []
+    edges: list[TraceRecord] = []
     kernel = Kernel(record=edges.append)
-    device = Mic488(controller())
+    device = Mic488Device(controller())
     kernel.add("m", device)
     circuit = Circuit(kernel, PinName("m", "IN3"))
     closed, bouncing = (
@@ -180,7 +183,7 @@ def test_the_bouncing_of_a_contact_that_changes_nothing_for_its_input_is_awaited
 def test_the_level_of_an_input_is_that_of_its_contacts_at_rest_and_of_the_switch_where_it_is() -> None:
     """A switch that is on where it is put: NO gives 1, NC 0; without a change nothing bounces."""
     kernel = Kernel()
-    kernel.add("m", Mic488(controller()))
+    kernel.add("m", Mic488Device(controller()))
     drive = kernel.drive_of("m", 1)
     for pin, normally_closed, level in (("IN1", False, 1.0), ("IN2", True, 0.0)):
         circuit = Circuit(kernel, PinName("m", pin))
@@ -191,3 +194,33 @@ def test_the_level_of_an_input_is_that_of_its_contacts_at_rest_and_of_the_switch
         circuit.close()
         kernel.settle()
         assert (kernel.machines["m"].pins()[pin], switch.on, switch.deadline()) == (level, True, None)
+
+
+@given(
+    targets=st.lists(st.integers(-25, 25), min_size=1, max_size=3),
+    position=st.integers(-27, 27),
+    direction=st.sampled_from([1, -1]),
+    asked=st.floats(0.0, 1.2),
+)
+def test_a_counted_position_is_reached_where_its_pulses_lead(
+    targets: list[int], position: int, direction: int, asked: float
+) -> None:
+    """Against all pulses, one after the other; a new target while it moves turns it round."""
+    axis = ToyAxis()
+    now = 0
+    for target in targets:
+        state = MotionState.of(axis.plan, now)
+        axis.follow(plan_position(state, target, 500.0, 400.0, 100.0))
+        now += SECOND // 7
+    plan = axis.plan
+    assert isinstance(plan, Profile)
+    assert plan.end is not None
+    after = plan.start + int((plan.end - plan.start) * asked)
+    count = plan.count(after)
+    expected = None
+    for moment, new in changes(plan, after, plan.end):
+        if new - count == direction and (new - position) * direction >= 0 and (count - position) * direction < 0:
+            expected = moment
+            break
+        count = new
+    assert CountedPosition(axis).reaches(position, after, direction) == expected

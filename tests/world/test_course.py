@@ -111,7 +111,7 @@ def there_and_back(first: int, second: int) -> Profile:
     sign=st.sampled_from([1, -1]),
     looks=st.lists(st.integers(SECOND, END), min_size=1, max_size=8),
 )
-def test_rotor_and_load_are_where_a_simulation_has_them(  # noqa: PLR0917
+def test_rotor_and_load_are_where_a_simulation_has_them(
     first: int, second: int, stops: tuple[int, int] | None, play: int, sign: int, looks: list[Nanos]
 ) -> None:
     plan = there_and_back(first, second)

@@ -6,13 +6,24 @@ import pytest
 
 from steptwin.files.world import World
 from steptwin.world.description import read_world
-from steptwin.world.reader import Text, WorldError
+from steptwin.world.kinds.mic488.table import Mic488Spec
+from steptwin.world.reader import TomlText, WorldError
+from steptwin.world.tomlplaces import LONGEST_SCALAR
 
 TABLE = '[[mic488]]\nname = "table"\n'
 AXIS = TABLE + '[[axis]]\nname = "x"\ndrive = "table.M1"\n'
 
 CHIP = '[[m1486]]\nname = "chip"\n'
 BUS = TABLE + 'line = "bus"\n[[line]]\nname = "bus"\n'
+
+
+def described(text: str) -> Mic488Spec:
+    (spec,) = read_world("w", text).controllers
+    assert isinstance(spec, Mic488Spec)
+    return spec
+
+
+MOTOR = "[axis.motor]\ntorque = [[0, 1.0]]\n"
 
 
 def wrong(text: str) -> str:
@@ -25,7 +36,7 @@ def wrong(text: str) -> str:
     ("text", "message"),
     [
         ("[world\n", "w.toml:1:7: error D001: this is no TOML"),
-        ("[worlds]\n", "w.toml:1:1: error D004: the file has no [worlds]; did you mean 'world'?"),
+        ("[worlds]\n", "w.toml:1:1: error D004: the file has no [worlds] (did you mean 'world'?)"),
         (TABLE + "[[axs]]\n", "w.toml:3:1: error D004: the file has no [axs]"),
         (TABLE + '[[fault]]\nkind = "crc"\nprobability = 2\n', "w.toml:5:1: error D003: [[fault]] (crc): probability = 2"),
         (TABLE + '[[fault]]\nkind = "stall"\naxis = 9\n', "w.toml:3:1: error D009: fault stall: axis = 9: permitted are 1 to 4"),
@@ -42,6 +53,14 @@ def wrong(text: str) -> str:
             "in_kr: 21: permitted are IN1 to IN20 or 'none', or the number of the vendor",
         ),
         (TABLE + "[[event]]\nat = 1\ndo = [{ wait = 1 }]\n", "w.toml:5:1: error D004: [event] has no 'do'"),
+        (TABLE + '[[axis]]\nname = "x"\ndrive = "table.Q1"\n', "table has M1, M2, M3, M4"),
+        (TABLE + '[[axis]]\nname = "x"\ndrive = "table.M"\n', "table has M1, M2, M3, M4"),
+        (TABLE + '[[axis]]\nname = "x"\ndrive = "table.M0"\n', "table has M1, M2, M3, M4"),
+        (TABLE + '[[axis]]\nname = "x"\ndrive = "table.M5"\n', "table has M1, M2, M3, M4"),
+        (AXIS + MOTOR + "mass = 1.0\n", "motor: mass and forces need a unit of "),
+        (AXIS + MOTOR + "force = 1.0\n", "motor: mass and forces need a unit of "),
+        (AXIS + MOTOR + "friction_force = 1.0\n", "motor: mass and forces need a unit of "),
+        (BUS + '[[line]]\nname = "bus"\n', "w.toml:7:1: error D006: there is a [[line]] named 'bus' already"),
         (TABLE + "[[script]]\nname = 's'\n", "w.toml:3:1: error D005: [script]: steps is missing"),
         (
             '[world]\nname = """\n[[button]]\nname = 5\n"""\n' + TABLE + '[[button]]\nname = "b"\nto = "none.IN1"\n',
@@ -53,7 +72,7 @@ def wrong(text: str) -> str:
         ("[[mic488]]\nname = 'tür'\n", "'tür' is no name: expected a letter from A to Z"),
         (TABLE + "[[event]]\nat = 1\nsteps = [{ send = 'bus', text = '→' }]\n", "text: '→': '→' is no character of a line"),
         ("[[mic488]]\nunit = 3\n", "w.toml:1:1: error D005: [mic488]: name is missing"),
-        (TABLE + "unti = 3\n", "w.toml:3:1: error D004: [mic488] has no 'unti'; did you mean 'unit'?"),
+        (TABLE + "unti = 3\n", "w.toml:3:1: error D004: [mic488] has no 'unti' (did you mean 'unit'?)"),
         (TABLE + "unit = 300\n", "w.toml:3:1: error D003: [mic488]: unit: 300: permitted are whole numbers from 1 to 247"),
         (TABLE + 'firmware = "1.8"\n', "firmware: '1.8': permitted are 1.23, 1.40, 1.70"),
         (TABLE + "firmware = 1.8\n", "firmware: '1.8': permitted are 1.23, 1.40, 1.70"),
@@ -74,7 +93,7 @@ def wrong(text: str) -> str:
         ),
         (
             TABLE + '[[wire]]\nfrom = "tabel.OUT1"\nto = "table.IN1"\n',
-            "w.toml:3:1: error D009: nothing is called 'tabel'; did you mean 'table'?",
+            "w.toml:3:1: error D009: nothing is called 'tabel' (did you mean 'table'?)",
         ),
         (TABLE + '[[wire]]\nfrom = "table.OUT9"\nto = "table.IN1"\n', "table.OUT9 is no output: outputs of 'table' are OUT1, "),
         (AXIS + "travel = [3, 1]\n", "w.toml:6:1: error D003: [axis]: travel: [3, 1]: the first must be below the second"),
@@ -97,7 +116,7 @@ def wrong(text: str) -> str:
         ),
         (TABLE + "[[event]]\nsteps = []\n", "an event needs one of at, every and when"),
         (TABLE + '[[event]]\nat = "5 sec"\nsteps = []\n', "w.toml:4:1: error D003: [event]: at: '5 sec' is no time"),
-        (TABLE + "[[event]]\nat = 1\nsteps = [{ wiat = 1 }]\n", "step 1 has 'wiat'; did you mean 'wait'?"),
+        (TABLE + "[[event]]\nat = 1\nsteps = [{ wiat = 1 }]\n", "step 1 has 'wiat' (did you mean 'wait'?)"),
         (TABLE + "[[event]]\nat = 1\nsteps = [{ until = 'a >' }]\n", "condition 'a >' ends too early"),
         (TABLE + '[[line]]\nname = "bus"\n', "w.toml:3:1: error D009: nothing is on this line"),
         (TABLE + 'line = "bus"\n[[line]]\nname = "bus"\nbaud = 38401\n', "baud = 38401: a MIC488 has 9600, 19200, 38400,"),
@@ -224,14 +243,14 @@ def test_steps_that_speak_of_what_is_not_there_are_told_before_anything_runs() -
     ]
     assert "step 2: no button is called 'nothing'" in lines[0]
     assert "step 4: firmware 1.70 has no register named 'M1_ENN'" in lines[1]
-    assert "step 5: no signal 'table.M1.stat'; there are status" in lines[2]
+    assert "step 5: no signal 'table.M1.stat' (did you mean 'M1.status'?); there are M1.status, M1.enabled" in lines[2]
     assert "step 6: no input pin 'OUT1'" in lines[3]
     assert "step 1: no axis M5: axes are M1 to M4" in lines[5]
     assert "step 2: fault stall: axis = 9: permitted are 1 to 4" in lines[6]
 
 
 def test_keys_of_nested_tables_have_their_lines() -> None:
-    text = Text("t", "[[a]]\nx = 1\n[[a]]\ny = 2\n[[a.b]]\nz = 3\n[[a.b]]\nz = 4\n[a.c]\nq.r = 5\n")
+    text = TomlText("t", "[[a]]\nx = 1\n[[a]]\ny = 2\n[[a.b]]\nz = 3\n[[a.b]]\nz = 4\n[a.c]\nq.r = 5\n")
     paths = {("a", 0, "x"): 2, ("a", 1, "y"): 4, ("a", 1, "b", 0, "z"): 6, ("a", 1, "b", 1, "z"): 8, ("a", 1, "c", "q", "r"): 10}
     assert {path: text.line(path) for path in paths} == paths
     assert text.line(("a", 1, "b", 1, "no", "such")) == 7
@@ -242,8 +261,9 @@ def test_keys_of_nested_tables_have_their_lines() -> None:
     ("written", "number"), [('"IN1"', 0), ('"in20"', 19), ('"none"', 20), ('"NONE"', 20), ("0", 0), ("20", 20)]
 )
 def test_switches_are_inputs_by_name_or_none(written: str, number: int) -> None:
-    spec = read_world("w", f"{TABLE}[mic488.M1]\nin_kl = {written}\nin_kr = {written}\n")
-    assert spec.mic488[0].axes == {1: {"in_kl": number, "in_kr": number}}
+    assert described(f"{TABLE}[mic488.M1]\nin_kl = {written}\nin_kr = {written}\n").axes == {
+        1: {"in_kl": number, "in_kr": number}
+    }
 
 
 def test_more_than_anybody_reads_is_not_told() -> None:
@@ -252,18 +272,18 @@ def test_more_than_anybody_reads_is_not_told() -> None:
 
 
 def test_the_configuration_of_a_controller_takes_words_and_numbers() -> None:
-    spec = read_world(
-        "w", TABLE + '[mic488.M2]\nunit = "mm"\ngear = 100.0\nin_kl = "IN3"\nlimit_mode = "KL+KR"\n[mic488.IN3]\nlevel = 1\n'
+    spec = described(
+        TABLE + '[mic488.M2]\nunit = "mm"\ngear = 100.0\nin_kl = "IN3"\nlimit_mode = "KL+KR"\n[mic488.IN3]\nlevel = 1\n'
     )
-    assert spec.mic488[0].axes == {2: {"unit": 3, "gear": 100.0, "in_kl": 2, "limit_mode": 3}}
-    assert spec.mic488[0].inputs == {3: {"level": 1}}
+    assert spec.axes == {2: {"unit": 3, "gear": 100.0, "in_kl": 2, "limit_mode": 3}}
+    assert spec.inputs == {3: {"level": 1}}
 
 
 @pytest.mark.parametrize(
     ("written", "firmware"), [("1.7", "1.70"), ('"1.7"', "1.70"), ('"1.70"', "1.70"), ("1.4", "1.40"), ("1.23", "1.23")]
 )
 def test_a_firmware_is_a_text_or_a_number(written: str, firmware: str) -> None:
-    assert read_world("w", f"{TABLE}firmware = {written}\n").mic488[0].firmware == firmware
+    assert described(f"{TABLE}firmware = {written}\n").firmware == firmware
 
 
 @pytest.mark.parametrize(("keys", "keeps"), [("", 0), ("trigger_keeps = true\n", 1), ("trigger_keeps = false\n", 0)])
@@ -360,7 +380,7 @@ def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None
     assert [(line.split(":")[0], line.partition(": error ")[2][:60]) for line in lines] == [
         ("5", "D003: [mic488]: firmware: '9': permitted are 1.23, 1.40, 1.7"),
         ("6", "D003: [mic488]: unit: 300: permitted are whole numbers from "),
-        ("10", "D009: nothing is called 'buss'; did you mean 'bus'?"),
+        ("10", "D009: nothing is called 'buss' (did you mean 'bus'?)"),
         ("18", "D003: [axis]: start: 'left': expected a number"),
         ("20", "D003: [axis.switch]: below: 'low': expected a number"),
         ("24", "D009: nothing is called 'nobody'"),
@@ -373,7 +393,7 @@ def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None
         ("61", "D003: [event.steps]: wait: 'soon' is no time: expected a num"),
         ("64", "D009: step 4: firmware 1.70 has no register named 'M1_ENN'; "),
         ("64", "D009: step 4: firmware 1.70 has no register named 'M2_ENN'; "),
-        ("66", "D009: step 6: no signal 'good.M1.stat'; there are status, en"),
+        ("66", "D009: step 6: no signal 'good.M1.stat' (did you mean 'M1.sta"),
     ]
 
 
@@ -387,3 +407,13 @@ def test_whole_numbers_have_64_bits(number: int, fits: bool) -> None:
 def test_every_input_of_a_controller_has_a_table(number: int) -> None:
     """Of keys as of axes: what is wrong in it is told."""
     assert f"IN{number}" in wrong(TABLE + f"[mic488.IN{number}]\nnothing = 1\n")
+
+
+def test_values_are_at_most_so_long() -> None:
+    digits = LONGEST_SCALAR - 2
+    assert f"a value of {LONGEST_SCALAR} characters" not in wrong(f"{TABLE}unit = 1.{'0' * digits}\n")
+    assert f"a value of {LONGEST_SCALAR + 1} characters that is no text" in wrong(f"{TABLE}unit = 1.{'0' * (digits + 1)}\n")
+
+
+def test_a_motor_without_masses_needs_no_length() -> None:
+    assert World.from_toml(AXIS + MOTOR + "inertia = 0.001\n", name="w.toml").axis["x"].position == 0.0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.expression import Condition, crossing, names, parse
+from steptwin.world.expression import SignalCondition, crossing, names, parse
 
 
 class Level:
@@ -82,7 +82,7 @@ SIGNALS = {
     ],
 )
 def test_conditions(text: str, truth: bool) -> None:
-    assert Condition(text, SIGNALS.__getitem__).holds(0) is truth
+    assert SignalCondition(text, SIGNALS.__getitem__).holds(0) is truth
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_what_is_no_condition_is_misuse(text: str, message: str) -> None:
 
 def test_two_moving_signals_cannot_be_compared() -> None:
     with pytest.raises(Misuse, match=r"x\.position and x\.velocity both move: compare with a number"):
-        Condition("x.position > x.velocity", SIGNALS.__getitem__)
+        SignalCondition("x.position > x.velocity", SIGNALS.__getitem__)
 
 
 def test_the_signals_of_a_condition_are_known() -> None:
@@ -136,7 +136,7 @@ def test_a_crossing_is_the_first_moment_on_another_side(level: int, now: Nanos, 
 
 
 def test_a_condition_says_when_it_may_come_true() -> None:
-    moving = Condition("x.position < 0 and a", SIGNALS.__getitem__)
+    moving = SignalCondition("x.position < 0 and a", SIGNALS.__getitem__)
     profile = Moving().profile
     at_zero = moving.due(SECOND // 2)
     assert at_zero == profile.pulse_time(0, 0)
@@ -145,7 +145,7 @@ def test_a_condition_says_when_it_may_come_true() -> None:
     assert below is not None
     assert below == profile.pulse_time(-1, 0)
     assert moving.due(below) == below
-    assert Condition("b", SIGNALS.__getitem__).due(5) is None
+    assert SignalCondition("b", SIGNALS.__getitem__).due(5) is None
 
 
 class Replanned(Moving):
@@ -165,7 +165,7 @@ class Replanned(Moving):
 
 def test_a_crossing_is_found_once_while_the_signal_goes_on_as_it_did() -> None:
     moving, limit = Replanned(), Level(60.0)
-    condition = Condition("x.position > limit or x.position < -20", {"x.position": moving, "limit": limit}.__getitem__)
+    condition = SignalCondition("x.position > limit or x.position < -20", {"x.position": moving, "limit": limit}.__getitem__)
     assert {condition.due(now) for now in range(SECOND // 2, SECOND * 3 // 2, SECOND // 20)} == {1_650_000_000}
     assert moving.looked == 2
     moving.replace()
@@ -177,4 +177,7 @@ def test_a_crossing_is_found_once_while_the_signal_goes_on_as_it_did() -> None:
 
 
 def test_a_condition_depends_on_what_its_signals_depend_on_each_once() -> None:
-    assert Condition("b or x.position > 5 and b == 0", SIGNALS.__getitem__).bring(5) == (SIGNALS["b"], SIGNALS["x.position"])
+    assert SignalCondition("b or x.position > 5 and b == 0", SIGNALS.__getitem__).bring(5) == (
+        SIGNALS["b"],
+        SIGNALS["x.position"],
+    )

@@ -12,9 +12,9 @@ from mic488_rig import Rig, controller
 from toy import Bare, ToyAxis
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import MILLISECOND, SECOND, Edge, Nanos
+from steptwin.machine import MILLISECOND, SECOND, Nanos, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_velocity
 from steptwin.world.contacts import PositionSwitch, place
 from steptwin.world.kernel import MAX_ROUNDS_PER_INSTANT, Kernel, PinName, Wire
@@ -64,7 +64,7 @@ class Relay(Bare):
     def _put(self, now: Nanos, value: float) -> None:
         if self.levels["B"] != value:
             self.levels["B"] = value
-            self.edges.append(Edge(now, "B", value))
+            self.edges.append(PinEdge(now, "B", value))
             self.changed()
 
     def pins(self) -> Mapping[str, float]:
@@ -80,9 +80,9 @@ def wire(source: str, target: str, *, inverted: bool = False) -> Wire:
     return Wire(PinName(one, output), PinName(other, input_), inverted)
 
 
-def two_controllers() -> tuple[Kernel, Mic488, Mic488]:
+def two_controllers() -> tuple[Kernel, Mic488Device, Mic488Device]:
     kernel = Kernel()
-    one, other = Mic488(ControllerConfig()), Mic488(controller(AxisConfig(limit_mode=2, in_kr=0)))
+    one, other = Mic488Device(ControllerConfig()), Mic488Device(controller(AxisConfig(limit_mode=2, in_kr=0)))
     kernel.add("one", one)
     kernel.add("other", other)
     return kernel, one, other
@@ -129,7 +129,7 @@ def test_an_output_may_drive_several_inputs_and_its_own_machine() -> None:
 def test_edges_travel_along_a_chain_with_the_delays_of_its_machines() -> None:
     kernel = Kernel()
     relays = [Relay(3 * MILLISECOND), Relay(), Relay(4 * MILLISECOND)]
-    seen: list[tuple[str, Edge]] = []
+    seen: list[tuple[str, PinEdge]] = []
     for number, relay in enumerate(relays):
         kernel.add(f"r{number}", relay)
     kernel.connect(wire("r0.B", "r1.A"))
@@ -140,9 +140,9 @@ def test_edges_travel_along_a_chain_with_the_delays_of_its_machines() -> None:
     assert kernel.deadline() == 13 * MILLISECOND
     kernel.advance(SECOND)
     assert seen == [
-        ("r0", Edge(13 * MILLISECOND, "B", 0.0)),
-        ("r1", Edge(13 * MILLISECOND, "B", 1.0)),
-        ("r2", Edge(17 * MILLISECOND, "B", 0.0)),
+        ("r0", PinEdge(13 * MILLISECOND, "B", 0.0)),
+        ("r1", PinEdge(13 * MILLISECOND, "B", 1.0)),
+        ("r2", PinEdge(17 * MILLISECOND, "B", 0.0)),
     ]
     assert kernel.deadline() is None
 
@@ -177,7 +177,7 @@ def test_time_cannot_go_back() -> None:
 
 def test_a_machine_joins_at_the_time_of_the_kernel() -> None:
     kernel = Kernel(SECOND)
-    late, early = Mic488(ControllerConfig()), Mic488(ControllerConfig())
+    late, early = Mic488Device(ControllerConfig()), Mic488Device(ControllerConfig())
     kernel.add("late", late)
     assert late.now == SECOND
     early.advance(2 * SECOND)
@@ -240,7 +240,7 @@ def test_a_switch_has_its_state_at_once(low: int | None, high: int | None, on: b
 def test_a_switch_is_crossed_at_the_moment_of_the_pulse_in_both_directions() -> None:
     """1000 p/s² to 1000 p/s and back: pulse 100 comes √0.2 s after the start."""
     kernel, relay = on_axis(100, 200)
-    seen: list[Edge] = []
+    seen: list[PinEdge] = []
     kernel.observers.append(lambda name, edge: seen.append(edge))
     relay.follow(plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1000.0, 1000.0, 1000.0))
     kernel.advance(3 * SECOND)

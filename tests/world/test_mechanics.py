@@ -13,16 +13,16 @@ from mic488_rig import controller
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.mic488.device import Mic488
-from steptwin.mic488.status import Status
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.status import AxisStatus
 from steptwin.motion import MotionState, plan_position
 from steptwin.world import script as do
 from steptwin.world.course import Build, Carried, Standing
 from steptwin.world.faults import read
 from steptwin.world.kernel import Kernel
 from steptwin.world.mechanics import EncoderBuild, Mechanism
-from steptwin.world.motor import Motor
-from steptwin.world.trace import Record
+from steptwin.world.motor import StepperMotor
+from steptwin.world.trace import TraceRecord
 
 AXIS = """
     [[mic488]]
@@ -72,10 +72,10 @@ def test_a_limit_switch_stops_the_drive() -> None:
     axis = world.mic488["m"].axis[1]
     axis.move_to(200.0)
     world.run(until="idle")
-    assert (axis.status, axis.position, world.axis["x"].position) == (Status.LIMIT_R, 80.0, 100.0)
+    assert (axis.status, axis.position, world.axis["x"].position) == (AxisStatus.LIMIT_R, 80.0, 100.0)
     axis.move_to(-200.0)
     world.run(until="idle")
-    assert (axis.status, axis.position, world.axis["x"].position) == (Status.LIMIT_L, -20.0, 0.0)
+    assert (axis.status, axis.position, world.axis["x"].position) == (AxisStatus.LIMIT_L, -20.0, 0.0)
 
 
 @pytest.mark.parametrize(("mode", "place"), [("HOME0", 0.0), ("HOME4", 1.0), ("HOME3", 1.0)])
@@ -85,7 +85,7 @@ def test_homing_ends_at_the_switch_or_the_index_next_to_switch_or_stop(mode: str
     axis = world.mic488["m"].axis[1]
     axis.home(-20.0)
     world.run(until="m.M1.status == 4", for_=30)
-    assert axis.status is Status.REACHED
+    assert axis.status is AxisStatus.REACHED
     assert axis.position == 0.0
     assert world.axis["x"].position == pytest.approx(place, abs=0.002)
     assert (world.axis["x"].lost != 0) is (mode == "HOME3")
@@ -268,8 +268,8 @@ def test_steps_taken_away_are_lost_until_the_end() -> None:
     assert mechanism.place(60 * SECOND) == pytest.approx(43)
 
 
-def rigged(build: Build, **options: object) -> tuple[Kernel, Driven, Mechanism, list[Record]]:
-    told: list[Record] = []
+def rigged(build: Build, **options: object) -> tuple[Kernel, Driven, Mechanism, list[TraceRecord]]:
+    told: list[TraceRecord] = []
     kernel, drive = Kernel(record=told.append), Driven()
     kernel.add("m", drive)
     mechanism = Mechanism(kernel, "m", 1, build, "x")
@@ -354,7 +354,7 @@ def test_the_trace_is_told_where_the_load_is_only_when_it_does_not_go_with_its_d
 
 def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_caught() -> None:
     """Nothing is left above 100 pulses/s: lost 0.2 s after the start with 500 pulses/s², caught at rest. Full steps of 16."""
-    build = Build(period_p=64, motor=Motor(((0.0, 1.0), (100.0, 1.0)), 0.0, 0.0, 0.0, None))
+    build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (100.0, 1.0)), 0.0, 0.0, 0.0, None))
     kernel, drive, mechanism, told = rigged(build)
     assert mechanism.deadline() is None
     drive.go(200, 0)
@@ -376,7 +376,7 @@ def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_c
 
 
 def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
-    build = Build(period_p=64, motor=Motor(((0.0, 1.0), (1000.0, 1.0)), 0.0, 0.0, 0.0, None))
+    build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (1000.0, 1.0)), 0.0, 0.0, 0.0, None))
     kernel, drive, mechanism, _ = rigged(build)
     mechanism.block(True, 0)
     drive.go(200, 0)
@@ -391,9 +391,9 @@ def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
 
 def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None:
     """The encoder of another controller: it is looked at while it turns, and at rest not at all."""
-    told: list[Record] = []
+    told: list[TraceRecord] = []
     kernel, drive = Kernel(record=told.append), Driven()
-    other = Mic488(controller())
+    other = Mic488Device(controller())
     kernel.add("m", drive)
     kernel.add("other", other)
     mechanism = Mechanism(kernel, "m", 1, Build())
@@ -417,7 +417,7 @@ def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None
 def test_an_encoder_sits_on_the_rotor_or_on_the_load(on_load: bool, counts: list[int]) -> None:
     """One count a pulse, 5 pulses of play."""
     kernel, drive = Kernel(), Driven()
-    other = Mic488(controller())
+    other = Mic488Device(controller())
     kernel.add("m", drive)
     kernel.add("other", other)
     mechanism = Mechanism(kernel, "m", 1, Build(sign=-1, zero=500, play=5))

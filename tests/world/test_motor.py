@@ -15,7 +15,7 @@ from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_v
 from steptwin.motion.paths import Circular
 from steptwin.motion.ramps import SpeedCurve, plan_endless
 from steptwin.world.course import Build, Course, Standing
-from steptwin.world.motor import Motor, _first_below_0, _first_not_below_0
+from steptwin.world.motor import StepperMotor, _first_below_0, _first_not_below_0
 
 PER_REV = 3200
 INERTIA = 1e-4 * 2 * pi / PER_REV
@@ -31,8 +31,8 @@ def motor(
     friction: float = 0.0,
     load: float = 0.0,
     start: float | None = None,
-) -> Motor:
-    return Motor(curve, inertia, friction, load, start)
+) -> StepperMotor:
+    return StepperMotor(curve, inertia, friction, load, start)
 
 
 def final(build: Build, plan: Profile) -> Standing:
@@ -146,7 +146,7 @@ def test_a_rotor_is_caught_when_speed_and_torque_both_allow_it() -> None:
     braking=st.booleans(),
     sign=st.sampled_from([1, -1]),
 )
-def test_the_moment_of_being_caught_is_the_first_that_a_walk_finds(  # noqa: PLR0917
+def test_the_moment_of_being_caught_is_the_first_that_a_walk_finds(
     torques: list[float], rate: float, speed: float, friction: float, load: float, start: float, braking: bool, sign: int
 ) -> None:
     """Every 1/2000 of a ramp: is it slow enough, and is there the torque?"""
@@ -196,7 +196,7 @@ CURVES = st.lists(st.floats(0.05, 1.5), min_size=2, max_size=5).map(
     parabolic=st.booleans(),
 )
 @example(curve=((0, 0.46875), (7000, 1.125)), rate=243826, speed=500, friction=0.234375, load=0.2109375, parabolic=True)
-def test_the_moment_is_the_first_at_which_a_walk_finds_too_little_torque(  # noqa: PLR0917
+def test_the_moment_is_the_first_at_which_a_walk_finds_too_little_torque(
     curve: tuple, rate: float, speed: float, friction: float, load: float, parabolic: bool
 ) -> None:
     """Velocity and acceleration by differences of the position, every 100 µs."""
@@ -231,7 +231,7 @@ def test_the_moment_is_the_first_at_which_a_walk_finds_too_little_torque(  # noq
             assert found >= walked - 2 * step or is_close(drive, s, found)
 
 
-def is_close(drive: Motor, s: Segment, t: float) -> bool:
+def is_close(drive: StepperMotor, s: Segment, t: float) -> bool:
     """What is needed and what is there differ by so little at ``t`` that the walk may step over it."""
     torque = at_speed(drive.curve, abs(s.velocity(t)))
     need = drive.inertia * (2 * s.c2 + 6 * s.c3 * (t - s.anchor_s)) + drive.friction + drive.load
@@ -329,13 +329,13 @@ def test_the_first_moment_at_which_nothing_is_below_0_is_that_of_a_dense_scan(pa
     part=st.floats(0.0, 0.9),
 )
 @example(radius=8000, speed=20_000.0, inertia=1e-5, friction=0.1, load=0.1, start=9000.0, sign=-1, part=0.3)
-def test_along_an_arc_it_is_looked_every_millisecond(  # noqa: PLR0917
+def test_along_an_arc_it_is_looked_every_millisecond(
     radius: int, speed: float, inertia: float, friction: float, load: float, start: float, sign: int, part: float
 ) -> None:
     """x = R cos φ with φ = w / R: velocity and acceleration by the derivatives of that, at whole milliseconds of a segment."""
     way = plan_position(MotionState(0, 0, 0.0, 0.0), round(2 * pi * radius), 40_000.0, 40_000.0, speed)
     profile = Circular(-radius, radius, 0.0, 4.0 / round(2 * pi * radius)).profile(way, 0, 0)
-    drive = Motor(LINEAR, inertia, friction, load, start)
+    drive = StepperMotor(LINEAR, inertia, friction, load, start)
     scale = 2 * pi / round(2 * pi * radius)
     begin = 0.0
     for s in profile.segments:
@@ -366,7 +366,7 @@ def test_a_motor_on_an_arc_loses_the_field_where_the_curve_is_too_tight() -> Non
     way = plan_position(MotionState(0, 0, 0.0, 0.0), 50_265, 20_000.0, 20_000.0, 20_000.0)
     profile = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(way, 0, 0)
     for need, follows in ((0.99, True), (1.01, False)):
-        build = Build(period_p=64, motor=Motor(((0.0, 1.0), (32_000.0, 1.0)), need / 50_000.0, 0.0, 0.0, 20_000.0))
+        build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (32_000.0, 1.0)), need / 50_000.0, 0.0, 0.0, 20_000.0))
         course = Course(build, profile, 0, Standing(0, 0))
         assert (course.next_stall(0) is None) is follows, need
         assert (course.at(1000 * SECOND) == Standing(0, 0)) is follows or course.at(1000 * SECOND).behind % 64 == 0

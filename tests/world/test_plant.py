@@ -12,9 +12,11 @@ from small_world import SMALL, moved, small
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.wire.crc import with_crc
+from steptwin.wire.slave import FrameDirection
 from steptwin.world import plant
 from steptwin.world import script as do
-from steptwin.world.actions import Leave
+from steptwin.world.actions import Bytes, Leave, See
 from steptwin.world.script import Steps
 
 
@@ -281,3 +283,51 @@ def test_what_is_remembered_of_texts_does_not_grow_without_bound(monkeypatch: py
     assert len(world._encoded) <= 3
     same = world.condition("x.position > 1")
     assert world.condition("x.position > 1") is same
+
+
+class Heard:
+    """Follows a line: frames by their place and direction, bytes that are none by their place."""
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[int, str, str, bytes]] = []
+        self.lost: list[tuple[str, int]] = []
+
+    def frame(self, now: int, place: str, direction: FrameDirection, data: bytes) -> None:
+        self.frames.append((now, place, direction.value, data))
+
+    def rubbish(self, now: int, place: str, count: int) -> None:
+        self.lost.append((place, count))
+
+
+@pytest.mark.parametrize("timing", ["off", "real"])
+@pytest.mark.parametrize(("gap", "gap_ns"), [("", 20_000_000), ("gap = 2\n", 2_000_000)])
+def test_the_gap_of_a_line_is_waited_for_where_a_length_is_not_known(timing: str, gap: str, gap_ns: int) -> None:
+    """MIC-1: a function nobody knows is refused when so long nothing has come behind it."""
+    world = World.from_toml(
+        f'[[line]]\nname = "bus"\ntiming = "{timing}"\n{gap}[[mic488]]\nname = "t"\nline = "bus"\n', name="w.toml"
+    )
+    heard = Heard()
+    line = world.lines["bus"]
+    line.follow_frames(heard)
+    unknown, refusal = with_crc(bytes.fromhex("01 41 01 02")), with_crc(bytes.fromhex("01 C1 01"))
+    world.outside(Bytes("bus", "plc", "rtu", unknown))
+    world.run(for_=0.1)
+    world.outside(Bytes("bus", "plc", "rtu", b"\xff\xfe"))
+    world.run(for_=0.1)
+    ((moment, data),) = line.places["plc"].received
+    assert data == refusal
+    # 6 characters there and 5 back at 38400 bit/s, and the turnaround.
+    wire_ns = 0 if timing == "off" else 1_562_500 + 750_000 + 1_302_084
+    assert moment == pytest.approx(gap_ns + wire_ns, abs=2)
+    assert [frame[1:] for frame in heard.frames] == [("plc", "in", unknown), ("plc", "out", refusal)]
+    assert heard.lost == [("plc", 2)]
+
+
+def test_a_record_of_a_vision_system_reaches_its_controller() -> None:
+    world = World.from_toml('[[mic488]]\nname = "t"\n[mic488.M1]\ngear = 1.0\n', name="w.toml")
+    before = [record for record in world.trace if record.kind == "input"]
+    world.outside(See("t", 2.0, 12.5, -3.0, 90.0))
+    assert before == []
+    (record,) = [record for record in world.trace if record.kind == "input"]
+    assert (record.machine, record.subject, record.value) == ("t", "vision", (2.0, 12.5, -3.0, 90.0))
+    assert world.mic488["t"].device.program.registers.vision.tolist() == [1.0, 2.0, 12.5, -3.0, 90.0]

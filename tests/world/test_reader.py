@@ -39,7 +39,7 @@ from steptwin.world.reader import flag, number, pair, pin_name, points, positive
         (whole(0, 4), True, "True: permitted are whole numbers"),
         (whole(1, 4), 2.0, r"2\.0: permitted are whole numbers"),
         (word("sine", "ramp"), "ramp", "ramp"),
-        (word("sine", "ramp"), "sin", r"'sin': permitted are sine, ramp; did you mean 'sine'\?$"),
+        (word("sine", "ramp"), "sin", r"'sin' \(did you mean 'sine'\?\): permitted are sine, ramp$"),
         (word("sine", "ramp"), 3, "3: permitted are sine, ramp$"),
         (positive_time, "1 us", 1000),
         (positive_time, "0 s", "'0 s': must be more than 0"),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from steptwin.world.reports import MOST_KEPT, Reports
-from steptwin.world.trace import Record
+from steptwin.world.trace import TraceRecord
 
 
 def test_records_beyond_a_number_are_counted_only() -> None:
     reports = Reports()
-    records = [Record(n, "world", "event", "overdue", "x") for n in range(MOST_KEPT + 5)]
+    records = [TraceRecord(n, "world", "event", "overdue", "x") for n in range(MOST_KEPT + 5)]
     for record in records:
         reports.add(record)
     assert list(reports) == records[:MOST_KEPT]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.files.world import World
-from steptwin.world.motor import Motor
+from steptwin.world.motor import StepperMotor
 from steptwin.world.reader import WorldError
 
 CHIP = """
@@ -46,7 +46,7 @@ def wrong(text: str) -> str:
     return str(caught.value)
 
 
-def motor_of(world: World) -> Motor:
+def motor_of(world: World) -> StepperMotor:
     motor = world.axes["y"].mechanism.build.motor
     assert motor is not None
     return motor
@@ -108,13 +108,13 @@ def test_an_axis_of_a_mic488_goes_as_it_says_else_as_its_controller_is_told(
     [
         (
             CHIP + 'unit = "mm"\n',
-            "w.toml:9:1: error D009: unit = 'mm': say pulses_per_unit or pitch, for drum counts minimum microsteps",
+            "w.toml:9:1: error D009: unit = 'mm': give pulses_per_unit or pitch, for drum counts minimum microsteps",
         ),
         (
             TABLE + AXIS + 'unit = "mm"\n',
-            "w.toml:9:1: error D009: unit = 'mm': say pulses_per_unit or pitch, for table is told that",
+            "w.toml:9:1: error D009: unit = 'mm': give pulses_per_unit or pitch, for table is told that",
         ),
-        (TABLE + AXIS + 'kind = "rotary"\nunit = "tooth"\n', "unit = 'tooth': say pulses_per_unit or pitch"),
+        (TABLE + AXIS + 'kind = "rotary"\nunit = "tooth"\n', "unit = 'tooth': give pulses_per_unit or pitch"),
         (
             CHIP + "pulses_per_rev = 3210\npitch = 1.0\n",
             "pulses_per_rev = 3210: of an M1486 they are minimum microsteps, 64 for each",

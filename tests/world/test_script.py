@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.world import script as do
-from steptwin.world.running import Script, Sent
+from steptwin.world.running import Script, SentValues
 
 NOTES = st.builds(do.Note, st.sampled_from("abc"))
 STEPS = st.recursive(
@@ -85,4 +85,4 @@ def test_a_generator_is_brought_back_by_sending_it_the_same(values: list[object]
 
 def test_what_a_step_cannot_give_is_not_sent() -> None:
     with pytest.raises(do.Misuse, match="5: a step gives nothing, a truth value, a number or bytes"):
-        Sent().add(5)
+        SentValues().add(5)

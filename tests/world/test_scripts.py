@@ -12,7 +12,7 @@ from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world import script as do
-from steptwin.world.expression import Condition
+from steptwin.world.expression import SignalCondition
 from steptwin.world.kernel import Kernel
 from steptwin.world.script import Steps
 
@@ -177,8 +177,8 @@ def test_scripts_that_watch_are_looked_at_for_what_they_watch_alone(until: str |
 
         monkeypatch.setattr(owner, name, call)
 
-    counting(Condition, "holds")
-    counting(Condition, "__init__")
+    counting(SignalCondition, "holds")
+    counting(SignalCondition, "__init__")
     counting(Kernel, "advance")
     found = []
     for controllers in (5, 20):
@@ -281,7 +281,7 @@ def test_a_snapshot_between_requests_and_answers_changes_nothing(moment: float) 
 
 def test_a_request_needs_a_line_of_controllers() -> None:
     world = World.from_toml('[[line]]\nname = "chips"\nkind = "m1486"\n[[m1486]]\nname = "a"\nline = "chips"\n')
-    with pytest.raises(Misuse, match="line 'chips' is of kind m1486: requests need one of kind modbus"):
+    with pytest.raises(Misuse, match="line 'chips' carries no Modbus: requests need a line of kind modbus"):
         world.outside(do.Request("chips", 1, b"\x03\x27\x19\x00\x01", SECOND))
 
 
@@ -296,3 +296,16 @@ def test_scripts_that_have_ended_are_forgotten() -> None:
     assert [script.name for script in branch.scripts] == ["event-1", "release go"]
     branch.run(for_=0.05)
     assert branch.mic488["b"].pins["IN4"] == 1.0
+
+
+def test_scripts_of_the_description_come_before_those_from_python() -> None:
+    world = small('[[event]]\nat = "1 s"\nsteps = [{ note = "own" }]\n')
+    world.at("1 s", do.Note("guest"))
+    world.run(for_="2 s")
+    assert [record.value for record in world.trace.events("world")] == ["own", "guest"]
+
+
+def test_what_is_not_there_is_named() -> None:
+    with pytest.raises(Misuse) as caught:
+        small("").touch("nix")
+    assert str(caught.value) == "no machine or line is called 'nix'; there are a, b, c"

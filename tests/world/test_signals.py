@@ -7,9 +7,12 @@ from small_world import small
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World
+from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import SECOND
+from steptwin.wire.crc import with_crc
 from steptwin.world.signals import Idle, SignalOf, find_signal
 
+OF_M1 = "M1.status, M1.enabled, M1.moving, M1.position, M1.velocity, M1.encoder"
 CHIP = """
     [[m1486]]
     name = "d"
@@ -76,7 +79,7 @@ def test_an_endless_motion_has_no_last_turn() -> None:
     world = small()
     world.mic488["a"].write("M1_EN", 1)
     world.mic488["a"].write("M1_VEL_ABS", -40.0)
-    assert list(find_signal(world.plan, "a.M1.position").turns(0)) == pytest.approx([0.4 * SECOND], abs=2)
+    assert list(find_signal(world.plan, "a.M1.velocity").turns(0)) == pytest.approx([0.4 * SECOND], abs=2)
 
 
 def test_a_version_changes_with_the_plan_and_with_the_coordinate() -> None:
@@ -173,11 +176,11 @@ def test_a_program_and_a_line_keep_a_world_busy() -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("a.M1.positon", r"no signal 'a\.M1\.positon' \(did you mean 'position'\?\); there are status, enabled, moving, position, velocity, encoder$"),  # noqa: E501
-        ("a.M1.xyz", r"no signal 'a\.M1\.xyz'; there are status, enabled, moving, position, velocity, encoder$"),
-        ("a.M5.position", r"no signal 'a\.M5\.position'; there are status, program, M1\.position and so on, and pins$"),
-        ("a.M1", r"no signal 'a\.M1'; there are status, program, M1\.position and so on, and pins$"),
-        ("d.status", r"no signal 'd\.status'; there are position, velocity, counter, moving, variable, and pins$"),
+        ("a.M1.positon", rf"no signal 'a\.M1\.positon' \(did you mean 'M1\.position'\?\); there are {OF_M1}$"),
+        ("a.M1.xyz", rf"no signal 'a\.M1\.xyz'; there are {OF_M1}$"),
+        ("a.M5.position", rf"did you mean 'M1.position'\?\); there are status, program, {OF_M1} and more, \d+ in all, and pins$"),
+        ("a.M1", rf"no signal 'a\.M1'; there are status, program, {OF_M1} and more, \d+ in all, and pins$"),
+        ("d.status", r"no signal 'd\.status'; there are position, velocity, counter, moving, room, variable, register1, "),
         ("x.speed", r"no signal 'x\.speed'; there are position, lost, stalled$"),
         ("go.pressd", r"no signal 'go\.pressd' \(did you mean 'pressed'\?\); there are pressed$"),
         ("tim", r"no signal 'tim': nothing is called 'tim' \(did you mean 'time'\?\); there are a, b, c, d, x, go, time, idle$"),
@@ -187,3 +190,102 @@ def test_a_program_and_a_line_keep_a_world_busy() -> None:
 def test_a_name_that_is_no_signal_is_refused_with_those_that_are(name: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
         find_signal(small(CHIP).plan, name)
+
+
+MASTER = """
+[[line]]
+name = "bus"
+[[mic488]]
+name = "a"
+line = "bus"
+unit = 1
+[mic488.M1]
+unit = "mm"
+gear = 100.0
+acc = 100.0
+dec = 100.0
+vel = 40.0
+[[script]]
+name = "operator"
+steps = [
+  { until = "a.USER_REGISTER[4]:real > 1.5 and a.hr:3 == 7" },
+  { note = "written" },
+]
+"""
+
+
+def written(values: bytes) -> bytes:
+    """A request that writes user registers from 3 on."""
+    return with_crc(bytes((1, 16, 0, 3, 0, len(values) // 2, len(values))) + values)
+
+
+def test_registers_are_read_by_name_and_by_address() -> None:
+    """Manual 1.70, table 3.2: POS_ACT of M1 at 10020, ACC at 10036, inputs from 5000 on, user registers from 0 on."""
+    world = World.from_toml(MASTER)
+    world.mic488["a"].write("M1_POS_ACT", 12.5)
+    world.line["bus"].send(written(bytes.fromhex("ff85 0000 4020")))
+    names = ("M1.position", "m1_pos_act", "hr:10020", "M1_ACC", "hr:10036", "DATA_TYPE")
+    assert [world.read(f"a.{name}") for name in names] == [12.5, 12.5, 12.5, 100.0, 100.0, 0.0]
+    # Low word first: 0x40200000 is 2.5; 0xFF85 is −123.
+    users = ("USER_REGISTER[3]", "hr:3", "hr:3:int", "USER_REGISTER[4]:real", "hr:4:dint")
+    assert [world.read(f"a.{name}") for name in users] == [65413.0, 65413.0, -123.0, 2.5, 0x40200000]
+    world.mic488["a"].write("DATA_TYPE", 1)
+    assert world.read("a.hr:10020") == 12.5
+    world.mic488["a"].set_pin("IN7", 1)
+    world.run(for_=1)
+    assert (world.read("a.IN7"), world.read("a.di:5006"), world.read("a.co:6000")) == (1.0, 1.0, 0.0)
+
+
+def test_a_condition_on_what_a_master_only_stores_is_not_late() -> None:
+    """Nothing happens in the controller when a user register is written."""
+    world = World.from_toml(MASTER)
+    live = LiveWorld(world)
+    port = PlacePort(live, "bus", "rtu-1", "rtu")
+    live.advance(SECOND)
+    port.exchange(written(bytes.fromhex("0007 0000 3f80")), SECOND)
+    live.deadline()
+    live.advance(2 * SECOND)
+    port.exchange(written(bytes.fromhex("0007 0000 4000")), 2 * SECOND)
+    live.deadline()
+    live.advance(3 * SECOND)
+    assert [record.time for record in world.trace if record.subject == "note"] == [2 * SECOND]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("a.M1_POS_ABS", "a.M1_POS_ABS can only be written"),
+        ("a.hr:10021", "'hr:10021': this is the second word of M1_POS_ACT, which is at 10020"),
+        ("a.hr:10020:real", "M1_POS_ACT is of type REAL/DINT; leave out :real"),
+        ("a.hr:9999", "has no holding register at 9999"),
+        ("a.xy:1", "addresses begin with hr:, co:, di:"),
+        ("a.USER_REGISTER", r"choose one of USER_REGISTER\[0\]"),
+        ("a.USER_REGISTER[2000]", "user register 2000 as WORD is outside 0 to 1999"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_in_a_condition(name: str, message: str) -> None:
+    world = World.from_toml(MASTER)
+    with pytest.raises(Misuse, match=message):
+        world.run(until=f"{name} > 1", for_=1)
+
+
+def test_a_condition_meets_a_count_that_begins_anew() -> None:
+    """G+ goes on until Kill; 2²⁴ minimum microsteps are 262 144 steps, after which the counter is at 0 again."""
+    world = World.from_toml('[[line]]\nname = "bus"\nkind = "m1486"\n[[m1486]]\nname = "d"\nline = "bus"\naddress = 3\n')
+    world.line["bus"].send(b"x3\rg+\rr\r")
+    world.run(until="d.moving")
+    drive = world.m1486["d"].chip.drive
+    drive.set_counter(2**24 - 1000, world.now)
+    assert world.run(until="d.counter < 1000", for_=60) == "d.counter < 1000"
+    at = world.now
+    assert (drive.counter_u(at - 1) > 2**23, drive.counter_u(at) < 1000) == (True, True)
+    assert world.run(until="d.U2 == 7", for_=60) == "d.U2 == 7"
+    assert (drive.counter_u(world.now - 1) >> 8, drive.counter_u(world.now) >> 8) == (6, 7)
+
+
+def test_no_condition_can_be_on_a_pin_that_changes_with_every_microstep() -> None:
+    world = World.from_toml('[[m1486]]\nname = "d"\ninterface = "dual"\n')
+    (occupied, *_) = world.m1486["d"].chip.interface.occupied
+    assert world.read(f"d.B{occupied}") in (0.0, 1.0)
+    with pytest.raises(Misuse, match=f"B{occupied} is taken: the .* interface has B"):
+        world.run(until=f"d.B{occupied}", for_=1)

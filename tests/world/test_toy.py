@@ -12,12 +12,12 @@ from toy import Toy, ToyBody, ToyLine
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488
+from steptwin.mic488.device import Mic488Device
 from steptwin.world.course import Build
 from steptwin.world.faults import Faults, read, rig
 from steptwin.world.kernel import Kernel, PinName, Wire
 from steptwin.world.mechanics import Mechanism
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 GO = b"M\x0a"
 """100 pulses: 1000 p/s² for 316 ms up to 316 p/s, and as long down again."""
@@ -25,7 +25,7 @@ ARRIVAL: Nanos = 632_455_533
 """2·√(100/1000) s, at the first whole nanosecond after it."""
 
 
-def told(records: list[Record], *kinds: str) -> list[tuple[Nanos, str, str, object]]:
+def told(records: list[TraceRecord], *kinds: str) -> list[tuple[Nanos, str, str, object]]:
     return [(r.time, r.machine, r.subject, r.value) for r in records if r.kind in kinds]
 
 
@@ -77,8 +77,8 @@ def test_time_in_pieces_is_time_at_once(inputs: list[tuple[Nanos, bytes | str]],
 # ---------------------------------------------------------------------- wires
 
 
-def wired() -> tuple[Kernel, Toy, Mic488]:
-    kernel, toy, mic = Kernel(), Toy(), Mic488(ControllerConfig())
+def wired() -> tuple[Kernel, Toy, Mic488Device]:
+    kernel, toy, mic = Kernel(), Toy(), Mic488Device(ControllerConfig())
     kernel.add("toy", toy)
     kernel.add("mic", mic)
     kernel.connect(Wire(PinName("toy", "BUSY"), PinName("mic", "IN5")))
@@ -141,7 +141,7 @@ def test_its_shaft_is_blocked_and_loses_pulses() -> None:
 
 def test_its_input_sticks_and_bounces() -> None:
     kernel, toy, _, faults = faulty("stuck pin=stop value=1 until_s=1", "bounce pin=STOP bounces=1 for_ms=2 from_s=2")
-    seen: list[Record] = []
+    seen: list[TraceRecord] = []
     faults.sinks.append(seen.append)
     kernel.advance(MILLISECOND)
     assert toy.execute(GO, MILLISECOND) == b"E\x0a"

@@ -5,7 +5,7 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import Division, Microstepping, StepTrain
-from steptwin.world.trace import Record, Trace, encode
+from steptwin.world.trace import Trace, TraceRecord, encode
 
 PLAN = plan_position(MotionState(5, 10, 0.0, 0.0), 5000, 1000.0, 2000.0, 800.0)
 GRIDS = Microstepping(8, 64, 1500.0)
@@ -14,14 +14,14 @@ GRIDS = Microstepping(8, 64, 1500.0)
 def test_records_of_several_machines_are_merged_by_time_then_order_of_the_machines_then_sequence() -> None:
     trace = Trace(["b", "a"])
     for time, machine, subject in [(1, "a", "1"), (3, "a", "2"), (3, "a", "3"), (1, "b", "4"), (2, "b", "5"), (3, "b", "6")]:
-        trace.add(Record(time, machine, "event", subject, ""))
+        trace.add(TraceRecord(time, machine, "event", subject, ""))
     assert [record.subject for record in trace] == ["4", "1", "5", "6", "2", "3"]
     assert [record.subject for record in trace.events("a")] == ["1", "2", "3"]
     assert list(trace.events("no such machine")) == []
 
 
 def test_the_digest_does_not_depend_on_the_order_in_which_independent_machines_were_advanced() -> None:
-    records = [Record(t, m, "edge", "OUT1", float(t % 2)) for m in ("a", "b") for t in range(5)]
+    records = [TraceRecord(t, m, "edge", "OUT1", float(t % 2)) for m in ("a", "b") for t in range(5)]
     one, other = Trace(["a", "b"]), Trace(["a", "b"])
     for record in records:
         one.add(record)
@@ -34,17 +34,17 @@ def test_the_digest_does_not_depend_on_the_order_in_which_independent_machines_w
 @pytest.mark.parametrize(
     "changed",
     [
-        Record(6, "a", "plan", "1", PLAN),
-        Record(5, "b", "plan", "1", PLAN),
-        Record(5, "a", "edge", "1", PLAN),
-        Record(5, "a", "plan", "2", PLAN),
-        Record(5, "a", "plan", "1", plan_position(MotionState(5, 10, 0.0, 0.0), 5000, 1000.0, 2000.0, 800.0000000000001)),
-        Record(5, "a", "plan", "1", 1.0),
+        TraceRecord(6, "a", "plan", "1", PLAN),
+        TraceRecord(5, "b", "plan", "1", PLAN),
+        TraceRecord(5, "a", "edge", "1", PLAN),
+        TraceRecord(5, "a", "plan", "2", PLAN),
+        TraceRecord(5, "a", "plan", "1", plan_position(MotionState(5, 10, 0.0, 0.0), 5000, 1000.0, 2000.0, 800.0000000000001)),
+        TraceRecord(5, "a", "plan", "1", 1.0),
     ],
 )
-def test_every_part_of_a_record_is_in_the_digest(changed: Record) -> None:
+def test_every_part_of_a_record_is_in_the_digest(changed: TraceRecord) -> None:
     one, other = Trace(), Trace()
-    one.add(Record(5, "a", "plan", "1", PLAN))
+    one.add(TraceRecord(5, "a", "plan", "1", PLAN))
     other.add(changed)
     assert one.digest() != other.digest()
 
@@ -53,16 +53,16 @@ def test_values_that_look_alike_have_different_bytes() -> None:
     values: list[object] = [1, 1.0, "1", b"1", True, None, "", b"", (), (1,), ((1,),), ("ab",), ("a", "b"), -0.0, 0.0]
     trains = [StepTrain(PLAN, GRIDS, (Division(0, 8),)), StepTrain(PLAN, GRIDS, (Division(0, 64),))]
     values += [PLAN, *trains, (PLAN, *trains)]
-    encoded = [encode(Record(0, "m", "event", "x", value)) for value in values]
+    encoded = [encode(TraceRecord(0, "m", "event", "x", value)) for value in values]
     assert len(set(encoded)) == len(values)
 
 
 def test_the_digest_is_the_same_on_every_machine_and_python() -> None:
     trace = Trace()
-    trace.add(Record(5, "a", "plan", "1", PLAN))
-    trace.add(Record(7, "a", "edge", "OUT1", 1.0))
-    trace.add(Record(7, "b", "frame", "tcp-1/in", b"\x01\x03"))
-    trace.add(Record(8, "b", "event", "limit", "M1 stopped by KL"))
+    trace.add(TraceRecord(5, "a", "plan", "1", PLAN))
+    trace.add(TraceRecord(7, "a", "edge", "OUT1", 1.0))
+    trace.add(TraceRecord(7, "b", "frame", "tcp-1/in", b"\x01\x03"))
+    trace.add(TraceRecord(8, "b", "event", "limit", "M1 stopped by KL"))
     assert trace.digest() == "5777a38db28e83d00a420ff7938b2fb9"
 
 
@@ -70,7 +70,7 @@ def test_a_trace_that_keeps_nothing_has_the_same_digest() -> None:
     kept, counted = Trace(), Trace(keep=False)
     for t in range(10):
         for trace in (kept, counted):
-            trace.add(Record(t, "a", "edge", "OUT1", float(t % 2)))
+            trace.add(TraceRecord(t, "a", "edge", "OUT1", float(t % 2)))
             if t % 4 == 0:
                 kept.digest()
     assert counted.digest() == kept.digest()
@@ -80,12 +80,12 @@ def test_a_trace_that_keeps_nothing_has_the_same_digest() -> None:
 
 def test_what_a_trace_does_not_take() -> None:
     trace = Trace()
-    trace.add(Record(5, "a", "event", "x", ""))
+    trace.add(TraceRecord(5, "a", "event", "x", ""))
     with pytest.raises(Misuse, match="a: a record of 4 ns after one of 5 ns"):
-        trace.add(Record(4, "a", "event", "x", ""))
+        trace.add(TraceRecord(4, "a", "event", "x", ""))
     with pytest.raises(Misuse, match="no kind of record 'edges': kinds are plan, load, coordinate, edge"):
         trace.of("edges")
-    trace.add(Record(5, "a", "event", "x", [1]))
+    trace.add(TraceRecord(5, "a", "event", "x", [1]))
     with pytest.raises(Misuse, match=r"\[1\] cannot be in a trace"):
         trace.digest()
 
@@ -94,8 +94,8 @@ def test_what_a_trace_does_not_take() -> None:
 def test_a_trace_goes_back_to_a_mark_and_forward_again(keep: bool) -> None:
     def take(trace: Trace, *times: int) -> str:
         for time in times:
-            trace.add(Record(time, "a", "edge", "OUT1", float(time)))
-            trace.add(Record(time, "b", "event", "code", "text"))
+            trace.add(TraceRecord(time, "a", "edge", "OUT1", float(time)))
+            trace.add(TraceRecord(time, "b", "event", "code", "text"))
         return trace.digest()
 
     trace, plain = Trace(["a"], keep=keep), Trace(["a"], keep=keep)

@@ -7,7 +7,7 @@ from small_world import moved, small
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 
 
 def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:
@@ -33,7 +33,7 @@ def test_positions_are_those_of_register_and_mechanics() -> None:
     world = moved(small(), 25.0)
     assert world.run(until="a.M1.status == 4") == "a.M1.status == 4"
     axis = world.mic488["a"].axis[1]
-    assert (axis.position, axis.velocity, axis.status, axis.unit) == (25.0, 0.0, Status.REACHED, "mm")
+    assert (axis.position, axis.velocity, axis.status, axis.unit) == (25.0, 0.0, AxisStatus.REACHED, "mm")
     assert (world.axis["x"].position, world.axis["x"].lost) == (75.0, 0)
 
 
@@ -55,7 +55,7 @@ def test_an_axis_in_motion() -> None:
     assert axis.position == pytest.approx(here - 1.0, abs=1e-9)
     axis.home(-20.0)
     world.run(until="idle and time > 3", for_=30)
-    assert axis.status is Status.REACHED
+    assert axis.status is AxisStatus.REACHED
 
 
 def test_rotor_and_load_differ_by_the_play() -> None:

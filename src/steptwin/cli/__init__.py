@@ -1,28 +1,35 @@
 """The command line. Each command lives in a module of its own and imports what it needs when it runs.
 
-Exit codes: 0 done, 1 not done (a check found something, a peer refused, a line failed), 2 wrong use.
+Exit codes: 0 done, 1 not done (a check found something, a peer refused, a line failed), 2 wrong use (an option, a name, a value,
+a file that is missing or has errors), 130 interrupted. docs/reference/command-line.md has the table.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 from functools import partial
-from typing import Annotated, Any
+from io import TextIOWrapper
+from itertools import pairwise
+from typing import Annotated, Any, NoReturn
 
 import typer
-from typer.core import TyperGroup, TyperOption
+from typer.core import TyperArgument, TyperGroup, TyperOption
+from typer.exceptions import TyperException
 
 from steptwin import __version__
 from steptwin.cli import (
     build,
     check,
     commands,
+    datasheet,
     decompile,
     export,
     fault,
     fmt,
     get,
     info,
+    lsp,
     monitor,
     move,
     pace,
@@ -36,22 +43,25 @@ from steptwin.cli import (
     sniff,
     terminal,
     twin,
+    twins,
     up,
     watch,
 )
-from steptwin.errors import Misuse, SteptwinError
+from steptwin.errors import Misuse, SourceErrors, SteptwinError
 
 GROUPS = {
-    "Twins": ("serve", "up", "state", "pin", "encoder", "power-cycle", "fault", "pause", "step", "resume", "save"),
-    "Programs and runs": ("check", "fmt", "build", "decompile", "run", "replay", "export"),
+    "Twins": ("serve", "up", "twins", "state", "pin", "encoder", "power-cycle", "fault", "pause", "step", "resume", "save"),
+    "Programs and runs": ("check", "fmt", "build", "decompile", "run", "replay", "export", "lsp"),
     "Devices and twins": (
-        "ports", "scan", "info", "get", "set", "watch", "enable", "disable", "home", "move", "jog", "stop", "send", "terminal",
-        "monitor", "sniff", "record", "diff",
+        "ports", "scan", "info", "get", "set", "watch", "enable", "disable", "home", "seek", "move", "jog", "stop", "send",
+        "terminal", "monitor", "sniff", "record", "diff",
     ),
-    "Reference": ("registers", "commands"),
+    "Reference": ("registers", "commands", "datasheet"),
 }  # fmt: skip
 """The commands as ``--help`` lists them."""
 LONGEST_SUMMARY = 200
+NOT_DONE, MISUSED = 1, 2
+"""Exit codes."""
 
 VALUE_NAMES = {"str": "TEXT", "list[str]": "TEXT", "int": "N", "float": "NUMBER", "path": "PATH", "list[path]": "PATH"}
 """What help shows as the value of an option, where typer would show a Python type."""
@@ -69,6 +79,8 @@ class _Commands(TyperGroup):
         for parameter in getattr(command, "params", ()):
             shown = parameter.display_type(ctx).strip("<>") if isinstance(parameter, TyperOption) else ""
             parameter.display_type = partial(_constant, VALUE_NAMES.get(shown, shown))
+            if isinstance(parameter, TyperArgument) and parameter.metavar is None:
+                parameter.metavar = str(parameter.name).upper()
         return command
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -77,16 +89,6 @@ class _Commands(TyperGroup):
             rows = [(name, self.commands[name].get_short_help_str(LONGEST_SUMMARY)) for name in group if name in names]
             with formatter.section(title):
                 formatter.write_dl(rows)
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except typer.BadParameter as error:
-            if type(error) is not typer.BadParameter:  # a missing parameter
-                raise
-            # typer checks choices with a validator whose name it puts before the message.
-            message = error.message.removeprefix("Value error, ")
-            raise typer.BadParameter(message, error.ctx, error.param, error.param_hint) from None
 
 
 app = typer.Typer(
@@ -101,14 +103,17 @@ app = typer.Typer(
 app.add_typer(serve.app, name="serve", cls=_Commands)
 app.command()(registers.registers)
 app.command()(commands.commands)
+app.command()(datasheet.datasheet)
 app.command()(check.check)
 app.command()(fmt.fmt)
+app.command()(lsp.lsp)
 app.command()(build.build)
 app.command()(decompile.decompile)
 app.command()(run.run)
 app.command()(up.up)
 app.command()(replay.replay)
 app.command()(export.export)
+app.command()(twins.twins)
 app.command()(twin.pin)
 app.command()(twin.encoder)
 app.command("power-cycle")(twin.power_cycle)
@@ -125,6 +130,7 @@ app.command()(watch.watch)
 app.command()(move.enable)
 app.command()(move.disable)
 app.command()(move.home)
+app.command()(move.seek)
 app.command()(move.move)
 app.command()(move.jog)
 app.command()(move.stop)
@@ -152,8 +158,41 @@ def _steptwin(
 
 
 def main() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # pipes on Windows have not every character
+            stream.reconfigure(errors="replace")
     try:
-        app()
+        code = app(standalone_mode=False)
+    except TyperException as error:
+        message = _usage(error)
+        _fail(message, MISUSED, head="" if message.startswith("Usage: ") else "steptwin: ")
+    except SourceErrors as error:
+        _fail(str(error), MISUSED, head="")
     except SteptwinError as error:
-        print(f"steptwin: {error}", file=sys.stderr)  # noqa: T201
-        sys.exit(2 if isinstance(error, Misuse) else 1)
+        _fail(str(error), MISUSED if isinstance(error, Misuse) else NOT_DONE)
+    except typer.Abort:
+        sys.exit(NOT_DONE)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _usage(error: TyperException) -> str:
+    """A mistake in the words of the command, and where its help is."""
+    # typer checks choices with a validator whose name it puts into the message.
+    message = error.format_message().replace("Value error, ", "").rstrip(".")
+    context = getattr(error, "ctx", None)
+    if context is None or message.startswith("Usage: "):  # a group without a command is shown its help
+        return message
+    return f"{message}; usage: {context.command_path} -h"
+
+
+def _fail(message: str, code: int, *, head: str = "steptwin: ") -> NoReturn:
+    """End with a message; one line of JSON where JSON is wanted."""
+    text = json.dumps({"error": message, "code": code}, ensure_ascii=False) if _wants_json() else f"{head}{message}"
+    print(text, file=sys.stderr)  # noqa: T201
+    sys.exit(code)
+
+
+def _wants_json() -> bool:
+    """Whether the command line asks for JSON; it may have a mistake that keeps it from being read."""
+    given = sys.argv[1:]
+    return "--json" in given or "--format=json" in given or ("--format", "json") in pairwise(given)

@@ -27,7 +27,7 @@ MOST_READ = 120
 _ADDRESS = re.compile(r"(?:(?P<space>[a-z]+):)?(?P<first>\d{1,5})(?:-(?P<last>\d{1,5}))?(?::(?P<form>\w+))?", re.IGNORECASE)
 
 
-class Place(NamedTuple):
+class ValueAddress(NamedTuple):
     """One value by its address. ``form`` is empty for a coil or input; ``first`` and ``count`` are what is read with it.
 
     A range is read with one request: the two words of a 32-bit value at one moment.
@@ -43,7 +43,7 @@ class Place(NamedTuple):
         return f"{self.space}:{self.address}{':' * bool(self.form)}{self.form}"
 
 
-def places(text: str, registers: RegisterMap) -> list[Place] | list[str] | None:
+def places(text: str, registers: RegisterMap) -> list[ValueAddress] | list[str] | None:
     """What an address stands for: values by address, or the name of the register there. None for what is no address.
 
     Raises `Misuse`.
@@ -72,7 +72,7 @@ def places(text: str, registers: RegisterMap) -> list[Place] | list[str] | None:
     found = []
     for address in range(first, end, step):
         start = address - (address - first) % MOST_READ
-        found.append(Place(space, address, form, start, min(end - start, MOST_READ)))
+        found.append(ValueAddress(space, address, form, start, min(end - start, MOST_READ)))
     return found
 
 
@@ -81,10 +81,10 @@ def _register_at(registers: RegisterMap, address: int) -> str:
 
     found = [register for space in Space if (register := registers.find(space, address)) is not None]
     if not found:
-        raise Misuse(f"firmware {registers.firmware.name} has no register at {address}; hr:{address} asks for it nevertheless")
+        raise Misuse(f"firmware {registers.firmware.name} has no register at {address}; hr:{address} reads it all the same")
     if len(found) > 1:
         kinds = ", ".join(f"{name}:{address}" for name in SPACES)
-        raise Misuse(f"at {address} there are {', '.join(r.name for r in found)}: say which is meant, {kinds}")
+        raise Misuse(f"at {address} there are {', '.join(r.name for r in found)}: name one of them, {kinds}")
     (register,) = found
     if register.cells > 1:
         return f"{register.name}[{address - register.address}]"
@@ -93,26 +93,26 @@ def _register_at(registers: RegisterMap, address: int) -> str:
     return register.name
 
 
-def read_places(mic: Mic488, wanted: Iterable[Place]) -> dict[Place, Any]:
+def read_places(mic: Mic488, wanted: Iterable[ValueAddress]) -> dict[ValueAddress, Any]:
     """The values there. Raises `Refused` where the device has nothing."""
     from steptwin.wire import pdu
 
     content: dict[tuple[str, int, int], Sequence[int]] = {}
-    values: dict[Place, Any] = {}
+    values: dict[ValueAddress, Any] = {}
     for place in wanted:
         key = (place.space, place.first, place.count)
         if key not in content:
-            answer = mic.request(pdu.Read(SPACES[place.space], place.first, place.count))
+            answer = mic.request(pdu.ReadRequest(SPACES[place.space], place.first, place.count))
             match answer:
-                case pdu.Bits():
+                case pdu.BitsResponse():
                     content[key] = pdu.unpack_bits(answer.packed, place.count)
-                case pdu.Registers():
+                case pdu.RegistersResponse():
                     content[key] = answer.values
         values[place] = _value(place, content[key][place.address - place.first :])
     return values
 
 
-def _value(place: Place, words: Sequence[int]) -> Any:
+def _value(place: ValueAddress, words: Sequence[int]) -> Any:
     from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
 
     match place.form:

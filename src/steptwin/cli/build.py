@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from steptwin.cli import completion
+from steptwin.cli.device import Json, print_json
 from steptwin.errors import Misuse
 
 
@@ -26,6 +27,7 @@ def build(
     firmware: Annotated[
         str, typer.Option(help="Firmware the program is checked for.", autocompletion=completion.firmwares)
     ] = "1.70",
+    json: Json = False,
 ) -> None:
     """Compile a WBC program to the image of firmware 1.25. Exit code 1 if it has errors or something without a known form.
 
@@ -59,6 +61,17 @@ def build(
         raise typer.Exit(1)
     target = output or file.with_suffix(".wbc")
     write_bytes(target, data)
+    if json:
+        print_json(
+            {
+                "file": str(file),
+                "positions": None if files.positions is None else str(files.positions),
+                "image": str(target),
+                "commands": len(executable.steps),
+                "rows": len(table.rows),
+            }
+        )
+        return
     if files.found:
         typer.echo(str(files))
     typer.echo(f"{target}: {len(executable.steps)} commands, {len(table.rows)} positions")

@@ -17,7 +17,7 @@ from steptwin.cli import completion
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.diagnostics import Diagnostic, Source
+    from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.m1486.check import ChipMemory
 
 #: Raised when a member of the JSON changes its meaning or goes away.
@@ -25,7 +25,7 @@ JSON_VERSION = 1
 
 
 @dataclass(frozen=True)
-class Options:
+class CheckOptions:
     """What was asked for on the command line; None where nothing was said."""
 
     variant: str | None = None
@@ -43,7 +43,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Report:
+class CheckReport:
     """What the checker of one language found: its findings, further members for the JSON, further lines for people.
 
     ``companions`` are the other files that were read, with what is wrong in them.
@@ -53,7 +53,7 @@ class Report:
     diagnostics: list[Diagnostic]
     data: dict[str, Any] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
-    companions: list[tuple[Source, list[Diagnostic]]] = field(default_factory=list)
+    companions: list[tuple[SourceText, list[Diagnostic]]] = field(default_factory=list)
 
 
 def check(
@@ -79,7 +79,7 @@ def check(
 
     checker = _checker(file)
     source = read_text(file).source
-    report = checker(source, Options(variant, interface, memory, positions, config, firmware))
+    report = checker(source, CheckOptions(variant, interface, memory, positions, config, firmware))
     findings = [(source, report.diagnostics), *report.companions]
     errors = sum(d.severity is Severity.ERROR for _, found in findings for d in found)
     warnings = sum(d.severity is Severity.WARNING for _, found in findings for d in found)
@@ -109,7 +109,7 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
-def _check_m1486(source: Source, options: Options) -> Report:
+def _check_m1486(source: SourceText, options: CheckOptions) -> CheckReport:
     from steptwin.m1486 import lines, variants
     from steptwin.m1486.check import check as check_program
 
@@ -127,7 +127,7 @@ def _check_m1486(source: Source, options: Options) -> Report:
         "interface": interface.name,
         "memory": [_memory_data(source, chip) for chip in checked.memory],
     }
-    return Report("m1486", checked.diagnostics, data, shown)
+    return CheckReport("m1486", checked.diagnostics, data, shown)
 
 
 def _memory_summary(chip: ChipMemory) -> str:
@@ -137,7 +137,7 @@ def _memory_summary(chip: ChipMemory) -> str:
     return f"{name}: {files}, {total}" if files else f"{name}: {total}, nothing in [ ] ({chip.limit} bits)"
 
 
-def _memory_lines(source: Source, chip: ChipMemory) -> list[str]:
+def _memory_lines(source: SourceText, chip: ChipMemory) -> list[str]:
     shown, total = ["  line  bits  total  command"], 0
     for taken in chip.commands:
         total += taken.bits
@@ -147,7 +147,7 @@ def _memory_lines(source: Source, chip: ChipMemory) -> list[str]:
     return shown
 
 
-def _memory_data(source: Source, chip: ChipMemory) -> dict[str, Any]:
+def _memory_data(source: SourceText, chip: ChipMemory) -> dict[str, Any]:
     commands = []
     for taken in chip.commands:
         line, column = source.position(taken.command.span.start)
@@ -163,7 +163,7 @@ def _memory_data(source: Source, chip: ChipMemory) -> dict[str, Any]:
     }
 
 
-def _check_wbc(source: Source, options: Options) -> Report:
+def _check_wbc(source: SourceText, options: CheckOptions) -> CheckReport:
     from steptwin.files.programfiles import Companions, check_source
     from steptwin.wbc.dialect import DEFAULT, dialect_for
 
@@ -180,14 +180,16 @@ def _check_wbc(source: Source, options: Options) -> Report:
         "executable_lines": lines,
         "limit_lines": dialect.max_steps,
     }
-    return Report("wbc", read.checked.diagnostics, data, [shown, *([str(files)] if files.found else [])], list(read.findings[1:]))
+    return CheckReport(
+        "wbc", read.checked.diagnostics, data, [shown, *([str(files)] if files.found else [])], list(read.findings[1:])
+    )
 
 
 #: The checker of each language by the suffix of its files; every other suffix is M1486.
-_CHECKERS: dict[str, Callable[[Source, Options], Report]] = {".prg": _check_wbc}
+_CHECKERS: dict[str, Callable[[SourceText, CheckOptions], CheckReport]] = {".prg": _check_wbc}
 
 
-def _checker(file: Path) -> Callable[[Source, Options], Report]:
+def _checker(file: Path) -> Callable[[SourceText, CheckOptions], CheckReport]:
     if file.suffix.lower() == ".wbc":
         raise Misuse(f"{file} is a compiled image: steptwin decompile makes a program of it")
     return _CHECKERS.get(file.suffix.lower(), _check_m1486)

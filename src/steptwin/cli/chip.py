@@ -1,4 +1,4 @@
-"""What the commands for devices do with an M1486: info, get, set, watch, move, stop, send.
+"""What the commands for devices do with an M1486: info, get, set, watch, send. Its motions are in `steptwin.cli.chip_motion`.
 
 From Python: `steptwin.drivers.m1486.M1486`.
 """
@@ -18,7 +18,7 @@ from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
     from steptwin.drivers.address import DeviceAddress
-    from steptwin.drivers.m1486 import M1486, ChipMoveEnd
+    from steptwin.drivers.m1486 import M1486
 
 Shown = dict[str, tuple[Any, str]]
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
@@ -33,16 +33,6 @@ _SETTINGS = {
 }
 _SWITCHES = {"ON": True, "TRUE": True, "1": True, "OFF": False, "FALSE": False, "0": False}
 SETTABLE = "POSITION, VARIABLE, B1…B21, FLAG80…FLAG86, F40…F63, S, A, V, P, M, Q, N"
-
-
-def chip_address(device: str | None) -> DeviceAddress | None:
-    """The address if it is an M1486's."""
-    if device is None:
-        return None
-    from steptwin.drivers.address import parse_device
-
-    address = parse_device(device)
-    return address if address.kind == "m1486" else None
 
 
 @contextlib.contextmanager
@@ -68,7 +58,7 @@ def checked(names: Sequence[str]) -> list[str]:
     wanted = [name.upper() for name in names]
     for name in wanted:
         if name not in NAMES:
-            raise Misuse(f"{name!r} is nothing an M1486 tells: there are {', '.join(NAMES)}")
+            raise Misuse(f"{name!r} is no value of an M1486: there are {', '.join(NAMES)}")
     return wanted
 
 
@@ -125,7 +115,7 @@ def get(address: DeviceAddress, names: Sequence[str], *, json: bool, log_frames:
 
 
 def set_values(address: DeviceAddress, changes: Sequence[str], *, log_frames: bool) -> None:
-    """Everything is looked at before anything is typed."""
+    """All changes are checked before anything is sent."""
     actions = [_action(change) for change in changes]
     with opened_chip(address, log_frames=log_frames) as chip:
         for action in actions:
@@ -167,58 +157,10 @@ def _switch(prefix: str, number: int, value: str, text: str) -> Callable[[M1486]
             return lambda chip: chip.set_function(number, on)
 
 
-# ---------------------------------------------------------------------- motion
-
-
-def move(
-    address: DeviceAddress,
-    target: float,
-    *,
-    by: bool,
-    velocity: float | None,
-    wait: bool,
-    timeout: float | None,
-    log_frames: bool,
-) -> ChipMoveEnd | None:
-    """Full steps. Ctrl-C stops it."""
-    held_up = HeldUp()
-    with opened_chip(address, log_frames=log_frames) as chip:
-        held_up.check()
-        if velocity is not None:
-            chip.configure(velocity=velocity)
-        held_up.check()
-        try:
-            (chip.move_by if by else chip.move_to)(target)
-            return chip.wait(timeout, check=False) if wait else None
-        except KeyboardInterrupt:
-            chip.stop()
-            complain("stopped")
-            raise
-
-
-def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
-    """K is typed whether the chip can be asked or not: one that moves cannot."""
-    from steptwin.drivers.m1486 import M1486
-
-    chip = M1486(
-        address.place,
-        address.chip,
-        baud=address.baud,
-        variant=address.variant,
-        timeout_s=address.timeout,
-        log=complain if log_frames else None,
-    )
-    chip.open_line()
-    try:
-        (chip.stop_program if program else chip.stop)()
-    finally:
-        chip.close()
-
-
 # ---------------------------------------------------------------------- programs
 
 
-def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
+def send(address: DeviceAddress, file: Path, *, json: bool, log_frames: bool) -> None:
     """Download a program into the chips it names by ``X``, or the one meant; it runs from its ``]`` on."""
     from steptwin.drivers.m1486 import M1486, M1486Line
     from steptwin.drivers.m1486.sync import download_to
@@ -235,28 +177,35 @@ def send(address: DeviceAddress, file: Path, *, log_frames: bool) -> None:
         with _progress(file.name) as tell:
             uploaded = download_to(chips.values(), text, first=chips.get(address.chip), progress=tell, name=str(file))
     title = next(iter(chips.values())).variant.title
+    started = _started(text)
+    if json:
+        names = [None if a is None else f"{a:X}" for a in addresses]
+        print_json(
+            {"file": str(file), "type": title, "chips": names, "started": started is not None, "uploaded": uploaded.hex(" ")}
+        )
+        return
     where = f"the {title}" if len(addresses) == 1 else f"chips {', '.join(f'{a:X}' for a in addresses)} ({title})"
-    typer.echo(f"{file} is in {where}{_started(text)}" + (f"; it uploaded {uploaded.hex(' ')}" if uploaded else ""))
+    typer.echo(f"{file} is in {where}{started or ''}" + (f"; it uploaded {uploaded.hex(' ')}" if uploaded else ""))
 
 
-def _started(text: str) -> str:
-    """What a sent program does already."""
+def _started(text: str) -> str | None:
+    """What a sent program does already; None: nothing that moves."""
     from steptwin.m1486.syntax import parse
 
     keys = {command.key for command in parse(text).program.commands}
     if "]" in keys:
         return " and has been started by its ]: the motor may move; 'steptwin stop --program' ends it"
-    return " and was carried out as it was sent: the motor may move" if keys & {"R", "(", ")", "J"} else ""
+    return " and was carried out as it was sent: the motor may move" if keys & {"R", "(", ")", "J"} else None
 
 
 def _addressed(text: str, chip: int | None, file: Path) -> list[int | None]:
-    """The chips a program is for: those it names by X, and ``chip`` for what stands before. What is wrong in it is told later."""
+    """The chips a program is for: those it names by X, and ``chip`` for what stands before. Errors in it are reported later."""
     from steptwin.drivers.m1486.download import parts
     from steptwin.m1486.syntax import parse
 
     named = dict.fromkeys(chip if address is None else address for address, _ in parts(parse(text).program))
     if None in named and len(named) > 1:
-        raise Misuse(f"{file} is not sent: what stands before its first X is for which chip? Give it: --device ADDRESS,chip=N")
+        raise Misuse(f"{file} is not sent: the commands before its first X need a chip: --device ADDRESS,chip=N")
     return list(named) or [chip]
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli import completion
+from steptwin.cli.device import aligned
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -21,26 +22,26 @@ if TYPE_CHECKING:
     from steptwin.m1486.variants import Variant
 
 
-class Device(enum.StrEnum):
+class CommandsOf(enum.StrEnum):
     M1486 = "m1486"
     MIC488 = "mic488"
 
 
-class Format(enum.StrEnum):
+class PageFormat(enum.StrEnum):
     TEXT = "text"
     JSON = "json"
     MD = "md"
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     title: str
     columns: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
 
 
 def commands(
-    device: Annotated[Device, typer.Argument(help="Controller.")],
+    device: Annotated[CommandsOf, typer.Argument(help="Controller.")],
     variant: Annotated[
         str | None,
         typer.Option(help="Type of M1486: A, B, C, E1, E2, or A2x and so on. Default: all.", autocompletion=completion.variants),
@@ -48,10 +49,10 @@ def commands(
     firmware: Annotated[
         str | None, typer.Option(help="Firmware of the MIC488. Default 1.70.", autocompletion=completion.firmwares)
     ] = None,
-    form: Annotated[Format, typer.Option("--format", help="How to print it.")] = Format.TEXT,
+    form: Annotated[PageFormat, typer.Option("--format", help="How to print it.")] = PageFormat.TEXT,
 ) -> None:
     """Show the statements or commands of a controller, their arguments and effects, and all findings of the checker."""
-    if device is Device.MIC488:
+    if device is CommandsOf.MIC488:
         if variant is not None:
             raise Misuse("--variant is for the M1486 only")
         sections = _wbc(firmware)
@@ -62,23 +63,23 @@ def commands(
     show(sections, form)
 
 
-def show(sections: Sequence[Section], form: Format) -> None:
+def show(sections: Sequence[PageSection], form: PageFormat) -> None:
     """Print tables."""
-    if form is Format.JSON:
+    if form is PageFormat.JSON:
         data = {s.title: [dict(zip(s.columns, row, strict=True)) for row in s.rows] for s in sections}
         typer.echo(json.dumps(data, ensure_ascii=False, indent=2))
     else:
-        typer.echo("\n".join(_markdown(s) if form is Format.MD else _text(s) for s in sections), nl=False)
+        typer.echo("\n".join(_markdown(s) if form is PageFormat.MD else _text(s) for s in sections), nl=False)
 
 
-def _wbc(firmware: str | None) -> list[Section]:
+def _wbc(firmware: str | None) -> list[PageSection]:
     from steptwin.cli.commands_wbc import sections_of as sections_of_wbc
     from steptwin.wbc.dialect import DEFAULT, dialect_for
 
     return sections_of_wbc(DEFAULT if firmware is None else dialect_for(firmware))
 
 
-def _m1486(variant: str | None) -> list[Section]:
+def _m1486(variant: str | None) -> list[PageSection]:
     from steptwin.m1486 import variants
 
     if variant is None:
@@ -86,7 +87,7 @@ def _m1486(variant: str | None) -> list[Section]:
     return sections_of((variants.variant(variant),))
 
 
-def sections_of(variants: tuple[Variant, ...]) -> list[Section]:
+def sections_of(variants: tuple[Variant, ...]) -> list[PageSection]:
     """The tables of the language, each with its columns, for these variants."""
     return [
         _commands(variants),
@@ -101,7 +102,7 @@ def sections_of(variants: tuple[Variant, ...]) -> list[Section]:
     ]
 
 
-def _commands(variants: tuple[Variant, ...]) -> Section:
+def _commands(variants: tuple[Variant, ...]) -> PageSection:
     from steptwin.m1486.commands import TABLE, When, memory_bits, takes_variable
 
     rows = [
@@ -117,54 +118,54 @@ def _commands(variants: tuple[Variant, ...]) -> Section:
         )
         for spec in TABLE
     ]
-    return Section("Commands", ("command", "name", "number", "variable", "bits", "acts", "effect", "section"), rows)
+    return PageSection("Commands", ("command", "name", "number", "variable", "bits", "acts", "effect", "section"), rows)
 
 
 def _numbers(spec: CommandSpec, variants: tuple[Variant, ...]) -> str:
-    from steptwin.m1486.commands import Kind, range_text
+    from steptwin.m1486.commands import ArgType, range_text
 
-    if spec.kind is Kind.NONE:
+    if spec.kind is ArgType.NONE:
         return ""
     texts: dict[str, list[str]] = {}
     for variant in variants:
-        texts.setdefault(range_text(spec, variant, named=spec.kind is not Kind.NUMBER), []).append(variant.name)
+        texts.setdefault(range_text(spec, variant, named=spec.kind is not ArgType.NUMBER), []).append(variant.name)
     if len(texts) == 1:
         return next(iter(texts))
     return "; ".join(f"{text} on {', '.join(names)}" for text, names in texts.items())
 
 
-def _functions() -> Section:
+def _functions() -> PageSection:
     from steptwin.m1486.functions import TABLE
 
     rows = [(str(f.number), f.name or "reserved", "ON" if f.default else "OFF", f.on, f.off) for f in TABLE]
-    return Section("Auxiliary functions", ("number", "name", "default", "ON", "OFF"), rows)
+    return PageSection("Auxiliary functions", ("number", "name", "default", "ON", "OFF"), rows)
 
 
-def _flags() -> Section:
+def _flags() -> PageSection:
     from steptwin.m1486.functions import CARRY, USER_FLAGS
 
     rows = [
         (f"{USER_FLAGS[0]} to {USER_FLAGS[-1]}", "user flags", "T and C"),
         (str(CARRY), "carry", "+ and - only"),
     ]
-    return Section("Flags", ("number", "name", "set and cleared by"), rows)
+    return PageSection("Flags", ("number", "name", "set and cleared by"), rows)
 
 
-def _registers() -> Section:
+def _registers() -> PageSection:
     from steptwin.m1486.registers import REGISTERS
 
     rows = [(str(r.number), r.name, str(r.bits), "yes" if r.is_operand else "no") for r in REGISTERS]
-    return Section("Registers", ("number", "name", "bits", "operand while function 58 is ON"), rows)
+    return PageSection("Registers", ("number", "name", "bits", "operand while function 58 is ON"), rows)
 
 
-def _uploads() -> Section:
+def _uploads() -> PageSection:
     from steptwin.m1486.registers import UPLOAD_RANGE, UPLOADS
 
     rows = [(str(number), UPLOADS.get(number, "reserved")) for number in UPLOAD_RANGE]
-    return Section("Bytes to upload", ("number", "content"), rows)
+    return PageSection("Bytes to upload", ("number", "content"), rows)
 
 
-def _microsteps() -> Section:
+def _microsteps() -> PageSection:
     from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, microstep_size
 
     rows = [
@@ -177,10 +178,10 @@ def _microsteps() -> Section:
         for m, qualifications in PAIRS.items()
     ]
     columns = ("M", "microstep in min. microsteps", "division in force up to, step/s", "above, step/s")
-    return Section("Microsteps", columns, rows)
+    return PageSection("Microsteps", columns, rows)
 
 
-def _lines() -> Section:
+def _lines() -> PageSection:
     from steptwin.m1486.lines import INTERFACES, LINES, SEEK_ENDS_LOW, SHARED_PINS
 
     rows = []
@@ -188,10 +189,10 @@ def _lines() -> Section:
         taken = [i.title for i in INTERFACES if line in i.occupied]
         end = "low" if line in SEEK_ENDS_LOW else "high"
         rows.append((f"B{line}", SHARED_PINS.get(line, ""), ", ".join(taken), end))
-    return Section("I/O lines", ("line", "shares its pin with", "taken by", "seek ends when"), rows)
+    return PageSection("I/O lines", ("line", "shares its pin with", "taken by", "seek ends when"), rows)
 
 
-def _variants(variants: tuple[Variant, ...]) -> Section:
+def _variants(variants: tuple[Variant, ...]) -> PageSection:
     rows = [
         (
             v.title,
@@ -205,24 +206,21 @@ def _variants(variants: tuple[Variant, ...]) -> Section:
         for v in variants
     ]
     columns = ("type", "labels", "input buffer, bits", "command memory, bits", "kept in", "addresses", "registers 1 to 8 in")
-    return Section("Types", columns, rows)
+    return PageSection("Types", columns, rows)
 
 
-def _findings() -> Section:
+def _findings() -> PageSection:
     from steptwin.m1486.findings import TABLE
 
     rows = [(f.code, f.severity.value, f.title, f.meaning) for f in TABLE]
-    return Section("What the checker finds", ("code", "severity", "finding", "why"), rows)
+    return PageSection("What the checker finds", ("code", "severity", "finding", "why"), rows)
 
 
-def _text(section: Section) -> str:
-    lines = [section.columns, *section.rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(section.columns))]
-    table = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
-    return f"{section.title}\n\n" + "\n".join(table) + "\n"
+def _text(section: PageSection) -> str:
+    return f"{section.title}\n\n{aligned([section.columns, *section.rows])}\n"
 
 
-def _markdown(section: Section) -> str:
+def _markdown(section: PageSection) -> str:
     # Keys like * or \ are code on a page, where only | needs an escape; the first column names the row in every table.
     pipes = [[cell.replace("|", "\\|") for cell in row] for row in section.rows]
     rows = [(f"`{first}`", *(cell.replace("*", "\\*") for cell in others)) for first, *others in pipes]

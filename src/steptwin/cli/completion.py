@@ -25,22 +25,24 @@ def variants(incomplete: str) -> list[str]:
     return _beginning((variant.name for variant in VARIANTS), incomplete)
 
 
-def twins(incomplete: str) -> list[str]:
-    """Names of running twins."""
-    from steptwin.live.control import running
+def devices(incomplete: str) -> list[str]:
+    """Running twins and their controllers by name."""
+    from steptwin.live.twins import running_twins
 
     with contextlib.suppress(SteptwinError):
-        return _beginning(running(), incomplete)
+        twins = running_twins()
+        named = {each.full_name: None for twin in twins for each in twin.controllers}
+        return _beginning({twin.name: None for twin in twins} | named, incomplete)
     return []
 
 
 def pins(context: typer.Context, incomplete: str) -> list[str]:
-    """``IN1=`` of the twin that ``--twin`` names, or of the only one."""
-    from steptwin.live.control import ask
+    """``IN1=`` of the twin that ``--device`` names, or of the only one."""
+    from steptwin.cli.twin import levels_of, selected
 
-    with contextlib.suppress(SteptwinError):
-        asked = {"do": "pin", "unit": context.params.get("unit"), "set": {}}
-        return _beginning((f"{name}=" for name in ask(context.params.get("twin"), asked)), incomplete)
+    with contextlib.suppress(SteptwinError), selected(context.params.get("twin")) as there:
+        several = len(there.controllers) > 1
+        return _beginning((f"{name if several else name.partition('.')[2]}=" for name in levels_of(there)), incomplete)
     return []
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from steptwin.cli.device import Json, print_json
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ def decompile(
     file: Annotated[Path, typer.Argument(help="Compiled image (.wbc).")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Program to write (.prg); default: print it.")] = None,
     positions: Annotated[Path | None, typer.Option(help="Position table to write; default: beside the program, as .csv.")] = None,
+    json: Json = False,
 ) -> None:
     """Turn a compiled image into a program and a position table that build to the same bytes."""
     from steptwin.files.textfiles import write_bytes
@@ -33,14 +35,28 @@ def decompile(
         table = output.with_suffix(".csv")
         if table.exists():
             raise Misuse(f"{table} exists already: name the position table with --positions")
+    if output is not None:
+        write_bytes(output, found.text.encode("utf-8"))
+    if table is not None:
+        write_bytes(table, found.positions.text.encode("utf-8"))
+    if json:
+        print_json(
+            {
+                "file": str(file),
+                "program": None if output is None else str(output),
+                "text": found.text,
+                "positions": None if table is None else str(table),
+                "rows": rows,
+                "unknown": found.unknown,
+                "inferred": found.inferred,
+            }
+        )
+        return
     if output is None:
         typer.echo(found.text, nl=False)
     else:
-        write_bytes(output, found.text.encode("utf-8"))
         typer.echo(f"{output}: {_summary(found)}")
-    if table is not None:
-        write_bytes(table, found.positions.text.encode("utf-8"))
-    elif rows:
+    if table is None and rows:
         typer.echo(f"{file} has {rows} positions: write them with --positions", err=True)
 
 

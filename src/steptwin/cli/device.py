@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.errors import LineFailure, Misuse, Refusal
 
 if TYPE_CHECKING:
     from steptwin.drivers import Mic488
+    from steptwin.drivers.address import DeviceAddress
     from steptwin.drivers.m1486.identify import SearchLine
 
 Device = Annotated[
@@ -23,27 +25,35 @@ Device = Annotated[
         "--device",
         "-d",
         envvar="STEPTWIN_DEVICE",
-        metavar="ADDRESS",
-        help="/dev/ttyUSB0, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT; behind it ,unit=N ,baud=N ,config=FILE "
-        ",firmware=V ,timeout=S; for an M1486 ,kind=m1486 or ,chip=7 ,variant=B. Default: the twin on tcp://127.0.0.1:5020.",
+        metavar="DEVICE",
+        help="A running twin: mic488, machine.table (a controller of it) or its file machine.toml. A device: /dev/ttyUSB0, COM3, "
+        "HOST:PORT, rtu-tcp://HOST:PORT, rfc2217://HOST:PORT. Behind it ,unit=N ,baud=N ,config=FILE ,firmware=V ,timeout=S; for "
+        "an M1486 ,kind=m1486 or ,chip=7 ,variant=B. Default: the only running twin.",
+        autocompletion=completion.devices,
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 LogFrames = Annotated[bool, typer.Option("--log-frames", help="Print every frame in words to the standard error.")]
-Axes = Annotated[list[str] | None, typer.Argument(metavar="[AXES]...", help="1 to 4, or M1 to M4. Default: all.")]
+Axes = Annotated[list[str] | None, typer.Argument(metavar="AXES", help="1 to 4, or M1 to M4. Default: all.")]
 REAL_LIMIT = 3.4e38
 TIED = "expected AXIS=NUMBER, such as 1=12.5 or M1=12.5"
 
 
-@contextlib.contextmanager
-def opened(device: str | None, *, observe: bool = True, log_frames: bool = False) -> Generator[Mic488]:
-    """The controller meant. ``observe``: DATA_TYPE is left as it is."""
-    from steptwin.drivers import LineLost, Mic488, NoAnswer
-    from steptwin.drivers.address import DEFAULT, parse_device
+def find(device: str | None, *, whole_line: bool = False) -> DeviceAddress:
+    """The device that ``--device`` names; `steptwin.live.twins.find_device`."""
+    from steptwin.live.twins import find_device
 
-    address = parse_device(device or DEFAULT)
+    return find_device(device, whole_line=whole_line)
+
+
+@contextlib.contextmanager
+def opened(address: DeviceAddress, *, observe: bool = True, log_frames: bool = False) -> Generator[Mic488]:
+    """A driver of the MIC488 there. ``observe``: DATA_TYPE is left as it is. Raises `Misuse` for another kind of device."""
+    from steptwin.drivers import Mic488, NoAnswer
+
     if address.kind != "mic488":
-        raise Misuse("this command is for the MIC488; an M1486 has info, get, set, watch, move, stop, send and terminal")
+        commands = "info, get, set, watch, home, seek, move, jog, stop, send and terminal"
+        raise Misuse(f"this command is for the MIC488; an M1486 has {commands}")
     mic = Mic488(
         address.place,
         address.unit,
@@ -56,13 +66,6 @@ def opened(device: str | None, *, observe: bool = True, log_frames: bool = False
     )
     try:
         mic.open()
-    except LineLost as error:
-        if device is None:
-            raise LineFailure(
-                f"{error}. That is where a twin would be: start one with 'steptwin serve mic488 --demo', or name a device with "
-                "--device or STEPTWIN_DEVICE"
-            ) from error
-        raise
     except NoAnswer as error:
         drop_rubbish(address.place, address.baud)
         raise LineFailure(f"{error}. If these are M1486 chips, put ',kind=m1486' behind the address") from error
@@ -161,7 +164,7 @@ class HeldUp:
 
 
 def tell_under_way(names: Sequence[str]) -> None:
-    """A sign of life for somebody at a terminal, for a motion takes its time."""
+    """Say on a terminal that a motion is under way, because it takes its time."""
     if sys.stderr.isatty():
         typer.echo(f"{', '.join(names)} under way; Ctrl-C stops", err=True)
 
@@ -198,10 +201,14 @@ def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
     if not lines:
         return ""
     columns = list(zip(*lines, strict=True))
-    widths = [max(map(len, column)) for column in columns]
-    right = [all(_is_number(cell) for cell in column[bool(head) :]) for column in columns]
+    return aligned(lines, [n for n, column in enumerate(columns) if all(map(_is_number, column[bool(head) :]))])
+
+
+def aligned(lines: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
+    """Columns below each other, to the left but for those named (from 0)."""
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     cells = [
-        [cell.rjust(width) if to_right else cell.ljust(width) for cell, width, to_right in zip(line, widths, right, strict=True)]
+        [cell.rjust(w) if n in right else cell.ljust(w) for n, (cell, w) in enumerate(zip(line, widths, strict=True))]
         for line in lines
     ]
     return "\n".join("  ".join(line).rstrip() for line in cells)

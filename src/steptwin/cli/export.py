@@ -11,10 +11,11 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli.device import Json, print_json
 from steptwin.errors import Misuse
 
 
-class Form(enum.StrEnum):
+class ExportFormat(enum.StrEnum):
     HTML = "html"
     PNG = "png"
     SVG = "svg"
@@ -26,7 +27,7 @@ class Form(enum.StrEnum):
 
 def export(
     trace: Annotated[Path, typer.Argument(help="A trace (.jsonl), or the directory that has trace.jsonl.")],
-    to: Annotated[list[Form] | None, typer.Option(help="Format; may be given more than once.")] = None,
+    to: Annotated[list[ExportFormat] | None, typer.Option(help="Format; may be given more than once.")] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File or directory; default: beside the trace, named alike.")
     ] = None,
@@ -42,13 +43,14 @@ def export(
         bool, typer.Option("--texts/--no-texts", help="Signals of type string (vcd): GTKWave shows them, sigrok refuses them.")
     ] = True,
     period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
+    json: Json = False,
 ) -> None:
     """Write a recorded trace as a timeline (html), a picture (png, svg), signals (vcd) or samples (csv, parquet)."""
     from steptwin.files.export import bar, read_trace, write_trace
     from steptwin.files.timedinputs import parse_duration
 
     if not to and output is None:
-        raise Misuse(f"nothing to write: name formats with --to ({', '.join(Form)}) or a file with --output")
+        raise Misuse(f"nothing to write: name formats with --to ({', '.join(ExportFormat)}) or a file with --output")
     saved = read_trace(trace)
     formats = [form.value for form in to or ()]
     begin_ns = parse_duration(begin, "--from")
@@ -56,8 +58,9 @@ def export(
     period_ns = parse_duration(period, "--period")
     source = trace / "trace.jsonl" if trace.is_dir() else trace
     targets = [source.with_suffix(f".{name}") for name in formats] if output is None else [output]
+    files: list[Path] = []
     for i, target in enumerate(targets):
-        written = write_trace(
+        files += write_trace(
             saved.trace,
             target,
             views=saved.views,
@@ -71,5 +74,8 @@ def export(
             texts=texts,
             watch=bar,
         )
-        for path in written:
-            typer.echo(f"{path}: {path.stat().st_size:,} bytes")
+    if json:
+        print_json([{"file": str(path), "bytes": path.stat().st_size} for path in files])
+        return
+    for path in files:
+        typer.echo(f"{path}: {path.stat().st_size:,} bytes")

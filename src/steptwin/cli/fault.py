@@ -1,4 +1,4 @@
-"""``steptwin fault``: what goes wrong with a running twin.
+"""``steptwin fault``: faults of a running twin.
 
 From Python: `steptwin.world.faults`.
 """
@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli import completion
-from steptwin.cli.commands import Format, Section, show
-from steptwin.cli.twin import Json, Twin
+from steptwin.cli.commands import PageFormat, PageSection, show
+from steptwin.cli.twin import Json, Twin, selected
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def fault(
     words: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[KIND [NAME=VALUE ...]]",
+            metavar="KIND NAME=VALUE",
             help="crc nth=3; without any, those that are set are shown.",
             autocompletion=completion.faults,
         ),
@@ -30,7 +30,7 @@ def fault(
     clear: Annotated[list[str] | None, typer.Option(help="Remove the fault of this name; repeatable.")] = None,
     clear_all: Annotated[bool, typer.Option("--clear-all", help="Remove all faults.")] = False,
     kinds: Annotated[bool, typer.Option("--kinds", help="Show all kinds of faults and what they take.")] = False,
-    form: Annotated[Format, typer.Option("--format", help="How to print the kinds.")] = Format.TEXT,
+    form: Annotated[PageFormat, typer.Option("--format", help="How to print the kinds.")] = PageFormat.TEXT,
     twin: Twin = None,
     json: Json = False,
 ) -> None:
@@ -40,14 +40,18 @@ def fault(
         return
     if clear and clear_all:
         raise Misuse("--clear and --clear-all exclude each other")
-    from steptwin.live.control import ask
+    from steptwin.subject.commands import ListFaults
+    from steptwin.world.faults import read
+    from steptwin.world.script import ClearFault, SetFault
 
-    wanted = []
-    if words:
-        from steptwin.world.faults import read
-
-        wanted = [str(read(" ".join(words)))]
-    there = ask(twin, {"do": "fault", "set": wanted, "clear": True if clear_all else clear or []})
+    wanted = read(" ".join(words)) if words else None
+    with selected(twin) as twin_:
+        unwanted = [active["name"] for active in twin_.do(ListFaults())] if clear_all else list(dict.fromkeys(clear or []))
+        for name in unwanted:
+            twin_.do(ClearFault(name))
+        if wanted is not None:
+            twin_.do(SetFault(wanted))
+        there = twin_.do(ListFaults())
     if json:
         import json as json_
 
@@ -60,7 +64,7 @@ def fault(
         typer.echo("no faults")
 
 
-def sections() -> list[Section]:
+def sections() -> list[PageSection]:
     """The table of faults for people."""
     from steptwin.world.faults.kinds import rows, shared
     from steptwin.world.faults.table import Layer
@@ -83,9 +87,10 @@ def sections() -> list[Section]:
             )
             for kind in rows(layer)
         ]
-        found.append(Section(f"Faults of {layer.value}", ("kind", "what happens", "on", "at each", "its own parameters"), table))
+        heads = ("kind", "what happens", "on", "at each", "its own parameters")
+        found.append(PageSection(f"Faults of {layer.value}", heads, table))
     common = [(parameter.name, parameter.meaning, parameter.permitted, _else(parameter), of) for parameter, of in shared()]
-    found.append(Section("Where and when", ("parameter", "meaning", "permitted", "else", "of"), common))
+    found.append(PageSection("Where and when", ("parameter", "meaning", "permitted", "else", "of"), common))
     return found
 
 

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli.device import Json, print_json
 from steptwin.errors import Misuse
 
 SUFFIX = ".prg"
@@ -18,12 +19,13 @@ SUFFIX = ".prg"
 def fmt(
     files: Annotated[list[Path], typer.Argument(help="WBC programs (.prg).")],
     check: Annotated[bool, typer.Option("--check", help="Change nothing; exit code 1 if a file is not in the style.")] = False,
+    json: Json = False,
 ) -> None:
     """Write WBC programs in one style: blanks, indentation, keywords in capitals. Lines with errors stay as they are."""
     from steptwin.files.textfiles import read_text, write_bytes
     from steptwin.wbc.printer import format_text
 
-    changed = 0
+    changed: list[str] = []
     for path in files:
         if path.suffix.lower() != SUFFIX:
             raise Misuse(f"cannot format {path}: permitted are WBC programs ({SUFFIX})")
@@ -31,11 +33,12 @@ def fmt(
         text = format_text(file.source.text)
         if text == file.source.text:
             continue
-        changed += 1
-        if check:
-            typer.echo(f"{path}: not in the style")
-        else:
+        changed.append(str(path))
+        if not check:
             write_bytes(path, file.to_bytes(text))
-            typer.echo(f"{path}: formatted")
+        if not json:
+            typer.echo(f"{path}: {'not in the style' if check else 'formatted'}")
+    if json:
+        print_json({"files": [str(path) for path in files], "not_in_the_style" if check else "formatted": changed})
     if check and changed:
         raise typer.Exit(1)

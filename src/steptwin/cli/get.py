@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from steptwin.cli.addresses import SPACES, Place, places, read_places
-from steptwin.cli.chip import chip_address, set_values
+from steptwin.cli.addresses import SPACES, ValueAddress, places, read_places
 from steptwin.cli.chip import get as chip_get
-from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, shown, table
+from steptwin.cli.chip import set_values
+from steptwin.cli.device import Device, Json, LogFrames, find, opened, print_json, shown, table
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def get(
     names: Annotated[
         list[str],
         typer.Argument(
-            metavar="NAME...",
+            metavar="NAME",
             help="M1_POS_ACT, OUT3, 'M*_ACC', USER_REGISTER[100-109], USER_REGISTER[4]:real; by address 10020, hr:10020:real, "
             "hr:10020-10023:hex, co:6000, di:5000",
             autocompletion=names_from,
@@ -47,11 +47,11 @@ def get(
     log_frames: LogFrames = False,
 ) -> None:
     """Read registers by name or address. 'steptwin registers mic488' lists them; an M1486 has POSITION, COUNTER, FLAGS…"""
-    chip = chip_address(device)
-    if chip is not None:
-        chip_get(chip, names, json=json, log_frames=log_frames)
+    address = find(device)
+    if address.kind == "m1486":
+        chip_get(address, names, json=json, log_frames=log_frames)
         return
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(address, log_frames=log_frames) as mic:
         registers = map_of(mic)
         values = look(mic, expanded(registers, names))
     if json:
@@ -64,7 +64,7 @@ def set_(
     changes: Annotated[
         list[str],
         typer.Argument(
-            metavar="NAME=VALUE...", help="M1_ACC=50 OUT3=on DATA_TYPE=REAL USER_REGISTER[4]=7", autocompletion=names_from
+            metavar="NAME=VALUE", help="M1_ACC=50 OUT3=on DATA_TYPE=REAL USER_REGISTER[4]=7", autocompletion=names_from
         ),
     ],
     device: Device = None,
@@ -75,15 +75,15 @@ def set_(
 
     A register that repeats would act twice on is sent once only; where its answer is lost, the message says so.
     """
-    chip = chip_address(device)
-    if chip is not None:
-        set_values(chip, changes, log_frames=log_frames)
+    address = find(device)
+    if address.kind == "m1486":
+        set_values(address, changes, log_frames=log_frames)
         return
     from steptwin.mic488.registermap import DataType
     from steptwin.mic488.values import encoded, named
 
     given = [_change(change) for change in changes]
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(address, log_frames=log_frames) as mic:
         registers = map_of(mic)
         wanted = {name: value_of(registers.named(name.partition("[")[0]), text, change) for name, text, change in given}
         for name, value in wanted.items():  # all of them before the first is written
@@ -104,7 +104,7 @@ def map_of(mic: Mic488) -> RegisterMap:
     return register_map(mic.firmware)
 
 
-def look(mic: Mic488, wanted: Sequence[str | Place]) -> dict[str, tuple[Any, str]]:
+def look(mic: Mic488, wanted: Sequence[str | ValueAddress]) -> dict[str, tuple[Any, str]]:
     """Values by name and by address, each with its unit."""
     names = [one for one in wanted if isinstance(one, str)]
     values = mic.get_shown(*names) if names else {}
@@ -112,15 +112,15 @@ def look(mic: Mic488, wanted: Sequence[str | Place]) -> dict[str, tuple[Any, str
     return {str(one): values[one] if isinstance(one, str) else (by_address[one], "") for one in wanted}
 
 
-def expanded(registers: RegisterMap, names: Sequence[str]) -> list[str | Place]:
+def expanded(registers: RegisterMap, names: Sequence[str]) -> list[str | ValueAddress]:
     """Names with ``*`` and ``?``, runs of user registers, and addresses, as all they stand for.
 
     Raises `Misuse` for one that stands for none.
     """
-    found: dict[str | Place, None] = {}
+    found: dict[str | ValueAddress, None] = {}
     for name in names:
         run = _RUN.fullmatch(name)
-        members: Sequence[str | Place] | None = places(name, registers)
+        members: Sequence[str | ValueAddress] | None = places(name, registers)
         if members is not None:
             pass
         elif run is not None:
@@ -132,7 +132,7 @@ def expanded(registers: RegisterMap, names: Sequence[str]) -> list[str | Place]:
         else:
             members = [name]
         if not members:
-            raise Misuse(f"{name!r} stands for no register that can be read; 'steptwin registers mic488' lists them")
+            raise Misuse(f"{name!r} matches no register that can be read; 'steptwin registers mic488' lists them")
         found |= dict.fromkeys(members)
     return list(found)
 
@@ -155,9 +155,9 @@ def value_of(register: Register, value: str, whole: str) -> float:
 
 
 def _holds(register: Register) -> bool:
-    from steptwin.mic488.registermap import Effect
+    from steptwin.mic488.registermap import WriteEffect
 
-    return bool(register.reads) and register.effect is Effect.STORE
+    return bool(register.reads) and register.effect is WriteEffect.STORE
 
 
 def _meaning(registers: RegisterMap, name: str, value: Any) -> str:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from steptwin.cli.chip import chip_address
 from steptwin.cli.chip import info as chip_info
-from steptwin.cli.device import Device, Json, LogFrames, opened, print_json, shown, table
+from steptwin.cli.device import Device, Json, LogFrames, find, opened, print_json, shown, table
 
 if TYPE_CHECKING:
     from steptwin.drivers import Mic488, Mic488Status
@@ -21,20 +20,27 @@ _PROGRAM = {0: "stopped", 1: "running", 2: "paused"}
 
 def info(device: Device = None, json: Json = False, log_frames: LogFrames = False) -> None:
     """Show what a controller is and what it is doing."""
-    chip = chip_address(device)
-    if chip is not None:
-        chip_info(chip, json=json, log_frames=log_frames)
+    address = find(device)
+    if address.kind == "m1486":
+        chip_info(address, json=json, log_frames=log_frames)
         return
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(address, log_frames=log_frames) as mic:
         status = mic.status()
-        data_type = mic.get("DATA_TYPE")["DATA_TYPE"]
+        data_type = "DINT" if mic.get("DATA_TYPE")["DATA_TYPE"] else "REAL"
+        firmwares = [mic.firmware] if address.firmware is not None else _firmwares(mic.firmware, status)
+        data = _data(mic, status, data_type, firmwares)
     if json:
-        print_json(_data(mic, status))
+        print_json(data)
     else:
-        typer.echo("\n".join(_lines(mic, status, "DINT" if data_type else "REAL")))
+        typer.echo("\n".join(_lines(data, status)))
 
 
-def _data(mic: Mic488, status: Mic488Status) -> dict[str, Any]:
+def _firmwares(found: str, status: Mic488Status) -> list[str]:
+    """The firmwares that answer as the one that was found: 1.40 has the addresses of 1.70, and its M_STATUS is always 0."""
+    return ["1.70", "1.40"] if found == "1.70" and not status.controller else [found]
+
+
+def _data(mic: Mic488, status: Mic488Status, data_type: str, firmwares: list[str]) -> dict[str, Any]:
     from steptwin.drivers.mic488.motion import status_text
 
     axes = [
@@ -47,6 +53,8 @@ def _data(mic: Mic488, status: Mic488Status) -> dict[str, Any]:
         "device": mic.place,
         "unit": mic.unit,
         "firmware": mic.firmware,
+        "firmware_may_be": firmwares,
+        "data_type": data_type,
         "status": status.controller,
         "program": _PROGRAM.get(status.program, str(status.program)),
         "axes": axes,
@@ -55,19 +63,18 @@ def _data(mic: Mic488, status: Mic488Status) -> dict[str, Any]:
     }
 
 
-def _lines(mic: Mic488, status: Mic488Status, data_type: str) -> list[str]:
+def _lines(data: dict[str, Any], status: Mic488Status) -> list[str]:
     from steptwin.mic488.registers import CONTROLLER_STATUS_TEXTS
 
-    data = _data(mic, status)
-    firmware = "1.70 or 1.40" if mic.firmware == "1.70" and not status.controller else mic.firmware
+    firmware = " or ".join(data["firmware_may_be"])
     state = "" if status.controller is None else f", {CONTROLLER_STATUS_TEXTS.get(status.controller, status.controller)}"
     rows = [
         (f"M{a['axis']}", shown(a["position"]), a["unit"], shown(a["velocity"]), f"{a['unit']}/s", str(a["status"]), a["meaning"])
         for a in data["axes"]
     ]
     return [
-        f"MIC488, unit {mic.unit} at {mic.place}, firmware {firmware}{state}",
-        f"program {data['program']}, values travel as {data_type}",
+        f"MIC488, unit {data['unit']} at {data['device']}, firmware {firmware}{state}",
+        f"program {data['program']}, values travel as {data['data_type']}",
         table(rows),
         f"inputs on:  {_on('IN', status.inputs)}",
         f"outputs on: {_on('OUT', status.outputs)}",

@@ -1,23 +1,19 @@
-"""``steptwin enable``, ``disable``, ``home``, ``move``, ``jog``, ``stop``: axes from the command line.
+"""``steptwin enable``, ``disable``, ``home``, ``seek``, ``move``, ``jog``, ``stop``: axes from the command line.
 
 From Python: `steptwin.drivers.Mic488` and its axes.
 """
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import signal
 import sys
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from steptwin.cli.chip import chip_address
-from steptwin.cli.chip import move as move_chip
-from steptwin.cli.chip import stop as chip_stop
+from steptwin.cli import chip_motion
 from steptwin.cli.device import (
     Axes,
     Device,
@@ -26,12 +22,14 @@ from steptwin.cli.device import (
     LogFrames,
     axes_of,
     complain,
+    find,
     number_of,
     opened,
     print_json,
     tell_under_way,
     tied,
 )
+from steptwin.cli.keys import interruptible, keys
 from steptwin.errors import Misuse, Refusal
 
 if TYPE_CHECKING:
@@ -44,13 +42,13 @@ Timeout = Annotated[float | None, typer.Option(help="Seconds to wait at most. De
 
 def enable(axes: Axes = None, device: Device = None, log_frames: LogFrames = False) -> None:
     """Switch drives on."""
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(find(device), log_frames=log_frames) as mic:
         mic.enable(*axes_of(axes))
 
 
 def disable(axes: Axes = None, device: Device = None, log_frames: LogFrames = False) -> None:
     """Switch drives off. Pulses end at once."""
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(find(device), log_frames=log_frames) as mic:
         mic.disable(*axes_of(axes))
 
 
@@ -63,11 +61,11 @@ def stop(
     log_frames: LogFrames = False,
 ) -> None:
     """Stop axes at once, without ramp; an M1486 with its ramp. A program that runs may move them again: see --program."""
-    chip = chip_address(device)
-    if chip is not None:
-        chip_stop(chip, program=program, log_frames=log_frames)
+    address = find(device)
+    if address.kind == "m1486":
+        chip_motion.stop(address, program=program, log_frames=log_frames)
         return
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(find(device), log_frames=log_frames) as mic:
         mic.stop(*axes_of(axes))
         if program:
             mic.program.stop()
@@ -76,7 +74,7 @@ def stop(
 
 
 def move(
-    targets: Annotated[list[str], typer.Argument(metavar="AXIS=POSITION...", help="1=100 2=-12.5, in the configured units.")],
+    targets: Annotated[list[str], typer.Argument(metavar="AXIS=POSITION", help="1=100 2=-12.5, in the configured units.")],
     device: Device = None,
     by: Annotated[bool, typer.Option("--by", help="The numbers are distances.")] = False,
     velocity: Annotated[float | None, typer.Option(help="Set VMAX first.")] = None,
@@ -89,9 +87,13 @@ def move(
 
     An M1486 has axis 1, and its unit is the full step.
     """
-    chip = chip_address(device)
-    if chip is not None:
-        _move_chip(chip, targets, by=by, velocity=velocity, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+    from steptwin.drivers.line import check_wait
+
+    address = find(device)
+    if address.kind == "m1486":
+        check_wait(timeout)
+        target = number_of(chip_motion.axis_value(targets, "NUMBER"), " ".join(targets))
+        chip_motion.move(address, target, by=by, velocity=velocity, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
         return
     values = tied(targets)
 
@@ -110,49 +112,34 @@ def move(
             (mic.axis(axis).move_by if by else mic.axis(axis).move_to)(value)
         begun.update(values)
 
-    _do(device, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
-
-
-def _move_chip(
-    chip: DeviceAddress,
-    targets: list[str],
-    *,
-    by: bool,
-    velocity: float | None,
-    wait: bool,
-    timeout: float | None,
-    json: bool,
-    log_frames: bool,
-) -> None:
-    from steptwin.drivers.line import check_wait
-
-    check_wait(timeout)
-    given = " ".join(targets)
-    name, _, typed = given.partition("=")
-    if name.strip().upper().removeprefix("M") != "1":
-        raise Misuse(f"{given!r}: an M1486 has one axis: expected 1=NUMBER")
-    value = number_of(typed, given)
-    with _interruptible():
-        end = move_chip(chip, value, by=by, velocity=velocity, wait=wait, timeout=timeout, log_frames=log_frames)
-    if end is None:
-        return
-    if json:
-        print_json({"ok": end.ok, "reason": end.reason.value, "position": end.position, "unit": end.unit, "after_s": end.after_s})
-    else:
-        typer.echo(str(end))
-    if not end.ok:
-        raise typer.Exit(1)
+    _do(address, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
 
 
 def home(
-    velocities: Annotated[list[str], typer.Argument(metavar="AXIS=VELOCITY...", help="1=-20: towards KL; positive: towards KR.")],
+    velocities: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="AXIS=VELOCITY", help="1=-20: towards KL; positive: towards KR. M1486: 1=-B8, direction and line."
+        ),
+    ],
     device: Device = None,
     wait: Wait = True,
     timeout: Timeout = None,
     json: Json = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Home axes, at the velocities given. Exit code 1 when one does not arrive."""
+    """Home axes, at the velocities given. Exit code 1 when one does not arrive.
+
+    An M1486 seeks the line at start/stop speed, and its position is 0 there.
+    """
+    from steptwin.drivers.line import check_wait
+
+    address = find(device)
+    if address.kind == "m1486":
+        check_wait(timeout)
+        wanted = chip_motion.sought(velocities)
+        chip_motion.seek(address, wanted, home=True, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+        return
     values = tied(velocities)
 
     held_up = HeldUp()
@@ -163,11 +150,33 @@ def home(
             mic.axis(axis).home(velocity)
             begun.add(axis)
 
-    _do(device, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+    _do(address, values, begin, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
+
+
+def seek(
+    line: Annotated[str, typer.Argument(metavar="1=LINE", help="1=-B8: in negative direction to line B8; 1=+B8: positive.")],
+    device: Device = None,
+    wait: Wait = True,
+    timeout: Timeout = None,
+    json: Json = False,
+    log_frames: LogFrames = False,
+) -> None:
+    """Move an M1486 at start/stop speed until a line has its end level. Exit code 1 when it does not arrive.
+
+    That is low for B1 to B3, B8 to B11 and B16 to B19, else high. The number of the line is in the internal variable afterwards.
+    """
+    from steptwin.drivers.line import check_wait
+
+    check_wait(timeout)
+    address = find(device)
+    if address.kind != "m1486":
+        raise Misuse("seek is a command of the M1486; a MIC488 has home")
+    wanted = chip_motion.sought([line])
+    chip_motion.seek(address, wanted, home=False, wait=wait, timeout=timeout, json=json, log_frames=log_frames)
 
 
 def _do(
-    device: str | None,
+    address: DeviceAddress,
     values: Mapping[int, float],
     begin: Callable[[Mic488, set[int]], None],
     *,
@@ -179,7 +188,7 @@ def _do(
     from steptwin.drivers.line import check_wait
 
     check_wait(timeout)
-    with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible():
+    with opened(address, observe=False, log_frames=log_frames) as mic, interruptible():
         begun: set[int] = set()
         try:
             begin(mic, begun)
@@ -226,15 +235,23 @@ def jog(
     json: Json = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Jog an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself."""
-    values = tied([velocity])
-    ((axis, speed),) = values.items()
+    """Jog an axis until a key is pressed. It is a dead-man's switch: if this command dies, the axis stops by itself.
+
+    An M1486 makes one short move after the other, at the velocity given (full steps/s), which V keeps. E types, which write every
+    command into their EEPROM, are not jogged.
+    """
+    ((axis, speed),) = tied([velocity]).items()
     if seconds is None and not sys.stdin.isatty():
-        raise Misuse("without a terminal nobody can press a key: give the time, --seconds")
+        raise Misuse("no terminal, so no key can end the jog: give --seconds")
     if seconds is not None and not seconds > 0.0:
         raise Misuse(f"--seconds {seconds:g}: permitted are more than 0")
+    address = find(device)
+    if address.kind == "m1486":
+        with keys() as pressed:
+            chip_motion.jog(address, speed, seconds=seconds, hold=hold, pressed=pressed, json=json, log_frames=log_frames)
+        return
     held_up = HeldUp()
-    with opened(device, observe=False, log_frames=log_frames) as mic, _interruptible(), _keys() as pressed:
+    with opened(address, observe=False, log_frames=log_frames) as mic, interruptible(), keys() as pressed:
         held_up.check()
         held = mic.axis(axis).jog(speed, hold_s=hold)
         try:
@@ -255,32 +272,3 @@ def jog(
         typer.echo(str(told))
     if not told.ok:
         raise typer.Exit(1)
-
-
-@contextlib.contextmanager
-def _interruptible() -> Generator[None]:
-    """SIGTERM and a closed terminal end a motion as Ctrl-C does."""
-    kept = {number: signal.signal(number, signal.default_int_handler) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in kept.items():
-            signal.signal(number, handler)
-
-
-@contextlib.contextmanager
-def _keys() -> Generator[Callable[[], bool]]:
-    """Whether a key was pressed."""
-    if not sys.stdin.isatty():
-        yield lambda: False
-        return
-    import select
-    import termios
-    import tty
-
-    kept = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin)
-    try:
-        yield lambda: bool(select.select([sys.stdin], [], [], 0)[0])
-    finally:
-        termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, kept)

@@ -1,6 +1,6 @@
 """``steptwin pause``, ``step``, ``resume``, ``save``: the time of a running world.
 
-From Python: `steptwin.World`, which advances only when told to, and `steptwin.files.session`.
+From Python: `steptwin.World`, which advances only on request, and `steptwin.files.session`.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ from typing import Annotated, Any
 
 import typer
 
-from steptwin.cli.twin import Json, Twin
+from steptwin.cli.twin import Json, Twin, ask_twin
 
 
 def pause(twin: Twin = None, json: Json = False) -> None:
     """Pause a running world."""
-    _tell(_ask(twin, {"do": "pause"}), json)
+    from steptwin.subject.commands import Pause
+
+    _tell(ask_twin(twin, Pause()), json)
 
 
 def resume(
@@ -24,12 +26,15 @@ def resume(
     json: Json = False,
 ) -> None:
     """Continue a paused world, or change its speed."""
-    _tell(_ask(twin, {"do": "resume", "speed": speed}), json)
+    from steptwin.live.pace import read_speed
+    from steptwin.subject.commands import Resume
+
+    _tell(ask_twin(twin, Resume(None if speed is None else read_speed(speed))), json)
 
 
 def step(
     duration: Annotated[
-        str | None, typer.Argument(metavar="[TIME]", help="How far, such as 10ms. Else to the next thing that happens by itself.")
+        str | None, typer.Argument(metavar="TIME", help="How far, such as 10ms. Else to the next thing that happens by itself.")
     ] = None,
     until: Annotated[
         str | None, typer.Option(metavar="CONDITION", help="Until this is true, after TIME (else 1h) at the latest.")
@@ -39,47 +44,54 @@ def step(
 ) -> None:
     """Advance a world by a time, to a condition or to its next event, show what happened, and pause."""
     from steptwin.files.timedinputs import parse_duration
+    from steptwin.subject.commands import Advance
+    from steptwin.subject.events import read_event
 
-    request: dict[str, object] = {"do": "step", "until": until}
-    if duration is not None:
-        request["for_ns"] = parse_duration(duration, "step")
-    happened: list[str] = []
+    wanted = Advance(None if duration is None else parse_duration(duration, "step"), until=until)
+    events: list[dict[str, Any]] = []
     while True:
-        there = _ask(twin, request)
+        there = ask_twin(twin, wanted)
         if json:
-            happened += there["happened"]
+            events += there["events"]
         else:
-            for line in there["happened"]:
-                typer.echo(line)
+            for event in there["events"]:
+                typer.echo(str(read_event(event)))
+            if there["missed"]:
+                typer.echo(f"... and {there['missed']} more", err=True)
         if "to_ns" not in there:
             break
-        request = {"do": "step", "until": until, "to_ns": there["to_ns"]}
+        wanted = Advance(to=int(there["to_ns"]), until=until)
+    if not json:
+        for name, statement in there["statements"].items():
+            typer.echo(f"{name}: {statement}")
     if there["idle"]:
         typer.echo("nothing happens any more by itself", err=True)
     if there["stopped"] is None and until is not None and not there["came"]:
         typer.echo(f"warning: {until} did not come true", err=True)
-    _tell({**there, "happened": happened}, json)
+    _tell({**there, "events": events}, json)
 
 
 def save(
-    file: Annotated[Path, typer.Argument(help="Where to write the session, such as now.json.")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="Where to write the session, such as now.json; else the last records of the trace."),
+    ],
     twin: Twin = None,
     json: Json = False,
 ) -> None:
     """Save the session of a running world, to replay it or to continue from it with 'run' and 'up'."""
-    from steptwin.files.beginning import check_session_target
+    from steptwin.files.beginning import check_session_target, is_session
+    from steptwin.files.export import FORMATS
 
-    check_session_target(file)
-    there = _ask(twin, {"do": "save", "file": str(file.absolute())})
+    if file.suffix[1:].lower() not in FORMATS:
+        check_session_target(file)
+    from steptwin.subject.commands import Save
+
+    there = ask_twin(twin, Save(str(file.absolute())))
     if not json:
-        typer.echo(f"wrote {file}: {there['inputs']} inputs, digest {there['digest']}")
+        what = f"{there['inputs']} inputs, digest {there['digest']}" if is_session(file) else f"{there['records']} records"
+        typer.echo(f"wrote {file}: {what}")
     _tell(there, json)
-
-
-def _ask(twin: str | None, request: dict[str, object]) -> Any:
-    from steptwin.live.control import ask
-
-    return ask(twin, request)
 
 
 def _tell(there: dict[str, Any], json: bool) -> None:

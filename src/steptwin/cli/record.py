@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from steptwin.cli.device import Device, Json, LogFrames, complain, opened, print_json
+from steptwin.cli.device import Device, Json, LogFrames, complain, find, opened, print_json
 from steptwin.cli.get import map_of
 from steptwin.errors import LineFailure, Misuse
 
@@ -32,7 +32,7 @@ def record(
     from steptwin.commands.devicesession import carry_out, steps_of, to_text
 
     text = _read(session)
-    with opened(device, observe=False, log_frames=log_frames) as mic:
+    with opened(find(device), observe=False, log_frames=log_frames) as mic:
         try:
             steps = steps_of(text, map_of(mic))
         except Misuse as error:
@@ -88,7 +88,9 @@ def _read(path: Path) -> str:
 
 
 def _write(path: Path, lines: list[str]) -> None:
+    from steptwin.system import reason
+
     try:
         path.write_text("\n".join(lines) + "\n", "utf-8")
     except OSError as error:
-        raise LineFailure(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error
+        raise LineFailure(f"cannot write {path}: {reason(error)}") from error

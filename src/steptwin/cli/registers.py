@@ -16,15 +16,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from steptwin.cli import completion
+from steptwin.cli.device import aligned
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.mic488.registermap import Register, RegisterMap, Row
+    from steptwin.mic488.registermap import MapRow, Register, RegisterMap
 
 _COLUMNS = ("address", "name", "type", "read", "write", "unit", "permitted", "meaning")
 
 
-class Format(enum.StrEnum):
+class Layout(enum.StrEnum):
     TABLE = "table"
     CSV = "csv"
     JSON = "json"
@@ -37,7 +38,7 @@ def registers(
     firmware: Annotated[
         str, typer.Option(help="Firmware generation: 1.23, 1.40 or 1.70.", autocompletion=completion.firmwares)
     ] = "1.70",
-    form: Annotated[Format, typer.Option("--format", help="How to print it; tags: a list for panels and SCADA.")] = Format.TABLE,
+    form: Annotated[Layout, typer.Option("--format", help="How to print it; tags: a list for panels and SCADA.")] = Layout.TABLE,
 ) -> None:
     """Show the coils, inputs and holding registers of a controller."""
     from steptwin.mic488.registers import register_map
@@ -47,13 +48,13 @@ def registers(
     if device != "mic488":
         raise Misuse(f"no controller {device!r} with registers; there is mic488")
     chosen = register_map(firmware)
-    if form is Format.CSV:
+    if form is Layout.CSV:
         typer.echo(as_csv(chosen), nl=False)
-    elif form is Format.JSON:
+    elif form is Layout.JSON:
         typer.echo(json.dumps(as_data(chosen), ensure_ascii=False, indent=2))
-    elif form is Format.TAGS:
+    elif form is Layout.TAGS:
         typer.echo(as_tags(chosen), nl=False)
-    elif form is Format.MD:
+    elif form is Layout.MD:
         typer.echo(as_markdown(chosen), nl=False)
     elif sys.stdout.isatty():
         _show(chosen)
@@ -156,11 +157,11 @@ def _functions(codes: Iterable[int]) -> str:
 
 
 def _permitted(register: Register) -> str:
-    from steptwin.mic488.registermap import Kind
+    from steptwin.mic488.registermap import Quantity
 
     if not register.accepts:
         return ""
-    return {Kind.SWITCH: "ON, OFF", Kind.MASK: "bit 0 M1 … bit 3 M4"}.get(register.kind, str(register.permitted))
+    return {Quantity.SWITCH: "ON, OFF", Quantity.MASK: "bit 0 M1 … bit 3 M4"}.get(register.kind, str(register.permitted))
 
 
 def _meaning(sentence: str, values: Mapping[int, str]) -> str:
@@ -184,11 +185,7 @@ def _line(register: Register) -> tuple[str, ...]:
 
 def as_text(register_map: RegisterMap) -> str:
     """Aligned columns, one register a line."""
-    lines = [_COLUMNS, *(_line(register) for register in register_map)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(_COLUMNS))]
-    return "".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() + "\n" for line in lines
-    )
+    return aligned([_COLUMNS, *(_line(register) for register in register_map)]) + "\n"
 
 
 def _show(register_map: RegisterMap) -> None:
@@ -220,7 +217,7 @@ def as_markdown(register_map: RegisterMap) -> str:
     return "\n".join(parts)
 
 
-def _family(register_map: RegisterMap, row: Row) -> tuple[str, ...]:
+def _family(register_map: RegisterMap, row: MapRow) -> tuple[str, ...]:
     members = [register for register in register_map if register.key == row.key]
     first, last = members[0], members[-1]
     cells = _line(first)

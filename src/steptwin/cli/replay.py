@@ -10,13 +10,16 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli.device import Json
+
 
 def replay(
     file: Annotated[Path, typer.Argument(help="A session, as 'steptwin run' and 'steptwin up' write them.")],
     trace: Annotated[Path | None, typer.Option(help="Write what happened to a file or into a directory.")] = None,
+    json: Json = False,
 ) -> None:
     """Run a recorded session again and compare what happens."""
     from steptwin.commands.run_world import replay as run_again
 
-    if not run_again(file, trace, typer.echo, lambda text: typer.echo(text, err=True)):
+    if not run_again(file, trace, typer.echo, lambda text: typer.echo(text, err=True), as_json=json):
         raise typer.Exit(1)

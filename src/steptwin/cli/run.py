@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 
 _NAMES = {"moment": "from"}
-"""Options that are no names in Python."""
+"""RunOptions that are no names in Python."""
 
 
 @dataclass(frozen=True)
-class Options:
+class RunOptions:
     """What was asked for on the command line; None where nothing was said."""
 
     limit: Nanos | None
@@ -44,9 +44,11 @@ class Options:
     fault: list[str] | None = None
     session: Path | None = None
     seed: int | None = None
+    state: Path | None = None
     moment: Nanos | None = None
     allow_outside: bool | None = None
     strict: bool | None = None
+    print_world: bool | None = None
 
     @property
     def until_idle(self) -> bool:
@@ -60,9 +62,7 @@ class Options:
 
 
 def run(
-    file: Annotated[
-        Path, typer.Argument(help="What to run; its suffix says what it is: .prg, .wbc, .m1486, .toml, or .json, a session.")
-    ],
+    file: Annotated[Path, typer.Argument(help="What to run, by its suffix: .prg, .wbc, .m1486, .toml, or .json, a session.")],
     duration: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until.")
     ] = None,
@@ -105,15 +105,22 @@ def run(
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="World: something that goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
+        typer.Option(help="World: fault from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="World: where all chance comes from. Default: what its file says.")] = None,
+    seed: Annotated[int | None, typer.Option(help="World: random seed. Default: that of its file.")] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="World: directory of the non-volatile memory. Default: that of its file, or none."),
+    ] = None,
     session: Annotated[Path | None, typer.Option(help="World: write a session for 'steptwin replay'.")] = None,
     begin: Annotated[
         str | None,
-        typer.Option("--from", metavar="TIME", help="Session: go on from this moment, such as 2.5s. Default: its end."),
+        typer.Option("--from", metavar="TIME", help="Session: continue from this moment, such as 2.5s. Default: its end."),
     ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="World: exit code 1 also for what was waited for in vain.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="World: exit code 1 also for a wait that timed out.")] = False,
+    print_world: Annotated[
+        bool, typer.Option("--print-world", help="Program: print the description of the world it runs in, and run nothing.")
+    ] = False,
     allow_outside: Annotated[
         bool, typer.Option("--allow-outside", help="World: permit files that do not lie beside its file or below.")
     ] = False,
@@ -137,7 +144,7 @@ def run(
         from steptwin.files.beginning import check_session_target
 
         check_session_target(session)
-    options = Options(
+    options = RunOptions(
         limit=limit,
         until=until,
         inputs=parse_inputs(",".join(inputs or [])),
@@ -154,19 +161,21 @@ def run(
         fault=fault,
         session=session,
         seed=seed,
+        state=state,
         moment=None if begin is None else parse_duration(begin, "--from"),
         allow_outside=allow_outside or None,
         strict=strict or None,
+        print_world=print_world or None,
     )
     if not runner(file, options):
         raise typer.Exit(1)
 
 
-_WORLDS = ("fault", "session", "seed", "moment", "allow_outside", "strict")
-"""Options for worlds alone."""
+_WORLDS = ("fault", "session", "seed", "state", "moment", "allow_outside", "strict")
+"""RunOptions for worlds alone."""
 
 
-def _run_m1486(file: Path, options: Options) -> bool:
+def _run_m1486(file: Path, options: RunOptions) -> bool:
     from steptwin.commands.run_m1486 import M1486Run
     from steptwin.commands.run_m1486 import run as run_program
     from steptwin.m1486.variants import DEFAULT
@@ -182,14 +191,15 @@ def _run_m1486(file: Path, options: Options) -> bool:
         inputs=tuple(options.inputs),
         trace=options.trace,
         as_json=options.as_json,
+        print_world=bool(options.print_world),
     )
     return run_program(wanted, typer.echo, lambda text: typer.echo(text, err=True))
 
 
-def _run_wbc(file: Path, options: Options) -> bool:
+def _run_wbc(file: Path, options: RunOptions) -> bool:
     from steptwin.commands.run_wbc import WbcRun
     from steptwin.commands.run_wbc import run as run_program
-    from steptwin.commands.wbc_bench import parse_travel
+    from steptwin.commands.travels import parse_travel
     from steptwin.files.timedinputs import parse_duration
     from steptwin.wbc.dialect import DEFAULT
 
@@ -206,20 +216,22 @@ def _run_wbc(file: Path, options: Options) -> bool:
         inputs=tuple(options.inputs),
         trace=options.trace,
         as_json=options.as_json,
+        print_world=bool(options.print_world),
     )
     return run_program(wanted, typer.echo, lambda text: typer.echo(text, err=True))
 
 
-def _run_world(file: Path, options: Options) -> bool:
+def _run_world(file: Path, options: RunOptions) -> bool:
     from steptwin.commands.run_world import WorldRun
     from steptwin.commands.run_world import run as run_world
 
-    mechanics = ("positions", "config", "firmware", "travel", "statement_time", "variant", "interface", "wire")
-    options.refuse("worlds, whose file says all that", *mechanics)
+    mechanics = ("positions", "config", "firmware", "travel", "statement_time", "variant", "interface", "wire", "print_world")
+    options.refuse("worlds, whose file has these settings", *mechanics)
     wanted = WorldRun(
         world=file,
         moment=options.moment,
         seed=options.seed,
+        state=options.state,
         limit=options.limit,
         until=options.until,
         inputs=tuple(options.inputs),
@@ -234,7 +246,7 @@ def _run_world(file: Path, options: Options) -> bool:
 
 
 #: What runs each kind of file; True when nothing went wrong.
-_RUNNERS: dict[str, Callable[[Path, Options], bool]] = {
+_RUNNERS: dict[str, Callable[[Path, RunOptions], bool]] = {
     ".m1486": _run_m1486,
     ".prg": _run_wbc,
     ".wbc": _run_wbc,

@@ -1,4 +1,4 @@
-"""``steptwin ports``, ``scan``: where a device could be, and where one is.
+"""``steptwin ports``, ``scan``: ports of this computer, and devices that respond on them.
 
 From Python: `steptwin.live.ports`, `steptwin.drivers.mic488.identify.scan`, `steptwin.drivers.m1486.identify.scan_chips`.
 """
@@ -21,7 +21,7 @@ BAUDS = (38400, 9600, 19200, 57600, 115200)
 """What a MIC488 is asked at; chips have rates of their own."""
 
 
-class Kind(enum.StrEnum):
+class ScannedKind(enum.StrEnum):
     ANY = "any"
     MIC488 = "mic488"
     M1486 = "m1486"
@@ -42,9 +42,9 @@ def ports(json: Json = False) -> None:
 
 def scan(
     places: Annotated[
-        list[str] | None, typer.Argument(metavar="[ADDRESS]...", help="Ports or addresses. Default: all that 'ports' lists.")
+        list[str] | None, typer.Argument(metavar="ADDRESS", help="Ports or addresses. Default: all that 'ports' lists.")
     ] = None,
-    kind: Annotated[Kind, typer.Option(help="What to look for.")] = Kind.ANY,
+    kind: Annotated[ScannedKind, typer.Option(help="What to look for.")] = ScannedKind.ANY,
     units: Annotated[str, typer.Option(help="Slave addresses of MIC488, such as 1-247 or 1,2,5.")] = "1-16",
     baud: Annotated[
         str | None, typer.Option(help="Baud rates to try on serial ports. Default: those each kind of device has.")
@@ -58,7 +58,7 @@ def scan(
     controllers are asked to read their inputs: each unit, at each baud rate. A chip that moves or runs a program cannot answer.
     It is made deaf meanwhile, as far as that is possible, because rubbish would end its program; --kind m1486 is safe for it.
 
-    Exit code 1 when nobody is found.
+    Exit code 1 when no device responds.
     """
     from steptwin.live.ports import serial_ports, twin_ports
 
@@ -72,7 +72,7 @@ def scan(
         for place in wanted:
             rows += _found_at(place, kind, numbers, bauds, timeout)
     except KeyboardInterrupt:
-        complain("interrupted: not everything was looked at")
+        complain("interrupted: the scan is not complete")
     if json:
         print_json(rows)
     elif rows:
@@ -83,20 +83,20 @@ def scan(
 
 
 def _which(row: dict[str, Any]) -> str:
-    return f"unit {row['unit']}" if row["kind"] == Kind.MIC488 else f"chip {row['chip']:X}"
+    return f"unit {row['unit']}" if row["kind"] == ScannedKind.MIC488 else f"chip {row['chip']:X}"
 
 
-def _found_at(place: str, kind: Kind, units: list[int], bauds: list[int] | None, timeout: float) -> list[dict[str, Any]]:
-    """All that answer at an address; nobody where it cannot be opened, which is told."""
+def _found_at(place: str, kind: ScannedKind, units: list[int], bauds: list[int] | None, timeout: float) -> list[dict[str, Any]]:
+    """All devices that respond at an address; none where it cannot be opened, which is reported."""
     from steptwin.drivers.m1486.identify import CHIP_BAUDS
 
     rows: list[dict[str, Any]] = []
     try:
-        if kind is not Kind.MIC488:
+        if kind is not ScannedKind.MIC488:
             chip_bauds = _rates(place, bauds or list(CHIP_BAUDS))
             try:
                 rows = _chips(place, chip_bauds, timeout)
-                if not rows and kind is Kind.ANY:
+                if not rows and kind is ScannedKind.ANY:
                     rows = _controllers(place, _rates(place, bauds or list(BAUDS)), units, timeout)
             finally:
                 if not rows:
@@ -119,7 +119,7 @@ def _rates(place: str, bauds: list[int]) -> list[int]:
     return bauds[:1]
 
 
-def _row(place: str, baud: int, kind: Kind, what: str, **more: object) -> dict[str, Any]:
+def _row(place: str, baud: int, kind: ScannedKind, what: str, **more: object) -> dict[str, Any]:
     return {"address": place, "baud": None if "://" in place else baud, "kind": kind.value, **more, "what": what}
 
 
@@ -142,7 +142,7 @@ def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]
                 _row(
                     place,
                     baud,
-                    Kind.M1486,
+                    ScannedKind.M1486,
                     "M1486, busy" if chip.variant is None else f"M1486{chip.variant}",
                     chip=chip.address,
                     variant=chip.variant,
@@ -176,7 +176,7 @@ def _controllers(place: str, bauds: list[int], units: list[int], timeout: float)
                 _row(
                     place,
                     baud,
-                    Kind.MIC488,
+                    ScannedKind.MIC488,
                     "answers, but is no MIC488" if one.firmware is None else f"MIC488, firmware {one.firmware}",
                     unit=one.unit,
                     firmware=one.firmware,

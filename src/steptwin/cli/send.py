@@ -10,25 +10,30 @@ from typing import Annotated
 
 import typer
 
-from steptwin.cli.chip import chip_address
 from steptwin.cli.chip import send as send_to_chip
-from steptwin.cli.device import Device, LogFrames
+from steptwin.cli.device import Device, Json, LogFrames, find
 from steptwin.errors import Refusal
+
+MIC488_PROGRAMS = (".prg", ".wbc")
 
 
 def send(
-    file: Annotated[Path, typer.Argument(help="The program.")], device: Device = None, log_frames: LogFrames = False
+    file: Annotated[Path, typer.Argument(help="The program.")],
+    device: Device = None,
+    json: Json = False,
+    log_frames: LogFrames = False,
 ) -> None:
     """Download a program into an M1486. A file in [ ] is started by its ]: the motor may move. An E type is erased before.
 
-    A program that names its chips with X goes into all of them: --device ADDRESS,kind=m1486 is their line.
+    A program that names its chips with X goes into all of them: --device
+    names their line: ADDRESS,kind=m1486, or the twin.
     """
-    chip = chip_address(device)
-    if chip is not None:
-        send_to_chip(chip, file, log_frames=log_frames)
+    address = None if file.suffix.lower() in MIC488_PROGRAMS else find(device, whole_line=True)
+    if address is not None and address.kind == "m1486":
+        send_to_chip(address, file, json=json, log_frames=log_frames)
         return
     raise Refusal(
         f"{file} is not sent: how the vendor's tool downloads a program into a MIC488 is documented nowhere. "
         "'steptwin build' makes the vendor's image of it; download that with the vendor's tool, or give it to a twin: "
-        "'steptwin serve mic488 --program'. An M1486 takes programs: name it with --device ADDRESS,kind=m1486"
+        "'steptwin serve mic488 --program'. An M1486 takes programs: name it with --device"
     )

@@ -21,9 +21,20 @@ ListenAny = Annotated[
 ]
 
 Fault = Annotated[
-    list[str] | None, typer.Option(help="Something that goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds.")
+    list[str] | None, typer.Option(help="Fault from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds.")
 ]
-Seed = Annotated[int, typer.Option(help="Chance of faults: the same number, the same chance.")]
+Seed = Annotated[int, typer.Option(help="Random seed for faults.")]
+
+Trace = Annotated[
+    str | None,
+    typer.Option(metavar="FILE", help="Write what happens to a file; 'ring N' keeps the last N records for 'save'; 'off'."),
+]
+PrintWorld = Annotated[
+    bool, typer.Option("--print-world", help="Print what would be served as the description of a world, for 'up', and end.")
+]
+SaveWorld = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write that description to FILE, with the files it names beside it, and end.")
+]
 
 
 def _default_host(listen_any: bool) -> str:
@@ -38,7 +49,7 @@ def mic488(
     units: Annotated[
         str | None, typer.Option(help="Slave addresses, such as 1,2,5. Default: that of the configuration, or 1.")
     ] = None,
-    pty: Annotated[Path | None, typer.Option(help="Modbus RTU on a pseudo terminal; PATH becomes a link to it.")] = None,
+    pty: Annotated[Path | None, typer.Option(help="Modbus RTU on a pseudo terminal, with PATH as a link to it.")] = None,
     serial: Annotated[str | None, typer.Option(help="Modbus RTU on a real serial port, 8N1.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate. Default: that of the configuration, or 38400.")] = None,
     tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="Modbus TCP; port 0 takes a free one.")] = None,
@@ -63,6 +74,7 @@ def mic488(
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Holes of the register map read as 0 instead of being refused.")
     ] = False,
+    trace: Trace = None,
     line_timing: Annotated[
         str,
         typer.Option(
@@ -73,7 +85,7 @@ def mic488(
     gap: Annotated[
         float | None,
         typer.Option(
-            help="Silence in ms after which bytes of no frame are given up: shorten it where requests are lost after rubbish. "
+            help="Silence in ms after which bytes outside a frame are discarded: shorten it if requests after noise are lost. "
             "It does not split frames, which may pause for 2 s. Default: 0.75 on a serial port, else 20."
         ),
     ] = None,
@@ -85,23 +97,28 @@ def mic488(
     listen_any: ListenAny = False,
     fault: Fault = None,
     seed: Seed = 0,
+    print_world: PrintWorld = False,
+    save_world: SaveWorld = None,
     demo: Annotated[bool, typer.Option("--demo", help="Four spindles in mm with a switch at each end.")] = False,
 ) -> None:
     """Serve virtual MIC488 controllers.
 
-    Without any of --pty, --serial, --tcp, --rtu-tcp and --rfc2217 it listens on a pty, on 127.0.0.1:5020 (Modbus TCP) and on
+    Without any of --pty, --serial, --tcp, --rtu-tcp and --rfc2217 it listens on a pty (where the
+    system has them), on 127.0.0.1:5020 (Modbus TCP) and on
     127.0.0.1:5021 (RTU over TCP).
     """
+    from steptwin.commands.serve import ServeMic488, serve_mic488
     from steptwin.files.timedinputs import parse_duration
-    from steptwin.served.serve_mic488 import Mic488Options, serve
 
     if not (pty or serial or tcp or rtu_tcp or rfc2217):
-        from steptwin.live.control import runtime_directory
+        from steptwin.live.directory import runtime_directory
+        from steptwin.system import HAS_PTYS
 
         host = _default_host(listen_any)
-        pty, tcp, rtu_tcp = runtime_directory() / name, f"{host}:{MODBUS_TCP_PORT}", f"{host}:{RTU_TCP_PORT}"
-    serve(
-        Mic488Options(
+        pty = runtime_directory() / name if HAS_PTYS else None
+        tcp, rtu_tcp = f"{host}:{MODBUS_TCP_PORT}", f"{host}:{RTU_TCP_PORT}"
+    serve_mic488(
+        ServeMic488(
             firmware=firmware,
             units=units,
             pty=pty,
@@ -116,6 +133,7 @@ def mic488(
             vision=vision,
             statement_time=parse_duration(statement_time, "--statement-time"),
             state=state,
+            trace=trace,
             lenient=lenient,
             line_timing=line_timing,
             gap_ms=gap,
@@ -125,6 +143,8 @@ def mic488(
             listen_any=listen_any,
             faults=tuple(fault or ()),
             seed=seed,
+            print_world=print_world,
+            save_world=save_world,
             demo=demo,
         )
     )
@@ -140,7 +160,7 @@ def m1486(
     wire: Annotated[
         list[str] | None, typer.Option(help="From a pin of one chip to an input of another: 0.B1=7.B3. Again for more.")
     ] = None,
-    pty: Annotated[Path | None, typer.Option(help="The line on a pseudo terminal; PATH becomes a link to it.")] = None,
+    pty: Annotated[Path | None, typer.Option(help="The line on a pseudo terminal, with PATH as a link to it.")] = None,
     serial: Annotated[str | None, typer.Option(help="The line on a real serial port, 8N1.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate the BR pins choose. Default: the highest of the type.")] = None,
     tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="The line as raw TCP; port 0 takes a free one.")] = None,
@@ -151,6 +171,7 @@ def m1486(
         Path | None, typer.Option(help="Directory of the EEPROMs of E types. Without it they end with the twin.")
     ] = None,
     program: Annotated[Path | None, typer.Option(help="Program a single chip is switched on with.")] = None,
+    trace: Trace = None,
     line_timing: Annotated[str, typer.Option(help="'real': characters take the time a wire would; 'off'.")] = "off",
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
     log_frames: Annotated[
@@ -160,19 +181,23 @@ def m1486(
     listen_any: ListenAny = False,
     fault: Fault = None,
     seed: Seed = 0,
+    print_world: PrintWorld = False,
+    save_world: SaveWorld = None,
 ) -> None:
     """Serve virtual M1486 chips on one line; several programs may be connected to it.
 
     Without any of --pty, --serial, --tcp and --rfc2217 it listens on a pty and on 127.0.0.1:5022 (raw TCP).
     """
-    from steptwin.served.serve_m1486 import M1486Options, serve
+    from steptwin.commands.serve import ServeM1486, serve_m1486
 
     if not (pty or serial or tcp or rfc2217):
-        from steptwin.live.control import runtime_directory
+        from steptwin.live.directory import runtime_directory
+        from steptwin.system import HAS_PTYS
 
-        pty, tcp = runtime_directory() / name, f"{_default_host(listen_any)}:{M1486_TCP_PORT}"
-    serve(
-        M1486Options(
+        pty = runtime_directory() / name if HAS_PTYS else None
+        tcp = f"{_default_host(listen_any)}:{M1486_TCP_PORT}"
+    serve_m1486(
+        ServeM1486(
             variant=variant,
             chain=chain,
             interface=interface,
@@ -183,6 +208,7 @@ def m1486(
             tcp=tcp,
             rfc2217=rfc2217,
             state=state,
+            trace=trace,
             program=program,
             line_timing=line_timing,
             ready_file=ready_file,
@@ -191,5 +217,7 @@ def m1486(
             listen_any=listen_any,
             faults=tuple(fault or ()),
             seed=seed,
+            print_world=print_world,
+            save_world=save_world,
         )
     )

@@ -1,4 +1,4 @@
-"""``steptwin sniff``: what two others say to each other, in words, until Ctrl-C.
+"""``steptwin sniff``: the traffic between a master and a device, decoded, until Ctrl-C.
 
 From Python: `steptwin.commands.sniff.sniff`.
 """
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from steptwin.words.frames import FrameLine
 
 
-class Language(enum.StrEnum):
+class SniffedLanguage(enum.StrEnum):
     MODBUS = "modbus"
     M1486 = "m1486"
 
@@ -30,7 +30,7 @@ def sniff(
         str | None, typer.Option(metavar="HOST:PORT", help="Relay: programs connect here instead of to the device.")
     ] = None,
     pty: Annotated[Path | None, typer.Option(help="Stand in the line: programs open the pseudo terminal PATH instead.")] = None,
-    language: Annotated[Language, typer.Option(help="What is spoken.")] = Language.MODBUS,
+    language: Annotated[SniffedLanguage, typer.Option(help="Protocol on the line.")] = SniffedLanguage.MODBUS,
     baud: Annotated[int, typer.Option(help="Baud rate of a serial port.")] = 38400,
     firmware: Annotated[str, typer.Option(help="Register map of the MIC488.", autocompletion=completion.firmwares)] = "1.70",
     variant: Annotated[str, typer.Option(help="Type of the M1486.", autocompletion=completion.variants)] = "A",
@@ -45,14 +45,14 @@ def sniff(
 
     from steptwin.commands.sniff import Decoder, M1486Decoder, ModbusDecoder
     from steptwin.commands.sniff import sniff as run
-    from steptwin.drivers.place import parse_place
+    from steptwin.drivers.place import parse_line_address
     from steptwin.world.addresses import parse_address
 
-    place = parse_place(address, baud)
+    place = parse_line_address(address, baud)
     where = None if listen is None else parse_address(listen, listen_any=False)
     show = _print_json if json else _print
     decoder: Decoder
-    if language is Language.M1486:
+    if language is SniffedLanguage.M1486:
         decoder = M1486Decoder(show, variant)
     else:
         decoder = ModbusDecoder(show, firmware, tcp=place.framed)

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from steptwin.cli.chip import chip_address
-from steptwin.cli.device import Device, LogFrames, complain, opened, shown
+from steptwin.cli.device import Device, LogFrames, complain, find, opened, shown
 from steptwin.cli.terminal_chip import chip_terminal
 from steptwin.cli.typedlines import typed_lines
 from steptwin.errors import Misuse, SteptwinError
@@ -32,13 +31,13 @@ help, quit"""
 def terminal(device: Device = None, log_frames: LogFrames = False) -> None:
     """Talk to a controller line by line: names read, NAME=VALUE writes. 'help' lists the rest. Lines may come from a pipe.
 
-    To an M1486 its own commands are typed, and what it sends is told in words.
+    An M1486 takes its own commands; what it sends is shown decoded.
     """
-    chip = chip_address(device)
-    if chip is not None:
-        chip_terminal(chip, log_frames=log_frames)
+    address = find(device, whole_line=True)
+    if address.kind == "m1486":
+        chip_terminal(address, log_frames=log_frames)
         return
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(address, log_frames=log_frames) as mic:
         interactive = sys.stdin.isatty()
         if interactive:
             complain(f"{mic.place}, unit {mic.unit}, firmware {mic.firmware}; 'help' helps, Ctrl-D ends")

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 HELP = """\
 COMMAND             as the manual has it: x7, v2000, f12800, r, u1, t41, [ … ; k stops at once
-raw TEXT            typed as it is; a command is looked at first, and wrong data are not sent
-wait [SECONDS]      until the chips have done all they were told: types u20 and waits for the answer, 60 s
+raw TEXT            sent as it is; other commands are checked first, and wrong data are not sent
+wait [SECONDS]      until the chips have done all commands: sends u20 and waits for the answer, 60 s
 sleep SECONDS
 help, quit"""
 WAIT_S = 60.0
@@ -52,7 +52,7 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
         sys.stdout.write(f"\r\x1b[K{text}\n{prompt()}{readline.get_line_buffer()}")
         sys.stdout.flush()
 
-    connection = _Connection(address, kind, tell, log_frames=log_frames)
+    connection = _ChipConnection(address, kind, tell, log_frames=log_frames)
     try:
         if interactive:
             with _told():
@@ -79,7 +79,7 @@ def _told() -> Generator[None]:
         complain(str(error))
 
 
-class _Connection:
+class _ChipConnection:
     """The line to the chips. Before the first command the chip is selected and verified by its echo; only K does without."""
 
     def __init__(self, address: DeviceAddress, kind: Variant | None, tell: Callable[[str], object], *, log_frames: bool) -> None:
@@ -143,7 +143,7 @@ class _Connection:
         self._terminal = None
 
 
-def _answer(connection: _Connection, line: str, kind: Variant | None, *, log_frames: bool, waits: bool) -> None:
+def _answer(connection: _ChipConnection, line: str, kind: Variant | None, *, log_frames: bool, waits: bool) -> None:
     word, _, rest = line.partition(" ")
     if word == "help":
         typer.echo(HELP)

@@ -1,23 +1,85 @@
-"""``steptwin pin``, ``encoder``, ``power-cycle``, ``state``: the inputs, power and state of a running twin."""
+"""``steptwin pin``, ``encoder``, ``power-cycle``, ``state``: the inputs, power and state of a running twin.
+
+From Python: `steptwin.live.remote.RemoteSubject`.
+"""
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from steptwin.cli import completion
+from steptwin.cli.device import shown
 from steptwin.errors import Misuse
 
-_LONGEST_UNIT = 10
-"""Digits; a longer number is nobody's unit."""
+if TYPE_CHECKING:
+    from steptwin.live.remote import RemoteSubject
+    from steptwin.subject.commands import Command
 
 Twin = Annotated[
-    str | None, typer.Option(help="Name of the twin; default: the only one running.", autocompletion=completion.twins)
+    str | None,
+    typer.Option(
+        "--device",
+        "-d",
+        metavar="TWIN",
+        help="A running twin: mic488, machine.table (a controller of it), its file or address. Default: the only one running.",
+        autocompletion=completion.devices,
+    ),
 ]
-Unit = Annotated[str | None, typer.Option(help="Unit, where the twin serves several: slave address, or address of a chip.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+class Selected:
+    """A running twin, and the controller of it that was named, if one was."""
+
+    def __init__(self, subject: RemoteSubject, controller: str | None) -> None:
+        self.subject = subject
+        self._controller = controller
+        self.controllers = tuple(machine.name for machine in subject.description.machines)
+
+    def do(self, command: Command) -> Any:
+        return self.subject.do(command).value
+
+    @property
+    def shown(self) -> Sequence[str]:
+        """The controllers that are meant: the one named, or all of them."""
+        return self.controllers if self._controller is None else (self._controller,)
+
+    def one(self) -> str:
+        """The controller that is meant. Raises `Misuse` where it is not clear which."""
+        if len(self.shown) != 1:
+            raise Misuse(f"several controllers: name one, --device TWIN.CONTROLLER: {', '.join(self.controllers)}")
+        return self.shown[0]
+
+    def called(self, name: str) -> str:
+        """The controller called ``name``, in capitals or not. Raises `Misuse`."""
+        found = next((each for each in self.controllers if each.upper() == name.upper()), None)
+        if found is None:
+            raise Misuse(f"no controller {name!r}: there are {', '.join(self.controllers)}")
+        return found
+
+
+@contextmanager
+def selected(twin: str | None) -> Generator[Selected]:
+    """The twin that ``twin`` names and its controller. Raises `LineFailure` or `Misuse` where it is not clear which."""
+    from steptwin.live.remote import RemoteSubject
+    from steptwin.live.twins import find_controller
+
+    name, controller = find_controller(twin)
+    with RemoteSubject(name) as subject:
+        yield Selected(subject, controller)
+
+
+def ask_twin(twin: str | None, command: Command) -> Any:
+    """What the twin that ``twin`` names answers to a command about all of it."""
+    from steptwin.live.remote import ask
+    from steptwin.live.twins import find_controller
+
+    return ask(find_controller(twin)[0], command)
 
 
 def pin(
@@ -26,10 +88,9 @@ def pin(
         typer.Argument(help="IN3=1 AIN1=4.2 ...; without any, all pins are shown.", autocompletion=completion.pins),
     ] = None,
     twin: Twin = None,
-    unit: Unit = None,
     json: Json = False,
 ) -> None:
-    """Set inputs of a running twin, or show all pins."""
+    """Set inputs of a running twin, press or release its buttons, or show all pins."""
     wanted: dict[str, float] = {}
     for change in changes or []:
         name, equals, value = change.partition("=")
@@ -39,65 +100,122 @@ def pin(
             wanted[name.strip().upper()] = float(value.replace(",", "."))
         except ValueError:
             raise Misuse(f"{change!r}: {value!r} is no number") from None
-    pins = _ask(twin, {"do": "pin", "unit": unit, "set": wanted})
+    with selected(twin) as there:
+        for command in _changes(there, wanted):
+            there.do(command)
+        pins = levels_of(there) if json or not wanted else {}
     if json:
         _print_json(pins)
-    elif not wanted:
+    elif pins:
         typer.echo("\n".join(f"{name:<6} {value:g}" for name, value in pins.items()))
+
+
+def levels_of(there: Selected) -> dict[str, float]:
+    """The pins that are meant, as CONTROLLER.PIN."""
+    from steptwin.subject.commands import ReadPins
+
+    return {name: level for machine in there.shown for name, level in there.do(ReadPins(machine)).items()}
+
+
+def _changes(there: Selected, wanted: dict[str, float]) -> list[Command]:
+    """The commands for pins and buttons: first all pins together."""
+    from steptwin.world.script import Press, Release, Set
+
+    levels: list[tuple[str, str, float]] = []
+    buttons: list[Command] = []
+    known = {button.upper(): button for button in there.subject.description.buttons}
+    for name, level in wanted.items():
+        owner, dot, pin = name.rpartition(".")
+        button = None if dot else known.get(name)
+        if button is None:
+            levels.append((there.called(owner) if dot else _owner(there, name), pin, level))
+        elif level not in (0, 1):
+            raise Misuse(f"{button} = {level:g}: a button takes 1 (pressed) and 0 (released)")
+        else:
+            buttons.append(Press(button) if level else Release(button))
+    return [*([Set(tuple(levels))] if levels else []), *buttons]
+
+
+def _owner(there: Selected, pin: str) -> str:
+    if len(there.shown) == 1:
+        return there.one()
+    buttons = ", ".join(there.subject.description.buttons) or "none"
+    raise Misuse(f"{pin}: give a pin as CONTROLLER.PIN; controllers are {', '.join(there.controllers)}; buttons are {buttons}")
 
 
 def encoder(
     changes: Annotated[
         list[str] | None,
-        typer.Argument(help="M1+40 or M1-40 turns the shaft by counts; M1=drive, M1=free, M1=blocked says what turns it."),
+        typer.Argument(help="M1+40 or M1-40 turns the shaft by counts; M1=drive, M1=free, M1=blocked selects what turns it."),
     ] = None,
     twin: Twin = None,
-    unit: Unit = None,
     json: Json = False,
 ) -> None:
     """Turn, couple or block the encoder shafts of a running twin, or show them."""
-    wanted: dict[str, int | str] = {}
+    wanted: dict[int, int | str] = {}
     for change in changes or []:
         match = re.fullmatch(r"(?ai)M([1-9]\d{0,8})(?:([+-]\d{1,18})|=(\w+))", change.strip())
         if match is None:
             raise Misuse(f"{change!r}: expected M1+40, M1-40, M1=drive, M1=free or M1=blocked")
-        wanted[match[1]] = int(match[2]) if match[2] else match[3].lower()
-    shafts = _ask(twin, {"do": "encoder", "unit": unit, "set": wanted})
+        wanted[int(match[1])] = int(match[2]) if match[2] else match[3].lower()
+    from steptwin.subject.commands import Encoders
+    from steptwin.world.script import Couple, Turn
+
+    with selected(twin) as there:
+        machine = there.one()
+        for axis, change in wanted.items():
+            there.do(Turn(machine, axis, change) if isinstance(change, int) else Couple(machine, axis, change))
+        shafts = there.do(Encoders(machine))
     if json:
         _print_json(shafts)
     else:
         typer.echo("\n".join(f"M{s['axis']}  {s['counts']:>10} counts, turned by: {s['turned_by']}" for s in shafts))
 
 
-def power_cycle(twin: Twin = None, unit: Unit = None) -> None:
+def power_cycle(twin: Twin = None) -> None:
     """Switch a running twin off and on again."""
-    _ask(twin, {"do": "power-cycle", "unit": unit})
+    from steptwin.world.script import PowerCycle
+
+    with selected(twin) as there:
+        for machine in there.shown:
+            there.do(PowerCycle(machine))
 
 
-def state(twin: Twin = None, unit: Unit = None, json: Json = False) -> None:
+def state(twin: Twin = None, json: Json = False) -> None:
     """Show the state of a running twin."""
-    shown = _ask(twin, {"do": "state", "unit": unit})
+    from steptwin.subject.commands import State
+
+    with selected(twin) as there:
+        found = there.do(State(there.one()))
     if json:
-        _print_json(shown)
+        _print_json(found)
         return
-    if shown.get("controller") == "M1486":
-        typer.echo("\n".join(_m1486_lines(shown)))
+    if found.get("controller") == "M1486":
+        typer.echo("\n".join(_m1486_lines(found)))
+        return
+    if "firmware" not in found:  # of a kind of one's own
+        typer.echo("\n".join(f"{name} {value}" for name, value in found.items()))
         return
     typer.echo(
-        f"firmware {shown['firmware']}, {shown['time_s']:.1f} s after power-on, program {_program_words(shown['program'])}"
+        f"firmware {found['firmware']}, {found['time_s']:.1f} s after power-on, program {_program_words(found['program'])}"
     )
-    for axis in shown["axes"]:
+    for axis in found["axes"]:
         unit_name = axis["unit"]
         typer.echo(
             f"M{axis['axis']}  {axis['position']:>12.4f} {unit_name}  {axis['velocity']:>10.3f} {unit_name}/s  "
             f"{axis['status']} {axis['status_text']}"
         )
-    on = [name for name, value in shown["pins"].items() if value and not name.startswith("AIN")]
-    typer.echo(f"on: {', '.join(on) or 'nothing'}")
+    on = [name for name, value in found["pins"].items() if value and not name.startswith("AIN")]
+    typer.echo("\n".join([f"on: {', '.join(on) or 'nothing'}", *_variables(found["program"])]))
 
 
 def _program_words(program: dict[str, Any]) -> str:
     return f"{program['state']} at line {program['line']}: {program['text']}" if "line" in program else program["state"]
+
+
+def _variables(program: dict[str, Any]) -> list[str]:
+    named = [f"{name} = {shown(value)}" for name, value in program["variables"].items()]
+    return [f"variables: {', '.join(named)}"] if named else []
 
 
 def _m1486_lines(shown: dict[str, Any]) -> list[str]:
@@ -118,15 +236,6 @@ def _m1486_lines(shown: dict[str, Any]) -> list[str]:
 
 def _numbers(numbers: list[int]) -> str:
     return " ".join(map(str, numbers)) or "none"
-
-
-def _ask(twin: str | None, request: dict[str, object]) -> Any:
-    from steptwin.live.control import ask
-
-    unit = request.get("unit")
-    if isinstance(unit, str) and unit.isdecimal() and len(unit) < _LONGEST_UNIT:
-        request = {**request, "unit": int(unit)}
-    return ask(twin, request)
 
 
 def _print_json(value: object) -> None:

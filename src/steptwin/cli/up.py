@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from steptwin.cli.commands import Format, Section, show
+from steptwin.cli.commands import PageFormat, PageSection, show
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def up(
     world: Annotated[
         Path | None,
-        typer.Argument(metavar="[MACHINE.toml]", help="The description of the world, or a session (.json) to go on from."),
+        typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a session (.json) to continue."),
     ] = None,
     speed: Annotated[
         str,
@@ -33,27 +33,42 @@ def up(
         str | None, typer.Option(help="Name under which 'steptwin pin' and its like find it. Default: that of the file.")
     ] = None,
     session: Annotated[Path | None, typer.Option(help="Write a session for 'steptwin replay' when it ends.")] = None,
-    trace: Annotated[Path | None, typer.Option(help="Write what happened to a file or into a directory when it ends.")] = None,
+    trace: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write what happens to a file or into a directory. 'ring N' keeps the last N records for 'save'. 'off'. "
+            "Default: as described.",
+        ),
+    ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="What goes wrong, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
+        typer.Option(help="Fault from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Where all chance comes from. Default: what the description says.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Random seed. Default: that of the description.")] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Directory of the non-volatile memory. Default: that of the description, or none."),
+    ] = None,
     begin: Annotated[
         str | None,
-        typer.Option("--from", metavar="TIME", help="Session: go on from this moment, such as 2.5s. Default: its end."),
+        typer.Option("--from", metavar="TIME", help="Session: continue from this moment, such as 2.5s. Default: its end."),
     ] = None,
     ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
+    control: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Control endpoint over TCP, too, on this computer."),
+    ] = None,
     listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
     log_frames: Annotated[
         bool, typer.Option("--log-frames", help="Print what goes over every line with time, direction, bytes and meaning.")
     ] = False,
-    strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 also for what was waited for in vain.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 also for a wait that timed out.")] = False,
     allow_outside: Annotated[
         bool, typer.Option("--allow-outside", help="Permit files that do not lie beside the description or below.")
     ] = False,
-    keys: Annotated[bool, typer.Option("--keys", help="Show what a description may say.")] = False,
-    form: Annotated[Format, typer.Option("--format", help="How to print the keys.")] = Format.TEXT,
+    keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
+    form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
 ) -> None:
     """Run a world in real time until Ctrl-C or until one of its scripts stops it; other programs connect to its lines.
 
@@ -72,12 +87,14 @@ def up(
         world=world,
         moment=None if begin is None else parse_duration(begin, "--from"),
         seed=seed,
+        state=state,
         speed=speed,
         name=name,
         session=session,
         trace=trace,
         faults=tuple(fault or ()),
         ready_file=ready_file,
+        control=control,
         listen_any=listen_any,
         log_frames=log_frames,
         strict=strict,
@@ -87,25 +104,25 @@ def up(
         raise typer.Exit(1)
 
 
-def sections() -> list[Section]:
+def sections() -> list[PageSection]:
     """The tables of a description, for people."""
     from steptwin.world.script import ACTIONS, REPEAT, STEPS
-    from steptwin.world.tables import KEYS, TABLES
+    from steptwin.world.tables import all_keys, written
 
     found = [
-        Section(
-            TABLES[name],
+        PageSection(
+            written(name),
             ("key", "meaning", "default"),
             [(key.name, key.meaning, "required" if key.is_required else _default(key)) for key in keys],
         )
-        for name, keys in KEYS.items()
+        for name, keys in all_keys().items()
     ]
     steps = [
         (action.main.name, action.main.meaning, ", ".join(f"{key.name}: {key.meaning}" for key in action.others))
         for action in ACTIONS.values()
     ]
     steps.append((REPEAT.name, REPEAT.meaning, f"{STEPS.name}: {STEPS.meaning}"))
-    return [*found, Section("Steps of events and scripts", ("first key", "meaning", "more keys"), steps)]
+    return [*found, PageSection("Steps of events and scripts", ("first key", "meaning", "more keys"), steps)]
 
 
 def _default(key: Key) -> str:

@@ -13,8 +13,8 @@ from typing import Annotated, Any
 
 import typer
 
-from steptwin.cli.chip import chip_address, opened_chip, read
-from steptwin.cli.device import Device, LogFrames, as_json, opened, shown, table
+from steptwin.cli.chip import opened_chip, read
+from steptwin.cli.device import Device, LogFrames, as_json, find, opened, shown, table
 from steptwin.cli.get import expanded, map_of, names_from
 from steptwin.cli.get import look as look_at
 from steptwin.errors import Misuse
@@ -30,10 +30,10 @@ LEAST_WIDTH = 10
 def watch(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="As of get. Default: what the axes do.", autocompletion=names_from),
+        typer.Argument(metavar="NAME", help="As of get. Default: what the axes do.", autocompletion=names_from),
     ] = None,
     device: Device = None,
-    hz: Annotated[float, typer.Option(help="How often a second, up to 50; the device may be slower.")] = 5.0,
+    hz: Annotated[float, typer.Option(help="Samples per second, up to 50; the device may be slower.")] = 5.0,
     count: Annotated[int | None, typer.Option(help="Stop after N samples.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each sample.")] = False,
     log_frames: LogFrames = False,
@@ -58,13 +58,25 @@ def watch(
 
 @contextlib.contextmanager
 def _reading(device: str | None, names: list[str] | None, *, log_frames: bool) -> Generator[Look]:
-    """One look at what is wanted of the device meant."""
-    chip = chip_address(device)
-    if chip is not None:
-        with opened_chip(chip, log_frames=log_frames) as one:
+    """One look at what is wanted of the device meant. A twin is not polled; raw addresses are those of its line."""
+    from steptwin.live.remote import RemoteSubject
+    from steptwin.live.twins import controller_of
+    from steptwin.live.watching import TwinWatch
+    from steptwin.mic488.registers import DEFAULT_FIRMWARE, register_map
+
+    twin = None if log_frames else controller_of(device)
+    if twin is not None and twin.kind == "mic488":
+        with RemoteSubject(twin.twin) as subject:
+            wanted = expanded(register_map(twin.type or DEFAULT_FIRMWARE), names or DEFAULT_NAMES)
+            if all(isinstance(one, str) for one in wanted):
+                yield TwinWatch(subject, twin.name, [str(one) for one in wanted]).look
+                return
+    address = find(device)
+    if address.kind == "m1486":
+        with opened_chip(address, log_frames=log_frames) as one:
             yield lambda: read(one, names or CHIP_NAMES)
         return
-    with opened(device, log_frames=log_frames) as mic:
+    with opened(address, log_frames=log_frames) as mic:
         wanted = expanded(map_of(mic), names or DEFAULT_NAMES)
         yield lambda: look_at(mic, wanted)
 
@@ -96,7 +108,11 @@ def _print_lines(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> N
             heads = ["time_s", *(f"{name} {unit}".rstrip() for name, (_, unit) in values.items())]
             widths = [max(len(head), LEAST_WIDTH) for head in heads]
             typer.echo(_line(heads, widths))
-        typer.echo(_line([f"{at:.3f}", *(shown(value) for value, _ in values.values())], widths))
+        typer.echo(_line([f"{at:.3f}", *(_text(value) for value, _ in values.values())], widths))
+
+
+def _text(value: Any) -> str:
+    return "unknown" if value is None else shown(value)
 
 
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
@@ -109,5 +125,5 @@ def _draw(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> None:
 
     with Live(auto_refresh=False) as live:
         for at, values in looks:
-            rows = [(name, shown(value), unit) for name, (value, unit) in values.items()]
+            rows = [(name, _text(value), unit) for name, (value, unit) in values.items()]
             live.update(Text(f"{table(rows)}\n{at:.1f} s, Ctrl-C ends", no_wrap=True), refresh=True)

@@ -31,7 +31,7 @@ FORMAT = "steptwin session 1"
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class SessionStep:
     """A line that was carried out: ``at_s`` since the beginning of the session, and what came of it."""
 
     line: str
@@ -58,12 +58,12 @@ def steps_of(text: str, registers: RegisterMap) -> list[tuple[str, Action]]:
     return steps
 
 
-def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[Step]:
+def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[SessionStep]:
     """Each step after the other. Raises `Refusal` for one that makes no sense after those before it, and `LineFailure`."""
     begin = time.monotonic()
     for line, action in steps:
         try:
-            yield Step(line, time.monotonic() - begin, _result(mic, action))
+            yield SessionStep(line, time.monotonic() - begin, _result(mic, action))
         except Misuse as error:
             raise Refusal(f"{line!r}: {error}") from error
 
@@ -167,20 +167,20 @@ _STEPS: dict[str, Callable[[list[str], RegisterMap], Action]] = {
 # ---------------------------------------------------------------------- recordings
 
 
-def to_text(steps: Iterable[Step], about: dict[str, Any]) -> Iterator[str]:
+def to_text(steps: Iterable[SessionStep], about: dict[str, Any]) -> Iterator[str]:
     """A recording: a head, then a line of JSON for each step."""
     yield json.dumps({"format": FORMAT, **about}, ensure_ascii=False)
     for step in steps:
         yield json.dumps({"line": step.line, "at_s": round(step.at_s, 4), "result": step.result}, ensure_ascii=False)
 
 
-def from_text(text: str, name: str) -> list[Step]:
+def from_text(text: str, name: str) -> list[SessionStep]:
     """Raises `Misuse` for what is no recording."""
     head, *lines = text.splitlines() or [""]
     try:
         if json.loads(head)["format"] != FORMAT:
             raise ValueError
-        return [Step(str(data["line"]), float(data["at_s"]), dict(data["result"])) for data in map(json.loads, lines)]
+        return [SessionStep(str(data["line"]), float(data["at_s"]), dict(data["result"])) for data in map(json.loads, lines)]
     except (ValueError, KeyError, TypeError):
         raise Misuse(f"{name} is no recording of a session ('steptwin record' makes them)") from None
 
@@ -203,7 +203,9 @@ def _said(value: Any) -> str:
     return "nothing" if value is None else json.dumps(value, ensure_ascii=False)
 
 
-def differences(one: list[Step], two: list[Step], *, tolerance: float = 0.0, time_s: float | None = None) -> list[Difference]:
+def differences(
+    one: list[SessionStep], two: list[SessionStep], *, tolerance: float = 0.0, time_s: float | None = None
+) -> list[Difference]:
     """What differs by more than ``tolerance``, and with ``time_s`` what came earlier or later than that.
 
     Raises `Misuse` for recordings of different sessions.

@@ -52,7 +52,7 @@ def command_of(text: str, variant: Variant | None) -> Command | None:
     return command
 
 
-class ChipWords:
+class TerminalWords:
     """What comes from a line in words, given what was typed. No I/O, no clock.
 
     The bytes do not say what they are. With function 41 ON a line comes back before all else; then its end inverted, where it
@@ -171,7 +171,7 @@ class ChipTerminal:
         self._quiet_s = QUIET_S + self._serial.duration(3) / SECOND
         self._write_s = variant.write_ns / SECOND if variant is not None and variant.store is Store.EEPROM else 0.0
         self._tell = tell
-        self._words = ChipWords()
+        self._words = TerminalWords()
         self._changed = threading.Condition()
         self._outgoing: deque[str] = deque()
         self._unsettled = 0  # lines whose echo may be to come

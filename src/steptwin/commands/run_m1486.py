@@ -7,32 +7,38 @@ file in ``[ ]`` is switched on with it in its EEPROM instead: writing takes half
 from __future__ import annotations
 
 import json
+import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
-from steptwin.commands.m1486_bench import Bench, Ending, Happening, Input
-from steptwin.diagnostics import Severity, Source, render
+from steptwin.commands.chips import Chain, check_chain, parse_wire, placed_wires
+from steptwin.commands.descriptions import print_world
+from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, limit_of, run_on, world_of, write
+from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.errors import Misuse
-from steptwin.files.export.m1486_axes import chip_views
 from steptwin.files.textfiles import read_text
 from steptwin.files.timedinputs import TimedInput
-from steptwin.m1486.check import Checked, check
-from steptwin.m1486.chip import M1486, OPEN_ADDRESS
+from steptwin.files.world import World
+from steptwin.inputfiles import read_bytes
+from steptwin.m1486.check import CheckedChipProgram, check
+from steptwin.m1486.chip import OPEN_ADDRESS, M1486Chip
 from steptwin.m1486.eeprom import image_of
-from steptwin.m1486.lines import Interface, interface
+from steptwin.m1486.events import M1486Event
+from steptwin.m1486.lines import interface
 from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.pins import refuse_taken, settable_pin
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.machine import SECOND, Nanos
-from steptwin.served.m1486 import ChainOptions, chip_name, make_chips, parse_wire, pin_change, refuse_taken
+from steptwin.wire.slave import FrameDirection
 from steptwin.words.m1486_state import program_words, velocity
-from steptwin.world.trace import Trace
+from steptwin.world.lines import SCRIPTS
+from steptwin.world.small import InputChange, Whole, chip_name, m1486_world
+from steptwin.world.trace import TraceRecord
 
-USUAL_LIMIT_NS: Nanos = 60 * SECOND
-LIMIT_UNTIL_IDLE_NS: Nanos = 3600 * SECOND
 JSON_VERSION = 1
 
 _HIDDEN = frozenset({"file", "power-on"})
@@ -40,7 +46,16 @@ _HIDDEN = frozenset({"file", "power-on"})
 
 _WRONG = frozenset({"wrong-data", "file-refused", "store-failed"})
 
-Say = Callable[[str], None]
+_LINE_END = re.compile(r"\r\n|\r|\n")
+FROM_HOST = f"{SCRIPTS}/{FrameDirection.IN.value}"
+"""The subject of frames that the host sends."""
+
+
+class ChipEvent(NamedTuple):
+    """Something to tell of a chip."""
+
+    chip: str
+    event: M1486Event
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,10 +71,12 @@ class M1486Run:
     inputs: Sequence[TimedInput] = ()
     trace: Path | None = None
     as_json: bool = False
+    print_world: bool = False
 
 
-def run(options: M1486Run, say: Say, warn: Say) -> bool:
-    """Run a program and say what it did; whether everything went right. ``warn`` is told what the checker found.
+def run(options: M1486Run, say: Print, warn: Print) -> bool:
+    """Run a program in a world of its own and say what it did; whether everything went right. ``warn`` is told what the checker
+    found.
 
     Raises `Misuse` for what cannot be run.
     """
@@ -67,39 +84,107 @@ def run(options: M1486Run, say: Say, warn: Say) -> bool:
     kind, driver = variant(options.variant), interface(options.interface)
     checked = check(source.text, kind, driver)
     addresses = [chip.address for chip in checked.memory if chip.address is not None] or [OPEN_ADDRESS]
-    chain = ChainOptions(variant=kind, addresses=addresses, interface=driver, wires=[parse_wire(w) for w in options.wires])
-    names = [chip_name(address) for address in addresses]
-    inputs = [_input(change, names, driver) for change in options.inputs]
-    text, image = _to_type(checked, chain, source.text)
+    chain = Chain(variant=kind, addresses=addresses, interface=driver, wires=[parse_wire(w) for w in options.wires])
+    changes = [_change(change, chain) for change in options.inputs]
+    is_stored = _is_stored(checked, chain)
+    check_chain(chain, has_program=is_stored)
+    typed = [] if is_stored else _LINE_END.split(source.text)
+    text = describe_chips(chain, options.program.stem, options.program if is_stored else None, typed, changes)
+    if options.print_world:
+        print_world(text, f"run {options.program}")
+        return True
     _warn_of_errors(checked, source, kind, warn)
 
-    trace = Trace(names) if options.trace is not None else None
-    chips = dict(zip(names, make_chips(chain, image=image).values(), strict=True))
-    bench = Bench(chips, text, chain.wires, trace)
-    report = _Json() if options.as_json else _Lines(say, several=len(names) > 1)
-    limit = options.limit if options.limit is not None else LIMIT_UNTIL_IDLE_NS if options.until_idle else USUAL_LIMIT_NS
-    begin = time.perf_counter()
-    ending = bench.run(inputs, limit, lambda: report.take(bench), until_idle=options.until_idle)
-    wall_s = time.perf_counter() - begin
-    report.end(bench, Outcome(options, ending, wall_s), say)
-    if trace is not None and options.trace is not None:
-        _write(trace, options.trace, options.program.name, chips, ending.at)
-    return not report.wrong
+    files = {str(options.program): read_bytes(options.program)} if is_stored else {}
+    with world_of(text, files, options.program, keep_trace=options.trace is not None) as world:
+        chips = Chips(world, len(typed))
+        limit = limit_of(options.limit, until_idle=options.until_idle)
+        begin = time.perf_counter()
+        why = run_on(world, limit, lambda: chips.due(limit), chips.are_idle, until_idle=options.until_idle)
+        outcome = Outcome(Ending(limit if why == "limit" else chips.end(), why), time.perf_counter() - begin)
+        if options.as_json:
+            say(json.dumps(_data(options, chips, outcome), ensure_ascii=False, indent=2))
+        else:
+            _say_lines(chips, outcome, say)
+        write(world, options.trace, options.program.name, outcome.ending.at)
+    return not chips.went_wrong
 
 
-def _to_type(checked: Checked, chain: ChainOptions, text: str) -> tuple[str, bytes | None]:
-    """What the host types, and what a chip has in its EEPROM before."""
+def describe_chips(chain: Chain, name: str, program: Path | None, typed: Sequence[str], changes: Sequence[InputChange]) -> str:
+    """The description of chips to which a host sends lines, or that are switched on with a program."""
+    values = {
+        "variant": chain.variant.name,
+        "interface": chain.interface.name,
+        "program": None if program is None else str(program),
+    }
+    lines = [line.encode("latin-1", "replace").decode("latin-1") for line in typed]
+    return m1486_world(Whole(name=name), chain.addresses, values, placed_wires(chain), typed=lines, changes=changes)
+
+
+class Chips:
+    """Follows the chips of a world in which a host sends lines."""
+
+    def __init__(self, world: World, lines: int) -> None:
+        self.world = world
+        self.chips = {name: view.chip for name, view in world.m1486.items()}
+        self.happened: list[ChipEvent] = []
+        self.sent = bytearray()
+        """What has come over the line to the host."""
+        self.unsent = lines
+        """Lines for which there was no room yet."""
+        self._last: Nanos = 0
+        for name, chip in self.chips.items():
+            for event in chip.events:
+                self._happens(name, event)
+        world.trace.watchers.append(self._recorded)
+
+    def _recorded(self, record: TraceRecord) -> None:
+        if record.kind == "event" and record.machine in self.chips:
+            self._happens(record.machine, M1486Event(record.time, record.subject, str(record.value)))
+        elif record.kind == "event" and record.subject == NOTE:
+            chip, _, text = str(record.value).partition(".")
+            self._happens(chip, M1486Event(record.time, "input", f"input {text}"))
+        elif record.kind == "frame" and record.subject == FROM_HOST:
+            self.unsent -= 1
+        elif record.kind == "frame" and isinstance(record.value, bytes):
+            self.sent += record.value
+
+    def _happens(self, chip: str, event: M1486Event) -> None:
+        self.happened.append(ChipEvent(chip, event))
+        self._last = event.time
+
+    @property
+    def went_wrong(self) -> bool:
+        return any(happening.event.code in _WRONG for happening in self.happened)
+
+    def due(self, limit: Nanos) -> Nanos | None:
+        """The next moment at which something happens by itself. The last W of a program ends without a deadline."""
+        due, now = self.world.due(), self.world.now
+        ready = max(chip.program.ready for chip in self.chips.values())
+        return min(ready, limit) if due is None and ready > now else due
+
+    def are_idle(self) -> bool:
+        for chip in self.chips.values():
+            chip.advance(self.world.now)
+        return all(chip.is_idle() for chip in self.chips.values())
+
+    def end(self) -> Nanos:
+        """When the last thing happened or the last command was done; the look that finds that out comes later."""
+        done = (chip.program.ready for chip in self.chips.values())
+        return max(self._last, *(moment for moment in done if moment <= self.world.now), 0)
+
+
+def _is_stored(checked: CheckedChipProgram, chain: Chain) -> bool:
+    """Whether the chip is switched on with the program in its EEPROM; else a host sends it."""
     commands = checked.program.all_commands
     is_file = len(chain.addresses) == 1 and commands and (commands[0].key, commands[-1].key) == ("[", "]")
     if chain.variant.store is Store.EEPROM and is_file and checked.is_sound:
-        try:
-            return "", image_of(checked.program, chain.variant)
-        except Misuse:
-            pass  # several files: the host types them
-    return text, None
+        with suppress(Misuse):  # several files
+            return bool(image_of(checked.program, chain.variant))
+    return False
 
 
-def _warn_of_errors(checked: Checked, source: Source, kind: Variant, warn: Say) -> None:
+def _warn_of_errors(checked: CheckedChipProgram, source: SourceText, kind: Variant, warn: Print) -> None:
     errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
     if errors:
         typed = f", typed at {kind.write_ns / SECOND:g} s a command" if kind.store is Store.EEPROM else ""
@@ -107,79 +192,53 @@ def _warn_of_errors(checked: Checked, source: Source, kind: Variant, warn: Say) 
         warn(f"{source.name}: the chip sees this, with {len(errors)} error{'s' if len(errors) > 1 else ''} in it{typed}:")
 
 
-def _input(change: TimedInput, names: Sequence[str], driver: Interface) -> Input:
+def _change(change: TimedInput, chain: Chain) -> InputChange:
     """``B3`` of the only chip, or ``7.B3``."""
+    names = {f"{address:X}": chip_name(address) for address in chain.addresses}
     chip, dot, pin = change.pin.rpartition(".")
     if not dot:
         if len(names) > 1:
-            raise Misuse(f"--input {change.pin}: there are several chips; name one, such as {names[0]}.{pin}")
-        chip = names[0]
+            raise Misuse(f"--input {change.pin}: there are several chips; name one, such as {next(iter(names))}.{pin}")
+        chip = next(iter(names))
     if chip not in names:
         raise Misuse(f"--input {change.pin}: no chip {chip}; there are {', '.join(names)}")
-    name, level = pin_change(pin, change.value)
-    refuse_taken(name, driver, f"--input {change.pin}: ")
-    return Input(change.time, chip, name, level)
-
-
-def _write(trace: Trace, where: Path, title: str, chips: Mapping[str, M1486], ended: Nanos) -> None:
-    from steptwin.files.export import bar, write_trace
-
-    write_trace(trace, where, views=chip_views(chips), title=title, ended=ended, watch=bar)
+    name = settable_pin(pin, change.value)
+    try:
+        refuse_taken(name, chain.interface)
+    except Misuse as error:
+        raise Misuse(f"--input {change.pin}: {error}") from None
+    placed = f"{names[chip]}.{name}"
+    return InputChange(change.time, placed, change.value, f"{placed} {'high' if change.value else 'low'}")
 
 
 # ---------------------------------------------------------------------- what is said
 
 
-class Outcome(NamedTuple):
-    options: M1486Run
-    ending: Ending
-    wall_s: float
-
-    @property
-    def virtual_s(self) -> float:
-        return self.ending.at / SECOND
-
-    @property
-    def ratio(self) -> float:
-        return self.virtual_s / self.wall_s
-
-
-class _Lines:
+def _say_lines(chips: Chips, outcome: Outcome, say: Print) -> None:
     """One line for each thing that happened, and the end."""
-
-    def __init__(self, say: Say, *, several: bool) -> None:
-        self._say = say
-        self._several = several
-        self.wrong = False
-
-    def take(self, bench: Bench) -> None:
-        # Chips that share no wire tell one after the other what happened meanwhile.
-        told = sorted((h for h in bench.happened if h.event.code not in _HIDDEN), key=lambda h: h.event.time)
-        bench.happened.clear()
-        self.wrong = self.wrong or any(h.event.code in _WRONG for h in told)
-        if told:
-            self._say("\n".join(map(self._line, told)))
-
-    def _line(self, happening: Happening) -> str:
-        chip = f"{happening.chip}  " if self._several else ""
-        return f"{happening.event.time / SECOND:14.6f} s  {chip}{happening.event.text}"
-
-    def end(self, bench: Bench, outcome: Outcome, say: Say) -> None:
-        for name, chip in bench.chips.items():
-            say(f"{f'chip {name}: ' if self._several else ''}{_position(chip, bench.now)}")
-            if bench.sent[name]:
-                say(f"  sent {bench.sent[name].hex(' ').upper()}")
-            if outcome.ending.why != "idle":
-                say(f"  {program_words(chip, bench.now)}")
-        if bench.untyped:
-            say(f"{bench.untyped} lines of the file were not taken: there was no room for them")
-        if outcome.ending.why == "limit":
-            say("ended by the limit of time: --for takes a longer one")
-        faster = f"{outcome.ratio:,.0f} times faster than real time"
-        say(f"{outcome.virtual_s:.6f} s of virtual time in {outcome.wall_s:.3f} s: {faster}")
+    several, now = len(chips.chips) > 1, chips.world.now
+    for happening in sorted(chips.happened, key=lambda h: h.event.time):
+        if happening.event.code not in _HIDDEN:
+            chip = f"{_address(happening.chip)}  " if several else ""
+            say(f"{happening.event.time / SECOND:14.6f} s  {chip}{happening.event.text}")
+    for name, chip in chips.chips.items():
+        say(f"{f'chip {_address(name)}: ' if several else ''}{_position(chip, now)}")
+        if outcome.ending.why != "ended":
+            say(f"  {program_words(chip, now)}")
+    if chips.sent:
+        say(f"  sent {chips.sent.hex(' ').upper()}")
+    if chips.unsent:
+        say(f"{chips.unsent} lines of the file were not taken: there was no room for them")
+    if outcome.ending.why == "limit":
+        say("ended by the limit of time: --for takes a longer one")
+    say(str(outcome))
 
 
-def _position(chip: M1486, now: Nanos) -> str:
+def _address(name: str) -> str:
+    return name.removeprefix(chip_name(0)[:-1])
+
+
+def _position(chip: M1486Chip, now: Nanos) -> str:
     drive = chip.drive
     counter = f"position {drive.counter_u(now)}{'' if drive.is_valid else ' (not valid)'}"
     true = drive.true_u(now)
@@ -187,45 +246,34 @@ def _position(chip: M1486, now: Nanos) -> str:
     return f"{counter}, true position {true} ({true / FULL_STEP:g} full steps){moving}"
 
 
-class _Json:
-    """The same as one object, printed at the end."""
-
-    def __init__(self) -> None:
-        self._events: list[dict[str, object]] = []
-        self.wrong = False
-
-    def take(self, bench: Bench) -> None:
-        for name, event in bench.happened:
-            self._events.append({"time_s": event.time / SECOND, "chip": name, "code": event.code, "text": event.text})
-            self.wrong = self.wrong or event.code in _WRONG
-        bench.happened.clear()
-
-    def end(self, bench: Bench, outcome: Outcome, say: Say) -> None:
-        self._events.sort(key=itemgetter("time_s"))
-        data = {
-            "version": JSON_VERSION,
-            "file": str(outcome.options.program),
-            "language": "m1486",
-            "variant": outcome.options.variant,
-            "ended": outcome.ending.why,
-            "went_wrong": self.wrong,
-            "virtual_s": outcome.virtual_s,
-            "wall_s": outcome.wall_s,
-            "ratio": outcome.ratio,
-            "lines_not_taken": bench.untyped,
-            "chips": [_chip_data(name, chip, bench) for name, chip in bench.chips.items()],
-            "events": self._events,
-        }
-        say(json.dumps(data, ensure_ascii=False, indent=2))
+def _data(options: M1486Run, chips: Chips, outcome: Outcome) -> dict[str, object]:
+    happened = sorted(chips.happened, key=lambda h: h.event.time)
+    return {
+        "version": JSON_VERSION,
+        "file": str(options.program),
+        "language": "m1486",
+        "variant": options.variant,
+        "ended": "idle" if outcome.ending.why == "ended" else outcome.ending.why,
+        "went_wrong": chips.went_wrong,
+        "virtual_s": outcome.virtual_s,
+        "wall_s": outcome.wall_s,
+        "ratio": outcome.ratio,
+        "lines_not_taken": chips.unsent,
+        "sent": chips.sent.hex(),
+        "chips": [_chip_data(name, chip, chips.world.now) for name, chip in chips.chips.items()],
+        "events": [
+            {"time_s": event.time / SECOND, "chip": _address(chip), "code": event.code, "text": event.text}
+            for chip, event in happened
+        ],
+    }
 
 
-def _chip_data(name: str, chip: M1486, bench: Bench) -> dict[str, object]:
+def _chip_data(name: str, chip: M1486Chip, now: Nanos) -> dict[str, object]:
     drive = chip.drive
     return {
-        "address": name,
-        "position": drive.counter_u(bench.now),
+        "address": _address(name),
+        "position": drive.counter_u(now),
         "position_valid": drive.is_valid,
-        "true_position": drive.true_u(bench.now),
-        "program": program_words(chip, bench.now),
-        "sent": bench.sent[name].hex(),
+        "true_position": drive.true_u(now),
+        "program": program_words(chip, now),
     }

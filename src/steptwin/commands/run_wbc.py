@@ -4,35 +4,52 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from steptwin.commands.wbc_bench import NAME, Bench, Ending, Happening, Travel
+from steptwin.commands.descriptions import Named, print_world
+from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, changes_of, limit_of, run_on, world_of, write
+from steptwin.commands.program_watch import ProgramEvent, ProgramWatch
+from steptwin.commands.travels import Placed, Travel, place_switches
 from steptwin.diagnostics import Severity, render, visible
+from steptwin.durations import duration_text
 from steptwin.errors import Misuse
-from steptwin.files.programbanks import Findings, ProgramErrors, read_banks
+from steptwin.files.programbanks import Findings, read_banks
 from steptwin.files.programfiles import Companions
 from steptwin.files.timedinputs import TimedInput
+from steptwin.files.world import World
+from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND, Nanos
-from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import check_pin
-from steptwin.served.serve_mic488 import load_config
+from steptwin.mic488.axis import Axis
+from steptwin.mic488.config import ConfigError, ControllerConfig, ProgramConfig, examine_config
+from steptwin.mic488.core import check_pin
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.homing import Homing
+from steptwin.mic488.inifile import IniFile
+from steptwin.mic488.inputs import index_input
+from steptwin.mic488.program import RUNNING
+from steptwin.mic488.status import AxisStatus, ProgramState
 from steptwin.wbc.dialect import DEFAULT, dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.real import real_text
+from steptwin.wbc.usage import homing_sides
 from steptwin.words.mic488_state import place_of, state_of
-from steptwin.world.trace import Trace
+from steptwin.world.overrides import NO_OVERRIDES
+from steptwin.world.small import Whole, mic488_world
+from steptwin.world.trace import TraceRecord
 
-USUAL_LIMIT_NS: Nanos = 60 * SECOND
-LIMIT_UNTIL_IDLE_NS: Nanos = 3600 * SECOND
+NAME = "mic488"
+"""Of the controller in the world."""
+PROGRAM = "program"
+"""The subject of its statements in traces."""
 JSON_VERSION = 1
 
 _WRONG = frozenset({"program-error", "position-error", "overrun"})
 """Events after which a run has not gone well."""
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,92 +67,194 @@ class WbcRun:
     inputs: Sequence[TimedInput] = ()
     trace: Path | None = None
     as_json: bool = False
+    print_world: bool = False
 
 
-class Outcome(NamedTuple):
-    options: WbcRun
-    ending: Ending
-    wall_s: float
-
-    @property
-    def virtual_s(self) -> float:
-        return self.ending.at / SECOND
-
-    @property
-    def ratio(self) -> float:
-        return self.virtual_s / self.wall_s
-
-
-def run(options: WbcRun, say: Say, warn: Say) -> bool:
-    """Run a program and say what it did; whether everything went right. ``warn`` is told what the checker found.
+def run(options: WbcRun, say: Print, warn: Print) -> bool:
+    """Run a program in a world of its own and say what it did; whether everything went right. ``warn`` is told what the checker
+    found.
 
     Raises `Misuse` for what cannot be run, `ProgramErrors` for a program with errors.
     """
-    files = Companions.of(options.program, options.positions, options.config)
-    config = ControllerConfig() if files.config is None else load_config(files.config, options.firmware)
-    for change in options.inputs:
-        check_pin(change.pin, change.value)
-    positions = {} if files.positions is None else {0: files.positions}
-    try:
-        banks = read_banks({0: options.program}, positions, config, dialect_for(options.firmware), option="--positions FILE")
-    except ProgramErrors as errors:
-        _warn(errors.findings, warn)
-        raise
-    _warn(banks.findings, warn)
-    if banks.programs[0].uses_positions and not banks.positions:
-        raise Misuse(f"{options.program} moves to rows of the position table: give it with --positions FILE")
-
-    trace = None if options.trace is None else Trace([NAME])
-    bench = Bench(
-        banks.programs[0],
-        banks.positions.get(0),
-        config,
-        firmware=options.firmware,
-        statement_time=options.statement_time,
-        trace=trace,
-    )
-    bench.place_switches(options.travels, {change.pin for change in options.inputs})
-    limit = options.limit if options.limit is not None else LIMIT_UNTIL_IDLE_NS if options.until_idle else USUAL_LIMIT_NS
-    begin = time.perf_counter()
-    ending = bench.run(options.inputs, limit, until_idle=options.until_idle)
-    outcome = Outcome(options, ending, time.perf_counter() - begin)
-    wrong = any(happening.code in _WRONG for happening in bench.happened)
-    if options.as_json:
-        say(json.dumps(_data(bench, outcome, files, wrong=wrong), ensure_ascii=False, indent=2))
-    else:
-        if files.found:
-            say(str(files))
-        _say_lines(bench, outcome, say)
-    if trace is not None and options.trace is not None:
-        _write(trace, options.trace, options.program.name, bench, ending.at)
+    given = _read(options, warn)
+    if options.print_world:
+        print_world(given.describe(str), f"run {options.program}")
+        return True
+    files = {str(path): read_bytes(path) for path in given.paths}
+    is_late = options.statement_time == 0
+    """What a program does at power-on itself is done before it can be followed: it is started then."""
+    late = {f"mic488.{NAME}.start": False} if is_late else NO_OVERRIDES
+    keep_trace = options.trace is not None
+    with world_of(given.describe(str), files, options.program, keep_trace=keep_trace, overrides=late) as world:
+        watch = RunWatch(world)
+        if is_late:
+            given.start(watch.device)
+        limit = limit_of(options.limit, until_idle=options.until_idle)
+        begin = time.perf_counter()
+        why = run_on(world, limit, world.due, lambda: watch.has_ended(world.due()), until_idle=options.until_idle)
+        end = limit if why == "limit" else min(watch.settled(), limit)
+        world.run_to(max(end, world.now))
+        outcome = Outcome(Ending(end, why), time.perf_counter() - begin)
+        ran = Ran(options, given, watch, outcome)
+        wrong = any(happening.code in _WRONG for happening in watch.happened)
+        if options.as_json:
+            say(json.dumps(_data(ran, wrong=wrong), ensure_ascii=False, indent=2))
+        else:
+            if given.companions.found:
+                say(str(given.companions))
+            _say_lines(ran, say)
+        write(world, options.trace, options.program.name, outcome.ending.at)
     return not wrong
 
 
-def _warn(findings: Findings, warn: Say) -> None:
+class Prepared(NamedTuple):
+    """What a run is made of."""
+
+    options: WbcRun
+    companions: Companions
+    placed: Placed
+    banks: ProgramConfig
+    """Which banks the configuration starts with."""
+
+    @property
+    def paths(self) -> list[Path]:
+        return [path for path in (self.options.program, self.companions.positions, self.companions.config) if path is not None]
+
+    def start(self, device: Mic488Device) -> None:
+        """Start the program now, as the controller does at power-on."""
+        device.program.program_bank, device.program.position_bank = self.banks.prog_bank, self.banks.pos_bank
+        device.command(partial(device.program.command, RUNNING), device.now)
+
+    def describe(self, named: Named) -> str:
+        """The description of the world."""
+        options, positions, config = self.options, self.companions.positions, self.companions.config
+        values = {
+            "firmware": options.firmware,
+            "config": None if config is None else named(config),
+            "programs": {self.banks.prog_bank: named(options.program)},
+            "positions": None if positions is None else {self.banks.pos_bank: named(positions)},
+            "start": True,
+            "statement_time": None if options.statement_time == STATEMENT_TIME else duration_text(options.statement_time),
+        }
+        changes = changes_of(options.inputs, NAME)
+        return mic488_world(Whole(name=options.program.stem), [None], values, switches=self.placed.switches, changes=changes)
+
+
+def _read(options: WbcRun, warn: Print) -> Prepared:
+    """Read and check the files. ``warn`` is told what is doubtful."""
+    files = Companions.of(options.program, options.positions, options.config)
+    config = ControllerConfig() if files.config is None else load_config(files.config, options.firmware, warn)
+    for change in options.inputs:
+        check_pin(change.pin, change.value)
+    positions = {} if files.positions is None else {0: files.positions}
+    banks = read_banks({0: options.program}, positions, config, dialect_for(options.firmware), option="--positions FILE")
+    _warn(banks.findings, warn)
+    program = banks.programs[0]
+    if program.uses_positions and not banks.positions:
+        raise Misuse(f"{options.program} moves to rows of the position table: give it with --positions FILE")
+    driven = {change.pin for change in options.inputs}
+    return Prepared(options, files, place_switches(config, options.travels, homing_sides(program.steps), driven), config.program)
+
+
+def load_config(path: Path, firmware: str, warn: Print) -> ControllerConfig:
+    """The configuration in a ``.cfg`` file; ``warn`` is told what is doubtful. Raises `Misuse`, with every error in it."""
+    file = IniFile.parse(read_bytes(path), str(path))
+    config, findings = examine_config(file, firmware)
+    if any(finding.severity is Severity.ERROR for finding in findings):
+        raise ConfigError(file.source, findings)
+    _warn(((file.source, findings),), warn)
+    return config
+
+
+def _warn(findings: Findings, warn: Print) -> None:
     for source, diagnostics in findings:
         shown = [d for d in diagnostics if d.severity is not Severity.NOTE]
         if shown:
             warn(render(source, shown))
 
 
-def _write(trace: Trace, where: Path, title: str, bench: Bench, ended: Nanos) -> None:
-    from steptwin.files.export import axis_views, bar, write_trace
+class RunWatch(ProgramWatch):
+    """Follows the program of the only controller; events and inputs are among what ``happened``."""
 
-    write_trace(trace, where, views=axis_views({NAME: bench.device}), title=title, ended=ended, watch=bar)
+    def __init__(self, world: World) -> None:
+        self._trace = world.trace
+        device = world.mic488[NAME].device
+        super().__init__(device, world.plan.kernel_of[NAME], NAME)
+        for event in device.events:  # those of power-on
+            self._tell(event.time, event.code, event.text)
+        world.trace.watchers.append(self._recorded)
+
+    def _recorded(self, record: TraceRecord) -> None:
+        if record.kind == "event" and record.machine == NAME:
+            self._tell(record.time, record.subject, str(record.value), self._caused(record.time))
+        elif record.kind == "event" and record.subject == NOTE:
+            self._tell(record.time, "input", str(record.value))
+
+    def _executed(self, now: Nanos, number: int) -> None:
+        if self._trace.is_kept:
+            self._trace.add(TraceRecord(now, NAME, "statement", PROGRAM, self.line(number)))
+
+    def has_ended(self, due: Nanos | None) -> bool:
+        return due is None and self.device.program.state is ProgramState.STOPPED
+
+    def settled(self) -> Nanos:
+        """From when on nothing has happened, and every axis stands or keeps its velocity."""
+        last = max((happening.time for happening in self.happened), default=0)
+        for axis in self.device.axes:
+            profile = axis.profile
+            last = max(last, profile.start, *(profile.start + int(end) for end in profile.ends if end != inf))
+        return last
+
+
+def missing_switches(device: Mic488Device, switched: Collection[str]) -> list[str]:
+    """Of every axis that homes: what it waits for, where nothing in the run can bring that about."""
+    homing = [(axis.number, _missing(device, axis, switched)) for axis in device.axes if axis.status is AxisStatus.HOMING]
+    return [f"M{number} homes {reason}" for number, reason in homing if reason is not None]
+
+
+def _missing(device: Mic488Device, axis: Axis, switched: Collection[str]) -> str | None:
+    homing = axis.homing
+    if homing.leg == Homing.TO_STOP:
+        return "to a mechanical stop: a run without a world has none"
+    if homing.leg == Homing.TO_INDEX:
+        pin = f"IN{index_input(axis.number - 1) + 1}"
+        missing = f"to channel C of its encoder on {pin}, which nothing switches: --input {pin}=1@TIME"
+        return None if pin in switched else missing
+    side = "KL" if homing.velocity_p < 0 else "KR"
+    if homing.sensor >= len(device.inputs.pins):
+        return f"to {side}, for which the configuration has no input (In{side} of [Axis{axis.number - 1}])"
+    pin = f"IN{homing.sensor + 1}"
+    if pin in switched:
+        return None
+    return f"to {side} on {pin}, which nothing switches: --travel M{axis.number}={'LOW..' if side == 'KL' else '..HIGH'}"
+
+
+class Ran(NamedTuple):
+    """A run that has ended."""
+
+    options: WbcRun
+    given: Prepared
+    watch: RunWatch
+    outcome: Outcome
+
+    @property
+    def missing(self) -> list[str]:
+        return missing_switches(self.watch.device, self.given.placed.pins)
 
 
 # ---------------------------------------------------------------------- what is said
 
 
-def _say_lines(bench: Bench, outcome: Outcome, say: Say) -> None:
-    for text in bench.assumed:
+def _say_lines(ran: Ran, say: Print) -> None:
+    watch, outcome = ran.watch, ran.outcome
+    for text in ran.given.placed.assumed:
         say(text)
-    if bench.happened:
-        say("\n".join(_line(bench, happening) for happening in bench.happened))
-    say(_ending(bench, outcome.ending))
-    for text in bench.missing_switches():
+    if watch.happened:
+        say("\n".join(_line(happening) for happening in watch.happened))
+    say(_ending(watch, outcome.ending))
+    for text in ran.missing:
         say(f"  {text}")
-    shown: Any = state_of(bench.device, outcome.ending.at)
+    shown: Any = state_of(watch.device, outcome.ending.at)
     for axis in shown["axes"]:
         if axis["enabled"] or axis["position_pulses"]:
             unit = axis["unit"]
@@ -143,68 +262,63 @@ def _say_lines(bench: Bench, outcome: Outcome, say: Say) -> None:
             say(f"  M{axis['axis']} at {real_text(axis['position'])} {unit}{speed}, {axis['status_text']}")
     on = [name for name, level in shown["pins"].items() if level and not name.startswith("AIN")]
     say(f"  on: {', '.join(on) or 'nothing'}")
-    virtual_s, wall_s = outcome.virtual_s, outcome.wall_s
-    say(f"{virtual_s:.6f} s of virtual time in {wall_s:.3f} s: {outcome.ratio:,.0f} times faster than real time")
+    say(str(outcome))
 
 
-def _line(bench: Bench, happening: Happening) -> str:
-    shown = f"{happening.time / SECOND:14.6f} s  {happening.text:<34}"
-    step = happening.step
-    if step is not None and step < len(bench.program.steps):
-        shown += f"  {bench.line(step):>4}  {_statement(bench, step)}"
-    return shown.rstrip()
+def _line(happening: ProgramEvent) -> str:
+    return f"{happening.time / SECOND:14.6f} s  {happening.text:<34}  {happening.place}".rstrip()
 
 
-def _statement(bench: Bench, step: int) -> str:
-    found = bench.program.steps[step]
-    return visible(bench.program.source.text[found.start : found.end].strip())
+def _statement(watch: RunWatch, step: int) -> str:
+    found = watch.program.steps[step]
+    return visible(watch.program.source.text[found.start : found.end].strip())
 
 
-def _ending(bench: Bench, ending: Ending) -> str:
-    fault = bench.device.program.fault
+def _ending(watch: RunWatch, ending: Ending) -> str:
+    fault = watch.device.program.fault
     if fault is not None:
-        line, _ = bench.program.source.position(fault.span.start)
+        line, _ = watch.program.source.position(fault.span.start)
         return f"an error has stopped the program in line {line}: {fault.text}"
     if ending.why == "ended":
         return "the program has ended"
-    place = place_of(bench.device)
+    place = place_of(watch.device)
     if place is None:
         return "ended by the limit of time"
     if ending.why == "waiting":
-        moving = [f"M{axis.number}" for axis in bench.device.axes if axis.profile.moving(ending.at)]
+        moving = [f"M{axis.number}" for axis in watch.device.axes if axis.profile.moving(ending.at)]
         meanwhile = f", while {' and '.join(moving)} {'moves' if len(moving) == 1 else 'move'} on" if moving else ""
         return f"it waits for ever in line {place.line}: {place.text}{meanwhile}"
     return f"ended by the limit of time (--for takes a longer one) in line {place.line}: {place.text}"
 
 
-def _data(bench: Bench, outcome: Outcome, files: Companions, *, wrong: bool) -> dict[str, object]:
-    options = outcome.options
+def _data(ran: Ran, *, wrong: bool) -> dict[str, object]:
+    options, files, watch, outcome = ran.options, ran.given.companions, ran.watch, ran.outcome
     return {
         "version": JSON_VERSION,
         "file": str(options.program),
         "positions": None if files.positions is None else str(files.positions),
         "config": None if files.config is None else str(files.config),
         "language": "wbc",
-        "firmware": bench.device.firmware.name,
+        "firmware": watch.device.firmware.name,
         "ended": outcome.ending.why,
         "went_wrong": wrong,
         "virtual_s": outcome.virtual_s,
         "wall_s": outcome.wall_s,
         "ratio": outcome.ratio,
-        "assumed": bench.assumed,
-        "missing_switches": bench.missing_switches(),
-        "state": state_of(bench.device, outcome.ending.at),
-        "events": [_event_data(bench, happening) for happening in bench.happened],
+        "assumed": list(ran.given.placed.assumed),
+        "missing_switches": ran.missing,
+        "state": state_of(watch.device, outcome.ending.at),
+        "events": [_event_data(watch, happening) for happening in watch.happened],
     }
 
 
-def _event_data(bench: Bench, happening: Happening) -> dict[str, object]:
+def _event_data(watch: RunWatch, happening: ProgramEvent) -> dict[str, object]:
     step = happening.step
-    known = step is not None and step < len(bench.program.steps)
+    known = step is not None and step < len(watch.program.steps)
     return {
         "time_s": happening.time / SECOND,
         "code": happening.code,
         "text": happening.text,
-        "line": bench.line(step) if step is not None and known else None,
-        "statement": _statement(bench, step) if step is not None and known else None,
+        "line": watch.line(step) if step is not None and known else None,
+        "statement": _statement(watch, step) if step is not None and known else None,
     }

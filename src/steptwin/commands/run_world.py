@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from steptwin.commands.program_watch import ProgramEvent, ProgramWatch
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, set_faults
@@ -19,8 +21,8 @@ from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.live.interrupts import FirstInterrupt
 from steptwin.machine import SECOND, Nanos
-from steptwin.words.records import describe, is_told
 from steptwin.world import script as do
+from steptwin.world.records import describe, is_shown
 from steptwin.world.references import check_step
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
@@ -28,7 +30,7 @@ SESSION = "session.json"
 INTERRUPTED = "Ctrl-C"
 JSON_VERSION = 1
 
-Say = Callable[[str], None]
+Print = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +45,8 @@ class WorldRun:
     moment: Nanos | None = None
     """That of the session; None: its end."""
     seed: int | None = None
+    state: Path | None = None
+    """Directory of the non-volatile memory; None: that of the description."""
     limit: Nanos | None = None
     until: str | None = None
     inputs: Sequence[TimedInput] = ()
@@ -56,25 +60,31 @@ class WorldRun:
     as_json: bool = False
 
 
-def run(options: WorldRun, say: Say, warn: Say) -> bool:
+def run(options: WorldRun, say: Print, warn: Print) -> bool:
     """Run a world and report what happened; whether all expectations held. ``warn`` is told what is doubtful in its files.
 
     Raises `Misuse` for what cannot be run, and `KeyboardInterrupt` after one that Ctrl-C has ended, when everything is written.
     """
     keep_trace = options.trace is not None or not options.as_json
-    world = begin_world(
+    with begin_world(
         options.world,
         warn,
         moment=options.moment,
         seed=options.seed,
         keep_trace=keep_trace,
         allow_outside=options.allow_outside,
-    )
+        state=options.state,
+    ) as world:
+        return _run_and_report(world, options, say)
+
+
+def _run_and_report(world: World, options: WorldRun, say: Print) -> bool:
     began = world.now
-    known = Counter(record.machine for record in filter(is_told, world.trace))
+    known = Counter(record.machine for record in filter(is_shown, world.trace))
     _arrange(world, options)
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual
+    watches = {} if options.as_json else _watched(world)
     wall = time.perf_counter()
     with bar(f"running {world.spec.name}", began, began + limit) as progress:
         reason = _run(world, options.until, limit, progress)
@@ -85,13 +95,25 @@ def run(options: WorldRun, say: Say, warn: Say) -> bool:
         sessions.save(session, options.session)
         written.append(options.session)
     in_vain = options.until if reason is None else None
-    outcome = Outcome(began, known, reason, in_vain, wall_s, session.digest, written)
-    report = _json if options.as_json else _lines
-    report(world, outcome, say)
+    outcome = WorldRunResult(began, known, reason, in_vain, wall_s, session.digest, written)
+    if options.as_json:
+        _json(world, outcome, say)
+    else:
+        _print_happened(world, outcome, watches, say)
+        _print_end(world, outcome, say)
     if reason is INTERRUPTED:
         raise KeyboardInterrupt
     in_time = not world.overdue and in_vain is None
     return not world.failures and (in_time or not options.strict)
+
+
+def _watched(world: World) -> dict[str, ProgramWatch]:
+    """What the programs of controllers do from now on."""
+    return {
+        name: ProgramWatch(view.device, world.plan.kernel_of[name], name)
+        for name, view in world.mic488.items()
+        if view.device.program.programs
+    }
 
 
 def _run(world: World, until: str | None, limit: Nanos, progress: Progress) -> str | None:
@@ -113,7 +135,7 @@ class _Interrupted(Exception):
     """Somebody wants a run to end."""
 
 
-class Outcome(NamedTuple):
+class WorldRunResult(NamedTuple):
     """How a run ended; ``reason`` is why before its time, ``in_vain`` what did not come true in its time.
 
     ``known``: how many of the records that are told each machine had when it ``began``.
@@ -161,19 +183,32 @@ def _write(world: World, options: WorldRun) -> list[Path]:
 
 
 def _write_trace(world: World, where: Path) -> list[Path]:
-    views = axis_views(world.machines, world.axes)
+    views = axis_views(world)
     return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now, watch=bar)
 
 
 # ---------------------------------------------------------------------- output
 
 
-def _lines(world: World, outcome: Outcome, say: Say) -> None:
-    for record in filter(is_told, world.trace):
+def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramWatch], say: Print) -> None:
+    """What happened in the world, and what programs did with the statements that caused it, in order of time."""
+    shown: list[tuple[Nanos, str]] = []
+    for record in filter(is_shown, world.trace):
         if outcome.known[record.machine]:
             outcome.known[record.machine] -= 1
         else:
-            say(describe(record))
+            shown.append((record.time, describe(record)))
+    for name, watch in watches.items():
+        shown += [(each.time, _with_statement(name, each)) for each in watch.happened]
+    for _, text in sorted(shown, key=itemgetter(0)):
+        say(text)
+
+
+def _with_statement(controller: str, happening: ProgramEvent) -> str:
+    return f"{happening.time / SECOND:12.6f} s  {controller:<10} {happening.text:<34}  {happening.place}".rstrip()
+
+
+def _print_end(world: World, outcome: WorldRunResult, say: Print) -> None:
     say("")
     for name, axis in world.axis.items():
         lost = f"   {axis.lost} pulses lost" if axis.lost else ""
@@ -204,7 +239,7 @@ def _lines(world: World, outcome: Outcome, say: Say) -> None:
     say(f"digest {outcome.digest}")
 
 
-def _json(world: World, outcome: Outcome, say: Say) -> None:
+def _json(world: World, outcome: WorldRunResult, say: Print) -> None:
     data: dict[str, Any] = {
         "version": JSON_VERSION,
         "world": world.spec.name,
@@ -230,18 +265,31 @@ def _json(world: World, outcome: Outcome, say: Say) -> None:
     say(json.dumps(data, ensure_ascii=False, indent=2))
 
 
-def replay(path: Path, trace: Path | None, say: Say, warn: Say) -> bool:
+def replay(path: Path, trace: Path | None, say: Print, warn: Print, *, as_json: bool = False) -> bool:
     """Run a session again; whether the same happened. Raises `Misuse` for what is no session."""
     session = sessions.load(path)
     world = session.replay()
     digest = world.trace.digest()
-    if trace is not None:
-        for written in _write_trace(world, trace):
-            say(f"wrote {written}")
-    if digest == session.digest:
+    is_same = digest == session.digest
+    written = [] if trace is None else _write_trace(world, trace)
+    if as_json:
+        data = {
+            "same": is_same,
+            "digest": digest,
+            "recorded_digest": session.digest,
+            "recorded_by": session.version,
+            "world": world.spec.name,
+            "time_s": world.time,
+            "inputs": len(session.inputs),
+            "files": [str(each) for each in written],
+        }
+        say(json.dumps(data, ensure_ascii=False, indent=2))
+        return is_same
+    for each in written:
+        say(f"wrote {each}")
+    if is_same:
         say(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")
-        return True
-    warn(
-        f"{path}: the run differs from the recorded one: digest {digest}, recorded {session.digest} (steptwin {session.version})"
-    )
-    return False
+    else:
+        recorded = f"recorded {session.digest} (steptwin {session.version})"
+        warn(f"{path}: the run differs from the recorded one: digest {digest}, {recorded}")
+    return is_same

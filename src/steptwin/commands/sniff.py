@@ -12,18 +12,19 @@ from typing import Protocol, cast
 
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
-from steptwin.drivers.place import Place
+from steptwin.drivers.place import LineAddress
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live.cell import Cell
+from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
-from steptwin.live.tcp import Clients, TcpLink
+from steptwin.live.tcp import TcpLink
 from steptwin.m1486.receiver import CR
 from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
 from steptwin.mic488.registers import register_map
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 from steptwin.words.characters import REPORTS, CharacterLog, LineSplitter
 from steptwin.words.frames import FrameLine
 from steptwin.world.addresses import Address
@@ -34,13 +35,13 @@ QUIET_NS: Nanos = 100 * MILLISECOND
 """After this silence of the chips nothing belongs to what they have said before."""
 MOST_TYPED = 4096
 """Characters whose echo is waited for: far more than an input buffer holds."""
-ARROWS = {Direction.IN: "→", Direction.OUT: "←"}
+ARROWS = {FrameDirection.IN: "→", FrameDirection.OUT: "←"}
 
 
 class Decoder(Protocol):
     """Puts bytes into words. ``direction`` is None where both come from one wire."""
 
-    def heard(self, data: bytes, now: Nanos, direction: Direction | None) -> None: ...
+    def heard(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None: ...
     def deadline(self) -> Nanos | None: ...
     def expire(self, now: Nanos) -> None: ...
 
@@ -50,11 +51,11 @@ class ModbusDecoder:
 
     def __init__(self, sink: Sink, firmware: str, *, tcp: bool) -> None:
         words = FrameWords(register_map(firmware), tcp=tcp)
-        words.sinks.append(lambda h: sink(FrameLine(h.time, "", h.direction or Direction.OUT, h.raw, h.meaning)))
+        words.sinks.append(lambda h: sink(FrameLine(h.time, "", h.direction or FrameDirection.OUT, h.raw, h.meaning)))
         self._tcp = TcpListener(words) if tcp else None
         self._rtu = RtuListener(words)
 
-    def heard(self, data: bytes, now: Nanos, direction: Direction | None) -> None:
+    def heard(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
         if self._tcp is not None and direction is not None:
             self._tcp.heard(data, now, direction)
         else:
@@ -86,17 +87,17 @@ class M1486Decoder:
         self._repeated_ns: Nanos = 0
 
     def _told(self, line: FrameLine) -> None:
-        upload = re.match(rb"\s*[Uu]\s*(\d+)\s*\r", line.raw) if line.direction is Direction.IN else None
+        upload = re.match(rb"\s*[Uu]\s*(\d+)\s*\r", line.raw) if line.direction is FrameDirection.IN else None
         if upload is not None:
             self._uploads.append((int(upload[1]), self._count))
         self._sink(line)
 
-    def heard(self, data: bytes, now: Nanos, direction: Direction | None) -> None:
+    def heard(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
         for byte in data:
-            if direction is Direction.OUT:
+            if direction is FrameDirection.OUT:
                 self._came(byte, now)
                 continue
-            if direction is Direction.IN:
+            if direction is FrameDirection.IN:
                 self._typed.append(byte)
                 self._count += 1
             self._lines.take(bytes((byte,)), now)
@@ -118,7 +119,7 @@ class M1486Decoder:
         elif self._typed and byte not in REPORTS and byte < 0x80:
             typed = chr(self._typed.popleft())
             meaning = f"{chr(byte)!r} where {typed!r} was typed: a garbled echo, or that of several chips at once"
-            self._sink(FrameLine(now, "", Direction.OUT, bytes((byte,)), meaning))
+            self._sink(FrameLine(now, "", FrameDirection.OUT, bytes((byte,)), meaning))
         else:
             self._log.sent(now, byte)
 
@@ -133,7 +134,7 @@ class M1486Decoder:
 
     def _is_echo(self) -> None:
         echo, self._repeated = self._repeated, b""
-        self._sink(FrameLine(self._repeated_ns, "", Direction.OUT, echo, f"echo of {echo.decode('latin-1')!r}"))
+        self._sink(FrameLine(self._repeated_ns, "", FrameDirection.OUT, echo, f"echo of {echo.decode('latin-1')!r}"))
 
     def _is_upload(self, byte: int, now: Nanos) -> None:
         if not self._uploads:
@@ -143,7 +144,7 @@ class M1486Decoder:
         while len(self._typed) > self._count - count:
             self._typed.popleft()  # an echo would have come before
         meaning = f"U{number} {UPLOADS.get(number, 'reserved')} = {byte}"
-        self._sink(FrameLine(now, "", Direction.OUT, bytes((byte,)), meaning))
+        self._sink(FrameLine(now, "", FrameDirection.OUT, bytes((byte,)), meaning))
 
     def deadline(self) -> Nanos | None:
         return self._repeated_ns + QUIET_NS if self._repeated else None
@@ -208,17 +209,17 @@ class Tap(asyncio.Protocol):
         now = self._now()
         for client in self.clients:
             client.say(data, now)
-        self._heard(data, Direction.OUT if self._stands_between else None)
+        self._heard(data, FrameDirection.OUT if self._stands_between else None)
 
     def pass_on(self, data: bytes) -> None:
         if self._transport is not None:
             self._transport.write(data)
-        self._heard(data, Direction.IN)
+        self._heard(data, FrameDirection.IN)
 
     def _now(self) -> Nanos:
         return time.monotonic_ns() - self._begin
 
-    def _heard(self, data: bytes, direction: Direction | None) -> None:
+    def _heard(self, data: bytes, direction: FrameDirection | None) -> None:
         decoder = self._decoder
         decoder.heard(data, self._now(), direction)
         due = decoder.deadline()
@@ -228,7 +229,7 @@ class Tap(asyncio.Protocol):
 
 
 async def sniff(
-    place: Place,
+    place: LineAddress,
     decoder: Decoder,
     *,
     listen: Address | None = None,

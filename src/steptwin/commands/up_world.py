@@ -6,7 +6,7 @@ import asyncio
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from math import inf
@@ -14,43 +14,52 @@ from pathlib import Path
 
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
-from steptwin.files.beginning import begin_world, check_session_target, set_faults
-from steptwin.files.export import axis_views, check_target, write_trace
+from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
+from steptwin.files.export import axis_views, check_target, growing_file, read_trace, write_trace
+from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
+from steptwin.live.faces import Face, Lines, banner, remarks_on
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
-from steptwin.live.rfc2217 import TwinLine, over_network
+from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.server import Server, clear_ready_file
-from steptwin.live.serving import check_name
-from steptwin.live.world import LiveWorld, PlacePort, VisionPort
+from steptwin.live.serving import check_name, shows_live_view
+from steptwin.live.transports import TRANSPORTS, VISION
+from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
-from steptwin.live.world_frames import follow_frames
 from steptwin.machine import Nanos
-from steptwin.words.records import describe, is_told
 from steptwin.world.actions import Leave
 from steptwin.world.addresses import check_addresses, parse_address
+from steptwin.world.kind import LinkKind
+from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
+from steptwin.world.records import is_shown
 from steptwin.world.spec import LineSpec
-from steptwin.world.trace import Record
+from steptwin.world.trace import TraceRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpOptions:
     """The command's options as given; see ``steptwin up --help``."""
 
-    world: Path
-    """A description, or a session to go on from."""
+    world: Path | None
+    """A description, or a session to go on from; None for a world that was made of options."""
     moment: Nanos | None = None
     """That of the session; None: its end."""
     seed: int | None = None
+    state: Path | None = None
+    """Directory of the non-volatile memory; None: that of the description."""
     speed: str = "1"
     name: str | None = None
     session: Path | None = None
-    trace: Path | None = None
+    trace: str | None = None
+    """A file or directory, ``ring N`` or ``off``; None: as the description says."""
     faults: Sequence[str] = ()
     ready_file: Path | None = None
+    control: str | None = None
+    """HOST:PORT on this computer for the control endpoint, besides the local socket."""
     strict: bool = False
     """Whether what was waited for in vain counts as a failure."""
     listen_any: bool = False
@@ -64,34 +73,47 @@ def up(options: UpOptions) -> bool:
 
     Raises `Misuse` or another `SteptwinError` with a text for the user.
     """
-    name = options.name or options.world.stem
-    check_name(name)
-    speed = read_speed(options.speed, least=0)
-    world = begin_world(
+    if options.world is None:
+        raise Misuse("which world? give the TOML file that describes it")
+    check_name(options.name or options.world.stem)
+    read_speed(options.speed, least=0)
+    with begin_world(
         options.world,
         lambda text: sys.stderr.write(f"{text}\n"),
         moment=options.moment,
         seed=options.seed,
-        keep_trace=options.trace is not None,
+        keep_trace=options.trace not in (None, "off") or not is_session(options.world),
         keep_inputs=options.session is not None,
         allow_outside=options.allow_outside,
-    )
+        state=options.state,
+    ) as world:
+        return up_with(world, options)
+
+
+def up_with(world: World, options: UpOptions) -> bool:
+    """As `up`, with a world that is there."""
+    name = options.name or (world.spec.name if options.world is None else options.world.stem)
+    speed = read_speed(options.speed, least=0)
     _send_away(world)
-    if options.session is None and options.trace is None:
-        world.stop_recording()
+    past = [] if world.now else [record for record in world.trace if is_shown(record)]
+    kept = read_kept(options.trace or world.spec.trace or "off")
+    if kept is None:
+        world.trace.let_go()
+        if options.session is None:
+            world.stop_recording()
     set_faults(world, options.faults)
     outside = [line for line in world.spec.lines if line.is_open]
     if speed == inf and outside:
         raise Misuse(f"--speed max: line {outside[0].name!r} has clients outside, which need a clock; use 'steptwin run'")
-    addresses = [address for line in world.spec.lines for address in (line.tcp, line.rtu_tcp, line.rfc2217)]
-    check_addresses((*addresses, *(spec.vision for spec in world.spec.mic488)), listen_any=options.listen_any)
-    if options.trace is not None:
-        check_target(options.trace)
+    addresses = [address for line in world.spec.lines for key, address in line.links.items() if TRANSPORTS[key].is_address]
+    check_addresses((*addresses, *(address for _, address in world.spec.vision_addresses())), listen_any=options.listen_any)
+    if isinstance(kept, Path):
+        check_target(kept)
     if options.session is not None:
         check_session_target(options.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    asyncio.run(_serve(options, world, speed, name, has_clients=bool(outside)))
+    asyncio.run(_serve(replace(options, name=name), world, past, kept))
     return not world.failures and not (options.strict and world.overdue)
 
 
@@ -102,62 +124,74 @@ def _send_away(world: World) -> None:
             world.outside(Leave(line.name, place))
 
 
-async def _serve(options: UpOptions, world: World, speed: float, name: str, *, has_clients: bool) -> None:
+async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], kept: Kept) -> None:
     with ExitStack() as stack:
         output = Output(sys.stdout)
         stack.callback(output.close)
-        live = LiveWorld(world, output.line)
-        server = Server(Cell(live, Clock(begin=world.now)), output.line)
-        live.share_reads(server.cell)
-        pace = Pace(live, server.cell, output.line, has_clients=has_clients)
+        live = LiveWorld(world)
+        cell = Cell(live, Clock(begin=world.now))
+        face = _face(live, cell, output, log_frames=options.log_frames)
+        live.show = face.notice
+        server = Server(cell, face.notice)
+        live.share_reads(cell)
+        pace = Pace(live, cell, face.notice, has_clients=any(line.is_open for line in world.spec.lines))
         live.on_stop = server.end
-        begun = False
+        begun, recorder = False, None
         try:
-            if options.log_frames:
-                follow_frames(live, lambda frame: output.line(str(frame)))
-            await _open(server, live, pace, options, name)
+            await _open(server, live, pace, options, options.name or world.spec.name)
+            recorder = _recorder(live, kept)
             begun = True
-            _greet(output, server, world)
-            world.trace.watchers.append(lambda record: _tell(output, record))
-            pace.begin(speed)
-            await server.until_ended()
-            server.cell.enter()
+            face.begin(banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any)), past)
+            pace.begin(read_speed(options.speed, least=0))
+            await face.show(server)
+            cell.enter()
         finally:
             pace.close()
             await server.close()
             if begun:
-                _keep(options, live, output)
+                _keep(options, live, output, recorder, kept)
 
 
-def _greet(output: Output, server: Server, world: World) -> None:
-    output.line(f"{world.spec.name}: {', '.join(world.machines)}")
-    for end_point in server.end_points:
-        output.line(f"  {end_point.protocol:<24} {end_point.place}")
-    output.line("Ctrl-C ends")
+def _face(live: LiveWorld, cell: Cell, output: Output, *, log_frames: bool) -> Face:
+    if not shows_live_view(output, log_frames=log_frames):
+        return Lines(live, output, frames=log_frames)
+    from steptwin.live.view import LiveView
+
+    return LiveView(live, cell, output)
 
 
-def _tell(output: Output, record: Record) -> None:
-    if is_told(record):
-        output.line(describe(record))
+def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
+    """What keeps the trace from now on in a file; a ring belongs to the world."""
+    world, recorder = live.world, None
+    if isinstance(kept, int):
+        live.ring = Ring(world.trace, kept)
+    elif kept is not None:
+        recorder = TraceFile(world.trace, growing_file(kept), axis_views(world), world.spec.name, live.show)
+    if kept is not None:
+        world.trace.let_go()
+    return recorder
 
 
-def _keep(options: UpOptions, live: LiveWorld, output: Output) -> None:
+def _keep(options: UpOptions, live: LiveWorld, output: Output, recorder: TraceFile | None, kept: Kept) -> None:
     """Write what was asked for when it is over. The session first: a trace can be made from it. Raises `Misuse`."""
     world = live.world
     world.advance(world.now)
     world.settle_all()
     failures: list[str] = []
-    for where, write in ((options.session, _write_session), (options.trace, _write_trace)):
-        if where is not None:
-            try:
-                for path in write(where, live):
-                    output.line(f"wrote {path}")
-            except Misuse as error:
-                failures.append(str(error))
+    session = options.session
+    writing: list[Callable[[], list[Path]]] = [] if session is None else [partial(_write_session, session, live)]
+    if recorder is not None and isinstance(kept, Path):
+        writing.append(partial(_write_trace, recorder, kept, world.now))
+    for write in writing:
+        try:
+            for path in write():
+                output.line(f"wrote {path}")
+        except Misuse as error:
+            failures.append(str(error))
     ended = "" if world.stopped is None else f", ended by: {world.stopped}"
     inputs = f", {len(live.session().inputs)} inputs" if options.session is not None else ""
     digest = f", digest {world.trace.digest()}" if world.trace.is_recorded else ""
-    output.line(f"{world.time:.3f} s{inputs}{ended}{digest}")
+    output.line(f"ran for {world.time:.3f} s{inputs}{ended}{digest}")
     if failures:
         raise Misuse("\n".join(failures))
 
@@ -167,50 +201,45 @@ def _write_session(where: Path, live: LiveWorld) -> list[Path]:
     return [where]
 
 
-def _write_trace(where: Path, live: LiveWorld) -> list[Path]:
-    world = live.world
-    views = axis_views(world.machines, world.axes)
-    return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now)
+def _write_trace(recorder: TraceFile, where: Path, ended: Nanos) -> list[Path]:
+    """End the file; other formats are made of it."""
+    recorder.close(ended)
+    if recorder.path == where:
+        return [where]
+    saved = read_trace(recorder.path)
+    written = write_trace(saved.trace, where, views=saved.views, title=saved.title, ended=saved.until)
+    if recorder.path not in written:
+        recorder.path.unlink()
+    return written
 
 
 # ---------------------------------------------------------------------- links
 
 
 async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, name: str) -> None:
-    await server.open_control(name, {**WorldControl(server.cell, live).handlers(), **pace.handlers()})
+    control = WorldControl(server.cell, live, pace, server.announcement)
+    address = None if options.control is None else parse_address(options.control, listen_any=False)
+    await server.open_control(name, control, partial(announced, live.world), options.world, address)
     for line in live.world.spec.lines:
         await _open_line(server, live, line, options)
-    for spec in live.world.spec.mic488:
-        if spec.vision is not None:
-            address = parse_address(spec.vision, listen_any=options.listen_any)
-            await server.open_tcp("vision", address, f"vision records, {spec.name}", partial(VisionPort, live, spec.name))
+    for controller, where in live.world.spec.vision_addresses():
+        make_port = partial(VisionPort, live, controller)
+        await server.open(VISION, where, f"vision records, {controller}", make_port, listen_any=options.listen_any)
     if options.ready_file is not None:
-        server.write_ready_file(options.ready_file, name)
+        server.write_ready_file(options.ready_file)
 
 
 async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: UpOptions) -> None:
     number, there = count(1), live.world.lines[line.name]
-    serial_kind = "rtu" if line.kind == "modbus" else "raw"
-    what = f"Modbus RTU, {line.name}" if line.kind == "modbus" else f"M1486 line, {line.name}"
+    wire = TwinLine(lambda: there.baud, there.is_timed)
 
-    def maker(link: str, kind: str, *, several: bool) -> Callable[[], PlacePort]:
-        return lambda: PlacePort(live, line.name, f"{link}-{next(number)}" if several else link, kind)
+    def maker(link: LinkKind, *, several: bool) -> Callable[[], PlacePort]:
+        return lambda: PlacePort(live, line.name, f"{link.place}-{next(number)}" if several else link.place, link.place_kind)
 
-    if line.pty is not None:
-        await server.open_pty(Path(line.pty), what, maker("pty", serial_kind, several=False))
-    if line.serial is not None:
-        kind = "serial" if line.kind == "modbus" else "raw"
-        await server.open_serial(line.serial, there.baud, what, maker("serial", kind, several=False))
-    if line.tcp is not None:
-        address = parse_address(line.tcp, listen_any=options.listen_any)
-        kind = "tcp" if line.kind == "modbus" else "raw"
-        protocol = f"Modbus TCP, {line.name}" if line.kind == "modbus" else what
-        await server.open_tcp("tcp", address, protocol, maker("tcp", kind, several=True))
-    if line.rtu_tcp is not None:
-        address = parse_address(line.rtu_tcp, listen_any=options.listen_any)
-        await server.open_tcp("rtu-tcp", address, f"RTU over TCP, {line.name}", maker("rtu", "rtu", several=True))
-    if line.rfc2217 is not None:
-        address = parse_address(line.rfc2217, listen_any=options.listen_any)
-        make = maker("rtu" if line.kind == "modbus" else "tcp", serial_kind, several=True)
-        wire = TwinLine(lambda: there.baud, there.is_timed, server.notice)
-        await server.open_tcp("rfc2217", address, f"network port, {line.name}", lambda: over_network(make(), wire))
+    on = "" if len(live.world.spec.lines) == 1 else f", {line.name}"
+    links = line_kinds()[line.kind].links
+    for key, where in line.links.items():
+        link, transport = links[key], TRANSPORTS[key]
+        make_port = maker(link, several=transport.has_several)
+        protocol = f"{link.protocol}{on}"
+        await server.open(transport, where, protocol, make_port, line=line.name, wire=wire, listen_any=options.listen_any)

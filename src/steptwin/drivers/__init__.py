@@ -8,46 +8,46 @@ Errors are `steptwin.errors.Misuse`, `Refusal` and `LineFailure`; what is listed
 from __future__ import annotations
 
 from steptwin.drivers.exchange import LineLost, NoAnswer, Overtaken, SentLate, TooLate
-from steptwin.drivers.mic488.axis import AsyncAxis
+from steptwin.drivers.mic488.axis import AsyncMic488Axis
 from steptwin.drivers.mic488.driver import AsyncMic488, Mic488Status, load_config
-from steptwin.drivers.mic488.failures import MoveFailed, NoMic488, NotReady, Refused, Untold
-from steptwin.drivers.mic488.jog import AsyncJog
+from steptwin.drivers.mic488.failures import ModbusRefusal, MoveFailed, NoMic488, NotReady, Unconfirmed
+from steptwin.drivers.mic488.jog import AsyncMic488Jog
 from steptwin.drivers.mic488.lines import AsyncModbusLine
 from steptwin.drivers.mic488.motion import MoveEnd, Reason
-from steptwin.drivers.mic488.program import AsyncProgram, ProgramState
-from steptwin.drivers.mic488.snapshot import Change, Snapshot
-from steptwin.drivers.mic488.sync import Axis, Jog, Mic488, ModbusLine, Program, UserRegisters, UserView
+from steptwin.drivers.mic488.program import AsyncMic488Program, ProgramState
+from steptwin.drivers.mic488.snapshot import Mic488Snapshot, SnapshotChange
+from steptwin.drivers.mic488.sync import Mic488, Mic488Axis, Mic488Jog, Mic488Program, ModbusLine, UserRegisters, UserView
 from steptwin.drivers.mic488.user import AsyncUserRegisters, AsyncUserView
 
 __all__ = [
-    "AsyncAxis",
-    "AsyncJog",
     "AsyncMic488",
+    "AsyncMic488Axis",
+    "AsyncMic488Jog",
+    "AsyncMic488Program",
     "AsyncModbusLine",
-    "AsyncProgram",
     "AsyncUserRegisters",
     "AsyncUserView",
-    "Axis",
-    "Change",
-    "Jog",
     "LineLost",
     "Mic488",
+    "Mic488Axis",
+    "Mic488Jog",
+    "Mic488Program",
+    "Mic488Snapshot",
     "Mic488Status",
     "ModbusLine",
+    "ModbusRefusal",
     "MoveEnd",
     "MoveFailed",
     "NoAnswer",
     "NoMic488",
     "NotReady",
     "Overtaken",
-    "Program",
     "ProgramState",
     "Reason",
-    "Refused",
     "SentLate",
-    "Snapshot",
+    "SnapshotChange",
     "TooLate",
-    "Untold",
+    "Unconfirmed",
     "UserRegisters",
     "UserView",
     "load_config",

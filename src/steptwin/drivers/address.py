@@ -6,14 +6,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from steptwin.errors import Misuse
 
-DEFAULT = "tcp://127.0.0.1:5020"
-"""Where `steptwin serve mic488` listens when nothing else is said."""
 OPTIONS = "unit=N, baud=N, firmware=1.70, config=FILE, timeout=SECONDS; for an M1486 kind=m1486, chip=0…F, variant=B"
 KINDS = ("mic488", "m1486")
 CHIP_BAUD = 4800
@@ -58,6 +56,19 @@ _OF_M1486 = frozenset({"chip", "variant"})
 
 def parse_device(text: str) -> DeviceAddress:
     """Raises `Misuse`."""
+    place, options = split_device(text)
+    return device_at(text, place, options)
+
+
+def device_at(text: str, place: str, options: Mapping[str, Any]) -> DeviceAddress:
+    """The device at an address with these options; ``text`` is how it was named, for messages. Raises `Misuse`."""
+    found = dict(options)
+    _check_kind(text, found)
+    return replace(DeviceAddress(place), **found)
+
+
+def split_device(text: str) -> tuple[str, dict[str, Any]]:
+    """What stands before the first comma, and the options behind it. Raises `Misuse`."""
     place, *options = (part.strip() for part in text.split(","))
     if not place:
         raise Misuse(f"device {text!r} has no address: expected ADDRESS, or with options behind it: ADDRESS,{OPTIONS}")
@@ -70,8 +81,7 @@ def parse_device(text: str) -> DeviceAddress:
             found[name] = _TYPES[name](value)
         except ValueError:
             raise Misuse(f"device {text!r}: {value!r} is no number for {name}") from None
-    _check_kind(text, found)
-    return replace(DeviceAddress(place), **found)
+    return place, found
 
 
 def _check_kind(text: str, found: dict[str, Any]) -> None:

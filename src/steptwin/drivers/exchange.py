@@ -21,7 +21,7 @@ from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.machine import SECOND, Nanos
 
 
-class Request(Protocol):
+class LineRequest(Protocol):
     """What is asked. Its text says so to people: ``unit 1: read M1_POS_ACT``."""
 
     @property
@@ -35,13 +35,13 @@ class Request(Protocol):
         ...
 
 
-Q = TypeVar("Q", bound=Request)
+Q = TypeVar("Q", bound=LineRequest)
 A = TypeVar("A")
-Q_contra = TypeVar("Q_contra", bound=Request, contravariant=True)
+Q_contra = TypeVar("Q_contra", bound=LineRequest, contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
 
 
-class More(NamedTuple):
+class SendNext(NamedTuple):
     """The exchange goes on: this is to be sent next.
 
     ``may_wait``: an urgent job may go first, and then the exchange is begun anew.
@@ -68,7 +68,7 @@ class Discipline(Protocol[Q_contra, A_co]):
         """Begin an exchange: what is to be sent."""
         ...
 
-    def receive(self, data: bytes, now: Nanos) -> A_co | More | None:
+    def receive(self, data: bytes, now: Nanos) -> A_co | SendNext | None:
         """Bytes that came during the exchange: its answer, what to send next, or None while more is needed.
 
         Raises `Refusal` when the peer refused, `LineLost` when the connection has become useless, and another `LineFailure`
@@ -99,7 +99,7 @@ class NoAnswer(LineFailure):
     ``uncertain``: the device may have carried the request out nevertheless.
     """
 
-    def __init__(self, place: str, request: Request, attempts: int, timeout_ns: Nanos, heard: bytes) -> None:
+    def __init__(self, place: str, request: LineRequest, attempts: int, timeout_ns: Nanos, heard: bytes) -> None:
         self.attempts = attempts
         self.heard = heard
         self.uncertain = request.changes
@@ -238,7 +238,7 @@ class Exchanger(Generic[Q, A]):
         self._urgent: deque[Job[Q, A]] = deque()
         self._waiting: deque[Job[Q, A]] = deque()
         self._current: Job[Q, A] | None = None
-        self._more: More | None = None  # what the current exchange has still to send
+        self._more: SendNext | None = None  # what the current exchange has still to send
         self._deadline: Nanos = 0  # of the current exchange
         self._due: Nanos | None = None  # when the next one may begin
         self._next: dict[Hashable, Nanos] = {}  # when a device may be asked again
@@ -322,8 +322,7 @@ class Exchanger(Generic[Q, A]):
                 job.fail(refusal)
                 continue
             begin = self._next.get(job.request.device, 0)
-            if begin < free:
-                begin = free
+            begin = max(begin, free)
             if begin <= now:
                 queue.remove(job)
                 return job
@@ -392,14 +391,14 @@ class Exchanger(Generic[Q, A]):
             return
         if answer is None:
             return
-        if isinstance(answer, More):
+        if isinstance(answer, SendNext):
             self._continue(job, answer, now)
             return
         self._current = None
         if not job.done:
             job.succeed(answer)
 
-    def _continue(self, job: Job[Q, A], more: More, now: Nanos) -> None:
+    def _continue(self, job: Job[Q, A], more: SendNext, now: Nanos) -> None:
         if more.may_wait and (job.done or (self._urgent and not job.urgent)):
             self._current = None
             if not job.done:

@@ -20,7 +20,7 @@ LONGEST_WAIT_S = 1e6
 LOCK_SLICE_S = 1.0
 
 
-class Line(Protocol[Q, A]):
+class DriverLine(Protocol[Q, A]):
     """A line that may be shared by several drivers, tasks or threads.
 
     ``notes`` is where drivers of one device on the line keep what they have in common.

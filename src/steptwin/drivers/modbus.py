@@ -6,13 +6,13 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
-from steptwin.drivers.exchange import LineLost, More
+from steptwin.drivers.exchange import LineLost, SendNext
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.wire import mbap, pdu, rtu
 from steptwin.wire.crc import crc16
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Direction, FrameObserver
+from steptwin.wire.slave import FrameDirection, FrameObserver
 
 QUIET_NS: Nanos = rtu.BURSTY_GAP_NS
 """After a failed exchange a line has to be silent this long before it is used again."""
@@ -53,11 +53,11 @@ class Query:
         self.changes = request.function not in pdu.READS
         self._describe = describe
         match request:
-            case pdu.Read(function, _, count):
+            case pdu.ReadRequest(function, _, count):
                 payload = (count + 7) // 8 if function in pdu.BIT_READS else 2 * count
                 self.head = bytes((function, payload))
                 self.size = 2 + payload
-            case pdu.WriteRegisters():
+            case pdu.WriteRegistersRequest():
                 self.head, self.size = self.pdu[:5], 5
             case _:
                 self.head, self.size = self.pdu, 5
@@ -143,7 +143,7 @@ class RtuMaster:
     def _send(self, query: Query, now: Nanos) -> bytes:
         self._asked = query
         if self.on_frame is not None:
-            self.on_frame(now, Direction.IN, query.rtu_frame)
+            self.on_frame(now, FrameDirection.IN, query.rtu_frame)
         return query.rtu_frame
 
     def _could_be_confused(self, request: Query, now: Nanos) -> bool:
@@ -156,11 +156,13 @@ class RtuMaster:
     def _marker(self, unit: int) -> Query:
         taken = {owed.query.rtu_size for owed in self._owed if owed.query.function == pdu.READ_HOLDING_REGISTERS}
         count = next((n for n in range(1, pdu.MAX_REGISTERS) if 2 * n + 5 not in taken), pdu.MAX_REGISTERS)
-        return Query(unit, pdu.Read(pdu.READ_HOLDING_REGISTERS, 0, count), lambda _: "a read to find out what is still to come")
+        return Query(
+            unit, pdu.ReadRequest(pdu.READ_HOLDING_REGISTERS, 0, count), lambda _: "a read to find out what is still to come"
+        )
 
     # ------------------------------------------------------------------ hearing
 
-    def receive(self, data: bytes, now: Nanos) -> bytes | More | None:
+    def receive(self, data: bytes, now: Nanos) -> bytes | SendNext | None:
         asked = self._asked
         if asked is None:
             return None
@@ -173,7 +175,7 @@ class RtuMaster:
                 self._held = held[-HELD_BYTES:]
                 return None
         if self.on_frame is not None:
-            self.on_frame(now, Direction.OUT, frame)
+            self.on_frame(now, FrameDirection.OUT, frame)
         self.free_ns = now + self._gap_ns
         self._held = b""
         self._asked = None
@@ -181,7 +183,7 @@ class RtuMaster:
             self._settle(asked)
         then, self._then = self._then, None
         if then is not None:
-            return More(self._send(then, now), may_wait=True)
+            return SendNext(self._send(then, now), may_wait=True)
         answer = frame[1:-2]
         if answer[0] != asked.function:
             raise pdu.ModbusException(asked.function, answer[1])
@@ -227,7 +229,7 @@ class RtuMaster:
         self.free_ns = now + QUIET_NS
         self._busy_until = now + NOISE_NS
         if heard and self.on_frame is not None:
-            self.on_frame(now, Direction.OUT, heard)
+            self.on_frame(now, FrameDirection.OUT, heard)
         return heard
 
     def stray(self, data: bytes, now: Nanos) -> None:
@@ -269,7 +271,7 @@ class TcpMaster:
         self._no_answer = b""
         frame = self._number_bytes + request.tcp_tail
         if self.on_frame is not None:
-            self.on_frame(now, Direction.IN, frame)
+            self.on_frame(now, FrameDirection.IN, frame)
         return frame
 
     def receive(self, data: bytes, now: Nanos) -> bytes | None:
@@ -281,12 +283,12 @@ class TcpMaster:
             answer = data[7:]
             if asked.answered_by(answer) and data[2:6] == (len(answer) + 1).to_bytes(4, "big"):
                 if self.on_frame is not None:
-                    self.on_frame(now, Direction.OUT, data)
+                    self.on_frame(now, FrameDirection.OUT, data)
                 self._asked = None
                 return answer
         for frame in self._feed(data):
             if self.on_frame is not None:
-                self.on_frame(now, Direction.OUT, frame.raw)
+                self.on_frame(now, FrameDirection.OUT, frame.raw)
             if frame.transaction == self._number and frame.unit == asked.device:
                 answer = frame.pdu
                 if asked.answered_by(answer):

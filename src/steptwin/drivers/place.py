@@ -1,11 +1,10 @@
-"""Where a device is reached: ``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``."""
+"""Where a device is reached: ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import errno
-import os
 import socket
 import struct
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from urllib.parse import urlsplit
 
 from steptwin.drivers.exchange import LineLost
 from steptwin.errors import Misuse
+from steptwin.system import reason
 from steptwin.wire.line import SerialLine
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ CONNECT_S = 3.0
 MODBUS_PORT = 502
 READ_BYTES = 4096
 BAUDS = (300, 1_000_000)
-FORMS = "expected a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT"
+FORMS = "expected a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, rtu-tcp://HOST:PORT or rfc2217://HOST:PORT"
 
 
 class Channel(Protocol):
@@ -52,7 +52,7 @@ class Endpoint(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class LineAddress:
     """An address as a driver takes it apart. ``framed``: Modbus TCP rather than the bytes of a serial line."""
 
     endpoint: Endpoint
@@ -61,7 +61,7 @@ class Place:
     """Set where bytes take their time."""
 
 
-def parse_place(text: str, baud: int) -> Place:
+def parse_line_address(text: str, baud: int) -> LineAddress:
     """The place behind an address. ``baud`` matters to serial ports. Raises `Misuse`."""
     if not BAUDS[0] <= baud <= BAUDS[1]:
         raise Misuse(f"{baud} bit/s is outside {BAUDS[0]} to {BAUDS[1]}")
@@ -69,9 +69,9 @@ def parse_place(text: str, baud: int) -> Place:
     if not separator:
         if not text or (":" in text and "/" not in text):
             raise Misuse(f"{text!r} is no address: {FORMS}")
-        return Place(SerialEndpoint(text, baud), serial=SerialLine(baud))
+        return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme == "rfc2217":
-        return Place(SerialEndpoint(text, baud), serial=SerialLine(baud))
+        return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme not in ("tcp", "rtu-tcp"):
         raise Misuse(f"{text!r} is no address: {FORMS}")
     try:
@@ -86,15 +86,7 @@ def parse_place(text: str, baud: int) -> Place:
         if scheme != "tcp":
             raise Misuse(f"{text!r} names no port: {FORMS}")
         port = MODBUS_PORT
-    return Place(TcpEndpoint(scheme, host, port), framed=scheme == "tcp")
-
-
-def reason(error: Exception) -> str:
-    """Why something failed, in words."""
-    number = getattr(error, "errno", None)
-    if isinstance(number, int) and number in errno.errorcode:
-        return os.strerror(number).lower()
-    return str(error) or type(error).__name__
+    return LineAddress(TcpEndpoint(scheme, host, port), framed=scheme == "tcp")
 
 
 # ---------------------------------------------------------------------- TCP
@@ -112,7 +104,7 @@ class TcpEndpoint:
 
     def open(self) -> Channel:
         try:
-            return SocketChannel(socket.create_connection((self.host, self.port), CONNECT_S), str(self))
+            return CHANNEL(socket.create_connection((self.host, self.port), CONNECT_S), str(self))
         except OSError as error:
             raise self._failed(error) from error
 
@@ -171,6 +163,36 @@ class SocketChannel:
 
     def close(self) -> None:
         self._socket.close()
+
+
+class TimedSocketChannel(SocketChannel):
+    """The same where a single call cannot be made not to wait (Windows)."""
+
+    def write(self, data: bytes) -> None:
+        self._socket.settimeout(0.0)
+        try:
+            sent = self._socket.send(data)
+            if sent < len(data):
+                raise BlockingIOError(errno.EAGAIN, "")
+        except BlockingIOError:
+            raise LineLost(f"{self._place}: the other end takes nothing any more") from None
+        except OSError as error:
+            raise LineLost(f"{self._place}: {reason(error)}") from error
+
+    def read(self, timeout_s: float) -> bytes:
+        self._socket.settimeout(max(timeout_s, 0.0))
+        try:
+            data = self._socket.recv(READ_BYTES)
+        except (BlockingIOError, TimeoutError):
+            return b""
+        except OSError as error:
+            raise LineLost(f"{self._place}: {reason(error)}") from error
+        if not data:
+            raise LineLost(f"{self._place}: the other end closed the connection")
+        return data
+
+
+CHANNEL = SocketChannel if hasattr(socket, "MSG_DONTWAIT") else TimedSocketChannel
 
 
 # ---------------------------------------------------------------------- serial ports

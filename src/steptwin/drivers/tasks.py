@@ -9,9 +9,10 @@ from typing import Any, Generic, cast
 
 from steptwin.drivers.exchange import A, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LOCK_SLICE_S
-from steptwin.drivers.place import Endpoint, reason
+from steptwin.drivers.place import Endpoint
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.system import reason
 
 CLOSE_S = 1.0
 """How long the other end is given for the end of a connection."""
@@ -26,7 +27,7 @@ class TaskLine(Generic[Q, A]):
         self._engine = exchanger
         self._loop: asyncio.AbstractEventLoop | None = None
         self._transport: asyncio.Transport | None = None
-        self._connection: _Connection | None = None
+        self._connection: _LineConnection | None = None
         self._ended = asyncio.Event()  # set when that is no more
         self._opening: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
@@ -54,7 +55,7 @@ class TaskLine(Generic[Q, A]):
             await self._open()
 
     async def _open(self) -> None:
-        connection = self._connection = _Connection(self)
+        connection = self._connection = _LineConnection(self)
         self._ended.clear()
         transport = await self._endpoint.connect(lambda: connection)
         self._loop = asyncio.get_running_loop()
@@ -117,7 +118,7 @@ class TaskLine(Generic[Q, A]):
         self._timer = None
         self._run()
 
-    def received(self, connection: _Connection, data: bytes) -> None:
+    def received(self, connection: _LineConnection, data: bytes) -> None:
         if self._transport is not connection.transport:
             return
         try:
@@ -129,7 +130,7 @@ class TaskLine(Generic[Q, A]):
             self._engine.lost(error)
         self._run()
 
-    def lost(self, connection: _Connection, error: Exception | None) -> None:
+    def lost(self, connection: _LineConnection, error: Exception | None) -> None:
         if connection is self._connection:
             self._ended.set()
         if self._transport is not connection.transport:
@@ -196,7 +197,7 @@ class _SlicedLock:
         self._lock.release()
 
 
-class _Connection(asyncio.Protocol):
+class _LineConnection(asyncio.Protocol):
     """One connection of a line; what an old one says is not heard any more."""
 
     transport: asyncio.Transport | None = None

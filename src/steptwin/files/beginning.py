@@ -37,20 +37,25 @@ def begin_world(
     keep_trace: bool = True,
     keep_inputs: bool = True,
     allow_outside: bool = False,
+    state: Path | None = None,
 ) -> World:
     """The world that a file describes; that of a session at its end, or at a ``moment`` with all that had come by then.
 
-    ``warn`` is told what is doubtful. Raises `Misuse`.
+    ``warn`` is called with warnings. Raises `Misuse`.
     """
     if not is_session(path):
         if moment is not None:
             raise Misuse(f"--from: {path} is no session; a description begins at 0 s")
-        world = World.load(path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs, allow_outside=allow_outside)
+        world = World.load(
+            path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs, allow_outside=allow_outside, state=state
+        )
         for warning in world.plan.warnings:
             warn(warning)
         return world
     if seed is not None:
         raise Misuse(f"--seed: {path} is a session, which goes on with its own")
+    if state is not None:
+        raise Misuse(f"--state: {path} is a session, which goes on with the memory it has")
     session = sessions.load(path)
     world = session.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
     if moment is None and world.trace.digest() != session.digest:

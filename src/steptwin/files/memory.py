@@ -4,7 +4,8 @@ An image is one file. A save writes a temporary file, syncs it, renames it onto 
 ``kill -9``, power loss, full disk — the old or the new content is there whole. Damage is found by a header with format,
 length and CRC-32; it is an error, never older content passed off as the newest.
 
-Layout: ``<name>.image``, ``<name>.tmp`` (a save in progress), ``owner.lock``. POSIX only (flock, fsync of directories).
+Layout: ``<name>.image``, ``<name>.tmp`` (a save in progress), ``owner.lock``. Windows syncs no directories: after
+power loss the content before the last save may be there.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Self
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.ownership import InUse, Ownership
 from steptwin.inputfiles import read_bytes
+from steptwin.system import reason, sync_directory
 
 _FAMILY = b"STW"
 _MAGIC = _FAMILY + b"2"
@@ -56,7 +58,7 @@ class StateDirectory:
         except InUse as taken:
             raise StateInUse(f"the state directory {self.path} is in use by {taken.owner}") from None
         except OSError as error:
-            raise StateFailure(f"the state directory {self.path} cannot be used: {error.strerror}") from error
+            raise StateFailure(f"the state directory {self.path} cannot be used: {reason(error)}") from error
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -70,11 +72,11 @@ class StateDirectory:
 
     def _make(self) -> None:
         if self.path.exists() and not self.path.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, "it is no directory")
+            raise NotADirectoryError(errno.ENOTDIR, "not a directory")
         missing = [p for p in (self.path, *self.path.parents) if not p.exists()]
         self.path.mkdir(parents=True, exist_ok=True)
         for path in missing:
-            _sync(path.parent)
+            sync_directory(path.parent)
 
     def load(self, name: str) -> bytes | None:
         """The content last saved of an image, None when it was never saved.
@@ -109,9 +111,9 @@ class StateDirectory:
         try:
             _write(temporary, _header(data) + data)
             temporary.replace(path)
-            _sync(self.path)
+            sync_directory(self.path)
         except OSError as error:
-            raise StateFailure(f"{name} cannot be saved in {self.path}: {error.strerror}") from error
+            raise StateFailure(f"{name} cannot be saved in {self.path}: {reason(error)}") from error
 
     def _path(self, name: str) -> Path:
         if self._lock is None:
@@ -150,12 +152,3 @@ def _write(path: Path, content: bytes) -> None:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
-
-
-def _sync(directory: Path) -> None:
-    """Make renames and new names in a directory survive power loss."""
-    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -1,18 +1,20 @@
-"""Lock files: of what one process at a time may have. POSIX only (flock)."""
+"""Lock files: of what one process at a time may have."""
 
 from __future__ import annotations
 
-import fcntl
+import contextlib
 import os
 import stat
 from errno import ELOOP, EPERM
 from pathlib import Path
 
 from steptwin.errors import Misuse
+from steptwin.files.locks import lock, unlock
+from steptwin.system import LOCK_FLAGS, is_own
 
 
 class InUse(Misuse):
-    """Somebody else owns it; ``owner`` is a process in words."""
+    """Another process owns it; ``owner`` is a process in words."""
 
     def __init__(self, path: Path, owner: str) -> None:
         self.owner = owner
@@ -22,17 +24,22 @@ class InUse(Misuse):
 def _open(path: Path) -> int:
     """A lock file of this user, opened or made. Raises `OSError`."""
     try:
-        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
+        file = os.open(path, LOCK_FLAGS, 0o644)
     except OSError as error:
         if error.errno == ELOOP:
             raise PermissionError(EPERM, f"the lock file {path} is a symbolic link") from None
         raise
     found = os.fstat(file)
     # A second name of the file would be a link as well.
-    if found.st_uid == os.getuid() and stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
+    if is_own(found) and stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
         return file
     os.close(file)
     raise PermissionError(EPERM, f"{path} is no lock file of this user")
+
+
+def _content(file: int) -> bytes:
+    os.lseek(file, 0, os.SEEK_SET)
+    return os.read(file, 32)
 
 
 class Ownership:
@@ -47,22 +54,24 @@ class Ownership:
         while True:
             self._file = _open(path)
             try:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock(self._file)
             except BlockingIOError:
-                number = os.pread(self._file, 32, 0).decode("ascii", "replace").strip()
+                number = _content(self._file).decode("ascii", "replace").strip()
                 os.close(self._file)
                 raise InUse(path, f"process {number}" if number else "another process") from None
-            if self._is_at_path():
+            if self._is_at(self._file):
                 break
             os.close(self._file)  # its last owner removed it between our two calls
         self.left_behind = os.fstat(self._file).st_size > 0
         """Whether a process that did not end cleanly had it before."""
         os.ftruncate(self._file, 0)
-        os.pwrite(self._file, b"%d\n" % os.getpid(), 0)
+        os.lseek(self._file, 0, os.SEEK_SET)
+        os.write(self._file, b"%d\n" % os.getpid())
 
-    def _is_at_path(self) -> bool:
+    def _is_at(self, file: int) -> bool:
+        """Whether the open file is still the one at the path."""
         try:
-            return os.path.samestat(os.fstat(self._file), os.lstat(self.path))
+            return os.path.samestat(os.fstat(file), os.lstat(self.path))
         except FileNotFoundError:
             return False
 
@@ -70,7 +79,15 @@ class Ownership:
         """Give it free and take the file away."""
         if self._file < 0:
             return
-        if self._is_at_path():
-            self.path.unlink()
-        os.close(self._file)
-        self._file = -1
+        file, self._file = self._file, -1
+        is_removed = not self._is_at(file)
+        if not is_removed:
+            os.ftruncate(file, 0)
+            with contextlib.suppress(PermissionError):  # Windows removes no open files
+                self.path.unlink()
+                is_removed = True
+        unlock(file)
+        os.close(file)
+        if not is_removed:
+            with contextlib.suppress(OSError):  # another process has it by now
+                self.path.unlink()

@@ -7,37 +7,37 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
-from steptwin.diagnostics import Diagnostic, Severity, Source
-from steptwin.errors import Misuse, SteptwinError
+from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
+from steptwin.errors import Misuse, SourceErrors
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.program import LoadedProgram, load, setup_of
-from steptwin.wbc.check import Checked, check
+from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.positions import PositionTable, parse_positions
 
-Findings: TypeAlias = tuple[tuple[Source, list[Diagnostic]], ...]
-"""What was said about files, by file."""
+Findings: TypeAlias = tuple[tuple[SourceText, list[Diagnostic]], ...]
+"""Findings by file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Banks:
-    """What a controller has in its banks, and everything said about the files it came from."""
+    """What a controller has in its banks, and the findings about the files it came from."""
 
     programs: Mapping[int, LoadedProgram] = field(default_factory=dict)
     positions: Mapping[int, PositionTable] = field(default_factory=dict)
     findings: Findings = ()
 
 
-class ProgramErrors(SteptwinError):
-    """Programs or tables with errors."""
+class ProgramErrors(SourceErrors):
+    """Programs or tables with errors; the text shows them all, with the warnings."""
 
     def __init__(self, findings: Findings) -> None:
         self.findings = findings
-        wrong = [source.name for source, diagnostics in findings if any(d.severity is Severity.ERROR for d in diagnostics)]
-        super().__init__(f"{' and '.join(wrong)} cannot be loaded: see the errors above")
+        shown = [(source, [d for d in found if d.severity is not Severity.NOTE]) for source, found in findings]
+        super().__init__("\n".join(render(source, found) for source, found in shown if found))
 
 
 def parse_banks(option: str, given: Sequence[str], banks: int) -> dict[int, Path]:
@@ -73,8 +73,8 @@ def read_banks(
     table; ``option`` is how a table for a bank is given.
     """
     tables: dict[int, PositionTable] = {}
-    findings: list[tuple[Source, list[Diagnostic]]] = []
-    sources: dict[int, Source] = {}
+    findings: list[tuple[SourceText, list[Diagnostic]]] = []
+    sources: dict[int, SourceText] = {}
     for bank, path in programs.items():
         if path.suffix.lower() == IMAGE:
             sources[bank], table, doubts = program_of(read_bytes(path), str(path))
@@ -88,7 +88,7 @@ def read_banks(
         tables[bank], found = parse_positions(source.text)
         findings.append((source, found))
     only = next(iter(tables.values())) if len(tables) == 1 else None
-    checked: dict[int, tuple[Checked, Path]] = {}
+    checked: dict[int, tuple[CheckedProgram, Path]] = {}
     for bank, path in programs.items():
         source = sources[bank]
         program = check(source.text, tables.get(bank, only), setup_of(config), dialect)

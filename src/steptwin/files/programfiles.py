@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from steptwin.diagnostics import Diagnostic, Severity, Source
+from steptwin.diagnostics import Diagnostic, Severity, SourceText
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.config import ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.program import setup_of
-from steptwin.wbc.check import Checked, check
+from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.decompile import IMAGE
 from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.positions import PositionTable, parse_positions
@@ -21,10 +21,10 @@ from steptwin.wbc.positions import PositionTable, parse_positions
 class ProgramFiles:
     """A program with what it was checked against. ``findings`` go by file, program first."""
 
-    checked: Checked
+    checked: CheckedProgram
     positions: PositionTable | None
     config: ControllerConfig | None
-    findings: tuple[tuple[Source, list[Diagnostic]], ...]
+    findings: tuple[tuple[SourceText, list[Diagnostic]], ...]
 
     def count(self, severity: Severity) -> int:
         return sum(d.severity is severity for _, diagnostics in self.findings for d in diagnostics)
@@ -68,11 +68,11 @@ def read_program(
 
 
 def check_source(
-    source: Source, positions: Path | None = None, config: Path | None = None, dialect: Dialect = DEFAULT
+    source: SourceText, positions: Path | None = None, config: Path | None = None, dialect: Dialect = DEFAULT
 ) -> ProgramFiles:
     """Check a program that was read already; otherwise like `read_program`."""
     table = settings = None
-    others: list[tuple[Source, list[Diagnostic]]] = []
+    others: list[tuple[SourceText, list[Diagnostic]]] = []
     if positions is not None:
         text = read_text(positions).source
         table, found = parse_positions(text.text)

@@ -13,16 +13,16 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from steptwin import __version__
+from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
-from steptwin.files.plaintypes import fitting
 from steptwin.files.textfiles import write_bytes
-from steptwin.files.world import World
+from steptwin.files.world import FailedSave, World
 from steptwin.inputfiles import MOST_RECORDED_BYTES, read_bytes
 from steptwin.machine import SECOND, Nanos
+from steptwin.plaintypes import fitting
 from steptwin.world import script as do
 from steptwin.world.actions import ACTIONS, Outside
 from steptwin.world.description import read_world
-from steptwin.world.durations import LONGEST_NS
 from steptwin.world.faults import Fault, parse
 from steptwin.world.overrides import Overrides
 from steptwin.world.plant import Given
@@ -36,7 +36,8 @@ _STEPS = {kind.__name__: kind for kind in ACTIONS}
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """A run of a world. ``digest`` is that of its trace at ``until``; ``firmware`` says what ran on each MIC488."""
+    """A run of a world. ``digest`` is that of its trace at ``until``; ``firmware`` is that of each MIC488, or the type of an
+    M1486: the variant of its data sheet."""
 
     name: str
     text: str
@@ -49,6 +50,8 @@ class Session:
     overrides: Overrides = field(default_factory=dict)
     """Values that replace those of the text."""
     version: str = __version__
+    failed_saves: tuple[FailedSave, ...] = ()
+    """Memory that could not be kept: a fact from outside, as the inputs are."""
 
     def world(self, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
@@ -57,13 +60,12 @@ class Session:
             self.files,
             keep_trace=keep_trace,
             keep_inputs=keep_inputs,
+            failing=self.failed_saves,
         )
-        ran = {name: view.device.firmware.name for name, view in world.mic488.items()}
+        ran = _firmwares(world)
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
-                raise Misuse(
-                    f"the session says that {name} runs firmware {firmware}, its world {ran.get(name, 'has no such machine')}"
-                )
+                raise Misuse(f"the session says that {name} is of {firmware}, its world {ran.get(name, 'has no such machine')}")
         return world
 
     def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
@@ -102,6 +104,12 @@ def _settle(world: World) -> None:
     world.settle_all()
 
 
+def _firmwares(world: World) -> dict[str, str]:
+    """The firmware, or type, of every controller that has one."""
+    sheets = {name: world.kind(name).datasheet(machine) for name, machine in world.machines.items()}
+    return {name: sheet.variant for name, sheet in sheets.items() if sheet.variant}
+
+
 def session_of(world: World) -> Session:
     """The session of a world up to now. What Python code did to the world is in it, the code is not.
 
@@ -115,12 +123,13 @@ def session_of(world: World) -> Session:
         spec.text.source.name,
         spec.text.source.text,
         world.files,
-        {name: view.device.firmware.name for name, view in world.mic488.items()},
+        _firmwares(world),
         spec.seed,
         tuple(world.inputs),
         world.now,
         world.trace.digest(),
         spec.overrides,
+        failed_saves=tuple(world.failed_saves),
     )
 
 
@@ -137,6 +146,7 @@ def save(session: Session, path: Path | str) -> None:
         "digest": session.digest,
         "world": session.text,
         "files": {name: b64encode(content).decode() for name, content in session.files.items()},
+        "failed_saves": [{"time_ns": time, "machine": machine, "reason": text} for time, machine, text in session.failed_saves],
         "inputs": [
             {"time_ns": time, "settled": settled, "do": type(what).__name__, **_plain(what)}
             for time, what, settled in session.inputs
@@ -196,6 +206,16 @@ def _session(data: Mapping[str, Any]) -> Session:
         fitting("digest", data["digest"], str),
         fitting("overrides", data.get("overrides", {}), dict),
         fitting("version", data["version"], str),
+        tuple(_failed(item) for item in fitting("failed_saves", data.get("failed_saves", []), list)),
+    )
+
+
+def _failed(item: object) -> FailedSave:
+    failed = fitting("a failed save", item, dict)
+    return FailedSave(
+        fitting("time_ns", failed["time_ns"], int),
+        fitting("machine", failed["machine"], str),
+        fitting("reason", failed["reason"], str),
     )
 
 

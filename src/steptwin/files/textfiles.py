@@ -7,17 +7,18 @@ from dataclasses import dataclass
 from errno import EACCES, EINVAL, EISDIR, ENOTDIR
 from pathlib import Path
 
-from steptwin.diagnostics import Source
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.inputfiles import read_bytes, shown
+from steptwin.system import reason
 from steptwin.textcodec import Decoded, decode
 
 
 @dataclass(frozen=True, slots=True)
 class TextFile:
-    """A text and how its bytes say it."""
+    """A text and its encoding."""
 
-    source: Source
+    source: SourceText
     decoded: Decoded
 
     def to_bytes(self, text: str) -> bytes:
@@ -39,7 +40,7 @@ def check_writable(path: Path) -> None:
     except ValueError as error:
         raise Misuse(f"cannot write {shown(path)}: {error}") from None
     if number:
-        raise Misuse(f"cannot write {shown(path)}: {os.strerror(number)}")
+        raise Misuse(f"cannot write {shown(path)}: {reason(OSError(number, ''))}")
     if path.exists() and not path.is_file():
         raise Misuse(f"cannot write {path}: it is no regular file")
 
@@ -57,7 +58,7 @@ def write_bytes(path: Path, data: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     except OSError as error:
-        raise Misuse(f"cannot write {path}: {error.strerror or error}") from error
+        raise Misuse(f"cannot write {path}: {reason(error)}") from error
 
 
 def read_text(path: Path) -> TextFile:
@@ -66,4 +67,4 @@ def read_text(path: Path) -> TextFile:
     Raises `Misuse` when it cannot be read or is no text.
     """
     decoded = decode(read_bytes(path), str(path))
-    return TextFile(Source(str(path), decoded.text), decoded)
+    return TextFile(SourceText(str(path), decoded.text), decoded)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-from decimal import Decimal
 from typing import NamedTuple
 
+from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
+from steptwin.machine import Nanos
 
-_UNITS: dict[str, Nanos] = {"us": MICROSECOND, "ms": MILLISECOND, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}
-_LONGEST_H = 366 * 24
-_DURATION = re.compile(r"(\d{1,30}(?:\.\d{1,30})?|\.\d{1,30}) *([a-z]*)\Z", re.ASCII)
 _INPUT = re.compile(r"([\w.&]+) *= *(-?\d+(?:\.\d+)?) *@ *(.+)\Z", re.ASCII)
 
 
@@ -25,7 +22,10 @@ class TimedInput(NamedTuple):
 
 def parse_duration(text: str, option: str) -> Nanos:
     """``10s``, ``1.5 s``, ``500ms``, ``2min``, ``1h``; a bare number is in seconds. Raises `Misuse` in the name of ``option``."""
-    return _nanoseconds(text, f"{option} {text}")
+    try:
+        return duration(text)
+    except Misuse as error:
+        raise Misuse(f"{option}: {error}") from None
 
 
 def parse_inputs(text: str, option: str = "--input") -> list[TimedInput]:
@@ -35,16 +35,5 @@ def parse_inputs(text: str, option: str = "--input") -> list[TimedInput]:
         match = _INPUT.match(part)
         if match is None:
             raise Misuse(f"{option} {part}: expected PIN=VALUE@TIME, such as IN3=1@2s or AIN1=4.2@500ms")
-        inputs.append(TimedInput(_nanoseconds(match[3], f"{option} {part}"), match[1].upper(), float(match[2])))
+        inputs.append(TimedInput(parse_duration(match[3], f"{option} {part}"), match[1].upper(), float(match[2])))
     return sorted(inputs, key=lambda each: each.time)
-
-
-def _nanoseconds(text: str, place: str) -> Nanos:
-    match = _DURATION.match(text.strip().lower())
-    unit = _UNITS.get(match[2] or "s") if match else None
-    if match is None or unit is None:
-        raise Misuse(f"{place}: expected a time with {', '.join(_UNITS)}, such as 90s or 500ms")
-    duration = int(Decimal(match[1]) * unit)
-    if duration > _LONGEST_H * _UNITS["h"]:
-        raise Misuse(f"{place}: permitted are 0 to {_LONGEST_H} h")
-    return duration

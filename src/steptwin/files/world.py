@@ -7,36 +7,48 @@ with World.load("machine.toml") as world:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeAlias
+from typing import Any, NamedTuple, Self, TypeAlias
 
+from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import Progress, silent
+from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import read_bytes, shown
-from steptwin.m1486.chip import M1486
 from steptwin.machine import SECOND, Nanos
-from steptwin.mic488.device import Mic488
 from steptwin.world import script as do
+from steptwin.world.build import memory_file
 from steptwin.world.description import describe, read_world
-from steptwin.world.durations import duration
 from steptwin.world.faults import Fault
 from steptwin.world.faults import read as read_fault
+from steptwin.world.kind import ControllerKind, M, S, V
+from steptwin.world.kinds import M1486, MIC488
 from steptwin.world.overrides import NO_OVERRIDES, Overrides
 from steptwin.world.plant import Plant, PlantSnapshot
 from steptwin.world.running import Script
 from steptwin.world.spec import WorldSpec
-from steptwin.world.views import AxisView, LineView, M1486View, Mic488View, Views
+from steptwin.world.views import LineView, MechanicsView, Views
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
-"""A condition that never comes true is given up after an hour, where nothing else is said."""
+"""A condition that never comes true is given up after an hour, where no other limit is given."""
 SLICES = 200
-"""In so many parts a run is done at least, where somebody watches its progress."""
+"""In so many parts a run is done at least, where its progress is shown."""
 LONGEST_SLICE_NS: Nanos = 10 * SECOND
-"""Somebody who watches may want it to end."""
+"""So that it can be interrupted in time."""
+
+
+class FailedSave(NamedTuple):
+    """The non-volatile memory of a machine could not be kept: the disk was full, or its like."""
+
+    time: Nanos
+    machine: str
+    reason: str
+
 
 Duration: TypeAlias = float | str
 """Seconds, or a text such as ``"10 min"``."""
@@ -45,7 +57,7 @@ Reaction: TypeAlias = do.Step | tuple[do.Step, ...] | Callable[[], object]
 
 
 class World(Plant):
-    """A world in virtual time. It begins at 0 s and runs when it is told to.
+    """A world in virtual time. It begins at 0 s and runs only on request.
 
     What is done to it from Python goes into its session and can be replayed; what is done to a `device` or `chip` behind its
     back cannot.
@@ -58,20 +70,31 @@ class World(Plant):
         *,
         keep_trace: bool = True,
         keep_inputs: bool = True,
+        state: StateDirectory | None = None,
+        failing: Iterable[FailedSave] = (),
     ) -> None:
-        super().__init__(spec, files or {}, keep_trace=keep_trace, keep_inputs=keep_inputs)
-        machines = self.machines
-        self.mic488: Views[Mic488View] = Views(
-            self, "MIC488", {name: Mic488View(self, name, m) for name, m in machines.items() if isinstance(m, Mic488)}
-        )
+        """``failing``: saves of memory that fail, as they did in the run that is replayed."""
+        self._state = state
+        self._failing = {(failed.time, failed.machine): failed.reason for failed in failing}
+        self.failed_saves: list[FailedSave] = []
+        """Memory that could not be kept so far, where inputs are kept: a replay has to see the same."""
+        keep = None if state is None and not self._failing else self._save
+        super().__init__(spec, files or {}, keep_trace=keep_trace, keep_inputs=keep_inputs, keep_memory=keep)
+        self.mic488 = self.views(MIC488)
         """The MIC488 controllers by name."""
-        self.m1486: Views[M1486View] = Views(
-            self, "M1486", {name: M1486View(self, name, m) for name, m in machines.items() if isinstance(m, M1486)}
-        )
+        self.m1486 = self.views(M1486)
         """The M1486 chips by name."""
-        self.axis: Views[AxisView] = Views(self, "axis", {name: AxisView(self, axis) for name, axis in self.axes.items()})
+        self.axis: Views[MechanicsView] = Views(
+            self, "axis", {name: MechanicsView(self, axis) for name, axis in self.axes.items()}
+        )
         """The mechanics by the names of their axes."""
         self.line: Views[LineView] = Views(self, "line", {name: LineView(self, name) for name in self.lines})
+
+    def views(self, kind: ControllerKind[S, M, V]) -> Views[V]:
+        """The controllers of a kind by name."""
+        view: Callable[[Plant, str, Any], V] = kind.view
+        there = {name: view(self, name, machine) for name, machine in self.machines.items() if self.kind(name) is kind}
+        return Views(self, kind.title.partition(" ")[2], there)
 
     # ------------------------------------------------------------------ making one
 
@@ -85,13 +108,15 @@ class World(Plant):
         keep_trace: bool = True,
         keep_inputs: bool = True,
         allow_outside: bool = False,
+        state: str | Path | None = None,
     ) -> Self:
         """The world described by a TOML file. Raises `WorldError` (a `Misuse`).
 
         ``seed`` replaces that of the description, ``overrides`` other values in it: ``{"axis.x.pitch": 4.0}``. Without
         ``keep_trace`` and ``keep_inputs`` the memory of a long run does not grow with what happens; it then has no trace and no
         session. Files the description names are read from its folder and those below, with ``allow_outside`` from anywhere: their
-        content becomes part of sessions.
+        content becomes part of sessions. ``state`` replaces the directory of non-volatile memory that the description names; the
+        world owns that directory until `close`, and raises `StateInUse` or `StateFailure` where it cannot have it.
         """
         place = Path(path)
         spec = describe(str(path), read_text(place).source.text, seed, overrides)
@@ -101,7 +126,42 @@ class World(Plant):
                 files[name] = read_bytes(_beside(place.parent, name, allow_outside=allow_outside))
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
-        return cls(spec, files, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        where = None if state is None else Path(state)
+        if where is None and spec.state is not None:
+            try:
+                where = _beside(place.parent, spec.state, allow_outside=allow_outside)
+            except Misuse as error:
+                spec.text.wrong(("world", "state"), "D003", str(error))
+        return cls._with_memory(spec, files, where, keep_trace=keep_trace, keep_inputs=keep_inputs)
+
+    def _save(self, machine: str, data: bytes, now: Nanos) -> None:
+        """Raises `StateFailure` where it is not safe."""
+        try:
+            if (now, machine) in self._failing:
+                raise StateFailure(self._failing[now, machine])
+            if self._state is not None:
+                self._state.save(machine, data)
+        except StateFailure as error:
+            if self.keeps_inputs:
+                self.failed_saves.append(FailedSave(now, machine, str(error)))
+            raise
+
+    @classmethod
+    def _with_memory(
+        cls, spec: WorldSpec, files: dict[str, bytes], where: Path | None, *, keep_trace: bool, keep_inputs: bool
+    ) -> Self:
+        """A world that reads its non-volatile memories from a directory and keeps them there."""
+        if where is None:
+            return cls(spec, files, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        with ExitStack() as opened:
+            state = opened.enter_context(StateDirectory(where))
+            for controller in spec.controllers:
+                image = state.load(controller.name)
+                if image is not None:
+                    files[memory_file(controller.name)] = image
+            world = cls(spec, files, keep_trace=keep_trace, keep_inputs=keep_inputs, state=state)
+            opened.pop_all()
+            return world
 
     @classmethod
     def from_toml(
@@ -114,15 +174,29 @@ class World(Plant):
         overrides: Overrides = NO_OVERRIDES,
         keep_trace: bool = True,
         keep_inputs: bool = True,
+        state: str | Path | None = None,
     ) -> Self:
-        """The world described by a text. ``files`` are the contents of the files it names; the rest is as in `load`."""
-        return cls(describe(name, text, seed, overrides), files, keep_trace=keep_trace, keep_inputs=keep_inputs)
+        """The world described by a text. ``files`` are the contents of the files it names; the rest is as in `load`, but that
+        non-volatile memory lasts in ``state`` alone: a text lies in no folder."""
+        spec = describe(name, text, seed, overrides)
+        where = None if state is None else Path(state)
+        return cls._with_memory(spec, dict(files or {}), where, keep_trace=keep_trace, keep_inputs=keep_inputs)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Nothing is open: for those who read with `with`."""
+        self.close()
+
+    @property
+    def state(self) -> Path | None:
+        """The directory of non-volatile memory; None: memory ends with this world."""
+        return None if self._state is None else self._state.path
+
+    def close(self) -> None:
+        """Give the directory of non-volatile memory free, where there is one. Closing twice does nothing."""
+        if self._state is not None:
+            self._state.close()
 
     # ------------------------------------------------------------------ running
 
@@ -131,15 +205,13 @@ class World(Plant):
         """The present moment in seconds."""
         return self.now / SECOND
 
-    def run(  # type: ignore[override]
-        self, until: float | str | None = None, *, for_: Duration | None = None, watch: Progress = silent
-    ) -> str | None:
+    def run(self, until: float | str | None = None, *, for_: Duration | None = None, watch: Progress = silent) -> str | None:
         """Run ``for_`` a time, or ``until`` a moment (seconds) or a condition (text, such as ``"idle"``) for an hour at most.
 
         With both it is whichever comes first. Raises `Misuse` for a moment that has passed.
 
-        Gives the condition, or the reason of a script, that ended the run before its time; else None. ``watch`` is told how far
-        it is.
+        Gives the condition, or the reason of a script, that ended the run before its time; else None. ``watch`` is called
+        with the time reached.
         """
         end = self.now + (LONGEST_RUN_NS if for_ is None else duration(for_))
         condition = until if isinstance(until, str) else None
@@ -151,23 +223,27 @@ class World(Plant):
         elif until is None and for_ is None:
             raise Misuse("run needs until or for_: a moment, a condition, or a duration")
         if watch is silent:
-            return super().run(end, condition)
+            return self.run_to(end, condition)
         begin = self.now
         slices = max(SLICES, (end - begin) // LONGEST_SLICE_NS)
         for part in range(1, slices + 1):
-            reason = super().run(begin + (end - begin) * part // slices, condition)
+            reason = self.run_to(begin + (end - begin) * part // slices, condition)
             watch(self.now)
             if reason is not None:
                 return reason
         return None
 
-    def step(self) -> Nanos | None:
-        """Run to the next moment at which anything happens by itself; gives it, None when nothing will."""
+    def due(self) -> Nanos | None:
+        """The next moment at which anything happens by itself, None when nothing will."""
         dues = [due for kernel in self.kernels if (due := kernel.deadline()) is not None]
         own = self.next()
-        due = min(dues if own is None else [*dues, own], default=None)
+        return min(dues if own is None else [*dues, own], default=None)
+
+    def step(self) -> Nanos | None:
+        """Run to the next moment at which anything happens by itself; gives it, None when nothing will."""
+        due = self.due()
         if due is not None:
-            super().run(max(due, self.now))
+            self.run_to(max(due, self.now))
         return due
 
     # ------------------------------------------------------------------ operators
@@ -212,12 +288,19 @@ class World(Plant):
 
     # ------------------------------------------------------------------ branches
 
+    def restore(self, snapshot: PlantSnapshot) -> None:
+        """As `Plant.restore`."""
+        super().restore(snapshot)
+        self.failed_saves = [failed for failed in self.failed_saves if failed.time <= snapshot.now]
+
     def branch(self, snapshot: PlantSnapshot | None = None) -> Self:
         """Another world in the state of this one, now or at a snapshot, which goes its own way.
 
         Scripts go along. Functions given to `at` and `when` do what they did: those that name this world act on this one.
         """
-        other = type(self)(self.spec, self.files, keep_trace=self.trace.is_kept, keep_inputs=self.keeps_inputs)
+        other = type(self)(
+            self.spec, self.files, keep_trace=self.trace.is_kept, keep_inputs=self.keeps_inputs, failing=self.failed_saves
+        )
         other.restore(self.snapshot() if snapshot is None else snapshot)
         return other
 

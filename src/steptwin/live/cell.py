@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
+from steptwin.live.batches import batches
 from steptwin.live.clock import Clock
-from steptwin.live.descriptors import descriptors
 from steptwin.machine import MILLISECOND, Nanos
 
 LONGEST_WAIT_S = 3600.0
@@ -18,7 +18,7 @@ LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 
 
 class Advancing(Protocol):
-    """What a cell keeps up with real time: a kernel, or a whole world. As `Kernel` says."""
+    """What a cell keeps up with real time: a kernel, or a whole world. As in `Kernel`."""
 
     stale: bool
 
@@ -35,14 +35,14 @@ class Cell:
     called with the delay.
     """
 
-    __slots__ = ("_armed_for", "_batch", "_descriptors", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
+    __slots__ = ("_armed_for", "_batch", "_batches", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
 
     def __init__(self, kernel: Advancing, clock: Clock) -> None:
         self.kernel = kernel
         self.clock = clock
         self.on_lag: Callable[[Nanos], None] | None = None
         self._loop = asyncio.get_running_loop()
-        self._descriptors = descriptors()
+        self._batches = batches()
         self._batch = 0
         """That the machines have been brought to the present for."""
         self.moments = 0
@@ -57,7 +57,7 @@ class Cell:
 
     def enter(self) -> Nanos:
         """Bring the machines to the present; inputs may be applied at the moment returned, then call `leave`."""
-        batch = self._descriptors.batch
+        batch = self._batches.current
         if batch and batch == self._batch:
             return self.kernel.now
         self._batch = batch

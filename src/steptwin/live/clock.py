@@ -37,11 +37,11 @@ class Clock:
         return max(ahead / self.speed, 0) / SECOND
 
     def lag(self, by: Nanos) -> None:
-        """From now on virtual time is ``by`` behind what it would have been; nobody may have seen the time taken back."""
+        """From now on virtual time is ``by`` behind what it would have been; the time taken back must not have been observed."""
         self._from_ns -= by
 
     def stop(self, moment: Nanos) -> None:
-        """Stand at ``moment``. No time that somebody has seen may come after it."""
+        """Stand at ``moment``. No observed time may be later."""
         self._from_ns = moment
         self.is_stopped = True
 

@@ -1,140 +1,71 @@
-"""The control endpoint of a running twin: what an operator does to pins, power and time, over a local socket.
+"""The control endpoint of a running twin: a shell around its dispatcher, over a local socket or over TCP on this computer.
 
-One request and one answer, each a line of JSON: ``{"do": NAME, ...}`` → ``{"ok": RESULT}`` or ``{"error": TEXT}``, with
-``"misuse": true`` where the request was wrong. Every request has exactly one answer, whatever it is; one that is not complete in
-time is answered with an error. Only the user who started the twin can open the socket, and clients believe no other.
+Messages are lines of JSON, as ``docs/control.md`` describes them. Every request has exactly one answer, in order; events of a
+``follow`` come after its answer, with its id. A local socket can be opened by the user who started the twin alone; over TCP the
+first line is a token that only this user can read. Everything is bounded: requests, what waits to be sent, clients.
 """
 
 from __future__ import annotations
 
 import asyncio
+import hmac
 import json
 import os
+import secrets
 import socket
-import stat
-import tempfile
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Protocol, cast
 
-from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
-from steptwin.live.links import where
-from steptwin.mic488.registers import AXES
+from steptwin.live.directory import private_directory, runtime_directory
+from steptwin.subject.commands import Command, Follow, Time, Unfollow
+from steptwin.subject.contract import Result
+from steptwin.subject.dispatch import FORM, LONGEST_REQUEST, Message, failure, read_message, respond
+from steptwin.subject.events import Event
+from steptwin.subject.following import Filter, Following, filter_of
+from steptwin.system import reason
+from steptwin.world.addresses import Address
 
-Handler = Callable[[Mapping[str, Any]], object]
-
-LONGEST_REQUEST = 65536
-LONGEST_TEXT = 4096
-"""Of a text in a request, in characters; the longest that are meant are paths."""
-LARGEST_NUMBER = 1 << 63
+HAS_LOCAL_SOCKETS = hasattr(socket, "AF_UNIX")
 TIMEOUT_S = 10.0
-"""For a request to be complete, and for its answer to be fetched."""
-SUFFIX = ".control"
-END_POINTS = "end-points"
-"""What every twin is asked for the places where it listens."""
-FORM = 'a request is a line of JSON: {"do": NAME, ...}'
+"""For a request to be complete, for a client to ask at all, and for one that reads nothing to go on reading."""
+MOST_CLIENTS = 64
+MOST_FOLLOWED = 16
+"""Follows of one client."""
+MOST_WAITING_BYTES = 1 << 18
+"""Of answers and events that a client has not read yet: no more is written before it has."""
+EVENTS_AT_ONCE = 200
+"""Written to one client before others are served."""
+SOCKET, ANNOUNCEMENT = ".control", ".twin"
+"""Suffixes in the runtime directory: a local socket; a file with the address and token of an endpoint over TCP."""
+TOKEN_BYTES = 16
 
 
-def runtime_directory() -> Path:
-    """Where sockets and pty links of this user's twins lie."""
-    base = os.environ.get("XDG_RUNTIME_DIR")
-    return Path(base) / "steptwin" if base else Path(tempfile.gettempdir()) / f"steptwin-{os.getuid()}"
+class Controlled(Protocol):
+    """What an endpoint is a shell of."""
 
-
-def private_directory(path: Path) -> Path:
-    """Make ``path`` for this user alone. Raises `Misuse` where it is something else or belongs to another user."""
-    path.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if _permissions(path) & 0o077:
-        path.chmod(0o700)
-    return path
-
-
-def _permissions(path: Path) -> int:
-    """The permission bits of a directory. Raises `Misuse` for what is no directory, or of another user."""
-    found = path.lstat()
-    if not stat.S_ISDIR(found.st_mode):
-        raise Misuse(f"{path} is no directory")
-    if found.st_uid != os.getuid():
-        raise Misuse(f"{path} belongs to another user")
-    return stat.S_IMODE(found.st_mode)
-
-
-# ---------------------------------------------------------------------- requests
-
-
-def read_request(line: bytes) -> dict[str, Any]:
-    """A request that handlers can rely on: plain texts of bounded length, finite numbers below 2⁶³. Raises `Misuse`."""
-    try:
-        request = json.loads(line)
-    except (ValueError, RecursionError):
-        raise Misuse(FORM) from None
-    if not isinstance(request, dict) or not isinstance(request.get("do"), str):
-        raise Misuse(FORM)
-    _check_values(request)
-    return request
-
-
-def _check_values(value: object) -> None:
-    if isinstance(value, dict):
-        for name, item in value.items():
-            _check_values(name)
-            _check_values(item)
-    elif isinstance(value, list):
-        for item in value:
-            _check_values(item)
-    elif isinstance(value, str):
-        if len(value) > LONGEST_TEXT:
-            raise Misuse(f"a text of {len(value)} characters: permitted are at most {LONGEST_TEXT}")
-        if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
-            raise Misuse(f"{value[:40]!r}: a text takes neither NUL nor surrogates")
-    elif isinstance(value, int | float) and not abs(value) < LARGEST_NUMBER:
-        raise Misuse("a number is not finite, or not below 2^63")
-
-
-def changes(request: Mapping[str, Any]) -> dict[str, Any]:
-    """``set`` of a request: names and values. Raises `Misuse`."""
-    found = request.get("set") or {}
-    if not isinstance(found, dict):
-        raise Misuse(f'"set" = {found!r}: expected {{NAME: VALUE, ...}}')
-    return found
-
-
-def texts(request: Mapping[str, Any], key: str) -> list[str]:
-    """A list of texts in a request. Raises `Misuse`."""
-    found = request.get(key) or []
-    if not isinstance(found, list) or not all(isinstance(text, str) for text in found):
-        raise Misuse(f'"{key}" = {found!r}: expected a list of texts')
-    return found
-
-
-def number(name: str, value: object) -> float:
-    """The value that a pin or button is to take. Raises `Misuse` for what is no number."""
-    if not isinstance(value, int | float):
-        raise Misuse(f"{name} = {value!r}: a pin takes a number")
-    return float(value)
-
-
-def axis_number(text: str) -> int:
-    """The number of an axis of a MIC488 in a request. Raises `Misuse`."""
-    if not (text.isascii() and text.isdigit() and len(text) < 10 and 1 <= int(text) <= AXES):
-        raise Misuse(f"no axis {text!r}: axes are numbered 1 to {AXES}")
-    return int(text)
-
-
-# ---------------------------------------------------------------------- serving
+    def do(self, wanted: Command) -> Result: ...
+    def follow(self, what: Filter, bound: int) -> Following: ...
+    def plans(self, what: Filter) -> list[Event]: ...
 
 
 class ControlEndpoint:
-    """Listens for requests and answers them with ``handlers``."""
+    """Listens for requests and has ``subject`` do them; over TCP where there is an ``address``, or no other way."""
 
-    def __init__(self, name: str, handlers: Mapping[str, Handler]) -> None:
+    def __init__(self, name: str, subject: Controlled, address: Address | None = None) -> None:
         self.name = name
-        self.path = runtime_directory() / f"{name}{SUFFIX}"
-        self._handlers = handlers
+        directory = runtime_directory()
+        self.path = directory / f"{name}{SOCKET}"
+        self.announcement = directory / f"{name}{ANNOUNCEMENT}"
+        self._address = address if address is not None or HAS_LOCAL_SOCKETS else Address("127.0.0.1", 0)
+        self._subject = subject
         self._owned: Ownership | None = None
-        self._server: asyncio.Server | None = None
-        self._asking: set[_Conversation] = set()
+        self._servers: list[asyncio.Server] = []
+        self._clients: set[_Conversation] = set()
+        self._token = ""
+        self.listening: Address | None = None
+        """Where it listens on TCP."""
 
     async def open(self) -> Path:
         """Listen. Raises `Misuse` when a twin of this name is running already."""
@@ -142,145 +73,236 @@ class ControlEndpoint:
             private_directory(self.path.parent)
             self._owned = Ownership(self.path.with_suffix(".lock"))
             self.path.unlink(missing_ok=True)
+            self.announcement.unlink(missing_ok=True)
             loop = asyncio.get_running_loop()
-            self._server = await loop.create_unix_server(lambda: _Conversation(self._answer, self._asking), str(self.path))
-            self.path.chmod(0o600)
+            if HAS_LOCAL_SOCKETS:
+                self._servers.append(await loop.create_unix_server(self._conversation, str(self.path)))
+                self.path.chmod(0o600)
+            if self._address is not None:
+                await self._open_tcp(self._address)
         except InUse as taken:
             raise Misuse(f"a twin named {self.name!r} is running already ({taken.owner}): give this one another --name") from None
         except OSError as error:
             await self.close()
-            raise LineFailure(f"cannot make the control socket {self.path}: {where(error)}") from error
+            raise LineFailure(f"cannot open the control endpoint {self._address or self.path}: {reason(error)}") from error
         return self.path
 
-    def _answer(self, line: bytes) -> dict[str, object]:
-        """The answer to a request. Any exception is one, too: a client that waits is never left without."""
-        try:
-            request = read_request(line)
-            wanted = request["do"]
-            handler = self._handlers.get(wanted)
-            if handler is None:
-                raise Misuse(f"this twin cannot do {wanted!r}: it can {', '.join(self._handlers)}")
-            return {"ok": handler(request)}
-        except Misuse as error:
-            return {"error": str(error), "misuse": True}
-        except SteptwinError as error:
-            return {"error": str(error)}
-        except Exception as error:  # noqa: BLE001  told to both sides
-            asyncio.get_running_loop().call_exception_handler({"message": "a control request failed", "exception": error})
-            return {"error": f"internal error, please report it: {type(error).__name__}: {error}"}
+    async def _open_tcp(self, address: Address) -> None:
+        """Listen on TCP, and leave address and token where this user alone can read them."""
+        self._token = secrets.token_hex(TOKEN_BYTES)
+        loop = asyncio.get_running_loop()
+        server = await loop.create_server(lambda: self._conversation(self._token), address.host, address.port)
+        self._servers.append(server)
+        host, port = server.sockets[0].getsockname()[:2]
+        self.listening = Address(host, port)
+        said = json.dumps({"name": self.name, "pid": os.getpid(), "host": host, "port": port, "token": self._token})
+        descriptor = os.open(self.announcement, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(said + "\n")
+
+    def _conversation(self, token: str = "") -> _Conversation:
+        return _Conversation(self._subject, self._clients, token)
 
     async def close(self) -> None:
-        if self._server is not None:
-            self._server.close()
-            for conversation in list(self._asking):
-                conversation.abort()
-            await self._server.wait_closed()
-            self._server = None
+        for server in self._servers:
+            server.close()
+        for client in list(self._clients):
+            client.abort()
+        for server in self._servers:
+            await server.wait_closed()
+        if self._servers:
             self.path.unlink(missing_ok=True)
+            self.announcement.unlink(missing_ok=True)
+        self._servers.clear()
         if self._owned is not None:
             self._owned.release()
             self._owned = None
 
 
 class _Conversation(asyncio.Protocol):
-    """One request and its answer."""
+    """One client: its requests in order, an answer to each, and the events that it follows."""
 
-    def __init__(self, answer: Callable[[bytes], dict[str, object]], asking: set[_Conversation]) -> None:
-        self._answer = answer
-        self._asking = asking
-        self._request = b""
-        self._is_answered = False
+    def __init__(self, subject: Controlled, clients: set[_Conversation], token: str) -> None:
+        self._subject = subject
+        self._clients = clients
+        self._token = token
+        """What the first line has to be; empty: nothing."""
+        self._received = b""
+        self._has_asked = False
+        self._has_ended = False
+        """The client sends no more."""
+        self._is_full = False
+        """The client has to read what was written first."""
+        self._following: dict[object, Following] = {}
+        self._timer: asyncio.TimerHandle | None = None
+        self._is_due = False
+
+    # ------------------------------------------------------------------ the connection
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
-        self._asking.add(self)
+        self._transport.set_write_buffer_limits(high=MOST_WAITING_BYTES)
+        if len(self._clients) >= MOST_CLIENTS:
+            self._end(failure(LineFailure(f"there are {MOST_CLIENTS} clients already, which is the most")))
+            return
+        self._clients.add(self)
         self._wait()
 
     def _wait(self) -> None:
+        """Some time from now on a client must have asked, finished its request, or read on."""
+        self._calm()
         self._timer = asyncio.get_running_loop().call_later(TIMEOUT_S, self._late)
 
+    def _calm(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
     def _late(self) -> None:
-        if self._is_answered:
+        if self._is_full or self._transport.is_closing():
             self.abort()
         else:
-            self._reply({"error": f"no complete request within {TIMEOUT_S:g} s: {FORM}", "misuse": True})
+            self._end(failure(Misuse(f"no complete request within {TIMEOUT_S:g} s: {FORM}")))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._timer.cancel()
-        self._asking.discard(self)
+        self._calm()
+        self._clients.discard(self)
+        self._unfollow_all()
 
-    def data_received(self, data: bytes) -> None:
-        if self._is_answered:
-            return
-        self._request += data
-        line, newline, _ = self._request.partition(b"\n")
-        if newline:
-            self._reply(self._answer(line))
-        elif len(self._request) > LONGEST_REQUEST:
-            self._reply({"error": f"a request has at most {LONGEST_REQUEST} bytes", "misuse": True})
-
-    def eof_received(self) -> None:
-        if self._request and not self._is_answered:
-            self._reply({"error": f"the request has no end of line: {FORM}", "misuse": True})
-
-    def _reply(self, answer: dict[str, object]) -> None:
-        self._is_answered = True
-        self._request = b""
-        self._timer.cancel()
-        self._wait()
-        self._transport.pause_reading()
-        self._transport.write(json.dumps(answer).encode() + b"\n")
-        self._transport.close()
+    def _unfollow_all(self) -> None:
+        for following in self._following.values():
+            following.close()
+        self._following.clear()
 
     def abort(self) -> None:
-        self._timer.cancel()
+        self._calm()
         self._transport.abort()
 
+    def eof_received(self) -> bool:
+        """The client sends no more, or has gone: what is left is answered, and nothing is followed any more."""
+        self._has_ended = True
+        self._unfollow_all()
+        if self._received and not self._is_full:
+            self._end(failure(Misuse(f"the request has no end of line: {FORM}")))
+        return self._is_full
 
-# ---------------------------------------------------------------------- asking
+    def pause_writing(self) -> None:
+        self._is_full = True
+        self._transport.pause_reading()
+        self._wait()
 
+    def resume_writing(self) -> None:
+        self._is_full = False
+        self._calm()
+        if not self._has_ended:
+            self._transport.resume_reading()
+        self._take_lines()
+        self._send_events()
+        if self._has_ended and not self._is_full:
+            self._transport.close()
 
-def _answers(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(TIMEOUT_S)
+    # ------------------------------------------------------------------ requests
+
+    def data_received(self, data: bytes) -> None:
+        self._received += data
+        self._take_lines()
+
+    def _take_lines(self) -> None:
+        while not self._is_full and not self._transport.is_closing():
+            line, newline, rest = self._received.partition(b"\n")
+            if not newline:
+                break
+            if len(line) > LONGEST_REQUEST:
+                self._end(_too_long())
+                return
+            self._received = rest
+            self._has_asked = True
+            self._take(line)
+        if self._transport.is_closing() or self._is_full:
+            return
+        if len(self._received) > LONGEST_REQUEST:
+            self._end(_too_long())
+        elif self._received and self._timer is None:
+            self._wait()
+        elif not self._received and self._has_asked:
+            self._calm()
+
+    def _take(self, line: bytes) -> None:
+        if self._token:
+            self._check_token(line)
+        else:
+            self._write(respond(self._do, line, _report))
+
+    def _check_token(self, line: bytes) -> None:
         try:
-            client.connect(str(path))
-        except OSError:
-            return False
-    return True
+            given = read_message(line, "token")["token"]
+        except Misuse:
+            given = ""
+        if not hmac.compare_digest(str(given).encode("utf-8", "replace"), self._token.encode()):
+            self._end(failure(Misuse('the first line of a connection is {"token": TOKEN}, with the token of this twin')))
+            return
+        self._token = ""
+        self._write({"ok": None})
+
+    def _do(self, wanted: Command, identity: object) -> Result:
+        if isinstance(wanted, Follow):
+            return self._subject.do(Time())._replace(value=self._follow(wanted, identity))
+        if isinstance(wanted, Unfollow):
+            following = self._following.pop(wanted.id, None)
+            if following is None:
+                raise Misuse(f"nothing is followed with the id {wanted.id!r}")
+            following.close()
+            return self._subject.do(Time())._replace(value=None)
+        return self._subject.do(wanted)
+
+    def _follow(self, wanted: Follow, identity: object) -> object:
+        if identity is None:
+            raise Misuse("follow: give an id, with which its events come")
+        if identity in self._following:
+            raise Misuse(f"follow: the id {identity!r} is in use")
+        if len(self._following) >= MOST_FOLLOWED:
+            raise Misuse(f"follow: there are {MOST_FOLLOWED} already, which is the most for a client")
+        what = filter_of(wanted.kinds, wanted.machines, wanted.axes)
+        plans = [plan.plain() for plan in self._subject.plans(what)]
+        following = self._following[identity] = self._subject.follow(what, wanted.bound)
+        following.on_event = self._events_came
+        return {"plans": plans}
+
+    # ------------------------------------------------------------------ what is sent
+
+    def _write(self, message: Message) -> None:
+        self._transport.write(json.dumps(message).encode() + b"\n")
+
+    def _end(self, message: Message) -> None:
+        """The last answer; what comes then is not read."""
+        self._received = b""
+        self._write(message)
+        self._wait()
+        self._transport.close()
+
+    def _events_came(self) -> None:
+        if not self._is_due:
+            self._is_due = True
+            asyncio.get_running_loop().call_soon(self._send_events)
+
+    def _send_events(self) -> None:
+        """Write events until the client has to read first; what waits then is bounded by its follow."""
+        self._is_due = False
+        for identity, following in self._following.items():
+            if self._is_full or self._transport.is_closing():
+                return
+            missed, events = following.take(EVENTS_AT_ONCE)
+            for event in events:
+                lost: Message = {"missed": missed} if missed else {}
+                self._write({"id": identity, "event": event.plain(), **lost})
+                missed = 0
+            if len(following):
+                self._events_came()
 
 
-def running() -> list[str]:
-    """Names of the twins of this user that answer. Raises `Misuse` where others could have put up their own."""
-    directory = runtime_directory()
-    try:
-        if _permissions(directory) & 0o022:
-            raise Misuse(f"{directory} can be written by other users, so a twin in it may be theirs: chmod 700 it")
-    except FileNotFoundError:
-        return []
-    return sorted(path.stem for path in directory.glob(f"*{SUFFIX}") if _answers(path))
+def _too_long() -> Message:
+    return failure(Misuse(f"a request has at most {LONGEST_REQUEST} bytes"))
 
 
-def ask(name: str | None, request: Mapping[str, object]) -> Any:
-    """Ask the twin ``name`` (default: the only one running). Raises `LineFailure`, `Misuse` or `Refusal`."""
-    names = running()
-    if name is None:
-        if not names:
-            raise LineFailure("no twin is running: start one with 'steptwin serve' or 'steptwin up'")
-        if len(names) > 1:
-            raise Misuse(f"several twins are running: choose one with --twin: {', '.join(names)}")
-        name = names[0]
-    elif name not in names:
-        raise LineFailure(f"no twin named {name!r} is running; running: {', '.join(names) or 'none'}")
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(TIMEOUT_S)
-        try:
-            client.connect(str(runtime_directory() / f"{name}{SUFFIX}"))
-            client.sendall(json.dumps(request).encode() + b"\n")
-            with client.makefile("rb") as stream:
-                answer = json.loads(stream.readline())
-        except (OSError, ValueError) as error:
-            raise LineFailure(f"the twin {name!r} does not answer: {error}") from error
-    if "error" in answer:
-        raise (Misuse if answer.get("misuse") else Refusal)(answer["error"])
-    return answer["ok"]
+def _report(error: Exception) -> None:
+    asyncio.get_running_loop().call_exception_handler({"message": "a control request failed", "exception": error})

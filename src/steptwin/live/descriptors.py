@@ -1,4 +1,4 @@
-"""What the links of a process wait for: file descriptors in one epoll set, served in turns.
+"""What the links of a process wait for on Linux: file descriptors in one epoll set, served in turns.
 
 An event loop takes a transport, a handle and often a sleep for every request. Here a loop is woken once, then everything that
 is ready is served until nothing is, so that a request costs little more than reading it and writing its answer.
@@ -13,6 +13,8 @@ from collections.abc import Callable
 from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
+from steptwin.live.batches import Batches, batches
+
 Serve: TypeAlias = Callable[[], None]
 """Called while a descriptor is ready, again and again; it may await or forget any descriptor, and must not block."""
 
@@ -21,18 +23,16 @@ TURN_NS = 1_000_000
 BATCH = 128
 """Descriptors served before the others are asked for."""
 LINGER_NS = 50_000
-"""Who has an answer often asks again at once. To wait for him awake spares him the time it takes to wake up."""
+"""A client often sends its next request right after an answer: polling that long without sleeping saves the wake-up."""
 MOST_SKIPPED = 1023
 
 
 class Descriptors:
     """The set of an event loop. One descriptor is awaited for one thing at a time: input, or room for output."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self.batch = 0
-        """While descriptors are served that were found ready together, the number of their batch: what they bring happens at
-        one moment. Between batches 0."""
-        self._batches = 0
+    def __init__(self, loop: asyncio.AbstractEventLoop, batches: Batches) -> None:
+        self._batches = batches
+        self._last_batch = 0
         self._epoll = select.epoll()
         self._serve: dict[int, Serve] = {}
         # Lingering that was in vain is not repeated for so many turns, and then longer still: slow masters cost nothing,
@@ -42,11 +42,11 @@ class Descriptors:
         loop.add_reader(self._epoll.fileno(), self._turn)
 
     def await_input(self, descriptor: int, serve: Serve) -> None:
-        """Call ``serve`` while there is something to read, or the other end is gone."""
+        """Call ``serve`` while there is something to read, or the other end has closed."""
         self._await(descriptor, select.EPOLLIN, serve)
 
     def await_room(self, descriptor: int, serve: Serve) -> None:
-        """Call ``serve`` while there is room to write, or the other end is gone."""
+        """Call ``serve`` while there is room to write, or the other end has closed."""
         self._await(descriptor, select.EPOLLOUT, serve)
 
     def _await(self, descriptor: int, events: int, serve: Serve) -> None:
@@ -66,14 +66,14 @@ class Descriptors:
         end = now() + TURN_NS
         ready = poll(0, BATCH)
         while ready:
-            self._batches = self.batch = self._batches + 1
+            self._batches.current = self._last_batch = self._last_batch + 1
             try:
                 for descriptor, _ in ready:
                     serve = serving.get(descriptor)
                     if serve is not None:  # one served before it has not ended it
                         serve()
             finally:
-                self.batch = 0
+                self._batches.current = 0
             if now() > end:
                 return
             ready = poll(0, BATCH) or self._linger()
@@ -102,5 +102,5 @@ def descriptors() -> Descriptors:
     loop = asyncio.get_running_loop()
     found = _of_loops.get(loop)
     if found is None:
-        found = _of_loops[loop] = Descriptors(loop)
+        found = _of_loops[loop] = Descriptors(loop, batches())
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import os
+from pathlib import Path
 from typing import Protocol
 
 from steptwin.live.cell import Cell
@@ -32,7 +32,7 @@ class Feed:
         """Whether the other end takes what is written. Unasked output is lost otherwise, as on a wire."""
         self._talks: TalkingPort | None = None
         if isinstance(port, TalkingPort):
-            self._talks = port
+            self._talks = port  # announces its output: it is not asked when there will be some
             port.on_output = self._fetch_soon
 
     def take(self, data: bytes) -> None:
@@ -42,9 +42,10 @@ class Feed:
             self._writer.write(answer)
         if cell.kernel.stale:
             cell.leave()
-        due = self._port.deadline()
-        if due is not None:
-            self._arm(due)
+        if self._talks is None:
+            due = self._port.deadline()
+            if due is not None:
+                self._arm(due)
 
     def _arm(self, due: Nanos) -> None:
         if self._timer is not None:
@@ -65,7 +66,7 @@ class Feed:
             if is_taken:
                 self._writer.write(data)
         self._cell.leave()
-        due = self._port.deadline()
+        due = self._port.deadline() if self._talks is None else None
         if due is not None:
             self._arm(due)
 
@@ -82,9 +83,9 @@ class Link(Protocol):
     async def close(self) -> None: ...
 
 
-def where(error: OSError) -> str:
-    """The reason of a system error in words."""
-    # Event loops put more into the text than the reason: the address, which the caller names anyway.
-    if error.errno is not None and error.errno > 0:
-        return os.strerror(error.errno).lower()
-    return (error.strerror or str(error)).lower()
+class PlacedLink(Link, Protocol):
+    """One that has a path."""
+
+    @property
+    def path(self) -> Path: ...
+    async def open(self) -> Path: ...

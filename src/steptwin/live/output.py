@@ -1,7 +1,7 @@
 """Text for whoever watches a served twin.
 
-A pager that is not scrolled, a terminal held by Ctrl-S: who reads our text may stop for a while, and a write to him then blocks.
-So a thread writes, and the twin goes on.
+A pager that is not scrolled, a terminal held by Ctrl-S: the reader of our output may stop for a while, and a write to it then
+blocks. So a thread writes, and the twin goes on.
 """
 
 from __future__ import annotations
@@ -10,19 +10,20 @@ import contextlib
 import os
 import queue
 import select
+import sys
 import threading
 from typing import TextIO
 
 MOST_WAITING = 10_000
 """Pieces kept for a reader that has stopped; later ones are left out."""
 PATIENCE_S = 1.0
-"""How long the end waits for him."""
+"""How long the end waits for the reader."""
 
 
 class Output:
     """Writes to ``stream``'s descriptor, in order, from a thread of its own. Also a file that rich can draw on.
 
-    Whoever closes his end is not written to any more; that is no error.
+    A reader that has closed its end gets no more output; that is no error.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -33,7 +34,7 @@ class Output:
         self._thread: threading.Thread | None = None
         if stream is not None:
             stream.flush()
-            self._thread = threading.Thread(target=self._run, args=(stream.fileno(),), name="output", daemon=True)
+            self._thread = threading.Thread(target=self._run, args=(stream,), name="output", daemon=True)
             self._thread.start()
 
     def line(self, text: str) -> None:
@@ -53,17 +54,17 @@ class Output:
     def isatty(self) -> bool:
         return self._stream is not None and self._stream.isatty()
 
-    def _run(self, descriptor: int) -> None:
+    def _run(self, stream: TextIO) -> None:
         with contextlib.suppress(OSError):
             while (data := self._waiting.get()) is not None:
-                _write_all(descriptor, data)
+                _write_all(stream, data)
                 if self._left_out and self._waiting.empty():
                     count, self._left_out = self._left_out, 0
-                    _write_all(descriptor, f"({count} lines left out: nobody read them)\n".encode())
+                    _write_all(stream, f"({count} lines left out: they were not read)\n".encode())
         self._thread = None
 
     def close(self) -> None:
-        """Write what waits, as long as somebody reads it."""
+        """Write what is queued, as long as it is read."""
         thread = self._thread
         if thread is not None:
             with contextlib.suppress(queue.Full):
@@ -72,11 +73,14 @@ class Output:
             self._thread = None
 
 
-def _write_all(descriptor: int, data: bytes) -> None:
+def _write_all(stream: TextIO, data: bytes) -> None:
+    if sys.platform == "win32" and stream.isatty():  # bytes for the descriptor of a console would be in its code page
+        stream.buffer.write(data)
+        stream.buffer.flush()
+        return
+    descriptor = stream.fileno()
     while data:
         try:
             data = data[os.write(descriptor, data) :]
-        except BlockingIOError:  # somebody who shares it made it so
-            writable = select.poll()
-            writable.register(descriptor, select.POLLOUT)
-            writable.poll()
+        except BlockingIOError:  # another process that shares it made it so
+            select.select([], [descriptor], [])

@@ -1,4 +1,4 @@
-"""The time of a live world in somebody's hands: it stands, goes in steps or at another speed, and is saved as a session.
+"""Control of the time of a live world: pause, step, another speed, and saving the session.
 
 Nothing of this is seen in the world, whose time just goes on later: a session replays whatever was done to its pace.
 """
@@ -6,40 +6,36 @@ Nothing of this is seen in the world, whose time just goes on later: a session r
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
-from steptwin.files.beginning import check_session_target
+from steptwin.files.beginning import check_session_target, is_session
+from steptwin.files.export import axis_views, check_target, write_trace
 from steptwin.files.textfiles import check_folder
-from steptwin.files.world import LONGEST_RUN_NS
 from steptwin.live.cell import Cell
-from steptwin.live.control import Handler
 from steptwin.machine import SECOND, Nanos
-from steptwin.words.records import describe, is_told
-from steptwin.world.durations import LONGEST_NS
-from steptwin.world.expression import Condition
-from steptwin.world.trace import Record
+from steptwin.subject import commands as command
+from steptwin.subject import events
+from steptwin.subject.dispatch import Action
+from steptwin.subject.events import line_of
+from steptwin.subject.fields import FASTEST, SLOWEST
+from steptwin.subject.following import Following
+from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
+from steptwin.world.expression import SignalCondition
+from steptwin.world.plant import WORLD
 
 if TYPE_CHECKING:
     from steptwin.live.world import LiveWorld
 
-SLOWEST, FASTEST = 0.001, 1000.0
 SLICE_NS: Nanos = 10 * SECOND
 """Without a clock a world runs this much at a time, so that others are served."""
 PART_S = 0.1
 """A step that takes longer is taken in parts, one for each request."""
-MOST_TOLD = 1000
-"""A part ends, too, when so much has happened that people want to know of."""
-_SEEN_CLOSELY: dict[str, Callable[[Any], str]] = {
-    "edge": lambda level: f"{level:g}",
-    "plan": lambda plan: "moves" if getattr(plan, "profile", plan).segments else "stands",
-}
-"""Records that are shown where the next thing is waited for, and their values in words."""
 
 
 def read_speed(text: str, least: float = SLOWEST) -> float:
@@ -56,16 +52,19 @@ def read_speed(text: str, least: float = SLOWEST) -> float:
     return speed
 
 
-class Pace:
-    """How the time of a live world goes; at first it stands. ``tell`` is told what a person watching should know."""
+_STANDS = events.PacePayload(paused=True, speed=None)
 
-    def __init__(self, live: LiveWorld, cell: Cell, tell: Callable[[str], None], *, has_clients: bool) -> None:
+
+class Pace:
+    """How the time of a live world goes; at first it is paused. ``show`` is called with notices for the user."""
+
+    def __init__(self, live: LiveWorld, cell: Cell, show: Callable[[str], None], *, has_clients: bool) -> None:
         self.speed = 1.0
         """Virtual seconds in a second, once it goes; infinite: as many as there can be."""
         self.is_paused = True
         self._live = live
         self._cell = cell
-        self._tell = tell
+        self._show = show
         self._has_clients = has_clients
         self._turn: asyncio.Handle | None = None
         cell.clock.stop(live.now)
@@ -77,14 +76,14 @@ class Pace:
             self.is_paused = False
             self._go()
         if speed != 1.0:
-            self._say(f"time goes on{self._how}" if speed else "time stands")
+            self._say(self._goes() if speed else _STANDS)
 
     def pause(self) -> None:
         """Time stands from now on."""
         self._halt()
         if not self.is_paused:
             self.is_paused = True
-            self._say("time stands")
+            self._say(_STANDS)
 
     def resume(self, speed: float | None = None) -> None:
         """Time goes on, at another speed where one is given; while it goes, only that changes. Raises `Misuse`."""
@@ -95,18 +94,17 @@ class Pace:
             self.speed = speed
         if changes:
             self._halt()
-            self._say(f"time goes on{self._how}")
+            self._say(self._goes())
             self.is_paused = False
             self._go()
 
-    @property
-    def _how(self) -> str:
-        if self.speed == inf:
-            return " as fast as possible"
-        return "" if self.speed == 1.0 else f", {self.speed:g} virtual seconds a second"
+    def _goes(self) -> events.PacePayload:
+        return events.PacePayload(paused=False, speed=None if self.speed == inf else self.speed)
 
-    def _say(self, text: str) -> None:
-        self._tell(describe(Record(self._live.now, "world", "event", "pace", text)))
+    def _say(self, pace: events.PacePayload) -> None:
+        """Notify users and followers."""
+        self._show(line_of(self._live.now, WORLD, pace.text))
+        self._live.subject.paced(pace)
 
     def _halt(self) -> None:
         """Bring the world to the present and stop the clock there."""
@@ -137,98 +135,104 @@ class Pace:
 
     # ------------------------------------------------------------------ steps
 
-    def step(self, end: Nanos, condition: Condition | None, happened: list[str], *, closely: bool = False) -> bool | None:
+    def step(self, end: Nanos, condition: SignalCondition | None, following: Following) -> bool | None:
         """Go on to the moment ``end``, or until a condition is true; gives whether that ended it, None for not there yet.
 
-        What people want to know of is added to ``happened``; ``closely``: levels and motions too.
+        A part ends, too, when as much has happened as fits into ``following``.
         """
         live = self._live
         world = live.world
         until = perf_counter() + PART_S
         moves = False
-
-        def listen(record: Record) -> None:
-            if is_told(record):
-                happened.append(describe(record))
-            elif closely and record.kind in _SEEN_CLOSELY:
-                happened.append(describe(record._replace(value=_SEEN_CLOSELY[record.kind](record.value))))
-
-        world.trace.watchers.append(listen)
         try:
             while True:
                 if condition is not None and world.holds(condition):
                     return True
                 if live.now >= end or world.stopped is not None:
                     return False
-                if moves and (perf_counter() > until or len(happened) >= MOST_TOLD):
+                if moves and (perf_counter() > until or len(following) >= MOST_SHOWN // 2):
                     return None
                 dues = [end, live.deadline(), None if condition is None else condition.due(live.now)]
                 live.advance(max(live.now, min(due for due in dues if due is not None)))
                 moves = True
         finally:
-            world.trace.watchers.remove(listen)
             self._cell.clock.stop(live.now)
             self._cell.close()  # a timer set for what has been done would find that it was held up
 
-    # ------------------------------------------------------------------ requests
+    # ------------------------------------------------------------------ commands
 
-    def handlers(self) -> dict[str, Handler]:
-        """Requests of the control endpoint. Moments and durations are in nanoseconds."""
-        return {"pause": self._asked_to_pause, "resume": self._asked_to_resume, "step": self._asked_to_step, "save": self._save}
-
-    def _where(self) -> dict[str, object]:
+    def actions(self) -> dict[type, Action]:
+        """Commands that bring the world to the present themselves."""
         return {
-            "world": self._live.world.spec.name,
-            "time_ns": self._live.now,
-            "time_s": self._live.now / SECOND,
-            "paused": self.is_paused,
-            "speed": "max" if self.speed == inf else self.speed,
+            command.Pause: self._pause,
+            command.Resume: self._resume,
+            command.Advance: self._advance,
+            command.Save: self._save,
         }
 
-    def _asked_to_pause(self, _: Mapping[str, Any]) -> object:
+    def where(self) -> dict[str, object]:
+        """The present moment, and how time goes."""
+        speed = "max" if self.speed == inf else self.speed
+        return {**self._live.subject.time(), "paused": self.is_paused, "speed": speed}
+
+    def _pause(self, _: command.Pause) -> object:
         self.pause()
-        return self._where()
+        return self.where()
 
-    def _asked_to_resume(self, request: Mapping[str, Any]) -> object:
-        speed = request.get("speed")
-        self.resume(None if speed is None else read_speed(str(speed)))
-        return self._where()
+    def _resume(self, wanted: command.Resume) -> object:
+        self.resume(wanted.speed)
+        return self.where()
 
-    def _asked_to_step(self, request: Mapping[str, Any]) -> object:
+    def _advance(self, wanted: command.Advance) -> object:
         """A step, or its next part: ``to_ns`` of the answer, where there is one, is for the request for that."""
-        text = request.get("until")
-        if text is not None and not isinstance(text, str):
-            raise Misuse(f"until = {text!r}: expected a condition")
-        condition = None if text is None else self._live.world.condition(text)
-        given = {key: request[key] for key in ("to_ns", "for_ns") if request.get(key) is not None}
-        for key, value in given.items():
-            if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= LONGEST_NS:
-                raise Misuse(f"{key} = {value!r}: permitted are whole nanoseconds from 0 to {LONGEST_NS}")
+        live = self._live
+        condition = None if wanted.until is None else live.world.condition(wanted.until)
         self.pause()
-        end = self._end_of(given, has_condition=condition is not None)
-        happened: list[str] = []
-        is_next = condition is None and not given
-        came = False if end is None else self.step(end, condition, happened, closely=is_next)
-        stopped = self._live.world.stopped
-        rest = {} if came is not None else {"to_ns": end}
-        return {**self._where(), "happened": happened, "came": came is True, "stopped": stopped, "idle": end is None, **rest}
+        end = end_of(live.world, wanted, live.deadline())
+        following = live.subject.follow(shown_of(wanted), MOST_SHOWN)
+        try:
+            came = False if end is None else self.step(end, condition, following)
+        finally:
+            following.close()
+        rest = {} if came is not None else {"to_ns": str(end)}
+        return {
+            **self.where(),
+            **happened(following),
+            "came": came is True,
+            "idle": end is None,
+            "statements": self._statements(),
+            **rest,
+        }
 
-    def _end_of(self, given: Mapping[str, Nanos], *, has_condition: bool) -> Nanos | None:
-        """The moment to which a step goes. Without a time that is the next thing that happens by itself; None: nothing will."""
-        if "to_ns" in given:
-            return given["to_ns"]
-        if "for_ns" in given:
-            return self._live.now + given["for_ns"]
-        return self._live.now + LONGEST_RUN_NS if has_condition else self._live.deadline()
+    def _statements(self) -> dict[str, str]:
+        """Where the programs of controllers are that run or are paused, by controller."""
+        world = self._live.world
+        found = {name: world.kind(name).statement(machine) for name, machine in world.machines.items()}
+        return {name: text for name, text in found.items() if text is not None}
 
-    def _save(self, request: Mapping[str, Any]) -> object:
-        file = request.get("file")
-        if not isinstance(file, str) or not Path(file).is_absolute():
-            raise Misuse(f"file = {file!r}: must be the absolute path of a file")
-        path = Path(file)
+    def _save(self, wanted: command.Save) -> object:
+        path = Path(wanted.file)
+        if not path.is_absolute():
+            raise Misuse(f"file = {wanted.file!r}: must be the absolute path of a file")
+        if not is_session(path):
+            return self._save_ring(path)
         check_session_target(path)
         check_folder(path)
         self._cell.enter()
         session = self._live.session()
         sessions.save(session, path)
-        return {**self._where(), "file": file, "inputs": len(session.inputs), "digest": session.digest}
+        return {**self.where(), "file": wanted.file, "inputs": len(session.inputs), "digest": session.digest}
+
+    def _save_ring(self, path: Path) -> object:
+        """The last records, in the format of the file's suffix."""
+        ring, world = self._live.ring, self._live.world
+        if ring is None:
+            raise Misuse(
+                f"{path}: this world keeps no last records: start it with --trace 'ring 10000'; a session is called NAME.json"
+            )
+        check_target(path)
+        self._cell.enter()
+        trace = ring.trace()
+        begin = next((record.time for record in trace), world.now)
+        written = write_trace(trace, path, views=axis_views(world), title=world.spec.name, begin=begin, ended=world.now)
+        return {**self.where(), "files": [str(one) for one in written], "records": len(trace)}

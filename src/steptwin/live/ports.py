@@ -6,18 +6,19 @@ import contextlib
 from dataclasses import dataclass
 
 from steptwin.errors import LineFailure, Refusal
-from steptwin.live.control import END_POINTS, ask, running
+from steptwin.live.remote import ask, running
+from steptwin.subject.commands import EndPoints
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FoundPort:
     """An address as every command takes it, and what is known of it."""
 
     address: str
     what: str
 
 
-def serial_ports() -> list[Place]:
+def serial_ports() -> list[FoundPort]:
     """The serial ports of this system, those of USB adapters with their maker's words."""
     import serialx
 
@@ -27,18 +28,18 @@ def serial_ports() -> list[Place]:
         what = " ".join(word for word in words if word) or "serial port"
         if port.vid is not None and port.pid is not None:
             what += f" ({port.vid:04X}:{port.pid:04X})"
-        found.append(Place(str(port.device), what))
+        found.append(FoundPort(str(port.device), what))
     return found
 
 
-def twin_ports() -> list[Place]:
+def twin_ports() -> list[FoundPort]:
     """The pseudo terminals of running twins, as far as they answer."""
     found = []
     for name in running():
         with contextlib.suppress(LineFailure, Refusal):  # gone meanwhile
             found += [
-                Place(point["path"], f"twin {name}, {point['protocol']}")
-                for point in ask(name, {"do": END_POINTS})
+                FoundPort(point["path"], f"twin {name}, {point['protocol']}")
+                for point in ask(name, EndPoints())["end_points"]
                 if point["kind"] == "pty"
             ]
     return found

@@ -13,17 +13,21 @@ from pathlib import Path
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
 from steptwin.live.cell import Cell
-from steptwin.live.links import SLICE_BYTES, Feed, where
+from steptwin.live.links import SLICE_BYTES, Feed
 from steptwin.machine import Port
+from steptwin.system import HAS_EPOLL, reason
 
-PTS = "/dev/pts/"
+DEVICES = ("/dev/pts/", "/dev/ttys")
+"""What links to pseudo terminals lead to, on Linux and on macOS."""
+LOOK_S = 0.02
+"""How often it is seen whether a program has come, where there is no epoll."""
 
 
 class PtyLink:
     """A pty whose far end is reached through the symbolic link ``path``.
 
     A program that opens it meets a new port: what one that went away had begun or had not read is not there for the next. (Where
-    the next is there before the hang-up has been noticed, within a fraction of a millisecond, they cannot be told apart.)
+    the next is there before the hang-up has been noticed, within a fraction of a millisecond, they cannot be distinguished.)
     """
 
     def __init__(self, cell: Cell, path: Path, make_port: Callable[[], Port]) -> None:
@@ -35,9 +39,10 @@ class PtyLink:
         self._master = -1
         self._device = ""
         self._stirring: select.epoll | None = None
+        self._next_look: asyncio.Handle | None = None
         self._feed: Feed | None = None
         self._quiet = True
-        """Nobody has sent anything since the last program left."""
+        """Nothing has been sent since the last program closed it."""
 
     async def open(self) -> Path:
         """Make the pty and its link. Raises `LineFailure`, or `Misuse` where the path is taken."""
@@ -48,8 +53,9 @@ class PtyLink:
             self._device = os.ttyname(slave)
             os.close(slave)
             os.set_blocking(self._master, False)
-            self._stirring = select.epoll()
-            self._stirring.register(self._master, select.EPOLLIN | select.EPOLLET)
+            if HAS_EPOLL:
+                self._stirring = select.epoll()
+                self._stirring.register(self._master, select.EPOLLIN | select.EPOLLET)
             fresh = self.path.with_name(f".{self.path.name}.{os.getpid()}")
             fresh.symlink_to(self._device)
             fresh.replace(self.path)
@@ -57,7 +63,7 @@ class PtyLink:
             raise Misuse(f"{self.path} is the pseudo terminal of {taken.owner}: choose another --pty") from None
         except OSError as error:
             await self.close()
-            raise LineFailure(f"cannot make a pseudo terminal at {self.path}: {where(error)}") from error
+            raise LineFailure(f"cannot make a pseudo terminal at {self.path}: {reason(error)}") from error
         self._left()
         return self.path
 
@@ -69,13 +75,13 @@ class PtyLink:
         if self.path.is_symlink():
             target = os.readlink(self.path)
             # A number under /dev/pts is given to another process as soon as its owner ends: only the lock shows whose link it is.
-            if not target.startswith(PTS) or (self.path.exists() and not self._owned.left_behind):
+            if not target.startswith(DEVICES) or (self.path.exists() and not self._owned.left_behind):
                 self._owned.release()
                 raise Misuse(f"{self.path} is somebody's link to {target}: choose another --pty")
 
     def write(self, data: bytes) -> None:
         """Send; what finds no room or no program there is lost, as on a serial line whose other end does not listen."""
-        if self._quiet and _is_hung_up(self._master):
+        if self._quiet and (self._stirring is None or _is_hung_up(self._master)):
             return
         try:
             os.write(self._master, data)
@@ -83,18 +89,12 @@ class PtyLink:
             return
 
     # While no program has the line open the master reports a hang-up, so the loop would never rest on it. An edge-triggered epoll
-    # reports that once, and then again when there is something to read or a program has come and gone.
+    # reports that once, and then again when there is something to read or a program has come and gone. Where there is no epoll
+    # the terminal is read from time to time.
 
     def _left(self) -> None:
-        """The last program closed the line: raw again, emptied of what it had not read, and a new port for the next one."""
-        slave = os.open(self._device, os.O_RDWR | os.O_NOCTTY)
-        try:
-            # The next program may be quick: its settings and what it has sent already must not be touched.
-            if not _is_raw(slave):
-                tty.setraw(slave, termios.TCSANOW)
-            termios.tcflush(slave, termios.TCIFLUSH)
-        finally:
-            os.close(slave)
+        """The last program closed the line: it is made ready for the next one, which meets a new port."""
+        self._make_raw()
         if self._feed is not None:
             self._feed.close()
         self._feed = Feed(self._cell, self._make_port(), self)
@@ -103,6 +103,19 @@ class PtyLink:
             self._loop.add_reader(self._stirring.fileno(), self._stirred)
             # Our own coming and going was reported too.
             self._look(self._stirring)
+        else:
+            self._next_look = self._loop.call_later(LOOK_S, self._look_again)
+
+    def _make_raw(self) -> None:
+        """Raw again, and emptied of what the last program had not read."""
+        slave = os.open(self._device, os.O_RDWR | os.O_NOCTTY)
+        try:
+            # The next program may be quick: its settings and what it has sent already must not be touched.
+            if not _is_raw(slave):
+                tty.setraw(slave, termios.TCSANOW)
+            termios.tcflush(slave, termios.TCIFLUSH)
+        finally:
+            os.close(slave)
 
     def _stirred(self) -> None:
         if self._stirring is not None and not self._look(self._stirring):
@@ -117,16 +130,45 @@ class PtyLink:
         self._loop.add_reader(self._master, self._readable)
         return True
 
+    def _look_again(self) -> None:
+        """Whether a program has come since: what no program has open cannot be read."""
+        self._next_look = None
+        try:
+            data = self._read()
+        except BlockingIOError:  # it has sent nothing yet
+            data = b""
+        else:
+            if not data:
+                if not _is_raw(self._master):  # a program came and went meanwhile
+                    self._make_raw()
+                self._next_look = self._loop.call_later(LOOK_S, self._look_again)
+                return
+        self._quiet = False
+        self._loop.add_reader(self._master, self._readable)
+        self._take(data)
+
     def _readable(self) -> None:
         try:
-            data = os.read(self._master, SLICE_BYTES)
+            data = self._read()
         except BlockingIOError:
             return
-        except OSError:
+        if data:
+            self._take(data)
+        else:
             self._loop.remove_reader(self._master)
             self._left()
-            return
-        if self._feed is not None:
+
+    def _read(self) -> bytes:
+        """What has come; nothing when no program has the line open. Raises `BlockingIOError`."""
+        try:
+            return os.read(self._master, SLICE_BYTES)
+        except BlockingIOError:
+            raise
+        except OSError:
+            return b""
+
+    def _take(self, data: bytes) -> None:
+        if self._feed is not None and data:
             self._feed.take(data)
 
     async def close(self) -> None:
@@ -134,6 +176,9 @@ class PtyLink:
             self._loop.remove_reader(self._stirring.fileno())
             self._stirring.close()
             self._stirring = None
+        if self._next_look is not None:
+            self._next_look.cancel()
+            self._next_look = None
         if self._feed is not None:
             self._feed.close()
             self._feed = None

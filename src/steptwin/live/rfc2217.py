@@ -19,11 +19,11 @@ SIGNATURE, BAUD_RATE, DATA_SIZE, PARITY, STOP_SIZE, CONTROL = range(6)
 LINE_STATE_MASK, MODEM_STATE_MASK, PURGE = 10, 11, 12
 NOTIFY_MODEM_STATE = 7
 ANSWER = 100
-"""Added to a command in what the server says."""
+"""Added to a command in answers of the server."""
 
 CTS_DSR_CD = 0xB0
 MOST_HELD = 256
-"""Bytes of one subnegotiation; the longest that means anything has six, a signature is what people write."""
+"""Bytes of one subnegotiation; the longest that means anything has six, a signature is free text."""
 WHO = b"steptwin"
 
 # SET-CONTROL: a value belongs to the group whose number asks for it (flow control, BREAK, DTR, RTS, inbound flow control).
@@ -46,12 +46,12 @@ _STOP_BITS = {1: "1", 2: "2", 3: "1.5"}
 
 
 def _unnoticed(text: str) -> None:
-    """For ports that are made without anybody to tell."""
+    """For ports without a receiver of notices."""
 
 
 @dataclass(frozen=True, slots=True)
 class TwinLine:
-    """The serial line of a twin, 8N1. ``baud`` gives its present rate in bit/s; ``notice`` is called with events for people."""
+    """The serial line of a twin, 8N1. ``baud`` gives its present rate in bit/s; ``notice`` takes notices for the user."""
 
     baud: Callable[[], int] = lambda: 38400
     is_timed: bool = False
@@ -121,7 +121,7 @@ class Telnet:
             self._command = b""
 
     def _negotiated(self, kind: int, option: int) -> bytes:
-        """Agree to what is known, refuse the rest, and say nothing about what is so already."""
+        """Agree to what is known, refuse the rest, and answer nothing where the state is unchanged."""
         side, agree, refuse = (self._ours, WILL, WONT) if kind in (DO, DONT) else (self._theirs, DO, DONT)
         if kind in (DO, WILL):
             if option not in OPTIONS:
@@ -142,7 +142,7 @@ class Telnet:
         return COM_PORT in (self._theirs if side is self._ours else self._ours)
 
     def _answered(self, content: bytes) -> bytes:
-        """The answer to a subnegotiation: each setting is taken and told as taken; 0 asks for the present one."""
+        """The answer to a subnegotiation: each setting is taken and confirmed; 0 asks for the present one."""
         if len(content) < 2 or content[0] != COM_PORT:
             return b""
         command, value = content[1], content[2:]

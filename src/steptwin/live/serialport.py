@@ -10,8 +10,9 @@ import serialx
 
 from steptwin.errors import LineFailure
 from steptwin.live.cell import Cell
-from steptwin.live.links import Feed, where
+from steptwin.live.links import Feed
 from steptwin.machine import Port
+from steptwin.system import reason
 
 RETRY_S = 1.0
 """How often a device that has disappeared is looked for."""
@@ -39,8 +40,8 @@ class SerialLink:
         try:
             self._transport, _ = await serialx.create_serial_connection(loop, self._make_line, self._device, self._baud)
         except (OSError, serialx.SerialException) as error:
-            reason = where(error) if isinstance(error, OSError) else str(error)
-            raise LineFailure(f"cannot open serial port {self._device} at {self._baud} bit/s: {reason}") from error
+            why = reason(error)
+            raise LineFailure(f"cannot open serial port {self._device} at {self._baud} bit/s: {why}") from error
         return self._device
 
     def _make_line(self) -> _Line:
@@ -49,8 +50,8 @@ class SerialLink:
     def _lost(self, error: Exception | None) -> None:
         self._transport = None
         if not self._closing:
-            reason = where(error) if isinstance(error, OSError) else str(error or "closed")
-            self._notice(f"serial port {self._device} is gone ({reason}); it is looked for")
+            why = "closed" if error is None else reason(error)
+            self._notice(f"serial port {self._device} is gone ({why}); it is looked for")
             self._search = asyncio.get_running_loop().create_task(self._look_for_it())
 
     async def _look_for_it(self) -> None:

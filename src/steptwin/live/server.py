@@ -6,114 +6,146 @@ import asyncio
 import contextlib
 import json
 import os
-import resource
-import signal
 import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.inputfiles import read_bytes
 from steptwin.live.cell import Cell
-from steptwin.live.control import END_POINTS, ControlEndpoint, Handler
-from steptwin.live.links import Link, where
-from steptwin.live.pty import PtyLink
-from steptwin.live.tcp import Clients, TcpLink
+from steptwin.live.clients import Clients
+from steptwin.live.control import ControlEndpoint, Controlled
+from steptwin.live.filelimit import allow_many_files
+from steptwin.live.links import Link
+from steptwin.live.rfc2217 import TwinLine
+from steptwin.live.signals import on_end
+from steptwin.live.transports import Opening, Transport
 from steptwin.machine import SECOND, Nanos, Port
+from steptwin.system import process_exists, reason
 from steptwin.world.addresses import Address
 
-MOST_FILES = 65536
-"""Every client is an open file; the usual limit of 1024 is for programs with few."""
 OTHER_FILES = 32
 """Files that are no clients."""
 REPEAT_S = 1.0
 """The same notice is not given again within this time."""
 
 
+UNTIMED = TwinLine()
+"""For links on which characters take no time."""
+
+Controllers = Callable[[], Sequence[Mapping[str, object]]]
+"""The controllers of a twin at present: ``name``, ``kind``, ``line`` (None: on none), and their address there: ``unit`` of a
+MIC488, ``chip`` (a hexadecimal digit) of an M1486."""
+
+
 @dataclass(frozen=True, slots=True)
 class EndPoint:
-    """Where a twin listens. ``kind``: pty, serial, tcp, rtu-tcp."""
+    """Where a twin listens. ``kind``: pty, serial, tcp, rtu-tcp, rfc2217, vision. ``line``: the name of the one reached there."""
 
     kind: str
     place: str
     protocol: str
     details: Mapping[str, object] = field(default_factory=dict)
+    line: str | None = None
+
+    def announced(self) -> dict[str, object]:
+        """As clients see it, in JSON."""
+        return {"kind": self.kind, "protocol": self.protocol, "line": self.line, **self.details}
 
 
 class Server:
     """Opens links one after the other and closes all of them, whatever happened.
 
-    ``tell`` is called with texts for the person watching.
+    ``show`` is called with notices for the user.
     """
 
-    def __init__(self, cell: Cell, tell: Callable[[str], None]) -> None:
+    def __init__(self, cell: Cell, show: Callable[[str], None]) -> None:
         self.cell = cell
         self.end_points: list[EndPoint] = []
-        self._tell = tell
+        self._show = show
         self._told: dict[str, float] = {}
         self._links: list[Link] = []
         self._ready_file: tuple[Path, str] | None = None
+        self._name = ""
+        self._controllers: Controllers = tuple
+        self._file: Path | None = None
         self._ended: asyncio.Event = asyncio.Event()
         self._failure: str | None = None
         cell.on_lag = self._lagged
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(self._trouble)
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) is not signal.SIG_IGN:  # nohup
-                loop.add_signal_handler(number, self._ended.set)
+        on_end(loop, self._ended.set)
         self._clients = Clients(max(1, allow_many_files() - OTHER_FILES), self.notice)
 
     def notice(self, text: str) -> None:
-        """Tell the person watching, but not the same thing again and again."""
+        """Show a notice to the user, but not the same one again and again."""
         now = asyncio.get_running_loop().time()
         self._told = {told: at for told, at in self._told.items() if now - at < REPEAT_S}
         if text not in self._told:
             self._told[text] = now
-            self._tell(text)
+            self._show(text)
 
-    async def open_pty(self, path: Path, protocol: str, make_port: Callable[[], Port]) -> None:
-        link = PtyLink(self.cell, path, make_port)
-        await link.open()
-        self._links.append(link)
-        self.end_points.append(EndPoint("pty", str(link.path), protocol, {"path": str(link.path)}))
+    async def open(
+        self,
+        transport: Transport,
+        where: str,
+        protocol: str,
+        make_port: Callable[[], Port],
+        *,
+        line: str | None = None,
+        wire: TwinLine = UNTIMED,
+        listen_any: bool = False,
+    ) -> None:
+        """Let programs outside reach the ports that are made: ``where`` is as the transport takes it.
 
-    async def open_serial(self, device: str, baud: int, protocol: str, make_port: Callable[[], Port]) -> None:
-        from steptwin.live.serialport import SerialLink
+        Raises `LineFailure`, or `Misuse` for a place that is not permitted.
+        """
+        wire = replace(wire, notice=self.notice)
+        opened = await transport.open(
+            Opening(where=where, make_port=make_port, line=wire, cell=self.cell, clients=self._clients, listen_any=listen_any)
+        )
+        self._links.append(opened.link)
+        self.end_points.append(EndPoint(transport.kind, opened.place, protocol, opened.details, line))
 
-        link = SerialLink(self.cell, device, baud, make_port, self.notice)
-        await link.open()
-        self._links.append(link)
-        self.end_points.append(EndPoint("serial", f"{device} at {baud} bit/s", protocol, {"device": device, "baud": baud}))
-
-    async def open_tcp(self, kind: str, address: Address, protocol: str, make_port: Callable[[], Port]) -> None:
-        link = TcpLink(self.cell, address, make_port, self._clients)
-        listening = await link.open()
-        self._links.append(link)
-        details = {"host": listening.host, "port": listening.port}
-        self.end_points.append(EndPoint(kind, str(listening), protocol, details))
-
-    async def open_control(self, name: str, handlers: Mapping[str, Handler]) -> None:
-        """Open the control endpoint: what ``handlers`` do, and the ``end-points`` of the server."""
-        endpoint = ControlEndpoint(name, {**handlers, END_POINTS: lambda _: self._where()})
+    async def open_control(
+        self,
+        name: str,
+        subject: Controlled,
+        controllers: Controllers = tuple,
+        file: Path | None = None,
+        address: Address | None = None,
+    ) -> None:
+        """Open the control endpoint of ``subject``, which was made from ``file``; over TCP too where there is an ``address``."""
+        self._name, self._controllers, self._file = name, controllers, file
+        endpoint = ControlEndpoint(name, subject, address)
         await endpoint.open()
         self._links.append(endpoint)
+        if endpoint.listening is not None:
+            self.end_points.append(EndPoint("control", str(endpoint.listening), "control", {"file": str(endpoint.announcement)}))
 
-    def _where(self) -> list[dict[str, object]]:
-        return [{"kind": e.kind, "protocol": e.protocol, **e.details} for e in self.end_points]
+    def announcement(self) -> dict[str, object]:
+        """The twin for programs that look for it: name, process, file it was made from, controllers, end points."""
+        return {
+            "name": self._name,
+            "pid": os.getpid(),
+            "file": None if self._file is None else str(self._file.absolute()),
+            "controllers": list(self._controllers()),
+            "end_points": [end_point.announced() for end_point in self.end_points],
+        }
 
-    def write_ready_file(self, path: Path, name: str) -> None:
-        """A JSON file with process id and end points; whole or not there at all, gone when the server ends."""
-        text = json.dumps({"name": name, "pid": os.getpid(), "end_points": self._where()}, indent=2) + "\n"
+    def write_ready_file(self, path: Path) -> None:
+        """The `announcement` as a JSON file; whole or not there at all, removed when the server ends."""
+        text = json.dumps(self.announcement(), indent=2) + "\n"
         fresh = path.with_name(f".{path.name}.{os.getpid()}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            fresh.write_text(text)
+            fresh.write_text(text, encoding="utf-8")
             fresh.replace(path)
         except OSError as error:
             fresh.unlink(missing_ok=True)
-            raise LineFailure(f"cannot write the ready file {path}: {where(error)}") from error
+            raise LineFailure(f"cannot write the ready file {path}: {reason(error)}") from error
         self._ready_file = path, text
 
     def end(self) -> None:
@@ -141,7 +173,7 @@ class Server:
         if isinstance(error, SteptwinError):
             self.fail(str(error))
         elif isinstance(error, OSError):
-            self.notice(f"{context['message']}: {where(error)}")
+            self.notice(f"{context['message']}: {reason(error)}")
         elif error is None:
             self.notice(context["message"])
         else:
@@ -163,12 +195,12 @@ class Server:
         path, text = self._ready_file
         self._ready_file = None
         with contextlib.suppress(OSError):
-            if path.read_text() == text:
+            if path.read_text(encoding="utf-8") == text:
                 path.unlink()
 
 
 def clear_ready_file(path: Path) -> None:
-    """Remove what a server that is gone left behind, so that a waiting program does not take it for the new one's.
+    """Remove what an ended server left behind, so that a waiting program does not take it for the new one's.
 
     Raises `Misuse` where the path is taken by another kind of file.
     """
@@ -185,15 +217,5 @@ def clear_ready_file(path: Path) -> None:
         pid = None
     if not isinstance(pid, int) or not 0 < pid < 1 << 31:
         raise Misuse(f"{path} exists and is no ready file: choose another --ready-file")
-    if pid == os.getpid() or not Path(f"/proc/{pid}").exists():
+    if pid == os.getpid() or not process_exists(pid):
         path.unlink()
-
-
-def allow_many_files() -> int:
-    """Raise the limit of open files as far as this process may, up to `MOST_FILES`; returns it."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
-    if soft == resource.RLIM_INFINITY or soft >= wanted:
-        return MOST_FILES if soft == resource.RLIM_INFINITY else soft
-    resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-    return wanted

@@ -23,5 +23,5 @@ def check_line_timing(wanted: str, *real: str) -> None:
 
 
 def shows_live_view(output: Output, *, log_frames: bool) -> bool:
-    """Whether ``output`` is a terminal to draw on, and nobody wants the frames there."""
+    """Whether ``output`` is a terminal to draw on, and no frames are to be shown there."""
     return output.isatty() and not log_frames and os.environ.get("TERM", "dumb") not in ("dumb", "unknown")

@@ -7,26 +7,39 @@ from heapq import heappop, heappush
 
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
+from steptwin.files.export.tracefile import Ring
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.machine import Nanos
 from steptwin.mic488.vision import VisionReceiver
+from steptwin.subject.world import WorldSubject
 from steptwin.world.actions import Bytes, Leave, Outside, See
 from steptwin.world.kernel import Kernel
-from steptwin.world.lines import ModbusLine, Place
+from steptwin.world.lines import LineEndPoint
 
 MOST_INPUTS = 200_000
 MOST_INPUT_BYTES = 16 << 20
 """Where a recorded session ends, so that its memory and its file stay bounded."""
 
 
+def announced(world: World) -> list[dict[str, object]]:
+    """The controllers of a world for programs that look for them: name, kind, line and present address there."""
+    found: list[dict[str, object]] = []
+    for name, machine in world.machines.items():
+        kind, on = world.kind(name), world.plan.line_of.get(name)
+        where = {"line": None} if on is None else {"line": on[0].name, **kind.announced(machine, on[1])}
+        found.append({"name": name, "kind": kind.name, **where})
+    return found
+
+
 class LiveWorld:
     """A world as a `Cell` keeps it up with real time."""
 
-    def __init__(self, world: World, tell: Callable[[str], None] = lambda _: None) -> None:
+    def __init__(self, world: World, show: Callable[[str], None] = lambda _: None) -> None:
         self.world = world
-        self._tell = tell
+        self.show = show
+        """Called with what the person watching should know."""
         self._recorded_bytes = sum(_size(given.what) for given in world.inputs)
         self._full: sessions.Session | None = None
         self.stale = True
@@ -35,6 +48,9 @@ class LiveWorld:
         """The deadline that was found last."""
         self._dues = _Dues(world.kernels)
         world.watch_kernels(self._changed)
+        self.ring: Ring | None = None
+        """The last records, where they are kept."""
+        self.subject = WorldSubject(world, self.outside)
         self.on_stop: Callable[[], None] | None = None
         """Called when a script has stopped it: nothing happens by itself from then on."""
 
@@ -45,8 +61,7 @@ class LiveWorld:
     def share_reads(self, cell: Cell) -> None:
         """From now on clients that ``cell`` serves at one moment share what they read."""
         for line in self.world.lines.values():
-            if isinstance(line, ModbusLine):
-                line.served = share_reads(line.devices, cell)
+            line.serve_by(lambda devices: share_reads(devices, cell))
 
     # ------------------------------------------------------------------ what comes from outside
 
@@ -69,7 +84,7 @@ class LiveWorld:
         self._full = sessions.session_of(world)
         world.keeps_inputs = False
         world.inputs.clear()
-        self._tell(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
+        self.show(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
 
     def session(self) -> sessions.Session:
         """The session up to now, or up to where it was full. Raises `Misuse` where none is recorded."""
@@ -88,7 +103,7 @@ class LiveWorld:
     def advance(self, now: Nanos) -> None:
         world = self.world
         if not self.stale and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
-            world.pass_time(now)
+            world.now, world.is_settled = now, True  # as `Plant.advance` where nothing is due
             return
         while (due := self._due()) is not None and due <= now:
             world.advance(due)
@@ -189,8 +204,12 @@ class PlacePort:
         self._kind = kind
         self.broken: str | None = None
         self.on_output: Callable[[], None] | None = None
+        if self._line.is_shared:  # it hears the others from now on
+            live.outside(Bytes(line, place, kind, b""))
+            live.stale = True
+            self._connected()
 
-    def _connected(self) -> Place:
+    def _connected(self) -> LineEndPoint:
         place = self._line.connect(self._name, self._kind)
         place.on_output = self._came
         return place
@@ -203,28 +222,44 @@ class PlacePort:
         live, kernel = self._live, self._kernel
         world = live.world
         now = world.now  # a world that was stopped stands
-        if world.keeps_inputs:
-            live.make_room(Bytes(self._line.name, self._name, self._kind, data))
         if kernel.now != now or kernel.stale:
             kernel.advance(now)
         place = self._places.get(self._name)
         if place is None or place.on_output is None:
             place = self._connected()
-        answer = self._line.exchange(self._name, place, data, now)
-        if world.keeps_inputs:
-            world.note(Bytes(self._line.name, self._name, self._kind, data))
+        if world.keeps_inputs or world.trace.is_recorded:
+            answer = self._recorded(place, data, now)
+        elif place.at_once and place.port.is_transparent:
+            answer = place.port.exchange(data, now)
+        else:
+            answer = self._line.exchange(self._name, place, data, now)
         if kernel.stale or place.received:
             answer = self._with_the_rest(place, answer, now)
-        self.broken = place.port.broken
+        self.broken = place.inner.broken
         return answer
 
-    def _with_the_rest(self, place: Place, answer: bytes, now: Nanos) -> bytes:
+    def _recorded(self, place: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        """An exchange that goes into the session and the trace, unless it changes nothing."""
+        world, line = self._live.world, self._line
+        if line.is_idle_read(place, data):
+            return line.exchange_unrecorded(self._name, place, data, now)
+        given = Bytes(line.name, self._name, self._kind, data)
+        if world.keeps_inputs:
+            self._live.make_room(given)
+        answer = line.exchange(self._name, place, data, now)
+        if world.keeps_inputs:
+            world.note(given)
+        return answer
+
+    def _with_the_rest(self, place: LineEndPoint, answer: bytes, now: Nanos) -> bytes:
         """The answer between what came before and what has come with it."""
-        before = place.take(now)
+        before = place.take(now) if place.received else []
         place.on_output = None  # what comes at once is given back at once
         if self._kernel.stale:
             self._kernel.settle()
         place.on_output = self._came
+        if not before and not place.received:
+            return answer
         return b"".join([*(piece for _, piece in before), answer, *(piece for _, piece in place.take(now))])
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:

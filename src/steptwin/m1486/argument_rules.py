@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from steptwin.diagnostics import Diagnostic, Fix
 from steptwin.m1486 import findings
-from steptwin.m1486.commands import CommandSpec, Kind, find, grouped, permitted_text, range_text, rows
+from steptwin.m1486.commands import ArgType, CommandSpec, find, grouped, permitted_text, range_text, rows
 from steptwin.m1486.functions import CARRY, is_reserved
 from steptwin.m1486.lines import LINES, Interface, line_group
 from steptwin.m1486.registers import UPLOADS
-from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 
 _REFUSES_OCCUPIED = frozenset("CT!OZ()")
@@ -26,7 +26,7 @@ def argument_rules(command: Command, variant: Variant, interface: Interface) -> 
     problem = number_problem(command, number, variant, interface)
     if problem is not None:
         yield problem
-    if isinstance(command.argument, Condition):
+    if isinstance(command.argument, JumpCondition):
         yield from _label_of_condition(command.argument, variant)
 
 
@@ -40,9 +40,9 @@ def number_problem(command: Command, number: int, variant: Variant, interface: I
 
 def lines_of(spec: CommandSpec, number: int) -> range:
     """The I/O lines a command with this number reads or writes."""
-    if spec.kind is Kind.LINE or (spec.kind is Kind.CONDITION and number in LINES):
+    if spec.kind is ArgType.LINE or (spec.kind is ArgType.CONDITION and number in LINES):
         return range(number, number + 1)
-    group = line_group(number) if spec.kind is Kind.LINES else None
+    group = line_group(number) if spec.kind is ArgType.LINES else None
     return group or range(0)
 
 
@@ -56,12 +56,12 @@ def _out_of_range(command: Command, number: int, variant: Variant) -> Diagnostic
     fix = None
     subject = f"{key} {grouped(number)}"
     kind = rows(key)[0].kind
-    if kind in (Kind.LABEL, Kind.ADDRESS):
-        subject = f"label {grouped(number)}" if kind is Kind.LABEL else f"address {number:X}"
+    if kind in (ArgType.LABEL, ArgType.ADDRESS):
+        subject = f"label {grouped(number)}" if kind is ArgType.LABEL else f"address {number:X}"
         hint += f" on {variant.title}{_others_that_take(key, number, variant)}"
     elif key in "TC" and number == CARRY:
         hint = f"flag {CARRY}, the carry, is set and cleared by + and - only; {hint}"
-    elif kind is Kind.LINES:
+    elif kind is ArgType.LINES:
         hint = f"{_lines_reached(number)}; {hint}"
     elif number == 0 and key in _INSTEAD_OF_ZERO:
         fix = Fix(command.span, _INSTEAD_OF_ZERO[key])
@@ -83,16 +83,16 @@ def _others_that_take(key: str, number: int, variant: Variant) -> str:
     return f"; {', '.join(others)} would take it" if others else ""
 
 
-def _label_of_condition(condition: Condition, variant: Variant) -> Iterator[Diagnostic]:
+def _label_of_condition(condition: JumpCondition, variant: Variant) -> Iterator[Diagnostic]:
     if find("J", condition.label, variant) is None:
         hint = f"{range_text(rows('J')[0], variant)} on {variant.title}{_others_that_take('J', condition.label, variant)}"
         yield findings.OUT_OF_RANGE(condition.label_span, f"label {grouped(condition.label)} is out of range", hint)
 
 
 def _reserved(command: Command, spec: CommandSpec, number: int) -> Diagnostic | None:
-    if spec.kind is Kind.FUNCTION and is_reserved(number):
+    if spec.kind is ArgType.FUNCTION and is_reserved(number):
         return findings.RESERVED(command.argument_span, f"function {number} is reserved", "the manual gives it no meaning")
-    if spec.kind is Kind.UPLOAD and number not in UPLOADS:
+    if spec.kind is ArgType.UPLOAD and number not in UPLOADS:
         known = ", ".join(map(str, UPLOADS))
         return findings.RESERVED(command.argument_span, f"byte {number} is reserved", f"bytes with a meaning are {known}")
     return None

@@ -1,4 +1,4 @@
-"""Check an M1486 program: everything that is wrong or doubtful at once, and the command memory it takes."""
+"""Check an M1486 program: all errors and warnings, and the command memory it uses."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.position_rules import position_rules
 from steptwin.m1486.structure import Stream, stored_bits, streams
 from steptwin.m1486.structure_rules import structure_rules
-from steptwin.m1486.syntax import Command, Program, parse
+from steptwin.m1486.syntax import Command, ProgramText, parse
 from steptwin.m1486.variants import DEFAULT, Variant
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
+class CheckedChipProgram:
     """The result: the program as far as it could be read, the findings in text order, the memory of each chip."""
 
-    program: Program
+    program: ProgramText
     diagnostics: list[Diagnostic]
     memory: list[ChipMemory]
 
@@ -42,17 +42,17 @@ class ChipMemory:
     total: int
     #: Bits of each file in ``[ ]``, in order.
     files: tuple[int, ...]
-    commands: tuple[CommandMemory, ...]
+    commands: tuple[CommandSize, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class CommandMemory:
+class CommandSize:
     command: Command
     bits: int
     in_file: bool
 
 
-def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIRECTION) -> Checked:
+def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIRECTION) -> CheckedChipProgram:
     """Check the text of a program for one variant and driver interface, as if started after power-up. Never raises."""
     program, found = parse(text)
     diagnostics = list(found)
@@ -64,12 +64,12 @@ def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIR
         diagnostics += flow_rules(stream, variant, interface)
         diagnostics += position_rules(stream, variant)
     # Commands that several chips receive are judged for each of them.
-    return Checked(program, in_order(dict.fromkeys(diagnostics)), [memory_of(s, variant) for s in chips])
+    return CheckedChipProgram(program, in_order(dict.fromkeys(diagnostics)), [memory_of(s, variant) for s in chips])
 
 
 def memory_of(stream: Stream, variant: Variant) -> ChipMemory:
     commands = tuple(
-        CommandMemory(command, stored_bits(command), stream.in_file[index] is not None)
+        CommandSize(command, stored_bits(command), stream.in_file[index] is not None)
         for index, command in enumerate(stream.commands)
     )
     files = tuple(file.bits for file in stream.files)

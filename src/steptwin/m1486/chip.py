@@ -2,17 +2,18 @@
 
 A chip is made of how it is tied and timed, and driven by four calls::
 
-    chip = M1486(variant("E1"), address=3, interface=DUAL_DAC, baud=4800, is_timed=True, image=kept)
+    chip = M1486Chip(variant("E1"), address=3, interface=DUAL_DAC, baud=4800, is_timed=True, image=kept)
     chip.receive(b"f12800\\rr\\r", now)  # characters from the host; chips that share a line: `steptwin.m1486.line`
     chip.set_pin("B3", 0, now)  # and what happens outside
     chip.advance(chip.deadline())  # time
     chip.to_send(now)  # characters to the host, with their moments
 
-What it does is told by ``on_event`` (moves, waits, outputs, uploads, stops, wrong data: `EVENT_CODES`), `take_edges` (pins) and
-``drive`` (motion: `Drive.train` is the pulse train in force, `Drive.revision` counts trains; `steptwin.m1486.signals` makes
+What it does is reported by ``on_event`` (moves, waits, outputs, uploads, stops, wrong data), `take_edges` (pins) and ``drive``
+(motion: `ChipDrive.train` is the pulse train in force, `ChipDrive.revision` counts trains; `steptwin.m1486.signals` makes
 pulses and converter data of it). A program file is in the memory from the start when ``image`` is what
 `steptwin.m1486.eeprom.image_of` makes of it; it then runs at power-on, on chips with RAM as well as on those with EEPROM.
-`M1486.snapshot` and `M1486.restore` (or `copy_state` and `set_state`, without their check) take all state out and put it back.
+`M1486Chip.snapshot` and `M1486Chip.restore` (or `copy_state` and `set_state`, without their check) take all state out and put it
+back.
 """
 
 from __future__ import annotations
@@ -20,48 +21,28 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from steptwin.errors import Misuse, TimeReversal
-from steptwin.m1486.drive import Drive, Motion
+from steptwin.m1486.drive import ChipDrive, MotionMode
 from steptwin.m1486.eeprom import pack, unpack
 from steptwin.m1486.effects import WrongData
+from steptwin.m1486.events import M1486Event
 from steptwin.m1486.functions import COMPLEMENT, CONTINUE, EDGE, LIMITOFF, OUTPUTS, RECOVER, RUNSIGN
 from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface
 from steptwin.m1486.memory import CommandMemory, FileState
-from steptwin.m1486.motor import Motor
-from steptwin.m1486.pins import LINE_PINS, Pins, settable_pin
-from steptwin.m1486.program import Program
+from steptwin.m1486.motor import MotorControl
+from steptwin.m1486.pins import LINE_PINS, WAVEFORM, ChipPins, baud_pins, settable_pin
+from steptwin.m1486.program import ProgramExecution
 from steptwin.m1486.receiver import Receiver
 from steptwin.m1486.signals import data_level
 from steptwin.m1486.uart import Uart
 from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import DEFAULT, Store, Variant
-from steptwin.machine import MILLISECOND, Edge, Nanos
+from steptwin.machine import MILLISECOND, Fact, Nanos, PinEdge
 from steptwin.state import Plain, Stateful
 
 EVENTS_KEPT = 1000
-
-#: What an `Event` can be about.
-EVENT_CODES = {
-    "moves": "R has started a move",
-    "seeks": "a seek has started",
-    "stops": "a motion is being stopped by K or LIMIT",
-    "stands": "a motion has ended",
-    "wait": "W, O or Z waits",
-    "output": "an output has changed",
-    "upload": "U sends a byte",
-    "kill": "K was received",
-    "clear-kill": "C75 was received",
-    "wrong-data": "a command was dropped (M-11)",
-    "file": "] has closed a file",
-    "file-refused": "a file was larger than the memory (M-12)",
-    "reset": "defaults, by \\ or RST",
-    "restart": "the program begins again, by RST",
-    "power-on": "off and on again",
-    "shutdown": "SD is low",
-    "store-failed": "the EEPROM's new content could not be kept",
-}
 
 #: Open address pins; a chip alone needs no other address (chapter II, Serial interface).
 OPEN_ADDRESS = 15
@@ -70,16 +51,8 @@ OPEN_ADDRESS = 15
 SHUTDOWN_RESET_NS: Nanos = 10 * MILLISECOND
 
 
-class Event(NamedTuple):
-    """Something worth telling. ``code`` is stable, one of `EVENT_CODES`; ``text`` is for people."""
-
-    time: Nanos
-    code: str
-    text: str
-
-
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class ChipSnapshot:
     """All state of a chip at a moment, and what it belongs to. It can be pickled; motions are shared."""
 
     variant: Variant
@@ -88,11 +61,7 @@ class Snapshot:
     state: Plain
 
 
-def _nothing() -> None:
-    pass
-
-
-class M1486(Stateful):
+class M1486Chip(Stateful):
     """One chip. Characters and pins are applied after everything that is due at their moment.
 
     ``address`` (0-15), ``interface`` and ``baud`` (bit/s, one of the variant's four, by default the fastest) are how pins are
@@ -109,6 +78,7 @@ class M1486(Stateful):
         "_due",
         "_edges",
         "_rst_high_since",
+        "_waveform",
         "address",
         "changed",
         "events",
@@ -149,37 +119,41 @@ class M1486(Stateful):
         self.variant = variant
         self.is_timed = is_timed
         self.store: Callable[[bytes], bytes | None] | None = None
-        self.changed: Callable[[], None] = _nothing
-        self.on_event: Callable[[Event], None] | None = None
+        self.changed: Callable[[], None] = lambda: None
+        self.on_event: Callable[[M1486Event], None] | None = None
         self.on_sent: Callable[[], None] | None = None
 
         self.now: Nanos = 0
         self.image = image
         file = unpack(image, variant)
-        self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
-        self._edges: list[Edge] = []
+        self.events: deque[M1486Event] = deque(maxlen=EVENTS_KEPT)
+        self._edges: list[PinEdge] = []
         self._due: Nanos | None = None
+        self._waveform = 1
+        """The characteristic of the phase currents, as it was reported last."""
         self._rst_high_since: Nanos | None = None
         self.is_shut_down = False
         self.interface = interface
         self.unit = NumericUnit()
-        self.io = Pins(address, baud_pins(variant, baud), interface, self._level_changed)
+        self.io = ChipPins(address, baud_pins(variant, baud), interface, self._level_changed)
         self.address = self.io.address()
         self.uart = Uart(variant.baud(*self.io.baud_pins()), is_timed=is_timed)
-        self.program = Program(self, 2 * variant.memory_bits // 8, variant.statement_ns if statement_ns is None else statement_ns)
+        self.program = ProgramExecution(
+            self, 2 * variant.memory_bits // 8, variant.statement_ns if statement_ns is None else statement_ns
+        )
         self.memory = CommandMemory(variant, self.program)
-        self.motor = Motor(self, Drive(variant, interface, 0))
+        self.motor = MotorControl(self, ChipDrive(variant, interface, 0))
         self.receiver = Receiver(self)
         if file is not None and (variant.store is Store.RAM or self.address != 0):
             self.memory.load(file)
         self._touch()
 
     @property
-    def drive(self) -> Drive:
+    def drive(self) -> ChipDrive:
         return self.motor.drive
 
     @property
-    def axes(self) -> tuple[Drive]:
+    def axes(self) -> tuple[ChipDrive]:
         """For the world: the one axis."""
         return (self.motor.drive,)
 
@@ -199,24 +173,24 @@ class M1486(Stateful):
         in which pieces characters are handed over."""
         self.now = at
         if self.is_shut_down:
-            self._end_shutdown()
+            self._end_shutdown(at)
         elif not self._run_hardware(at):
-            due = self.program.deadline()
+            due = self.program.deadline(at)
             if due is not None and due <= at:
                 self._run_program(at, until)
             elif (byte := self.uart.arrived(at)) is not None:
-                self.receiver.character(byte)
+                self.receiver.character(byte, at)
         self._touch()
 
     def _run_hardware(self, at: Nanos) -> bool:
         due = self.motor.deadline()
         if due is not None and due <= at:
-            self.motor.ended()
-            self.receiver.compress()
+            self.motor.ended(at)
+            self.receiver.compress(at)
             return True
         due = self.receiver.busy_until
         if due is not None and due <= at:
-            self.receiver.eeprom_done()
+            self.receiver.eeprom_done(at)
             return True
         if self.uart.leave(at):
             if self.on_sent is not None:
@@ -225,12 +199,12 @@ class M1486(Stateful):
         return False
 
     def _run_program(self, at: Nanos, until: Nanos) -> None:
-        """As far as nothing else happens; one command where somebody waits for what it does."""
-        if self.drive.motion is not Motion.REST or self.receiver.is_stalled:
+        """As far as nothing else happens; one command where the drive or the receiver may depend on it."""
+        if self.drive.motion is not MotionMode.REST or self.receiver.is_stalled:
             until = at
         due = self._hardware_deadline()
-        self.program.run(until if due is None else max(at, min(until, due - 1)))
-        self.receiver.compress()
+        self.now = self.program.run(at, until if due is None else max(at, min(until, due - 1)))
+        self.receiver.compress(self.now)
 
     def _hardware_deadline(self) -> Nanos | None:
         dues = (self.motor.deadline(), self.receiver.busy_until, self.uart.arrival(), self.uart.departure())
@@ -245,7 +219,7 @@ class M1486(Stateful):
             since = self._rst_high_since
             self._due = None if since is None else since + SHUTDOWN_RESET_NS
         else:
-            due, other = self._hardware_deadline(), self.program.deadline()
+            due, other = self._hardware_deadline(), self.program.deadline(self.now)
             self._due = other if due is None else due if other is None else min(due, other)
         self.changed()
 
@@ -275,8 +249,8 @@ class M1486(Stateful):
         self.advance(now)
         return [(moment, bytes((byte,))) for moment, byte in self.uart.take_sent()]
 
-    def send(self, byte: int) -> None:
-        if self.uart.send(byte, self.now) and self.on_sent is not None:
+    def send(self, byte: int, now: Nanos) -> None:
+        if self.uart.send(byte, now) and self.on_sent is not None:
             self.on_sent()
 
     # ------------------------------------------------------------------ pins
@@ -287,51 +261,55 @@ class M1486(Stateful):
         self.advance(now)
         level = int(value)
         if name in LINE_PINS:
-            self.io.set_external(LINE_PINS[name], level)
+            self.io.set_external(LINE_PINS[name], level, now)
         elif self.io[name] != level:
             self.io.others[name] = level
-            self._control_changed(name, level)
+            self._control_changed(name, level, now)
         self._settle()
 
-    def _control_changed(self, name: str, level: int) -> None:
+    def _control_changed(self, name: str, level: int, now: Nanos) -> None:
         if name == "RST":
-            self._rst_changed(level)
+            self._rst_changed(level, now)
         elif self.is_shut_down:
             return
         elif name == "SD":
             if not level and self.variant.has_shutdown:
-                self._shut_down()
+                self._shut_down(now)
         elif name == "LIMIT":
-            self.motor.limit_changed(level)
+            self.motor.limit_changed(level, now)
         elif name == "JOG" and not level:
-            self.motor.jog()
+            self.motor.jog(now)
 
-    def _level_changed(self, name: str, level: int) -> None:
-        self._edges.append(Edge(self.now, name, float(level)))
+    def _level_changed(self, name: str, level: int, now: Nanos) -> None:
+        self._edges.append(PinEdge(now, name, float(level)))
         line = LINE_PINS.get(name)
         if line is not None and not self.is_shut_down:
             self.program.line_changed(line, level)
-            self.motor.line_changed(line, level)
+            self.motor.line_changed(line, level, now)
 
     def pins(self) -> Mapping[str, float]:
-        shown = {f"B{line}": float(self.level(line)) for line in LINES}
+        shown = {f"B{line}": float(self.level(line, self.now)) for line in LINES}
         return shown | {name: float(level) for name, level in self.io.others.items()}
 
-    def take_edges(self) -> list[Edge]:
+    def take_edges(self) -> list[PinEdge]:
+        waveform = self.motor.drive.characteristic
+        if waveform != self._waveform:
+            self._waveform = waveform
+            self._edges.append(PinEdge(self.now, WAVEFORM, float(waveform)))
         edges, self._edges = self._edges, []
         return edges
 
-    def level(self, line: int) -> int:
+    def level(self, line: int, now: Nanos) -> int:
         """What can be read on a line; where the driver interface has its pin, the interface's signal (M-21)."""
         if line in self.interface.occupied:
-            return data_level(line, self.drive.currents(self.now))
+            return data_level(line, self.drive.currents(now))
         return self.io.levels[line]
 
     # ------------------------------------------------------------------ what commands ask of their chip
 
-    def read(self, lines: range) -> int:
+    def read(self, lines: range, now: Nanos) -> int:
         """Lines as a number, lowest line = least significant bit; inverted by function 47."""
-        number = sum(self.level(line) << bit for bit, line in enumerate(lines))
+        number = sum(self.level(line, now) << bit for bit, line in enumerate(lines))
         return number ^ (1 << len(lines)) - 1 if self.unit.on(COMPLEMENT) else number
 
     def refuse_occupied(self, line: int) -> None:
@@ -339,189 +317,189 @@ class M1486(Stateful):
         if line in self.interface.occupied:
             raise WrongData(f"B{line} belongs to the {self.interface.title} interface")
 
-    def put_out(self, lines: range, bits: int) -> None:
+    def put_out(self, lines: range, bits: int, now: Nanos) -> None:
         """Set outputs, lowest line = least significant bit. Raises `WrongData` where the interface has one (M-21)."""
         for line in lines:
             self.refuse_occupied(line)
         for bit, line in enumerate(lines):
             level = bits >> bit & 1
             if self.io.latches[line] != level:
-                self.event("output", f"B{line} {'high' if level else 'low'}")
-                self.io.set_latch(line, level)
+                self.event("output", f"B{line} {'high' if level else 'low'}", now, ("line", line), ("level", level))
+                self.io.set_latch(line, level, now)
 
-    def switch(self, function: int, on: bool) -> None:
+    def switch(self, function: int, on: bool, now: Nanos) -> None:
         """T and C of a function."""
         self.unit.switch(function, on)
         if function == RUNSIGN:
-            self.motor.show_runsign()
+            self.motor.show_runsign(now)
         elif function in (LIMITOFF, EDGE, RECOVER):
-            self.motor.look_at_limit()
+            self.motor.look_at_limit(now)
 
-    def upload(self, number: int, byte: int) -> None:
-        self.event("upload", f"U{number} sends {byte:02X}H")
-        self.send(byte)
+    def upload(self, number: int, byte: int, now: Nanos) -> None:
+        self.event("upload", f"U{number} sends {byte:02X}H", now, ("command", number), ("byte", byte))
+        self.send(byte, now)
 
-    def event(self, code: str, text: str) -> None:
-        event = Event(self.now, code, text)
+    def event(self, code: str, text: str, now: Nanos, *facts: Fact) -> None:
+        event = M1486Event(now, code, text, facts)
         self.events.append(event)
         if self.on_event is not None:
             self.on_event(event)
 
-    def wrong_data(self, what: str) -> None:
+    def wrong_data(self, what: str, now: Nanos) -> None:
         """M-11: the command is dropped, and the program stops unless function 44 is ON."""
         stops = not self.unit.on(CONTINUE)
-        self.event("wrong-data", f"wrong data: {what}{'; the program stops' if stops else ''}")
+        self.event(
+            "wrong-data", f"wrong data: {what}{'; the program stops' if stops else ''}", now, ("why", what), ("stops", stops)
+        )
         if stops:
-            self.program.abandon()
+            self.program.abandon(now)
 
     # ------------------------------------------------------------------ what the receiver asks of its chip
 
-    def wrong_data_received(self, what: str) -> None:
+    def wrong_data_received(self, what: str, now: Nanos) -> None:
         """The same; a file that is arriving is not to run then."""
-        self.wrong_data(what)
+        self.wrong_data(what, now)
         if self.memory.file is FileState.OPEN and not self.unit.on(CONTINUE):
             self.memory.refuse_file()
 
-    def kill(self) -> None:
-        self.event("kill", "Kill")
-        self.motor.kill()
+    def kill(self, now: Nanos) -> None:
+        self.event("kill", "Kill", now)
+        self.motor.kill(now)
 
-    def clear_kill(self) -> None:
-        self.event("clear-kill", "Clear kill")
+    def clear_kill(self, now: Nanos) -> None:
+        self.event("clear-kill", "Clear kill", now)
         self.program.is_killed = False
 
-    def close_file(self) -> None:
+    def close_file(self, now: Nanos) -> None:
         """``]``: the file runs, and an E type keeps it."""
         file = self.memory.close_file()
         if file is None:
             return
-        self.event("file", f"a file of {8 * len(file.code)} bits")
+        self.event("file", f"a file of {8 * len(file.code)} bits", now, ("size", 8 * len(file.code)))
         if self.variant.store is Store.EEPROM:
-            self._keep(pack(file))  # M-37: nothing else is kept
+            self._keep(pack(file), now)  # M-37: nothing else is kept
 
-    def software_reset(self) -> None:
+    def software_reset(self, now: Nanos) -> None:
         """``\\``: defaults; an E type erases its EEPROM. Address and baud rate stay."""
-        self.event("reset", "reset")
-        self._set_defaults()
+        self.event("reset", "reset", now)
+        self._set_defaults(now)
         if self.variant.store is Store.EEPROM:
-            self._keep(b"")
-            self.receiver.erase()
+            self._keep(b"", now)
+            self.receiver.erase(now)
 
-    def _keep(self, image: bytes) -> None:
+    def _keep(self, image: bytes, now: Nanos) -> None:
         stored = None
         if self.store is not None:
             try:
                 stored = self.store(image)
             except OSError as error:
-                self.event("store-failed", f"the EEPROM could not be kept: {error}")
+                self.event("store-failed", f"the EEPROM could not be kept: {error}", now, ("why", str(error)))
         self.image = image if stored is None else stored
 
     # ------------------------------------------------------------------ power, RST, shutdown
 
     def power_off(self, now: Nanos) -> None:
-        """Everything off: until a `power_cycle` the chip does nothing, hears nothing and sends nothing."""
+        """Everything off: until a `power_cycle` the chip does nothing, receives nothing and sends nothing."""
         self.advance(now)
-        self._fall_silent()
-        self.io.release_outputs()
+        self._fall_silent(now)
+        self.io.release_outputs(now)
         self._settle()
 
     def power_cycle(self, now: Nanos) -> None:
         """Off and on again. Pins stay tied as they are, and the motor stands where it stood."""
         self.advance(now)
         self.is_shut_down = False
-        self.event("power-on", "power-on")
+        self.event("power-on", "power-on", now)
         self._read_pins()
-        self._start_anew()
+        self._start_anew(now)
         self._settle()
 
-    def _start_anew(self) -> None:
+    def _start_anew(self, now: Nanos) -> None:
         """Defaults; an E type runs its stored file. M-30: with all address pins low it is only reset, and keeps the file."""
         self.receiver.reset()
-        self._set_defaults()
+        self._set_defaults(now)
         if self.variant.store is Store.EEPROM and self.address != 0:
-            self._run_stored_file()
+            self._run_stored_file(now)
 
-    def _run_stored_file(self) -> None:
+    def _run_stored_file(self, now: Nanos) -> None:
         file = unpack(self.image, self.variant)
         if file is not None:
             self.memory.load(file)
-            self.program.restart(self.memory.begin)
+            self.program.restart(self.memory.begin, now)
 
     def _read_pins(self) -> None:
         self.address = self.io.address()
         self.uart.set_baud(self.variant.baud(*self.io.baud_pins()))
 
-    def _set_defaults(self) -> None:
-        self.motor.stop_at_once()
-        self.io.release_outputs()
+    def _set_defaults(self, now: Nanos) -> None:
+        self.motor.stop_at_once(now)
+        self.io.release_outputs(now)
         self.interface = self.io.interface()
         self.unit.reset()
         self.drive.reset_settings(self.variant, self.interface)
-        self.drive.set_counter(0, self.now)
+        self.drive.set_counter(0, now)
         self.memory.reset()
-        self.program.reset()
+        self.program.reset(now)
 
-    def _rst_changed(self, level: int) -> None:
-        self._rst_high_since = self.now if level else None
+    def _rst_changed(self, level: int, now: Nanos) -> None:
+        self._rst_high_since = now if level else None
         if level and not self.is_shut_down:
             self._read_pins()
             if self.address == 0:
-                self.event("reset", "RST with all address pins low: reset")
-                self._start_anew()
+                self.event("reset", "RST with all address pins low: reset", now)
+                self._start_anew(now)
             else:
-                self.event("restart", "RST: the program begins again")
-                self._restart()
+                self.event("restart", "RST: the program begins again", now)
+                self._restart(now)
 
-    def _restart(self) -> None:
+    def _restart(self, now: Nanos) -> None:
         """The program in memory begins again (an E type's stored file); settings and position stay (M-23)."""
-        self.motor.stop_at_once()
+        self.motor.stop_at_once(now)
         self.receiver.reset()
         if self.variant.store is Store.EEPROM:
             self.memory.reset()
-            self._run_stored_file()
+            self._run_stored_file(now)
         else:
             if self.memory.file is not FileState.CLOSED:
                 self.memory.drop_file()
-            self.program.restart(self.memory.begin)
+            self.program.restart(self.memory.begin, now)
 
-    def _shut_down(self) -> None:
-        self.event("shutdown", "shutdown")
-        self._fall_silent()
+    def _shut_down(self, now: Nanos) -> None:
+        self.event("shutdown", "shutdown", now)
+        self._fall_silent(now)
         if not self.unit.on(OUTPUTS):
-            self.io.tie_low(True)
+            self.io.tie_low(True, now)
 
-    def _fall_silent(self) -> None:
-        self.motor.stop_at_once()
+    def _fall_silent(self, now: Nanos) -> None:
+        self.motor.stop_at_once(now)
         self.uart.clear()
         self.is_shut_down = True
         self._rst_high_since = None
 
-    def _end_shutdown(self) -> None:
+    def _end_shutdown(self, now: Nanos) -> None:
         """RST has been high for long enough. The address pins are not read; M-31: the program begins again, as with RST."""
         self._rst_high_since = None
         if not self.io["SD"]:
             return
         self.is_shut_down = False
-        self.event("restart", "shutdown is over: the program begins again")
-        self.io.tie_low(False)
+        self.event("restart", "shutdown is over: the program begins again", now)
+        self.io.tie_low(False, now)
         self.uart.set_baud(self.variant.baud(*self.io.baud_pins()))
-        self._restart()
-
-    # ------------------------------------------------------------------ debugging
+        self._restart(now)
 
     def resume(self, now: Nanos) -> None:
-        """Do the command before which a hook on commands (`Program.watch`) has halted the program, and go on."""
+        """Do the command before which a hook on commands (`ProgramExecution.watch`) has halted the program, and go on."""
         self.advance(now)
-        self.program.resume()
+        self.program.resume(now)
         self._settle()
 
     # ------------------------------------------------------------------ snapshots
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> ChipSnapshot:
         """All state at the present moment; hooks are no part of it."""
-        return Snapshot(self.variant, self.is_timed, self.program.statement_ns, self.copy_state())
+        return ChipSnapshot(self.variant, self.is_timed, self.program.statement_ns, self.copy_state())
 
-    def restore(self, snapshot: Snapshot) -> None:
+    def restore(self, snapshot: ChipSnapshot) -> None:
         """Take the state of a snapshot, its moment too. Raises `Misuse` when it belongs to another kind of chip."""
         belongs = (snapshot.variant, snapshot.is_timed, snapshot.statement_ns)
         if belongs != (self.variant, self.is_timed, self.program.statement_ns):
@@ -530,13 +508,3 @@ class M1486(Stateful):
             )
         self.set_state(snapshot.state)
         self.changed()
-
-
-def baud_pins(variant: Variant, baud: int | None) -> int:
-    """BR1 and BR0 as a number for a baud rate, by default the highest. Raises `Misuse` with the four there are."""
-    rates = [variant.baud(code >> 1, code & 1) for code in range(4)]
-    if baud is None:
-        return len(rates) - 1
-    if baud not in rates:
-        raise Misuse(f"{baud} bit/s: {variant.title} has {', '.join(map(str, rates))}")
-    return rates.index(baud)

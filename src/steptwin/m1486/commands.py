@@ -18,7 +18,7 @@ from steptwin.m1486.registers import REGISTERS, UPLOAD_RANGE
 from steptwin.m1486.variants import Variant
 
 
-class Kind(enum.Enum):
+class ArgType(enum.Enum):
     """What the argument of a command is."""
 
     NONE = "none"
@@ -53,7 +53,7 @@ class CommandSpec:
 
     key: str
     name: str
-    kind: Kind
+    kind: ArgType
     values: range | tuple[int, ...] | None
     effect: str
     section: str
@@ -66,9 +66,9 @@ class CommandSpec:
 
     def permitted(self, variant: Variant) -> range | tuple[int, ...]:
         """The numbers this command takes on ``variant``; empty for a command without a number."""
-        if self.kind is Kind.LABEL:
+        if self.kind is ArgType.LABEL:
             return range(1, variant.labels + 1)
-        if self.kind is Kind.ADDRESS:
+        if self.kind is ArgType.ADDRESS:
             return variant.addresses
         return () if self.values is None else self.values
 
@@ -94,78 +94,78 @@ _C = CommandSpec
 
 _ROWS: tuple[CommandSpec, ...] = (
     # Program control
-    _C("@", "Address", Kind.LABEL, None, "Gives the next command a label.", _PROGRAM, when=When.COMPRESSED),
-    _C("L", "Loop", Kind.NUMBER, _BYTE, "Runs the commands up to the matching E this many times.", _PROGRAM, "times"),
-    _C("E", "End of loop", Kind.NONE, None, "Goes back to the matching L until its count is done.", _PROGRAM),
-    _C("I", "If", Kind.CONDITION, CONDITIONS, "Jumps to the label when the line or flag has the level named.", _PROGRAM),
-    _C("J", "Jump", Kind.LABEL, None, "Goes on at the label.", _PROGRAM),
-    _C("K", "Kill", Kind.NONE, None, "Stops the motion with its ramp, and the program too while function 51 is OFF.",
+    _C("@", "Address", ArgType.LABEL, None, "Gives the next command a label.", _PROGRAM, when=When.COMPRESSED),
+    _C("L", "Loop", ArgType.NUMBER, _BYTE, "Runs the commands up to the matching E this many times.", _PROGRAM, "times"),
+    _C("E", "End of loop", ArgType.NONE, None, "Goes back to the matching L until its count is done.", _PROGRAM),
+    _C("I", "If", ArgType.CONDITION, CONDITIONS, "Jumps to the label when the line or flag has the level named.", _PROGRAM),
+    _C("J", "Jump", ArgType.LABEL, None, "Goes on at the label.", _PROGRAM),
+    _C("K", "Kill", ArgType.NONE, None, "Stops the motion with its ramp, and the program too while function 51 is OFF.",
        _PROGRAM, when=When.RECEIVED),
-    _C("C", "Clear kill", Kind.NUMBER, (CLEAR_KILL,), "Lets a program go on that Kill has stopped.",
+    _C("C", "Clear kill", ArgType.NUMBER, (CLEAR_KILL,), "Lets a program go on that Kill has stopped.",
        _PROGRAM, when=When.RECEIVED),
-    _C("U", "Upload", Kind.UPLOAD, UPLOAD_RANGE, "Sends one byte to the host.", _PROGRAM),
-    _C("W", "Wait", Kind.NUMBER, _DISTANCE, "Waits.", _PROGRAM, "ms"),
-    _C("[", "Disable", Kind.NONE, None, "From here on commands are stored, not run.", _PROGRAM, when=When.COMPRESSED),
-    _C("]", "Enable", Kind.NONE, None, "Runs the commands stored since [.", _PROGRAM, when=When.COMPRESSED),
-    _C("'", "Subroutine", Kind.LABEL, None, "Goes on at the label and comes back at the next dot.", _PROGRAM),
-    _C(".", "End of subroutine", Kind.NONE, None, "Goes back to the command after the call.", _PROGRAM),
+    _C("U", "Upload", ArgType.UPLOAD, UPLOAD_RANGE, "Sends one byte to the host.", _PROGRAM),
+    _C("W", "Wait", ArgType.NUMBER, _DISTANCE, "Waits.", _PROGRAM, "ms"),
+    _C("[", "Disable", ArgType.NONE, None, "From here on commands are stored, not run.", _PROGRAM, when=When.COMPRESSED),
+    _C("]", "Enable", ArgType.NONE, None, "Runs the commands stored since [.", _PROGRAM, when=When.COMPRESSED),
+    _C("'", "Subroutine", ArgType.LABEL, None, "Goes on at the label and comes back at the next dot.", _PROGRAM),
+    _C(".", "End of subroutine", ArgType.NONE, None, "Goes back to the command after the call.", _PROGRAM),
     # Motion control
-    _C("B", "Backward", Kind.NUMBER, _DISTANCE, "Sets distance and negative direction of the next move.",
+    _C("B", "Backward", ArgType.NUMBER, _DISTANCE, "Sets distance and negative direction of the next move.",
        _MOTION, "min. microsteps"),
-    _C("D", "Direction", Kind.NONE, None, "Reverses the direction of the next move.", _MOTION),
-    _C("F", "Forward", Kind.NUMBER, _DISTANCE, "Sets distance and positive direction of the next move.",
+    _C("D", "Direction", ArgType.NONE, None, "Reverses the direction of the next move.", _MOTION),
+    _C("F", "Forward", ArgType.NUMBER, _DISTANCE, "Sets distance and positive direction of the next move.",
        _MOTION, "min. microsteps"),
-    _C("G", "Go absolute", Kind.NUMBER, _DISTANCE, "Sets distance and direction from the present position to this one.",
+    _C("G", "Go absolute", ArgType.NUMBER, _DISTANCE, "Sets distance and direction from the present position to this one.",
        _MOTION, "min. microsteps"),
-    _C("G+", "Go positive", Kind.NONE, None, "The next move runs in positive direction until Kill or LIMIT.", _MOTION),
-    _C("G-", "Go negative", Kind.NONE, None, "The next move runs in negative direction until Kill or LIMIT.", _MOTION),
-    _C("H", "Home", Kind.NONE, None, "Sets distance and direction from the present position to 0.", _MOTION),
-    _C("=", "Equal", Kind.NUMBER, _DISTANCE, "Gives the position counter a value.", _MOTION, "min. microsteps"),
-    _C("C", "Clear position counter", Kind.NUMBER, (CLEAR_POSITION,), "Sets the position counter to 0.", _MOTION),
-    _C("A", "Acceleration", Kind.NUMBER, range(1, 65_001), "Sets acceleration and deceleration.", _MOTION, "step/s²"),
-    _C("S", "Start/stop", Kind.NUMBER, range(16, 1_951), "Sets the speed at which a move starts and ends.",
+    _C("G+", "Go positive", ArgType.NONE, None, "The next move runs in positive direction until Kill or LIMIT.", _MOTION),
+    _C("G-", "Go negative", ArgType.NONE, None, "The next move runs in negative direction until Kill or LIMIT.", _MOTION),
+    _C("H", "Home", ArgType.NONE, None, "Sets distance and direction from the present position to 0.", _MOTION),
+    _C("=", "Equal", ArgType.NUMBER, _DISTANCE, "Gives the position counter a value.", _MOTION, "min. microsteps"),
+    _C("C", "Clear position counter", ArgType.NUMBER, (CLEAR_POSITION,), "Sets the position counter to 0.", _MOTION),
+    _C("A", "Acceleration", ArgType.NUMBER, range(1, 65_001), "Sets acceleration and deceleration.", _MOTION, "step/s²"),
+    _C("S", "Start/stop", ArgType.NUMBER, range(16, 1_951), "Sets the speed at which a move starts and ends.",
        _MOTION, "step/s"),
-    _C("P", "Profile", Kind.NUMBER, _PROFILE,
+    _C("P", "Profile", ArgType.NUMBER, _PROFILE,
        "Sets the speed from which the acceleration is parabolic; above 7000 and V there is no such part.",
        _MOTION, "step/s"),
-    _C("V", "Velocity", Kind.NUMBER, range(16, 20_001), "Sets the highest speed of a move.", _MOTION, "step/s"),
-    _C("R", "Run", Kind.NONE, None, "Makes the move specified last.", _MOTION),
-    _C(")", "Seek positive", Kind.LINE, LINES,
+    _C("V", "Velocity", ArgType.NUMBER, range(16, 20_001), "Sets the highest speed of a move.", _MOTION, "step/s"),
+    _C("R", "Run", ArgType.NONE, None, "Makes the move specified last.", _MOTION),
+    _C(")", "Seek positive", ArgType.LINE, LINES,
        "Moves at start/stop speed in positive direction until the line has its end level.", _MOTION),
-    _C("(", "Seek negative", Kind.LINE, LINES,
+    _C("(", "Seek negative", ArgType.LINE, LINES,
        "Moves at start/stop speed in negative direction until the line has its end level.", _MOTION),
     # User I/O
-    _C("C", "Clear", Kind.LINE, LINES, "Sets an output low.", _IO),
-    _C("O", "One", Kind.LINE, LINES, "Waits until the line is high.", _IO),
-    _C("T", "Turn on", Kind.LINE, LINES, "Sets an output high.", _IO),
-    _C("Z", "Zero", Kind.LINE, LINES, "Waits until the line is low.", _IO),
+    _C("C", "Clear", ArgType.LINE, LINES, "Sets an output low.", _IO),
+    _C("O", "One", ArgType.LINE, LINES, "Waits until the line is high.", _IO),
+    _C("T", "Turn on", ArgType.LINE, LINES, "Sets an output high.", _IO),
+    _C("Z", "Zero", ArgType.LINE, LINES, "Waits until the line is low.", _IO),
     # Sequencer
-    _C("M", "Microstep", Kind.NUMBER, MICROSTEPS, "Sets the microsteps per full step at low speed.", _SEQUENCER),
-    _C("Q", "Qualification", Kind.NUMBER, QUALIFICATIONS, "Sets the microsteps per full step at high speed.", _SEQUENCER),
-    _C("N", "Number of characteristic", Kind.NUMBER, range(1, 8), "Chooses the waveform of the phase currents.", _SEQUENCER),
+    _C("M", "Microstep", ArgType.NUMBER, MICROSTEPS, "Sets the microsteps per full step at low speed.", _SEQUENCER),
+    _C("Q", "Qualification", ArgType.NUMBER, QUALIFICATIONS, "Sets the microsteps per full step at high speed.", _SEQUENCER),
+    _C("N", "Number of characteristic", ArgType.NUMBER, range(1, 8), "Chooses the waveform of the phase currents.", _SEQUENCER),
     # Configuration
-    _C("\\", "Reset", Kind.NONE, None, "Sets everything to its defaults; E types erase the EEPROM too.",
+    _C("\\", "Reset", ArgType.NONE, None, "Sets everything to its defaults; E types erase the EEPROM too.",
        _CONFIGURATION, when=When.COMPRESSED),
-    _C("X", "indeX", Kind.ADDRESS, None, "Lets only the chip with this address listen.", _CONFIGURATION, when=When.RECEIVED),
-    _C("XG", "indeX all", Kind.NONE, None, "Lets all chips listen.", _CONFIGURATION, when=When.RECEIVED),
+    _C("X", "indeX", ArgType.ADDRESS, None, "Lets only the chip with this address listen.", _CONFIGURATION, when=When.RECEIVED),
+    _C("XG", "indeX all", ArgType.NONE, None, "Lets all chips listen.", _CONFIGURATION, when=When.RECEIVED),
     # Auxiliary functions and flags
-    _C("T", "Function on", Kind.FUNCTION, FUNCTIONS, "Switches a function on.", _AUXILIARY),
-    _C("C", "Function off", Kind.FUNCTION, FUNCTIONS, "Switches a function off.", _AUXILIARY),
-    _C("T", "Flag on", Kind.FLAG, USER_FLAGS, "Sets a user flag.", _AUXILIARY),
-    _C("C", "Flag off", Kind.FLAG, USER_FLAGS, "Clears a user flag.", _AUXILIARY),
+    _C("T", "Function on", ArgType.FUNCTION, FUNCTIONS, "Switches a function on.", _AUXILIARY),
+    _C("C", "Function off", ArgType.FUNCTION, FUNCTIONS, "Switches a function off.", _AUXILIARY),
+    _C("T", "Flag on", ArgType.FLAG, USER_FLAGS, "Sets a user flag.", _AUXILIARY),
+    _C("C", "Flag off", ArgType.FLAG, USER_FLAGS, "Clears a user flag.", _AUXILIARY),
     # Numeric unit
-    _C(":", "Load", Kind.NUMBER, _24_BIT, "Gives the internal variable a value.", _NUMERIC),
-    _C("?", "Query", Kind.LINES, _LINE_GROUPS, "Reads lines into the internal variable, lowest line = lowest bit.", _NUMERIC),
-    _C("!", "Order", Kind.LINES, _LINE_GROUPS, "Puts the internal variable out on lines, lowest line = lowest bit.", _NUMERIC),
-    _C(">", "Move to register", Kind.REGISTER, range(1, len(REGISTERS) + 1),
+    _C(":", "Load", ArgType.NUMBER, _24_BIT, "Gives the internal variable a value.", _NUMERIC),
+    _C("?", "Query", ArgType.LINES, _LINE_GROUPS, "Reads lines into the internal variable, lowest line = lowest bit.", _NUMERIC),
+    _C("!", "Order", ArgType.LINES, _LINE_GROUPS, "Puts the internal variable out on lines, lowest line = lowest bit.", _NUMERIC),
+    _C(">", "Move to register", ArgType.REGISTER, range(1, len(REGISTERS) + 1),
        "Copies the internal variable to a register.", _NUMERIC),
-    _C("<", "Move from register", Kind.REGISTER, range(1, len(REGISTERS) + 1),
+    _C("<", "Move from register", ArgType.REGISTER, range(1, len(REGISTERS) + 1),
        "Copies a register to the internal variable.", _NUMERIC),
-    _C("+", "Add", Kind.NUMBER, _BYTE, "Adds to the internal variable; sets flag 87 on overflow.", _NUMERIC),
-    _C("-", "Subtract", Kind.NUMBER, _BYTE, "Subtracts from the internal variable; sets flag 87 when that is too small.",
+    _C("+", "Add", ArgType.NUMBER, _BYTE, "Adds to the internal variable; sets flag 87 on overflow.", _NUMERIC),
+    _C("-", "Subtract", ArgType.NUMBER, _BYTE, "Subtracts from the internal variable; sets flag 87 when that is too small.",
        _NUMERIC),
-    _C("*", "Multiply", Kind.NUMBER, _BYTE, "Multiplies the internal variable.", _NUMERIC),
-    _C("/", "Divide", Kind.NUMBER, _BYTE, "Divides the internal variable; the remainder goes to register 10.", _NUMERIC),
+    _C("*", "Multiply", ArgType.NUMBER, _BYTE, "Multiplies the internal variable.", _NUMERIC),
+    _C("/", "Divide", ArgType.NUMBER, _BYTE, "Divides the internal variable; the remainder goes to register 10.", _NUMERIC),
 )  # fmt: skip
 
 #: Sizes the manual states by themselves (chapter II, Memory): four commands take no memory; ``I`` holds line, level and label.
@@ -184,9 +184,9 @@ def argument_bits(largest: int) -> int:
 
 
 def _largest(spec: CommandSpec) -> int:
-    if spec.kind is Kind.LABEL:
+    if spec.kind is ArgType.LABEL:
         return LARGEST_LABEL
-    if spec.kind is Kind.ADDRESS:
+    if spec.kind is ArgType.ADDRESS:
         return _LARGEST_ADDRESS
     return spec.values[-1] if spec.values else 0
 
@@ -228,7 +228,7 @@ def find(key: str, argument: int | None, variant: Variant) -> CommandSpec | None
     For a command without a number, and for ``I`` with the line or flag it asks, the same.
     """
     for spec in rows(key):
-        if spec.kind is Kind.NONE:
+        if spec.kind is ArgType.NONE:
             return spec if argument is None else None
         if argument is not None and argument in spec.permitted(variant):
             return spec
@@ -236,7 +236,7 @@ def find(key: str, argument: int | None, variant: Variant) -> CommandSpec | None
 
 
 def takes_number(key: str) -> bool:
-    return any(spec.kind is not Kind.NONE for spec in rows(key))
+    return any(spec.kind is not ArgType.NONE for spec in rows(key))
 
 
 def takes_variable(key: str) -> bool:
@@ -265,7 +265,7 @@ def grouped(number: int) -> str:
 
 def permitted_text(key: str, variant: Variant) -> str:
     """What may follow ``key``, for people: ``1 to 21 (line), 40 to 63 (function), 75 (Clear kill)``."""
-    specs = [s for s in rows(key) if s.kind is not Kind.NONE]
+    specs = [s for s in rows(key) if s.kind is not ArgType.NONE]
     if not specs:
         return "nothing"
     several = len(specs) > 1
@@ -276,13 +276,13 @@ def permitted_text(key: str, variant: Variant) -> str:
 def range_text(spec: CommandSpec, variant: Variant, *, named: bool = False) -> str:
     """The permitted numbers of one row with their unit, followed by what they stand for if ``named``."""
     values = spec.permitted(variant)
-    if spec.kind is Kind.NONE:
+    if spec.kind is ArgType.NONE:
         return "nothing"
-    if spec.kind is Kind.ADDRESS:
+    if spec.kind is ArgType.ADDRESS:
         return f"{values[0]:X} to {values[-1]:X}"
-    if spec.kind is Kind.LINES:
+    if spec.kind is ArgType.LINES:
         return "first line 1 to 21 and count 1 to 9 as one number, such as 14 for lines 1 to 4, up to line 21"
-    if spec.kind is Kind.CONDITION:
+    if spec.kind is ArgType.CONDITION:
         return f"line {LINES[0]} to {LINES[-1]} or flag {USER_FLAGS[0]} to {CARRY}, then H or L and a label"
     if values == _PROFILE:
         return f"{PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]} {spec.unit}, or a larger number above V for no parabolic part"
@@ -290,5 +290,5 @@ def range_text(spec: CommandSpec, variant: Variant, *, named: bool = False) -> s
     if spec.unit:
         text += f" {spec.unit}"
     if named:
-        text += f" ({spec.name if spec.kind is Kind.NUMBER else spec.kind.value})"
+        text += f" ({spec.name if spec.kind is ArgType.NUMBER else spec.kind.value})"
     return text

@@ -11,7 +11,16 @@ from math import inf
 from typing import ClassVar
 
 from steptwin.m1486.lines import Interface
-from steptwin.m1486.microsteps import FULL_STEP, HIGHEST_SPEED, PAIRS, low_range_limit, microstep_size
+from steptwin.m1486.microsteps import (
+    DEFAULT_DISTANCE_U,
+    DEFAULT_PROFILE,
+    DEFAULT_VELOCITY,
+    FULL_STEP,
+    HIGHEST_SPEED,
+    PAIRS,
+    low_range_limit,
+    microstep_size,
+)
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import Variant
 from steptwin.machine import MICROSECOND, SECOND, Nanos
@@ -22,17 +31,13 @@ from steptwin.motion.ramps import SpeedCurve, plan_distance, plan_endless
 from steptwin.motion.waveforms import currents
 from steptwin.state import Stateful
 
-#: Default of F and B (chapter VII.2, Backward).
-DEFAULT_DISTANCE_U = 64_000
-DEFAULT_VELOCITY = 1_000
-DEFAULT_PROFILE = 25_000
 #: Function 52: a seek ends on a multiple of four full steps, one electrical period.
 SEEK_LANDING_U = 4 * FULL_STEP
 #: M-18: a jog pulse gives one step, as fast as the chip steps at all (40 000 a second); pulses that come faster are missed.
 JOG_NS: Nanos = 25 * MICROSECOND
 
 
-class Motion(enum.Enum):
+class MotionMode(enum.Enum):
     REST = "at rest"
     #: F, B, G and H: the distance is known.
     MOVE = "move"
@@ -43,14 +48,23 @@ class Motion(enum.Enum):
 
 
 #: Motions of R and the seeks: they stall the compression, hold BOOST low and keep jog pulses out.
-BUSY = frozenset({Motion.MOVE, Motion.ENDLESS, Motion.SEEK})
+BUSY = frozenset({MotionMode.MOVE, MotionMode.ENDLESS, MotionMode.SEEK})
+
+
+def speed_curve(settings: tuple[int, int, int, int], qualification: int, clock: int) -> SpeedCurve:
+    """How a move gains speed with S, A, P and V, in minimum microsteps; ``clock`` is that of the variant."""
+    start_stop, acceleration, profile, velocity = settings
+    # M-34: V may ask for more than Q permits.
+    top = min(velocity, HIGHEST_SPEED[qualification])
+    unit = FULL_STEP * clock
+    return SpeedCurve(float(start_stop * unit), float(acceleration * unit * clock), float(profile * unit), float(top * unit))
 
 
 class WrongMove(Exception):
     """A move that cannot start; the text says why."""
 
 
-class Drive(Stateful):
+class ChipDrive(Stateful):
     """The axis of a chip: a `steptwin.machine.Drive`."""
 
     __slots__ = (
@@ -82,7 +96,7 @@ class Drive(Stateful):
         self.revision = 0
         self.reset_settings(variant, interface)
         self._curve = self._speed_curve()
-        self.motion = Motion.REST
+        self.motion = MotionMode.REST
         self.is_stopping = False
         self.train = self._resting(now, 0)
         self.zero_counter(now)
@@ -99,6 +113,24 @@ class Drive(Stateful):
         #: The next move: its signed distance, or its direction if it is endless (else 0).
         self.distance_u = DEFAULT_DISTANCE_U
         self.endless = 0
+
+    def set_acceleration(self, number: int) -> None:
+        self.acceleration = number
+
+    def set_start_stop(self, number: int) -> None:
+        self.start_stop = number
+
+    def set_profile_speed(self, number: int) -> None:
+        self.profile_speed = number
+
+    def set_velocity(self, number: int) -> None:
+        self.velocity = number
+
+    def set_qualification(self, number: int) -> None:
+        self.qualification = number
+
+    def set_characteristic(self, number: int) -> None:
+        self.characteristic = number
 
     def set_microstep(self, microstep: int) -> None:
         self.microstep = microstep
@@ -126,7 +158,7 @@ class Drive(Stateful):
 
     def counter_u(self, now: Nanos) -> int:
         """The position counter. M-16: a move of known distance is in it from its start."""
-        if self.motion is Motion.MOVE:
+        if self.motion is MotionMode.MOVE:
             return (self._final_u() + self.offset_u) & MASK
         return (self.true_u(now) + self.offset_u) & MASK
 
@@ -143,7 +175,7 @@ class Drive(Stateful):
 
     def deadline(self) -> Nanos | None:
         """When the motion ends."""
-        return None if self.motion is Motion.REST else self.train.profile.end
+        return None if self.motion is MotionMode.REST else self.train.profile.end
 
     def _final_u(self) -> int:
         return self.train.profile.base + self.train.profile.counts[-1]
@@ -167,14 +199,14 @@ class Drive(Stateful):
         begin = self.true_u(now)
         self._curve = self._speed_curve()
         if self.endless:
-            self._start(Motion.ENDLESS, step_train(plan_endless(now, begin, self.endless, self._curve), begin, microstepping))
+            self._start(MotionMode.ENDLESS, step_train(plan_endless(now, begin, self.endless, self._curve), begin, microstepping))
             return True
         if self.distance_u % self.grid_u:
             raise WrongMove(f"the distance {self.distance_u} is not a multiple of {self.grid_u} (M{self.microstep})")
         if self.distance_u == 0:
             return False
         profile = plan_distance(now, begin, begin + self.distance_u, self._curve)
-        self._start(Motion.MOVE, step_train(profile, begin, microstepping))
+        self._start(MotionMode.MOVE, step_train(profile, begin, microstepping))
         return True
 
     def seek(self, direction: int, now: Nanos) -> None:
@@ -183,20 +215,20 @@ class Drive(Stateful):
         begin = self.true_u(now)
         speed = self._speed(self.start_stop)
         self._curve = SpeedCurve(speed, self._acceleration(), speed, speed)
-        self._start(Motion.SEEK, step_train(plan_endless(now, begin, direction, self._curve), begin, microstepping))
+        self._start(MotionMode.SEEK, step_train(plan_endless(now, begin, direction, self._curve), begin, microstepping))
 
     def force_stop(self, now: Nanos, landing_u: int | None) -> None:
         """End the motion with its ramp, and then on a multiple of ``landing_u`` (or wherever it ends)."""
-        target_u = self._final_u() if self.motion is Motion.MOVE else None
+        target_u = self._final_u() if self.motion is MotionMode.MOVE else None
         self._replace(forced_stop(self.train, now, self._curve, landing_u))
         self._keep_counter_at(target_u)
         self.is_stopping = True
 
     def stop_at_once(self, now: Nanos) -> None:
         """The pulses end, as at a reset."""
-        if self.motion is Motion.REST:
+        if self.motion is MotionMode.REST:
             return
-        target_u = self._final_u() if self.motion is Motion.MOVE else None
+        target_u = self._final_u() if self.motion is MotionMode.MOVE else None
         self._replace(self._resting(now, self.true_u(now)))
         self._keep_counter_at(target_u)
         self.finish()
@@ -212,14 +244,14 @@ class Drive(Stateful):
         begin = self.true_u(now)
         end_s = JOG_NS / SECOND
         profile = Profile(now, begin, (cruise(0.0, end_s, 0.0, direction * self.grid_u / end_s),), float(direction * self.grid_u))
-        self._start(Motion.JOG, step_train(profile, begin, Microstepping(self.grid_u, self.grid_u, inf)))
+        self._start(MotionMode.JOG, step_train(profile, begin, Microstepping(self.grid_u, self.grid_u, inf)))
 
     def finish(self) -> None:
         """The motion has ended."""
-        self.motion = Motion.REST
+        self.motion = MotionMode.REST
         self.is_stopping = False
 
-    def _start(self, motion: Motion, train: StepTrain) -> None:
+    def _start(self, motion: MotionMode, train: StepTrain) -> None:
         self.motion = motion
         self.is_stopping = False
         self._replace(train)
@@ -241,10 +273,8 @@ class Drive(Stateful):
         return Microstepping(self.grid_u, microstep_size(qualification), self._speed(low_range_limit(microstep)))
 
     def _speed_curve(self) -> SpeedCurve:
-        # M-34: V may ask for more than Q permits.
-        top = min(self.velocity, HIGHEST_SPEED[self.qualification])
-        start, knee = self._speed(self.start_stop), self._speed(self.profile_speed)
-        return SpeedCurve(start, self._acceleration(), knee, self._speed(top))
+        settings = self.start_stop, self.acceleration, self.profile_speed, self.velocity
+        return speed_curve(settings, self.qualification, self._clock)
 
     def _speed(self, full_steps_per_s: float) -> float:
         return float(full_steps_per_s * FULL_STEP * self._clock)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from steptwin.errors import Misuse
 from steptwin.m1486.commands import When, when
 from steptwin.m1486.encoding import encode
-from steptwin.m1486.memory import Image
+from steptwin.m1486.memory import StoredFile
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import Program
+from steptwin.m1486.syntax import ProgramText
 from steptwin.m1486.variants import Variant
 
 _VERSION = 1
@@ -19,12 +19,12 @@ _HEAD = 2
 _LABEL = 3
 
 
-def pack(image: Image) -> bytes:
+def pack(image: StoredFile) -> bytes:
     labels = b"".join(bytes((label, place & 0xFF, place >> 8)) for label, place in sorted(image.labels.items()))
     return bytes((_VERSION, len(image.labels))) + labels + image.code
 
 
-def unpack(data: bytes, variant: Variant) -> Image | None:
+def unpack(data: bytes, variant: Variant) -> StoredFile | None:
     """The file in ``data``, None if there is none. Raises `Misuse` if it is none of this kind or does not fit the variant."""
     if not data:
         return None
@@ -37,10 +37,10 @@ def unpack(data: bytes, variant: Variant) -> Image | None:
         raise Misuse(f"the stored file takes {8 * len(code)} bits: {variant.title} has {variant.memory_bits}")
     if any(place > len(code) or not 1 <= label <= variant.labels for label, place in labels.items()):
         raise Misuse(f"the stored file has labels that {variant.title} does not have: permitted are 1 to {variant.labels}")
-    return Image(code, labels)
+    return StoredFile(code, labels)
 
 
-def image_of(program: Program, variant: Variant) -> bytes:
+def image_of(program: ProgramText, variant: Variant) -> bytes:
     """A program as the stored file that downloading it gives; with or without ``[ ]`` around it.
 
     Raises `Misuse` for a program that is more than one file for one chip, or that the variant does not take.
@@ -60,6 +60,6 @@ def image_of(program: Program, variant: Variant) -> bytes:
             code += encode(command)
         else:
             raise Misuse(f"{command} cannot be stored: a program to switch on with is one file for one chip")
-    image = pack(Image(code, labels))
+    image = pack(StoredFile(code, labels))
     unpack(image, variant)
     return image

@@ -6,13 +6,69 @@ Each part of the language enters its makers into a table of its own, by the name
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, NoReturn, TypeAlias
+from typing import NamedTuple, NoReturn, Protocol, TypeAlias
 
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
+from steptwin.m1486.drive import ChipDrive
+from steptwin.m1486.lines import Interface
+from steptwin.m1486.memory import CommandMemory
+from steptwin.m1486.pins import ChipPins
+from steptwin.m1486.uart import Uart
+from steptwin.m1486.unit import NumericUnit
+from steptwin.m1486.variants import Variant
+from steptwin.machine import Fact, Nanos
 
-Effect: TypeAlias = Callable[[], int]
-Maker: TypeAlias = "Callable[[M1486, int, int, int], Effect]"
+
+class ProgramFlow(Protocol):
+    """Where a program is: its loops and call in progress, and what it waits for. `steptwin.m1486.program` says more."""
+
+    loop_starts: list[int]
+    loop_counts: list[int]
+    back: int | None
+
+    def wait_until(self, moment: Nanos) -> None: ...
+    def wait_for_line(self, line: int, level: int) -> None: ...
+
+
+class Mover(Protocol):
+    """What starts motions. False: one is in progress, and the command waits for its end."""
+
+    def move(self, now: Nanos) -> bool: ...
+    def seek(self, line: int, direction: int, now: Nanos) -> bool: ...
+
+
+class CommandHost(Protocol):
+    """What commands ask of the chip that does them, each at its moment ``now``."""
+
+    @property
+    def variant(self) -> Variant: ...
+    @property
+    def interface(self) -> Interface: ...
+    @property
+    def unit(self) -> NumericUnit: ...
+    @property
+    def memory(self) -> CommandMemory: ...
+    @property
+    def drive(self) -> ChipDrive: ...
+    @property
+    def io(self) -> ChipPins: ...
+    @property
+    def uart(self) -> Uart: ...
+    @property
+    def program(self) -> ProgramFlow: ...
+    @property
+    def motor(self) -> Mover: ...
+    def level(self, line: int, now: Nanos) -> int: ...
+    def read(self, lines: range, now: Nanos) -> int: ...
+    def refuse_occupied(self, line: int) -> None: ...
+    def put_out(self, lines: range, bits: int, now: Nanos) -> None: ...
+    def switch(self, function: int, on: bool, now: Nanos) -> None: ...
+    def upload(self, number: int, byte: int, now: Nanos) -> None: ...
+    def event(self, code: str, text: str, now: Nanos, *facts: Fact) -> None: ...
+
+
+Effect: TypeAlias = Callable[[Nanos], int]
+"""Takes the moment of the command; those that only compute do not look at it."""
+Maker: TypeAlias = Callable[[CommandHost, int, int, int], Effect]
 """Takes the chip, the command's number (0 for none), its place and the place after it."""
 
 
@@ -21,7 +77,7 @@ class WrongData(Exception):
 
 
 class Making(NamedTuple):
-    """How a command is made. ``computes``: it needs no clock and shows nothing. ``is_linked``: it knows where a label is."""
+    """How a command is made. ``computes``: it depends on no moment and shows nothing. ``is_linked``: it knows a label's place."""
 
     make: Maker
     computes: bool
@@ -45,7 +101,7 @@ class Makers(dict[str, Making]):
 def refusing(why: str) -> Effect:
     """A command that can only be wrong data."""
 
-    def run() -> NoReturn:
+    def run(now: Nanos) -> NoReturn:
         raise WrongData(why)
 
     return run

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from steptwin.m1486.commands import LETTERS, When, memory_bits, rows, takes_number, takes_variable
-from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.syntax import Command, JumpCondition
 
 FROM_VARIABLE = 0x80
 _ENDLESS = {"G+": 0xFFFFFF, "G-": 0xFFFFFE}
@@ -35,7 +35,7 @@ def encode(command: Command) -> bytes:
     first = ord(letter) | (FROM_VARIABLE if command.from_variable else 0)
     size = SIZES[letter] - 1
     argument = command.argument
-    if isinstance(argument, Condition):
+    if isinstance(argument, JumpCondition):
         return bytes((first, argument.line, ord("H" if argument.high else "L"), argument.label))
     number = _ENDLESS.get(command.key, 0) if argument is None else argument
     return bytes((first,)) + number.to_bytes(size, "little")
@@ -54,7 +54,7 @@ def decode(raw: bytes) -> Stored | None:
         return Stored(Command(letter), size) if takes_variable(letter) else None
     if letter == "I":
         level = chr(raw[2])
-        return Stored(Command("I", Condition(raw[1], level == "H", raw[3])), size) if level in "HL" else None
+        return Stored(Command("I", JumpCondition(raw[1], level == "H", raw[3])), size) if level in "HL" else None
     if not takes_number(letter):
         return Stored(Command(letter), size)
     number = int.from_bytes(raw[1:size], "little")

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from steptwin.m1486 import flow_effects, io_effects, motion_effects, numeric_effects
 from steptwin.m1486.commands import TABLE, When, find
-from steptwin.m1486.effects import Effect, Making, WrongData, refusing
+from steptwin.m1486.effects import CommandHost, Effect, Making, WrongData, refusing
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import Command, Condition
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
+from steptwin.m1486.syntax import Command, JumpCondition
+from steptwin.machine import Nanos
 
 
-class Code(NamedTuple):
+class CompiledCommand(NamedTuple):
     """A compiled command; the rest as in `Making`."""
 
     effect: Effect
@@ -25,29 +23,29 @@ class Code(NamedTuple):
 _MAKERS: dict[str, Making] = flow_effects.MAKERS | motion_effects.MAKERS | io_effects.MAKERS | numeric_effects.MAKERS
 
 
-def compile_command(chip: M1486, command: Command, place: int, following: int) -> Code:
+def compile_command(chip: CommandHost, command: Command, place: int, following: int) -> CompiledCommand:
     """The closure of a command that stands in the memory at ``place``."""
     if command.from_variable:
-        return Code(_with_variable(chip, command.key, place, following), computes=False, is_linked=False)
+        return CompiledCommand(_with_variable(chip, command.key, place, following), computes=False, is_linked=False)
     why = out_of_range(command, chip.variant)
     spec = find(command.key, command.number, chip.variant)
     if why is not None or spec is None:
-        return Code(refusing(why or f"{command} is no command"), computes=True, is_linked=False)
-    if isinstance(command.argument, Condition):
-        return Code(*flow_effects.condition(chip, command.argument, following), is_linked=True)
+        return CompiledCommand(refusing(why or f"{command} is no command"), computes=True, is_linked=False)
+    if isinstance(command.argument, JumpCondition):
+        return CompiledCommand(*flow_effects.condition(chip, command.argument, following), is_linked=True)
     row = _MAKERS[spec.name]
-    return Code(row.make(chip, command.argument or 0, place, following), row.computes, row.is_linked)
+    return CompiledCommand(row.make(chip, command.argument or 0, place, following), row.computes, row.is_linked)
 
 
-def _with_variable(chip: M1486, key: str, place: int, following: int) -> Effect:
+def _with_variable(chip: CommandHost, key: str, place: int, following: int) -> Effect:
     """A command without its number: the internal variable is it, whatever it is when the command is done."""
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         number = chip.unit.variable
         spec = find(key, number, chip.variant)
         if spec is None:
             raise WrongData(f"the internal variable gives: {out_of_range(Command(key, number), chip.variant)}")
-        return _MAKERS[spec.name].make(chip, number, place, following)()
+        return _MAKERS[spec.name].make(chip, number, place, following)(now)
 
     return run
 

@@ -15,18 +15,15 @@ from typing import NamedTuple
 from steptwin.m1486.commands import find
 from steptwin.m1486.functions import INPUT, REGISTER, RUNSIGN
 from steptwin.m1486.lines import Interface, line_group
-from steptwin.m1486.microsteps import microstep_size
+from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, DEFAULT_PROFILE, DEFAULT_VELOCITY, microstep_size
 from steptwin.m1486.structure import Stream
-from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import Variant
 
 #: Enough for a line group of five lines; more settings at one place are merged.
 MOST_STATES = 32
 #: The call a command runs under when it runs under none.
 _MAIN = -1
-_DEFAULT_DISTANCE = 64_000
-_DEFAULT_VELOCITY = 1_000
-_DEFAULT_PROFILE = 25_000
 
 
 class Settings(NamedTuple):
@@ -67,10 +64,10 @@ def defaults(variant: Variant, interface: Interface) -> Settings:
         microstep=interface.microstep,
         qualification=1,
         start_stop=variant.start_stop,
-        velocity=_DEFAULT_VELOCITY,
-        profile=_DEFAULT_PROFILE,
+        velocity=DEFAULT_VELOCITY,
+        profile=DEFAULT_PROFILE,
         acceleration=variant.acceleration,
-        distance=_DEFAULT_DISTANCE,
+        distance=DEFAULT_DISTANCE_U,
         variable=None,
         runsign=0,
         lines_operand=0,
@@ -79,7 +76,7 @@ def defaults(variant: Variant, interface: Interface) -> Settings:
 
 
 @dataclass(slots=True)
-class Flow:
+class FlowAnalysis:
     """The result: for each command that can be reached the settings it can be reached with, and where jumps lead."""
 
     states: dict[int, set[Settings]] = field(default_factory=dict)
@@ -95,7 +92,7 @@ def value(command: Command, state: Settings) -> int | None:
     return state.variable if command.from_variable else command.number
 
 
-def follow(stream: Stream, variant: Variant, interface: Interface) -> Flow:
+def follow(stream: Stream, variant: Variant, interface: Interface) -> FlowAnalysis:
     """Follow every path of the stream from its beginning and from each reset."""
     return _Walk(stream, variant, interface).run()
 
@@ -134,12 +131,12 @@ class _Walk:
         self.stream = stream
         self.variant = variant
         self.start = defaults(variant, interface)
-        self.flow = Flow()
+        self.flow = FlowAnalysis()
         self.points: dict[tuple[int, int], _Point] = {}
         self.open: list[tuple[int, int, Settings]] = []
         self.returned: set[int] = set()
 
-    def run(self) -> Flow:
+    def run(self) -> FlowAnalysis:
         self.arrive(0, _MAIN, self.start)
         for index, command in enumerate(self.stream.commands):
             # A reset ends whatever was running, also what would run for ever.
@@ -176,7 +173,7 @@ class _Walk:
             case "J":
                 self.jump(index, call, state, value(command, state))
             case "I":
-                if isinstance(command.argument, Condition):
+                if isinstance(command.argument, JumpCondition):
                     self.jump(index, call, state, command.argument.label)
                 self.arrive(index + 1, call, state)
             case "'" if call != _MAIN:

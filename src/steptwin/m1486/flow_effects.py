@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from steptwin.m1486.effects import Effect, Makers, WrongData, refusing
+from steptwin.m1486.effects import CommandHost, Effect, Makers, WrongData, refusing
 from steptwin.m1486.functions import CARRY, USER_FLAGS
-from steptwin.m1486.syntax import Condition
-from steptwin.machine import MILLISECOND
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
+from steptwin.m1486.syntax import JumpCondition
+from steptwin.machine import MILLISECOND, Nanos
 
 #: M-5: loops inside one another.
 LOOP_LEVELS = 4
@@ -19,10 +14,10 @@ MAKERS = Makers()
 
 
 @MAKERS.does("Loop", computes=True)
-def _loop(chip: M1486, count: int, _place: int, following: int) -> Effect:
+def _loop(chip: CommandHost, count: int, _place: int, following: int) -> Effect:
     program = chip.program
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         starts, counts = program.loop_starts, program.loop_counts
         if following in starts:
             # M-35: a jump has left this loop, and leads to its beginning again.
@@ -38,10 +33,10 @@ def _loop(chip: M1486, count: int, _place: int, following: int) -> Effect:
 
 
 @MAKERS.does("End of loop", computes=True)
-def _end_of_loop(chip: M1486, _number: int, _place: int, following: int) -> Effect:
+def _end_of_loop(chip: CommandHost, _number: int, _place: int, following: int) -> Effect:
     program = chip.program
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         counts = program.loop_counts
         if not counts:
             raise WrongData("E outside a loop")  # M-20
@@ -61,21 +56,21 @@ def _end_of_loop(chip: M1486, _number: int, _place: int, following: int) -> Effe
 
 
 @MAKERS.does("Jump", computes=True, is_linked=True)
-def _jump(chip: M1486, label: int, _place: int, _following: int) -> Effect:
+def _jump(chip: CommandHost, label: int, _place: int, _following: int) -> Effect:
     target = chip.memory.labels.get(label)
     if target is None:
         return refusing(f"there is no label {label}")  # M-17
-    return lambda: target
+    return lambda now: target
 
 
 @MAKERS.does("Subroutine", computes=True, is_linked=True)
-def _call(chip: M1486, label: int, _place: int, following: int) -> Effect:
+def _call(chip: CommandHost, label: int, _place: int, following: int) -> Effect:
     target = chip.memory.labels.get(label)
     if target is None:
         return refusing(f"there is no label {label}")  # M-17
     program = chip.program
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         if program.back is not None:
             raise WrongData("a subroutine inside a subroutine")
         program.back = following
@@ -85,10 +80,10 @@ def _call(chip: M1486, label: int, _place: int, following: int) -> Effect:
 
 
 @MAKERS.does("End of subroutine", computes=True)
-def _return(chip: M1486, _number: int, _place: int, _following: int) -> Effect:
+def _return(chip: CommandHost, _number: int, _place: int, _following: int) -> Effect:
     program = chip.program
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         back = program.back
         if back is None:
             raise WrongData("a dot outside a subroutine")  # M-20
@@ -101,42 +96,42 @@ def _return(chip: M1486, _number: int, _place: int, _following: int) -> Effect:
 
 
 @MAKERS.does("Wait")
-def _wait(chip: M1486, milliseconds: int, _place: int, following: int) -> Effect:
+def _wait(chip: CommandHost, milliseconds: int, _place: int, following: int) -> Effect:
     duration = milliseconds * MILLISECOND // chip.variant.clock
 
-    def run() -> int:
-        chip.program.wait_until(chip.now + duration)
-        chip.event("wait", f"waits {duration / MILLISECOND:g} ms")
+    def run(now: Nanos) -> int:
+        chip.program.wait_until(now + duration)
+        chip.event("wait", f"waits {duration / MILLISECOND:g} ms", now, ("duration", duration))
         return following
 
     return run
 
 
 @MAKERS.does("Clear kill")
-def _clear_kill(_chip: M1486, _number: int, _place: int, following: int) -> Effect:
+def _clear_kill(_chip: CommandHost, _number: int, _place: int, following: int) -> Effect:
     # A program that comes here is not stopped; C75 itself acts when it is received.
-    return lambda: following
+    return lambda now: following
 
 
-def condition(chip: M1486, asked: Condition, following: int) -> tuple[Effect, bool]:
+def condition(chip: CommandHost, asked: JumpCondition, following: int) -> tuple[Effect, bool]:
     """The closure of ``I``, and whether it only computes."""
     line, high, label = asked.line, asked.high, asked.label
     target = chip.memory.labels.get(label)
     # M-17: a missing label matters only when the condition holds.
-    jump: Effect = refusing(f"there is no label {label}") if target is None else lambda: target
+    jump: Effect = refusing(f"there is no label {label}") if target is None else lambda now: target
     unit, io = chip.unit, chip.io
 
-    def if_line() -> int:
-        return jump() if (io.levels[line] == 1) is high else following
+    def if_line(now: Nanos) -> int:
+        return jump(now) if (io.levels[line] == 1) is high else following
 
-    def if_interface_line() -> int:
-        return jump() if (chip.level(line) == 1) is high else following
+    def if_interface_line(now: Nanos) -> int:
+        return jump(now) if (chip.level(line, now) == 1) is high else following
 
-    def if_flag() -> int:
-        return jump() if unit.flags[line - USER_FLAGS.start] is high else following
+    def if_flag(now: Nanos) -> int:
+        return jump(now) if unit.flags[line - USER_FLAGS.start] is high else following
 
-    def if_carry() -> int:
-        return jump() if unit.carry is high else following
+    def if_carry(now: Nanos) -> int:
+        return jump(now) if unit.carry is high else following
 
     if line == CARRY:
         return if_carry, True

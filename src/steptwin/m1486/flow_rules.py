@@ -10,13 +10,13 @@ from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
 from steptwin.m1486 import findings
 from steptwin.m1486.argument_rules import lines_of, lines_text, number_problem
 from steptwin.m1486.commands import DIVIDEND_LIMIT, FREE_DIVISORS, PROFILE_RANGE, When, find, grouped, when
-from steptwin.m1486.findings import Finding
-from steptwin.m1486.flow import Flow, Settings, follow, value
+from steptwin.m1486.findings import ChipFinding
+from steptwin.m1486.flow import FlowAnalysis, Settings, follow, value
 from steptwin.m1486.lines import LINES, RUNSIGN_LINE, Interface, line_group
 from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, microstep_size
 from steptwin.m1486.registers import GENERAL
-from steptwin.m1486.structure import Stream
-from steptwin.m1486.structure_rules import label_problem, written_label
+from steptwin.m1486.structure import Stream, written_label
+from steptwin.m1486.structure_rules import label_problem
 from steptwin.m1486.syntax import Command
 from steptwin.m1486.variants import Variant
 
@@ -27,7 +27,7 @@ _MOVES = frozenset("R)(")
 _DISTANCES = frozenset("FBG=")
 _ARITHMETIC = frozenset("+-*/")
 #: What a setting makes wrong: the finding, the message, the hint.
-_Fault = tuple[Finding, str, str | None]
+_Fault = tuple[ChipFinding, str, str | None]
 _Rule = Callable[[Command, Settings], _Fault | None]
 
 
@@ -222,7 +222,7 @@ def _runsign(command: Command, states: set[Settings], variant: Variant) -> Itera
         return
 
 
-def _calls(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+def _calls(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     for index in flow.nested_calls:
         command = stream.commands[index]
         yield findings.NESTED_CALL(command.span, f"{command} inside a subroutine", "one level only")
@@ -233,7 +233,7 @@ def _calls(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
         yield findings.NEVER_RETURNS(command.span, f"{command} does not come back", "a subroutine ends with a dot")
 
 
-def _labels(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+def _labels(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     """Labels of a file, or of what comes between resets, that nothing jumps to, and those given twice: one finding for each."""
     used = set().union(*flow.targets.values())
     for index, command in enumerate(stream.commands):
@@ -251,7 +251,7 @@ def _labels(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
                 yield findings.LABEL_TWICE(stream.commands[later].span, message, "the later one counts")
 
 
-def _never_reached(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
+def _never_reached(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     """One warning for each run of commands that no path leads to."""
     run: list[int] = []
     for index in range(len(stream.commands) + 1):
@@ -269,7 +269,7 @@ def _never_reached(stream: Stream, flow: Flow) -> Iterator[Diagnostic]:
             run = []
 
 
-def _shared_registers(stream: Stream, flow: Flow, variant: Variant) -> Iterator[Diagnostic]:
+def _shared_registers(stream: Stream, flow: FlowAnalysis, variant: Variant) -> Iterator[Diagnostic]:
     """Registers 1 to 8 where they lie in the command memory: safe after a reset and with a short file only (chapter VII.7)."""
     limit = variant.memory_bits - variant.shared_bits
     if not variant.shared_bits or (stream.commands and stream.commands[0].key == "\\" and stream.bits <= limit):

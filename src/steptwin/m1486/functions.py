@@ -25,7 +25,7 @@ REMAINDER = 59
 
 
 @dataclass(frozen=True, slots=True)
-class Function:
+class AuxiliaryFunction:
     """One auxiliary function. ``name`` is empty where the manual reserves the number."""
 
     number: int
@@ -44,35 +44,39 @@ def default(number: int) -> bool:
 
 
 _NAMED = (
-    Function(RUNSIGN, "Runsign", "B1 is low while the motor runs, high at rest", "B1 is a user line"),
-    Function(RETURN, "Return", "every character received is sent back", "the chip sends only what was asked for"),
-    Function(LIMITOFF, "Limitoff", "LIMIT does nothing", "LIMIT stops the motion"),
-    Function(EDGE, "Edge", "LIMIT acts on its falling edge", "LIMIT acts while it is low"),
-    Function(CONTINUE, "Continue", "the program goes on after wrong data", "wrong data stop the program"),
-    Function(OUTPUTS, "Outputs", "outputs keep their values at shutdown", "shutdown ties all outputs low"),
-    Function(INPUT, "Input", "the operand of + - * / is read from lines", "the operand is the number given"),
-    Function(COMPLEMENT, "Complement", "what is read from lines is inverted", "lines are read as they are"),
-    Function(FULLSTEP, "Fullstep", "after a forced stop the motor goes on to a full step", "a forced stop ends where it ends"),
-    Function(RECOVER, "Recover", "the program goes on after Kill or LIMIT", "Kill and LIMIT stop the program"),
-    Function(FULLSTEPSS, "Fullstepss", "a seek stops on a multiple of 4 full steps", "a seek stops on any microstep"),
-    Function(REPORT, "Report", "sends 7FH when the input buffer is empty, 7EH when three bytes are free", "sends neither"),
-    Function(REGISTER, "Register", "the operand of + - * / is read from a register", "the operand is the number given"),
-    Function(REMAINDER, "Remainder", "Order puts out the remainder", "Order puts out the internal variable"),
+    AuxiliaryFunction(RUNSIGN, "Runsign", "B1 is low while the motor runs, high at rest", "B1 is a user line"),
+    AuxiliaryFunction(RETURN, "Return", "every character received is sent back", "the chip sends only what was asked for"),
+    AuxiliaryFunction(LIMITOFF, "Limitoff", "LIMIT does nothing", "LIMIT stops the motion"),
+    AuxiliaryFunction(EDGE, "Edge", "LIMIT acts on its falling edge", "LIMIT acts while it is low"),
+    AuxiliaryFunction(CONTINUE, "Continue", "the program goes on after wrong data", "wrong data stop the program"),
+    AuxiliaryFunction(OUTPUTS, "Outputs", "outputs keep their values at shutdown", "shutdown ties all outputs low"),
+    AuxiliaryFunction(INPUT, "Input", "the operand of + - * / is read from lines", "the operand is the number given"),
+    AuxiliaryFunction(COMPLEMENT, "Complement", "what is read from lines is inverted", "lines are read as they are"),
+    AuxiliaryFunction(
+        FULLSTEP, "Fullstep", "after a forced stop the motor goes on to a full step", "a forced stop ends where it ends"
+    ),
+    AuxiliaryFunction(RECOVER, "Recover", "the program goes on after Kill or LIMIT", "Kill and LIMIT stop the program"),
+    AuxiliaryFunction(FULLSTEPSS, "Fullstepss", "a seek stops on a multiple of 4 full steps", "a seek stops on any microstep"),
+    AuxiliaryFunction(
+        REPORT, "Report", "sends 7FH when the input buffer is empty, 7EH when three bytes are free", "sends neither"
+    ),
+    AuxiliaryFunction(REGISTER, "Register", "the operand of + - * / is read from a register", "the operand is the number given"),
+    AuxiliaryFunction(REMAINDER, "Remainder", "Order puts out the remainder", "Order puts out the internal variable"),
 )
 
 
-def _table() -> tuple[Function, ...]:
+def _table() -> tuple[AuxiliaryFunction, ...]:
     by_number = {f.number: f for f in _NAMED}
     if len(by_number) != len(_NAMED) or not set(by_number) <= set(FUNCTIONS):
-        raise ValueError("a function number stands twice or lies outside 40 to 63")
-    return tuple(by_number.get(number, Function(number)) for number in FUNCTIONS)
+        raise ValueError("a function number is defined twice or outside 40 to 63")
+    return tuple(by_number.get(number, AuxiliaryFunction(number)) for number in FUNCTIONS)
 
 
 #: Every function from 40 to 63 in order, reserved ones included.
-TABLE: tuple[Function, ...] = _table()
+TABLE: tuple[AuxiliaryFunction, ...] = _table()
 
 
-def function(number: int) -> Function:
+def function(number: int) -> AuxiliaryFunction:
     return TABLE[number - FUNCTIONS.start]
 
 

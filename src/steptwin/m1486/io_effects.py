@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from steptwin.m1486.effects import Effect, Maker, Makers
+from steptwin.m1486.effects import CommandHost, Effect, Maker, Makers
 from steptwin.m1486.functions import REMAINDER, USER_FLAGS
 from steptwin.m1486.lines import LINES, line_group
 from steptwin.m1486.registers import UPLOADS
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
+from steptwin.machine import Nanos
 
 #: M-15: what U16 sends.
 PRODUCTION_SERIES = 1
@@ -20,9 +17,9 @@ MAKERS = Makers()
 
 
 def _output(level: int) -> Maker:
-    def make(chip: M1486, line: int, _place: int, following: int) -> Effect:
-        def run() -> int:
-            chip.put_out(range(line, line + 1), level)
+    def make(chip: CommandHost, line: int, _place: int, following: int) -> Effect:
+        def run(now: Nanos) -> int:
+            chip.put_out(range(line, line + 1), level, now)
             return following
 
         return run
@@ -35,12 +32,13 @@ MAKERS.does("Clear")(_output(0))
 
 
 def _line_wait(level: int) -> Maker:
-    def make(chip: M1486, line: int, _place: int, following: int) -> Effect:
-        def run() -> int:
+    def make(chip: CommandHost, line: int, _place: int, following: int) -> Effect:
+        def run(now: Nanos) -> int:
             chip.refuse_occupied(line)
             if chip.io.levels[line] != level:
                 chip.program.wait_for_line(line, level)
-                chip.event("wait", f"waits until B{line} is {'high' if level else 'low'}")
+                text = f"waits until B{line} is {'high' if level else 'low'}"
+                chip.event("wait", text, now, ("line", line), ("level", level))
             return following
 
         return run
@@ -53,9 +51,9 @@ MAKERS.does("Zero")(_line_wait(0))
 
 
 def _switch(on: bool) -> Maker:
-    def make(chip: M1486, function: int, _place: int, following: int) -> Effect:
-        def run() -> int:
-            chip.switch(function, on)
+    def make(chip: CommandHost, function: int, _place: int, following: int) -> Effect:
+        def run(now: Nanos) -> int:
+            chip.switch(function, on, now)
             return following
 
         return run
@@ -68,11 +66,11 @@ MAKERS.does("Function off")(_switch(on=False))
 
 
 def _flag(on: bool) -> Maker:
-    def make(chip: M1486, flag: int, _place: int, following: int) -> Effect:
+    def make(chip: CommandHost, flag: int, _place: int, following: int) -> Effect:
         unit = chip.unit
         index = flag - USER_FLAGS.start
 
-        def run() -> int:
+        def run(now: Nanos) -> int:
             unit.flags[index] = on
             return following
 
@@ -86,77 +84,78 @@ MAKERS.does("Flag off", computes=True)(_flag(on=False))
 
 
 @MAKERS.does("Query")
-def _query(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _query(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     lines = line_group(number) or LINES
 
-    def run() -> int:
-        chip.unit.variable = chip.read(lines)
+    def run(now: Nanos) -> int:
+        chip.unit.variable = chip.read(lines, now)
         return following
 
     return run
 
 
 @MAKERS.does("Order")
-def _order(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _order(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     lines = line_group(number) or LINES
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         unit = chip.unit
-        chip.put_out(lines, unit.remainder if unit.on(REMAINDER) else unit.variable)
+        chip.put_out(lines, unit.remainder if unit.on(REMAINDER) else unit.variable, now)
         return following
 
     return run
 
 
-def _position_byte(shift: int) -> Callable[[M1486], int]:
-    return lambda chip: chip.drive.counter_u(chip.now) >> shift & 0xFF
+def _position_byte(shift: int) -> Callable[[CommandHost, Nanos], int]:
+    return lambda chip, now: chip.drive.counter_u(now) >> shift & 0xFF
 
 
-def _variable_byte(shift: int) -> Callable[[M1486], int]:
-    return lambda chip: chip.unit.variable >> shift & 0xFF
+def _variable_byte(shift: int) -> Callable[[CommandHost, Nanos], int]:
+    return lambda chip, now: chip.unit.variable >> shift & 0xFF
 
 
-def _function_byte(first: int) -> Callable[[M1486], int]:
-    return lambda chip: chip.unit.function_byte(first)
+def _function_byte(first: int) -> Callable[[CommandHost, Nanos], int]:
+    return lambda chip, now: chip.unit.function_byte(first)
 
 
-def _reserved(_chip: M1486) -> int:
+def _reserved(_chip: CommandHost, _now: Nanos) -> int:
     """M-32: bytes without a meaning are 0."""
     return 0
 
 
-_UPLOADED: dict[int, Callable[[M1486], int]] = {
+UPLOADED: dict[int, Callable[[CommandHost, Nanos], int]] = {
     1: _position_byte(0),
     2: _position_byte(8),
     3: _position_byte(16),
     4: _variable_byte(0),
     5: _variable_byte(8),
     6: _variable_byte(16),
-    14: lambda chip: chip.unit.flag_byte(),
-    15: lambda chip: chip.interface.code,
-    16: lambda _chip: PRODUCTION_SERIES,
+    14: lambda chip, now: chip.unit.flag_byte(),
+    15: lambda chip, now: chip.interface.code,
+    16: lambda _chip, now: PRODUCTION_SERIES,
     17: _function_byte(40),
     18: _function_byte(48),
     19: _function_byte(56),
-    20: lambda chip: chip.variant.type_letter,
+    20: lambda chip, now: chip.variant.type_letter,
 }
+"""What each ``U`` sends."""
 
 
 @MAKERS.does("Upload")
-def _upload(chip: M1486, number: int, place: int, following: int) -> Effect:
-    read = _UPLOADED.get(number, _reserved)
+def _upload(chip: CommandHost, number: int, place: int, following: int) -> Effect:
+    read = UPLOADED.get(number, _reserved)
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         all_left = chip.uart.all_left()
         if all_left is not None:
             # M-36: there is one place for a byte to send, so the program goes no faster than the line.
             chip.program.wait_until(all_left)
             return place
-        chip.upload(number, read(chip))
+        chip.upload(number, read(chip, now), now)
         return following
 
     return run
 
 
-if _UPLOADED.keys() != UPLOADS.keys():
-    raise ValueError(f"bytes to upload with no content, or unknown: {sorted(_UPLOADED.keys() ^ UPLOADS.keys())}")
+if UPLOADED.keys() != UPLOADS.keys():
+    raise ValueError(f"bytes to upload with no content, or unknown: {sorted(UPLOADED.keys() ^ UPLOADS.keys())}")

@@ -2,14 +2,14 @@
 
 How a shell builds a line::
 
-    chips = [M1486(variant("B"), address=0, interface=STEP_DIRECTION, baud=4800), M1486(variant("B"), address=7)]
+    chips = [M1486Chip(variant("B"), address=0, interface=STEP_DIRECTION, baud=4800), M1486Chip(variant("B"), address=7)]
     chain = SerialChain(chips)
     port = chain.port()  # one for each program that is connected
     port.exchange(b"x7\\rf12800\\rr\\r", now)
     port.to_send(later)  # [(moment, characters)], the same for every port
 
 Chips are machines of their own: a shell adds each to its `steptwin.world.kernel.Kernel` and advances that before it hands
-over characters. What a chip does is told by its hooks (`steptwin.m1486.chip.M1486`).
+over characters. What a chip does is told by its hooks (`steptwin.m1486.chip.M1486Chip`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 from typing import ClassVar
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.uart import MOST_WAITING
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
@@ -37,9 +37,9 @@ class SerialChain(Stateful):
     __slots__ = ("_ports", "_wire_free", "chips", "collisions")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_ports", "chips"})
 
-    def __init__(self, chips: Iterable[M1486]) -> None:
+    def __init__(self, chips: Iterable[M1486Chip]) -> None:
         #: By the address each had when the line was made.
-        self.chips: dict[int, M1486] = {}
+        self.chips: dict[int, M1486Chip] = {}
         for chip in chips:
             if chip.address in self.chips:
                 raise Misuse(f"two chips with address {chip.address:X} on one line")
@@ -69,7 +69,7 @@ class SerialChain(Stateful):
             self._ports.remove(port)
 
     def receive(self, data: bytes, now: Nanos) -> None:
-        """Every chip hears the host."""
+        """Every chip receives what the host sends."""
         for chip in self.chips.values():
             chip.receive(data, now)
 
@@ -146,7 +146,7 @@ class LinePort:
             del self.pending[:-MOST_WAITING]
 
     def deadline(self) -> Nanos | None:
-        """When there may be more to send: characters that are on their way. ``on_output`` tells of others."""
+        """When there may be more to send: characters that are on their way. ``on_output`` is called for others."""
         return self._chain.departure()
 
     def wake(self) -> None:
@@ -154,6 +154,6 @@ class LinePort:
             self.on_output()
 
     def close(self) -> None:
-        """The program has gone."""
+        """The program at the other end has closed the connection."""
         self.on_output = None
         self._chain.leave(self)

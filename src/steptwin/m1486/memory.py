@@ -29,7 +29,7 @@ class FileState(enum.Enum):
     REFUSED = "refused"
 
 
-class Image(NamedTuple):
+class StoredFile(NamedTuple):
     """A file as it is stored: its bytes and where its labels are, counted from its first byte."""
 
     code: bytes
@@ -158,7 +158,7 @@ class CommandMemory(Stateful):
         self.file = FileState.CLOSED
         self.write = self.end
 
-    def close_file(self) -> Image | None:
+    def close_file(self) -> StoredFile | None:
         """The file may run; None when it was refused."""
         stored = self.file is FileState.OPEN
         self.file = FileState.CLOSED
@@ -166,13 +166,13 @@ class CommandMemory(Stateful):
             return None
         self.begin = begin = self.end
         code = bytes(self._bytes[(begin + offset) % self.size] for offset in range(self.age(begin)))
-        image = Image(code, {label: (place - begin) % self.span for label, place in self._file_labels.items()})
+        image = StoredFile(code, {label: (place - begin) % self.span for label, place in self._file_labels.items()})
         self.labels |= self._file_labels
         self.enable()
         self._reader.labels_changed()
         return image
 
-    def load(self, image: Image) -> None:
+    def load(self, image: StoredFile) -> None:
         """Put a stored file at the beginning of the empty memory; it may run."""
         registers = self._own
         self.reset()

@@ -9,6 +9,11 @@ from __future__ import annotations
 #: Minimum microsteps in a full step.
 FULL_STEP = 64
 
+#: What a chip is set to at power-on: the distance is that of F and B (chapter VII.2, Backward).
+DEFAULT_DISTANCE_U = 64_000
+DEFAULT_VELOCITY = 1_000
+DEFAULT_PROFILE = 25_000
+
 #: Values of Q that may stand with each M. M1 Q1 is missing in the manual's list and is its default for Step & Direction.
 PAIRS: dict[int, tuple[int, ...]] = {
     1: (1,),

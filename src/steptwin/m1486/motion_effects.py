@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-from steptwin.m1486.effects import Effect, Maker, Makers, WrongData
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
+from steptwin.m1486.drive import ChipDrive
+from steptwin.m1486.effects import CommandHost, Effect, Maker, Makers, WrongData
+from steptwin.machine import Nanos
 
 MAKERS = Makers()
 
 
-def _setting(name: str) -> Maker:
-    def make(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _setting(change: Callable[[ChipDrive, int], None]) -> Maker:
+    def make(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
         drive = chip.drive
 
-        def run() -> int:
-            setattr(drive, name, number)
+        def run(now: Nanos) -> int:
+            change(drive, number)
             return following
 
         return run
@@ -25,31 +24,20 @@ def _setting(name: str) -> Maker:
     return make
 
 
-for _name, _attribute in (
-    ("Acceleration", "acceleration"),
-    ("Start/stop", "start_stop"),
-    ("Profile", "profile_speed"),
-    ("Velocity", "velocity"),
-    ("Qualification", "qualification"),
-    ("Number of characteristic", "characteristic"),
-):
-    MAKERS.does(_name, computes=_name != "Number of characteristic")(_setting(_attribute))
-
-
-@MAKERS.does("Microstep", computes=True)
-def _microstep(chip: M1486, number: int, _place: int, following: int) -> Effect:
-    def run() -> int:
-        chip.drive.set_microstep(number)
-        return following
-
-    return run
+MAKERS.does("Acceleration", computes=True)(_setting(ChipDrive.set_acceleration))
+MAKERS.does("Start/stop", computes=True)(_setting(ChipDrive.set_start_stop))
+MAKERS.does("Profile", computes=True)(_setting(ChipDrive.set_profile_speed))
+MAKERS.does("Velocity", computes=True)(_setting(ChipDrive.set_velocity))
+MAKERS.does("Qualification", computes=True)(_setting(ChipDrive.set_qualification))
+MAKERS.does("Microstep", computes=True)(_setting(ChipDrive.set_microstep))
+MAKERS.does("Number of characteristic")(_setting(ChipDrive.set_characteristic))
 
 
 def _distance(direction: int) -> Maker:
-    def make(chip: M1486, distance: int, _place: int, following: int) -> Effect:
+    def make(chip: CommandHost, distance: int, _place: int, following: int) -> Effect:
         drive = chip.drive
 
-        def run() -> int:
+        def run(now: Nanos) -> int:
             _refuse_off_grid(chip, distance)
             drive.distance_u = direction * distance
             drive.endless = 0
@@ -64,15 +52,15 @@ MAKERS.does("Forward", computes=True)(_distance(1))
 MAKERS.does("Backward", computes=True)(_distance(-1))
 
 
-def _refuse_off_grid(chip: M1486, number: int) -> None:
+def _refuse_off_grid(chip: CommandHost, number: int) -> None:
     grid = chip.drive.grid_u
     if number % grid:
         raise WrongData(f"{number} is not a multiple of {grid} minimum microsteps (M{chip.drive.microstep})")
 
 
 @MAKERS.does("Direction", computes=True)
-def _direction(chip: M1486, _number: int, _place: int, following: int) -> Effect:
-    def run() -> int:
+def _direction(chip: CommandHost, _number: int, _place: int, following: int) -> Effect:
+    def run(now: Nanos) -> int:
         chip.drive.reverse()
         return following
 
@@ -80,18 +68,18 @@ def _direction(chip: M1486, _number: int, _place: int, following: int) -> Effect
 
 
 @MAKERS.does("Go absolute", "Home")
-def _go(chip: M1486, position: int, _place: int, following: int) -> Effect:
-    def run() -> int:
+def _go(chip: CommandHost, position: int, _place: int, following: int) -> Effect:
+    def run(now: Nanos) -> int:
         _refuse_off_grid(chip, position)
-        chip.drive.go_to(position, chip.now)
+        chip.drive.go_to(position, now)
         return following
 
     return run
 
 
 def _endless(direction: int) -> Maker:
-    def make(chip: M1486, _number: int, _place: int, following: int) -> Effect:
-        def run() -> int:
+    def make(chip: CommandHost, _number: int, _place: int, following: int) -> Effect:
+        def run(now: Nanos) -> int:
             chip.drive.endless = direction
             return following
 
@@ -105,36 +93,36 @@ MAKERS.does("Go negative", computes=True)(_endless(-1))
 
 
 @MAKERS.does("Equal")
-def _equal(chip: M1486, position: int, _place: int, following: int) -> Effect:
-    def run() -> int:
+def _equal(chip: CommandHost, position: int, _place: int, following: int) -> Effect:
+    def run(now: Nanos) -> int:
         _refuse_off_grid(chip, position)
-        chip.drive.set_counter(position, chip.now)
+        chip.drive.set_counter(position, now)
         return following
 
     return run
 
 
 @MAKERS.does("Clear position counter")
-def _clear_position(chip: M1486, _number: int, _place: int, following: int) -> Effect:
-    def run() -> int:
-        chip.drive.set_counter(0, chip.now)
+def _clear_position(chip: CommandHost, _number: int, _place: int, following: int) -> Effect:
+    def run(now: Nanos) -> int:
+        chip.drive.set_counter(0, now)
         return following
 
     return run
 
 
 @MAKERS.does("Run")
-def _run(chip: M1486, _number: int, place: int, following: int) -> Effect:
-    def run() -> int:
-        return following if chip.motor.move() else place
+def _run(chip: CommandHost, _number: int, place: int, following: int) -> Effect:
+    def run(now: Nanos) -> int:
+        return following if chip.motor.move(now) else place
 
     return run
 
 
 def _seek(direction: int) -> Maker:
-    def make(chip: M1486, line: int, place: int, following: int) -> Effect:
-        def run() -> int:
-            return following if chip.motor.seek(line, direction) else place
+    def make(chip: CommandHost, line: int, place: int, following: int) -> Effect:
+        def run(now: Nanos) -> int:
+            return following if chip.motor.seek(line, direction, now) else place
 
         return run
 

@@ -2,28 +2,53 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, Protocol
 
-from steptwin.m1486.drive import SEEK_LANDING_U, Drive, Motion, WrongMove
+from steptwin.m1486.drive import SEEK_LANDING_U, ChipDrive, MotionMode, WrongMove
 from steptwin.m1486.effects import WrongData
 from steptwin.m1486.functions import EDGE, FULLSTEP, FULLSTEPSS, LIMITOFF, RECOVER, RUNSIGN
-from steptwin.m1486.lines import STEP_DIRECTION
+from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.m1486.pins import JOG_DIRECTION_LINE, seek_ends
-from steptwin.machine import SECOND, Nanos
+from steptwin.m1486.pins import JOG_DIRECTION_LINE, ChipPins, seek_ends
+from steptwin.m1486.unit import NumericUnit
+from steptwin.machine import SECOND, Fact, Nanos
 from steptwin.state import Stateful
 
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
+AXIS: Fact = "axis", 1
 
 
-class Motor(Stateful):
+class MovingProgram(Protocol):
+    """The program, as far as motions hold it up."""
+
+    is_killed: bool
+    is_limited: bool
+
+    def wait_for_motion(self) -> None: ...
+    def motion_ended(self) -> None: ...
+
+
+class MotorHost(Protocol):
+    """What the motor asks of its chip."""
+
+    @property
+    def interface(self) -> Interface: ...
+    @property
+    def unit(self) -> NumericUnit: ...
+    @property
+    def io(self) -> ChipPins: ...
+    @property
+    def program(self) -> MovingProgram: ...
+    def refuse_occupied(self, line: int) -> None: ...
+    def event(self, code: str, text: str, now: Nanos, *facts: Fact) -> None: ...
+
+
+class MotorControl(Stateful):
     """The drive of a chip in the hands of its program and pins."""
 
     __slots__ = ("_chip", "_seek_line", "drive")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_chip"})
 
-    def __init__(self, chip: M1486, drive: Drive) -> None:
+    def __init__(self, chip: MotorHost, drive: ChipDrive) -> None:
         self._chip = chip
         self.drive = drive
         self._seek_line = 0
@@ -33,25 +58,31 @@ class Motor(Stateful):
 
     # ------------------------------------------------------------------ commands
 
-    def move(self) -> bool:
+    def move(self, now: Nanos) -> bool:
         """R. False if a motion is still in progress: then the command waits for its end."""
-        chip, drive = self._chip, self.drive
+        drive = self.drive
         if self._must_wait():
             return False
         try:
-            started = drive.run(chip.now)
+            started = drive.run(now)
         except WrongMove as wrong:
             raise WrongData(str(wrong)) from None
         if not started:
             return True
-        if drive.motion is Motion.ENDLESS:
-            self._started("moves", f"moves on in {'positive' if drive.endless > 0 else 'negative'} direction")
+        if drive.motion is MotionMode.ENDLESS:
+            self._started(
+                "moves",
+                f"moves on in {'positive' if drive.endless > 0 else 'negative'} direction",
+                now,
+                ("direction", drive.endless),
+            )
         else:
-            duration = ((drive.profile.end or chip.now) - chip.now) / SECOND
-            self._started("moves", f"moves {drive.distance_u:+d} to {drive.counter_u(chip.now)} in {duration:.6f} s")
+            duration = ((drive.profile.end or now) - now) / SECOND
+            text = f"moves {drive.distance_u:+d} to {drive.counter_u(now)} in {duration:.6f} s"
+            self._started("moves", text, now, ("direction", 1 if drive.distance_u > 0 else -1), ("distance", drive.distance_u))
         return True
 
-    def seek(self, line: int, direction: int) -> bool:
+    def seek(self, line: int, direction: int, now: Nanos) -> bool:
         """A seek; it goes nowhere if the line has its end level already. False as for `move`."""
         chip = self._chip
         if self._must_wait():
@@ -60,101 +91,104 @@ class Motor(Stateful):
         if seek_ends(line, chip.io.levels[line]):
             return True
         try:
-            self.drive.seek(direction, chip.now)
+            self.drive.seek(direction, now)
         except WrongMove as wrong:
             raise WrongData(str(wrong)) from None
         self._seek_line = line
-        self._started("seeks", f"seeks B{line} in {'positive' if direction > 0 else 'negative'} direction")
+        text = f"seeks B{line} in {'positive' if direction > 0 else 'negative'} direction"
+        self._started("seeks", text, now, ("direction", direction), ("line", line))
         return True
 
     def _must_wait(self) -> bool:
-        if self.drive.motion is Motion.REST:
+        if self.drive.motion is MotionMode.REST:
             return False
         self._chip.program.wait_for_motion()
         return True
 
-    def _started(self, code: str, text: str) -> None:
+    def _started(self, code: str, text: str, now: Nanos, *facts: Fact) -> None:
         chip = self._chip
-        chip.event(code, text)
+        chip.event(code, text, now, AXIS, *facts)
         chip.program.wait_for_motion()
-        chip.io.set_output("BOOST", 0)
-        self._show_direction()
-        self.show_runsign()
-        self.look_at_limit()
+        chip.io.set_output("BOOST", 0, now)
+        self._show_direction(now)
+        self.show_runsign(now)
+        self.look_at_limit(now)
 
-    def _show_direction(self) -> None:
+    def _show_direction(self, now: Nanos) -> None:
         if self._chip.interface == STEP_DIRECTION:
-            self._chip.io.set_output("DIRECTION", int(self.drive.train.direction < 0))
+            self._chip.io.set_output("DIRECTION", int(self.drive.train.direction < 0), now)
 
-    def show_runsign(self) -> None:
+    def show_runsign(self, now: Nanos) -> None:
         """Function 40."""
         chip = self._chip
-        chip.io.set_runsign(int(not self.drive.is_busy) if chip.unit.on(RUNSIGN) else None)
+        chip.io.set_runsign(int(not self.drive.is_busy) if chip.unit.on(RUNSIGN) else None, now)
 
     # ------------------------------------------------------------------ ends
 
-    def ended(self) -> None:
+    def ended(self, now: Nanos) -> None:
         """The motion is over."""
         chip = self._chip
-        was_jog = self.drive.motion is Motion.JOG
+        was_jog = self.drive.motion is MotionMode.JOG
         self.drive.finish()
         if not was_jog:
             validity = "" if self.drive.is_valid else ", position not valid"
-            chip.event("stands", f"stands at {self.drive.counter_u(chip.now)}{validity}")
-            chip.io.set_output("BOOST", 1)
-            self.show_runsign()
+            counter = self.drive.counter_u(now)
+            facts = ("counter", counter), ("is_valid", self.drive.is_valid)
+            chip.event("stands", f"stands at {counter}{validity}", now, AXIS, *facts)
+            chip.io.set_output("BOOST", 1, now)
+            self.show_runsign(now)
         chip.program.motion_ended()
 
-    def stop_at_once(self) -> None:
+    def stop_at_once(self, now: Nanos) -> None:
         """The pulses end without a ramp: reset, shutdown."""
-        if self.drive.motion is not Motion.REST:
-            self.drive.stop_at_once(self._chip.now)
-            self.ended()
+        if self.drive.motion is not MotionMode.REST:
+            self.drive.stop_at_once(now)
+            self.ended(now)
 
-    def _force_stop(self, why: str) -> None:
+    def _force_stop(self, why: str, now: Nanos) -> None:
         """Down the ramp, and on to a full step by function 50."""
         chip, drive = self._chip, self.drive
         if drive.is_busy and not drive.is_stopping:
-            chip.event("stops", f"stops: {why}")
-            drive.force_stop(chip.now, FULL_STEP if chip.unit.on(FULLSTEP) else None)
+            chip.event("stops", f"stops: {why}", now, AXIS, ("why", why))
+            drive.force_stop(now, FULL_STEP if chip.unit.on(FULLSTEP) else None)
 
-    def kill(self) -> None:
+    def kill(self, now: Nanos) -> None:
         """K."""
-        self._force_stop("Kill")
+        self._force_stop("Kill", now)
         if not self._chip.unit.on(RECOVER):
             self._chip.program.is_killed = True
 
-    def line_changed(self, line: int, level: int) -> None:
+    def line_changed(self, line: int, level: int, now: Nanos) -> None:
         """A seek ends when its line says so; function 52 has it end on a multiple of four full steps."""
         chip, drive = self._chip, self.drive
-        if drive.motion is Motion.SEEK and not drive.is_stopping and line == self._seek_line and seek_ends(line, level):
-            drive.force_stop(chip.now, SEEK_LANDING_U if chip.unit.on(FULLSTEPSS) else None)
+        if drive.motion is MotionMode.SEEK and not drive.is_stopping and line == self._seek_line and seek_ends(line, level):
+            drive.force_stop(now, SEEK_LANDING_U if chip.unit.on(FULLSTEPSS) else None)
 
     # ------------------------------------------------------------------ LIMIT
 
-    def limit_changed(self, level: int) -> None:
+    def limit_changed(self, level: int, now: Nanos) -> None:
         chip = self._chip
         if level:
             chip.program.is_limited = False
         elif not chip.unit.on(LIMITOFF):
-            self._trip()
+            self._trip(now)
 
-    def look_at_limit(self) -> None:
+    def look_at_limit(self, now: Nanos) -> None:
         """LIMIT is low already: with function 43 OFF the level counts."""
         unit = self._chip.unit
         if not self._chip.io["LIMIT"] and not unit.on(LIMITOFF) and not unit.on(EDGE):
-            self._trip()
+            self._trip(now)
 
-    def _trip(self) -> None:
-        self._force_stop("LIMIT")
+    def _trip(self, now: Nanos) -> None:
+        self._force_stop("LIMIT", now)
         if not self._chip.unit.on(RECOVER):
             self._chip.program.is_limited = True
 
     # ------------------------------------------------------------------ jog
 
-    def jog(self) -> None:
+    def jog(self, now: Nanos) -> None:
         """A falling edge of JOG: one step, unless the motor is moving."""
         chip = self._chip
-        if self.drive.motion is Motion.REST:
-            self.drive.jog(-1 if chip.io.levels[JOG_DIRECTION_LINE] else 1, chip.now)
-            self._show_direction()
+        if self.drive.motion is MotionMode.REST:
+            self.drive.jog(-1 if chip.io.levels[JOG_DIRECTION_LINE] else 1, now)
+            self._show_direction(now)

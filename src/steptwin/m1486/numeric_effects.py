@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from steptwin.m1486.commands import DIVIDEND_LIMIT, FREE_DIVISORS
-from steptwin.m1486.effects import Effect, Makers, WrongData
+from steptwin.m1486.effects import CommandHost, Effect, Makers, WrongData
 from steptwin.m1486.lines import line_group
 from steptwin.m1486.registers import GENERAL, POSITION_REGISTER
 from steptwin.m1486.unit import FROM_LINES, MASK
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
+from steptwin.machine import Nanos
 
 MAKERS = Makers()
 
 
 @MAKERS.does("Load", computes=True)
-def _load(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _load(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     unit = chip.unit
 
-    def run() -> int:
+    def run(now: Nanos) -> int:
         unit.variable = number
         return following
 
@@ -28,13 +24,13 @@ def _load(chip: M1486, number: int, _place: int, following: int) -> Effect:
 
 
 @MAKERS.does("Move to register")
-def _to_register(chip: M1486, number: int, _place: int, following: int) -> Effect:
-    def run() -> int:
+def _to_register(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
+    def run(now: Nanos) -> int:
         unit = chip.unit
         if number in GENERAL:
             chip.memory.set_register(number, unit.variable)
         elif number == POSITION_REGISTER:
-            chip.drive.set_counter(unit.variable, chip.now)
+            chip.drive.set_counter(unit.variable, now)
         else:
             unit.remainder = unit.variable & 0xFF
         return following
@@ -43,13 +39,13 @@ def _to_register(chip: M1486, number: int, _place: int, following: int) -> Effec
 
 
 @MAKERS.does("Move from register")
-def _from_register(chip: M1486, number: int, _place: int, following: int) -> Effect:
-    def run() -> int:
+def _from_register(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
+    def run(now: Nanos) -> int:
         unit = chip.unit
         if number in GENERAL:
             unit.variable = chip.memory.register(number)
         elif number == POSITION_REGISTER:
-            unit.variable = chip.drive.counter_u(chip.now)
+            unit.variable = chip.drive.counter_u(now)
         else:
             unit.variable = unit.remainder
         return following
@@ -57,13 +53,13 @@ def _from_register(chip: M1486, number: int, _place: int, following: int) -> Eff
     return run
 
 
-def _indirect(chip: M1486, number: int, *, low_byte: bool) -> int:
+def _indirect(chip: CommandHost, number: int, now: Nanos, *, low_byte: bool) -> int:
     """The operand where functions 46 and 58 make its number lines or a register."""
     if chip.unit.operand_source == FROM_LINES:
         lines = line_group(number)
         if lines is None:
             raise WrongData(f"{number} names no lines, and function 46 is ON: first line and count, such as 14, up to line 21")
-        return chip.read(lines)
+        return chip.read(lines, now)
     if number not in GENERAL:
         raise WrongData(f"{number} is no operand register, and function 58 is ON: permitted are 1 to 8")
     value = chip.memory.register(number)
@@ -71,11 +67,11 @@ def _indirect(chip: M1486, number: int, *, low_byte: bool) -> int:
 
 
 @MAKERS.does("Add", computes=True)
-def _add(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _add(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     unit = chip.unit
 
-    def run() -> int:
-        operand = _indirect(chip, number, low_byte=False) if unit.operand_source else number
+    def run(now: Nanos) -> int:
+        operand = _indirect(chip, number, now, low_byte=False) if unit.operand_source else number
         total = unit.variable + operand
         unit.carry = total > MASK
         unit.variable = total & MASK
@@ -85,11 +81,11 @@ def _add(chip: M1486, number: int, _place: int, following: int) -> Effect:
 
 
 @MAKERS.does("Subtract", computes=True)
-def _subtract(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _subtract(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     unit = chip.unit
 
-    def run() -> int:
-        operand = _indirect(chip, number, low_byte=False) if unit.operand_source else number
+    def run(now: Nanos) -> int:
+        operand = _indirect(chip, number, now, low_byte=False) if unit.operand_source else number
         difference = unit.variable - operand
         unit.carry = difference < 0
         unit.variable = difference & MASK
@@ -99,11 +95,11 @@ def _subtract(chip: M1486, number: int, _place: int, following: int) -> Effect:
 
 
 @MAKERS.does("Multiply", computes=True)
-def _multiply(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _multiply(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     unit = chip.unit
 
-    def run() -> int:
-        operand = _indirect(chip, number, low_byte=True) if unit.operand_source else number
+    def run(now: Nanos) -> int:
+        operand = _indirect(chip, number, now, low_byte=True) if unit.operand_source else number
         unit.variable = unit.variable * operand & MASK  # M-13
         return following
 
@@ -111,11 +107,11 @@ def _multiply(chip: M1486, number: int, _place: int, following: int) -> Effect:
 
 
 @MAKERS.does("Divide", computes=True)
-def _divide(chip: M1486, number: int, _place: int, following: int) -> Effect:
+def _divide(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     unit = chip.unit
 
-    def run() -> int:
-        operand = _indirect(chip, number, low_byte=True) if unit.operand_source else number
+    def run(now: Nanos) -> int:
+        operand = _indirect(chip, number, now, low_byte=True) if unit.operand_source else number
         if operand == 0:
             raise WrongData("division by 0")
         if unit.variable > DIVIDEND_LIMIT and operand not in FREE_DIVISORS:

@@ -10,6 +10,8 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.m1486.lines import DUAL_DAC, LINES, RUNSIGN_LINE, SEEK_ENDS_LOW, STEP_DIRECTION, TWO_DACS, Interface
+from steptwin.m1486.variants import Variant
+from steptwin.machine import Nanos
 from steptwin.state import Stateful
 
 LINE_PINS = {f"B{line}": line for line in LINES}
@@ -22,19 +24,21 @@ ALIASES = {
     "ADDR0": "B18", "ADDR1": "B19", "ADDR2": "B20", "ADDR3": "B21",
 }  # fmt: skip
 
+WAVEFORM = "N"
+"""No pin: its edges say which waveform the phase currents follow from then on."""
 JOG_DIRECTION_LINE = 7
 _BAUD_LINES = (5, 6)
 _ADDRESS_LINES = (18, 19, 20, 21)
 
 
-class Pins(Stateful):
-    """Levels of all pins. ``told`` is called with name and level whenever a line or an output has changed."""
+class ChipPins(Stateful):
+    """Levels of all pins. ``on_change`` is called with name, level and moment whenever a line or an output has changed."""
 
-    __slots__ = ("_told", "external", "latches", "levels", "others", "runsign", "tied_low")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_told"})
+    __slots__ = ("_on_change", "external", "latches", "levels", "others", "runsign", "tied_low")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_on_change"})
 
-    def __init__(self, address: int, baud_code: int, interface: Interface, told: Callable[[str, int], None]) -> None:
-        self._told = told
+    def __init__(self, address: int, baud_code: int, interface: Interface, on_change: Callable[[str, int, Nanos], None]) -> None:
+        self._on_change = on_change
         # Index 0 of these lists is no line.
         #: What pulls a line from outside; by default nothing does.
         self.external = [1] * (LINES.stop)
@@ -57,38 +61,38 @@ class Pins(Stateful):
     def __getitem__(self, name: str) -> int:
         return self.others[name]
 
-    def set_output(self, name: str, level: int) -> None:
+    def set_output(self, name: str, level: int, now: Nanos) -> None:
         if self.others[name] != level:
             self.others[name] = level
-            self._told(name, level)
+            self._on_change(name, level, now)
 
-    def set_external(self, line: int, level: int) -> bool:
+    def set_external(self, line: int, level: int, now: Nanos) -> bool:
         """Pull or release a line from outside; True if its level changed."""
         self.external[line] = level
-        return self._settle(line)
+        return self._settle(line, now)
 
-    def set_latch(self, line: int, level: int) -> None:
+    def set_latch(self, line: int, level: int, now: Nanos) -> None:
         self.latches[line] = level
-        self._settle(line)
+        self._settle(line, now)
 
-    def set_runsign(self, level: int | None) -> None:
+    def set_runsign(self, level: int | None, now: Nanos) -> None:
         self.runsign = level
-        self._settle(RUNSIGN_LINE)
+        self._settle(RUNSIGN_LINE, now)
 
-    def tie_low(self, low: bool) -> None:
+    def tie_low(self, low: bool, now: Nanos) -> None:
         self.tied_low = low
         for line in LINES:
-            self._settle(line)
+            self._settle(line, now)
 
-    def release_outputs(self) -> None:
+    def release_outputs(self, now: Nanos) -> None:
         """All outputs high, as after power-up."""
         self.runsign = None
         self.tied_low = False
         for line in LINES:
             self.latches[line] = 1
-            self._settle(line)
+            self._settle(line, now)
 
-    def _settle(self, line: int) -> bool:
+    def _settle(self, line: int, now: Nanos) -> bool:
         own = self.latches[line]
         if line == RUNSIGN_LINE and self.runsign is not None:
             own = self.runsign
@@ -96,7 +100,7 @@ class Pins(Stateful):
         if level == self.levels[line]:
             return False
         self.levels[line] = level
-        self._told(f"B{line}", level)
+        self._on_change(f"B{line}", level, now)
         return True
 
     # ------------------------------------------------------------------ what is read at a reset
@@ -140,5 +144,22 @@ def settable_pin(pin: str, value: float) -> str:
     return name
 
 
+def refuse_taken(pin: str, interface: Interface) -> None:
+    """`Misuse` for a line whose pin the driver interface has: it is no input and no output (M-21)."""
+    taken = interface.occupied
+    if LINE_PINS.get(pin) in taken:
+        raise Misuse(f"{pin} is taken: the {interface.title} interface has B{taken[0]} to B{taken[-1]}")
+
+
 def _number(bits: list[int]) -> int:
     return sum(bit << n for n, bit in enumerate(bits))
+
+
+def baud_pins(variant: Variant, baud: int | None) -> int:
+    """BR1 and BR0 as a number for a baud rate, by default the highest. Raises `Misuse` with the four there are."""
+    rates = [variant.baud(code >> 1, code & 1) for code in range(4)]
+    if baud is None:
+        return len(rates) - 1
+    if baud not in rates:
+        raise Misuse(f"{baud} bit/s: {variant.title} has {', '.join(map(str, rates))}")
+    return rates.index(baud)

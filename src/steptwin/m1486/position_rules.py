@@ -1,4 +1,4 @@
-"""Where a program takes the position counter, as far as the text alone tells: G and H count from what it shows.
+"""Where a program takes the position counter, as far as it follows from the text: G and H count from what it shows.
 
 The counter has 24 bits without a sign. The manual advises initial values that keep it from passing 0 (chapter VII.2, Equal).
 """
@@ -12,13 +12,13 @@ from typing import NamedTuple
 from steptwin.diagnostics import Diagnostic
 from steptwin.m1486 import findings
 from steptwin.m1486.commands import CLEAR_POSITION, When, find, grouped, when
+from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U
 from steptwin.m1486.structure import Stream
-from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import Variant
 
 #: Commands that are followed along all paths together; a program is left at that.
 MOST_COMMANDS = 5_000
-_DEFAULT_DISTANCE = 64_000
 _COUNTER = range(2**24)
 
 
@@ -27,7 +27,7 @@ class _State(NamedTuple):
 
     index: int
     position: int | None = 0
-    distance: int | None = _DEFAULT_DISTANCE
+    distance: int | None = DEFAULT_DISTANCE_U
     back: int | None = None
     loops: tuple[tuple[int, int], ...] = ()
 
@@ -57,6 +57,11 @@ def _signed(number: int) -> str:
     return f"-{grouped(-number)}" if number < 0 else grouped(number)
 
 
+def _distance_to(target: int | None, position: int | None) -> int | None:
+    """The distance of G and H, which count from what the position counter shows."""
+    return None if target is None or position is None else target - position % len(_COUNTER)
+
+
 def _after(stream: Stream, state: _State, variant: Variant) -> list[_State]:
     index, position, distance, back, loops = state
     command = stream.commands[index]
@@ -73,8 +78,7 @@ def _after(stream: Stream, state: _State, variant: Variant) -> list[_State]:
             return [following._replace(distance=None if distance is None else -distance)]
         case "G" | "H":
             target = 0 if command.key == "H" else command.number
-            known = position is not None and target is not None
-            return [following._replace(distance=target - position % len(_COUNTER) if known else None)]  # type: ignore[operator]
+            return [following._replace(distance=_distance_to(target, position))]
         case "G+" | "G-":
             return [following._replace(distance=None)]
         case "=":
@@ -112,7 +116,7 @@ def _end_of_loop(following: _State, loops: tuple[tuple[int, int], ...]) -> _Stat
 
 def _jumps(stream: Stream, following: _State, index: int) -> list[_State]:
     command = stream.commands[index]
-    label = command.argument.label if isinstance(command.argument, Condition) else command.number
+    label = command.argument.label if isinstance(command.argument, JumpCondition) else command.number
     target = None if label is None else stream.resolve(index, label)
     if target is None:
         return [following]

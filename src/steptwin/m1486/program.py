@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, NoReturn
+from typing import ClassVar, NamedTuple, NoReturn, Protocol
 
-from steptwin.m1486.effects import Effect, WrongData
+from steptwin.m1486.effects import CommandHost, Effect, WrongData
 from steptwin.m1486.encoding import LONGEST, decode
 from steptwin.m1486.execute import compile_command
 from steptwin.m1486.syntax import Command
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Plain, Stateful
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
 
 #: Where commands take no time, so many of them happen at one moment; then a while passes, so that a loop without end lets
 #: time go on. The while is long enough for a chip that polls a line to cost little.
@@ -30,11 +27,11 @@ LOST = -1
 """The place of a loop's beginning, or of a return, that has been overwritten."""
 
 CommandHook = Callable[[Nanos, int, Command | None], bool | None]
-"""Told of every command before it is done: moment, place in memory, command (None where the bytes are none). True halts the
+"""Called before every command is done: moment, place in memory, command (None where the bytes are none). True halts the
 program before it."""
 
 
-class Waiting(enum.Enum):
+class WaitReason(enum.Enum):
     """What the next command waits for beside its time."""
 
     NOTHING = "nothing"
@@ -46,7 +43,7 @@ class _Look(Exception):
     """The command is not compiled or does more than compute."""
 
 
-def _look() -> NoReturn:
+def _look(now: Nanos) -> NoReturn:
     raise _Look
 
 
@@ -56,7 +53,13 @@ class _Compiled(NamedTuple):
     command: Command | None
 
 
-class Program(Stateful):
+class ProgramHost(CommandHost, Protocol):
+    """What a program asks of its chip: all that commands do, and where wrong data go."""
+
+    def wrong_data(self, what: str, now: Nanos) -> None: ...
+
+
+class ProgramExecution(Stateful):
     """Where the program stands, and what it waits for.
 
     ``statement_ns`` is the time of a command (M-19). ``loop_starts`` and ``loop_counts`` are the loops in progress, from the
@@ -86,9 +89,9 @@ class Program(Stateful):
     )
     FIXED: ClassVar[frozenset[str]] = frozenset({"_chip", "_code", "_compiled", "_linked", "_on_command", "statement_ns"})
 
-    def __init__(self, chip: M1486, places: int, statement_ns: Nanos) -> None:
+    def __init__(self, chip: ProgramHost, places: int, statement_ns: Nanos) -> None:
         self._chip = chip
-        self._code: list[Callable[[], int]] = [_look] * places
+        self._code: list[Effect] = [_look] * places
         self._compiled: dict[int, _Compiled] = {}
         #: Places of commands whose closures know where labels are.
         self._linked: set[int] = set()
@@ -96,13 +99,13 @@ class Program(Stateful):
         self.statement_ns = statement_ns
         self._burst = 0
         self._burst_at: Nanos = 0
-        self.reset()
+        self.reset(0)
 
-    def reset(self) -> None:
+    def reset(self, now: Nanos) -> None:
         """As after power-up, with an empty memory."""
         self.pc = 0
         #: When the next command may be done; a wait that a reset cuts short is over.
-        self.ready: Nanos = self._chip.now
+        self.ready: Nanos = now
         self.is_killed = False
         self.is_limited = False
         self.is_halted = False
@@ -112,7 +115,7 @@ class Program(Stateful):
         self.loop_starts: list[int] = []
         self.loop_counts: list[int] = []
         self.back: int | None = None
-        self.waiting = Waiting.NOTHING
+        self.waiting = WaitReason.NOTHING
         self.line = 0
         self.line_level = 0
 
@@ -126,23 +129,22 @@ class Program(Stateful):
     @property
     def is_at_end(self) -> bool:
         """Nothing is left to be done; a command in progress may still wait."""
-        return self.pc == self._chip.memory.end and self.waiting is Waiting.NOTHING
+        return self.pc == self._chip.memory.end and self.waiting is WaitReason.NOTHING
 
-    def deadline(self) -> Nanos | None:
-        if self.waiting is not Waiting.NOTHING or self.pc == self._chip.memory.end or self.is_held:
+    def deadline(self, now: Nanos) -> Nanos | None:
+        if self.waiting is not WaitReason.NOTHING or self.pc == self._chip.memory.end or self.is_held:
             return None
-        return max(self.ready, self._chip.now)
+        return max(self.ready, now)
 
-    def abandon(self) -> None:
+    def abandon(self, now: Nanos) -> None:
         """Give up what has been stored so far; commands that come now are done (M-11)."""
-        chip = self._chip
-        self.pc = chip.memory.end
-        self.ready = min(self.ready, chip.now + self.statement_ns)
+        self.pc = self._chip.memory.end
+        self.ready = min(self.ready, now + self.statement_ns)
         self._forget_nesting()
 
-    def restart(self, begin: int | None) -> None:
+    def restart(self, begin: int | None, now: Nanos) -> None:
         """Run from ``begin`` on, or nothing."""
-        self.reset()
+        self.reset(now)
         self.pc = self._chip.memory.end if begin is None else begin
 
     # ------------------------------------------------------------------ waiting
@@ -151,27 +153,28 @@ class Program(Stateful):
         self.ready = max(self.ready, moment)
 
     def wait_for_motion(self) -> None:
-        self.waiting = Waiting.MOTION
+        self.waiting = WaitReason.MOTION
 
     def wait_for_line(self, line: int, level: int) -> None:
-        self.waiting = Waiting.LINE
+        self.waiting = WaitReason.LINE
         self.line = line
         self.line_level = level
 
     def motion_ended(self) -> None:
-        if self.waiting is Waiting.MOTION:
-            self.waiting = Waiting.NOTHING
+        if self.waiting is WaitReason.MOTION:
+            self.waiting = WaitReason.NOTHING
 
     def line_changed(self, line: int, level: int) -> None:
-        if self.waiting is Waiting.LINE and (line, level) == (self.line, self.line_level):
-            self.waiting = Waiting.NOTHING
+        if self.waiting is WaitReason.LINE and (line, level) == (self.line, self.line_level):
+            self.waiting = WaitReason.NOTHING
 
     # ------------------------------------------------------------------ running
 
-    def run(self, until: Nanos) -> None:
-        """Do what is due from the chip's moment to ``until``, at most up to the first command that does more than compute."""
-        chip = self._chip
-        now = chip.now
+    def run(self, now: Nanos, until: Nanos) -> Nanos:
+        """Do what is due from ``now`` to ``until``, at most up to the first command that does more than compute.
+
+        Returns the moment that the chip has come to by that.
+        """
         statement = self.statement_ns
         most = (until - now) // statement + 1 if statement else self._left_at(now)
         code = self._code
@@ -179,22 +182,23 @@ class Program(Stateful):
         done = 0
         try:
             for done in range(most):  # noqa: B007 - the count is wanted where the loop breaks
-                place = code[place]()
+                place = code[place](now)
             done = most
         except _Look:
             self.pc = place
             self._pass(now, done)
-            chip.now = now + done * statement
-            self._look_at(place)
-            return
+            now += done * statement
+            self._look_at(place, now)
+            return now
         except WrongData as wrong:
             self.pc = self._compiled[place].following
             self._pass(now, done + 1)
-            chip.now = now + done * statement
-            chip.wrong_data(str(wrong))
-            return
+            now += done * statement
+            self._chip.wrong_data(str(wrong), now)
+            return now
         self.pc = place
         self._pass(now, done)
+        return now
 
     def _left_at(self, now: Nanos) -> int:
         if self._burst_at != now:
@@ -213,25 +217,23 @@ class Program(Stateful):
             self._burst = 0
             self.ready = now + BURST_NS
 
-    def _look_at(self, place: int) -> None:
-        """Do the command at ``place`` at the chip's moment."""
-        chip = self._chip
-        if place == chip.memory.end:
+    def _look_at(self, place: int, now: Nanos) -> None:
+        """Do the command at ``place``."""
+        if place == self._chip.memory.end:
             return
         compiled = self._compiled.get(place) or self._compile(place)
-        if self._on_command is not None and self._on_command(chip.now, place, compiled.command):
+        if self._on_command is not None and self._on_command(now, place, compiled.command):
             self.is_halted = True
             return
-        self._do(compiled)
+        self._do(compiled, now)
 
-    def _do(self, compiled: _Compiled) -> None:
-        chip = self._chip
-        self._pass(chip.now, 1)
+    def _do(self, compiled: _Compiled, now: Nanos) -> None:
+        self._pass(now, 1)
         self.pc = compiled.following
         try:
-            self.pc = compiled.effect()
+            self.pc = compiled.effect(now)
         except WrongData as wrong:
-            chip.wrong_data(str(wrong))
+            self._chip.wrong_data(str(wrong), now)
 
     def _compile(self, place: int) -> _Compiled:
         chip = self._chip
@@ -253,7 +255,7 @@ class Program(Stateful):
     def _after(self, place: int, size: int) -> int:
         return (place + size) % len(self._code)
 
-    # ------------------------------------------------------------------ what the memory tells
+    # ------------------------------------------------------------------ changes of the memory
 
     def bytes_changed(self, first: int, count: int) -> None:
         size = len(self._code) // 2
@@ -289,16 +291,16 @@ class Program(Stateful):
     # ------------------------------------------------------------------ watching
 
     def watch(self, hook: CommandHook | None) -> None:
-        """Have ``hook`` told of every command, or nobody."""
+        """Call ``hook`` before every command; None: no longer."""
         self._on_command = hook
         self._forget_code()
 
-    def resume(self) -> None:
+    def resume(self, now: Nanos) -> None:
         """Do the command before which a hook has halted the program, and go on."""
         if self.is_halted:
             self.is_halted = False
-            self._do(self._compiled.get(self.pc) or self._compile(self.pc))
+            self._do(self._compiled.get(self.pc) or self._compile(self.pc), now)
 
 
-def _no_command() -> NoReturn:
+def _no_command(now: Nanos) -> NoReturn:
     raise WrongData("these bytes of the command memory are no command")

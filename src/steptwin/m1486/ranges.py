@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from steptwin.m1486.commands import find, permitted_text
-from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import Variant
 
 
@@ -12,6 +12,6 @@ def out_of_range(command: Command, variant: Variant) -> str | None:
     if not command.from_variable and find(command.key, command.number, variant) is None:
         return f"{command} is out of range: permitted is {permitted_text(command.key, variant)}"
     argument = command.argument
-    if isinstance(argument, Condition) and find("J", argument.label, variant) is None:
+    if isinstance(argument, JumpCondition) and find("J", argument.label, variant) is None:
         return f"{command} is out of range: permitted is label {permitted_text('J', variant)}"
     return None

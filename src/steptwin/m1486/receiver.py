@@ -8,20 +8,19 @@ from __future__ import annotations
 
 from collections import deque
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, Protocol
 
 from steptwin.m1486.commands import CLEAR_KILL, When, find, permitted_text, when
+from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.encoding import SIZES, encode
 from steptwin.m1486.functions import REPORT, RETURN
-from steptwin.m1486.memory import FileState
+from steptwin.m1486.memory import CommandMemory, FileState
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import Command, parse_line
+from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import Store, Variant
-from steptwin.machine import Nanos
+from steptwin.machine import Fact, Nanos
 from steptwin.state import Stateful
-
-if TYPE_CHECKING:
-    from steptwin.m1486.chip import M1486
 
 CR = 0x0D
 _SKIPPED = frozenset(b"\n \t")
@@ -37,6 +36,37 @@ _CLEAR_KILL = f"C{CLEAR_KILL}"
 _MOST_SEEN = 4
 #: Lines that are read only once.
 _LINES_KEPT = 4096
+
+
+class StoredProgram(Protocol):
+    """The program, as far as room for new commands depends on it."""
+
+    @property
+    def pc(self) -> int: ...
+
+
+class ReceiverHost(Protocol):
+    """What the receiver asks of its chip."""
+
+    @property
+    def variant(self) -> Variant: ...
+    @property
+    def address(self) -> int: ...
+    @property
+    def unit(self) -> NumericUnit: ...
+    @property
+    def memory(self) -> CommandMemory: ...
+    @property
+    def drive(self) -> ChipDrive: ...
+    @property
+    def program(self) -> StoredProgram: ...
+    def send(self, byte: int, now: Nanos) -> None: ...
+    def event(self, code: str, text: str, now: Nanos, *facts: Fact) -> None: ...
+    def wrong_data_received(self, what: str, now: Nanos) -> None: ...
+    def kill(self, now: Nanos) -> None: ...
+    def clear_kill(self, now: Nanos) -> None: ...
+    def close_file(self, now: Nanos) -> None: ...
+    def software_reset(self, now: Nanos) -> None: ...
 
 
 class Receiver(Stateful):
@@ -60,7 +90,7 @@ class Receiver(Stateful):
     )
     FIXED: ClassVar[frozenset[str]] = frozenset({"_capacity", "_chip"})
 
-    def __init__(self, chip: M1486) -> None:
+    def __init__(self, chip: ReceiverHost) -> None:
         self._chip = chip
         self._capacity = chip.variant.input_bits // 8
         self.reset()
@@ -102,28 +132,28 @@ class Receiver(Stateful):
 
     # ------------------------------------------------------------------ characters
 
-    def character(self, byte: int) -> None:
+    def character(self, byte: int, now: Nanos) -> None:
         """A character has arrived."""
         if self.is_deaf:
             return
         if byte == CR:
-            self._end_of_line()
+            self._end_of_line(now)
         elif self._in_comment or byte in _SKIPPED:
-            self._echo(byte)
+            self._echo(byte, now)
         elif byte == _SEMICOLON:
             self._in_comment = True
-            self._echo(byte)
+            self._echo(byte, now)
         else:
-            self._part_of_line(byte)
+            self._part_of_line(byte, now)
 
-    def _part_of_line(self, byte: int) -> None:
+    def _part_of_line(self, byte: int, now: Nanos) -> None:
         before = self._seen
         if len(before) < _MOST_SEEN:
             char = chr(byte)
             self._seen += char.upper() if char.isascii() else char
         if self._acts_when_received():
-            self._echo(byte)
-        elif self.is_listening and not self._skips_line and not self._store(byte) and not self._is_torn:
+            self._echo(byte, now)
+        elif self.is_listening and not self._skips_line and not self._store(byte, now) and not self._is_torn:
             # What is not received is no part of the line: K may follow at once.
             self._seen = before
 
@@ -131,63 +161,63 @@ class Receiver(Stateful):
         """M-27: no other command begins with K or X, so these lines are never put into the buffer."""
         return self._seen[:1] in ("K", "X")
 
-    def _echo(self, byte: int) -> None:
+    def _echo(self, byte: int, now: Nanos) -> None:
         if self.is_listening and self._chip.unit.on(RETURN):
-            self._chip.send(byte)
+            self._chip.send(byte, now)
 
-    def _store(self, byte: int) -> bool:
+    def _store(self, byte: int, now: Nanos) -> bool:
         """Put a character into the buffer; with the answers of a buffer that is filling up."""
         free = self.free
         if free == 0 or self._is_torn:
-            self._refuse(byte)
+            self._refuse(byte, now)
             return False
-        self._echo(byte)
+        self._echo(byte, now)
         self._buffer.append(byte)
         self._seen_stored += 1
         if free <= _LAST_BYTES:
-            self._chip.send(~byte & 0xFF)
+            self._chip.send(~byte & 0xFF, now)
         return True
 
-    def _refuse(self, byte: int) -> None:
+    def _refuse(self, byte: int, now: Nanos) -> None:
         if byte != CR and _CLEAR_KILL.startswith(self._seen):
             # This may become C75, which needs no room. If it becomes something else, it has lost its beginning.
             self._is_torn = True
             self._unanswered += 1
             return
         for _ in range(self._unanswered + 1):
-            self._chip.send(NO_ROOM)
+            self._chip.send(NO_ROOM, now)
         self._unanswered = 0
         self._has_lost = True
         if not self._lines and not self._is_torn:
             # No command is as long as the buffer; waiting for its end would be for ever.
             self._buffer.clear()
             self._skips_line = True
-            self._chip.wrong_data_received("a line longer than the input buffer")
+            self._chip.wrong_data_received("a line longer than the input buffer", now)
 
-    def _end_of_line(self) -> None:
+    def _end_of_line(self, now: Nanos) -> None:
         seen, stored, skipped = self._seen, self._seen_stored, self._skips_line
         if self._acts_when_received():
-            self._echo(CR)
+            self._echo(CR, now)
             self._begin_line()
-            self._act(seen)
+            self._act(seen, now)
         elif not self.is_listening or skipped:
-            self._echo(CR)
+            self._echo(CR, now)
             self._begin_line()
         elif seen == _CLEAR_KILL:
-            self._echo(CR)
+            self._echo(CR, now)
             self._begin_line()
-            self._take_back(stored)
-            self._chip.clear_kill()
+            self._take_back(stored, now)
+            self._chip.clear_kill(now)
         elif (self._buffer and self._buffer[-1] != CR) or self._is_torn:
-            self._lines += self._store(CR)
+            self._lines += self._store(CR, now)
             self._begin_line()
         elif self._has_lost and self.free == 0:
-            self._chip.send(NO_ROOM)
+            self._chip.send(NO_ROOM, now)
             self._begin_line()
         else:
-            self._echo(CR)
+            self._echo(CR, now)
             self._begin_line()
-        self.compress()
+        self.compress(now)
 
     def _begin_line(self) -> None:
         self._seen = ""
@@ -198,17 +228,17 @@ class Receiver(Stateful):
         self._has_lost = False
         self._skips_line = False
 
-    def _act(self, line: str) -> None:
+    def _act(self, line: str, now: Nanos) -> None:
         """A line that begins with K or X."""
         if line[0] == "X":
-            self._select(line[1:])
+            self._select(line[1:], now)
         elif self.is_listening:
             if line == "K":
-                self._chip.kill()
+                self._chip.kill(now)
             else:
-                self._chip.wrong_data_received(f"{line}: K takes no number")
+                self._chip.wrong_data_received(f"{line}: K takes no number", now)
 
-    def _select(self, argument: str) -> None:
+    def _select(self, argument: str, now: Nanos) -> None:
         """X: only the chip with this address listens from now on."""
         chip = self._chip
         if argument == "G":
@@ -217,27 +247,28 @@ class Receiver(Stateful):
             self.is_listening = int(argument, 16) == chip.address
         elif self.is_listening:
             chip.wrong_data_received(
-                f"X{argument} names no chip: permitted are {permitted_text('X', chip.variant)}, or G for all"
+                f"X{argument} names no chip: permitted are {permitted_text('X', chip.variant)}, or G for all",
+                now,
             )
 
-    def _take_back(self, stored: int) -> None:
+    def _take_back(self, stored: int, now: Nanos) -> None:
         """A line that acted when received leaves the buffer again."""
         for _ in range(stored):
             self._buffer.pop()
-        self._removed(stored)
+        self._removed(stored, now)
 
-    def _removed(self, count: int) -> None:
+    def _removed(self, count: int, now: Nanos) -> None:
         """Function 57: say that there is room again."""
         if count == 0 or not self._chip.unit.on(REPORT):
             return
         if self.free - count < _LAST_BYTES <= self.free:
-            self._chip.send(THREE_FREE)
+            self._chip.send(THREE_FREE, now)
         if not self._buffer:
-            self._chip.send(EMPTY)
+            self._chip.send(EMPTY, now)
 
     # ------------------------------------------------------------------ compression
 
-    def compress(self) -> None:
+    def compress(self, now: Nanos) -> None:
         """Move commands from the buffer to the memory as far as that is possible now."""
         while self._lines and self.busy_until is None:
             length = self._buffer.index(CR)
@@ -248,11 +279,11 @@ class Receiver(Stateful):
             for _ in range(length + 1):
                 self._buffer.popleft()
             self._lines -= 1
-            self._removed(length + 1)
+            self._removed(length + 1, now)
             if isinstance(command, Command):
-                self._take(command)
+                self._take(command, now)
             else:
-                self._chip.wrong_data_received(command)
+                self._chip.wrong_data_received(command, now)
 
     def _is_stopped_by_motor(self) -> bool:
         """Compression stands still while the motor runs, but not inside ``[ ]``."""
@@ -269,7 +300,7 @@ class Receiver(Stateful):
             return False
         return not memory.has_room(size, chip.program.pc)
 
-    def _take(self, command: Command) -> None:
+    def _take(self, command: Command, now: Nanos) -> None:
         chip = self._chip
         memory = chip.memory
         match command.key:
@@ -277,17 +308,17 @@ class Receiver(Stateful):
                 if memory.file is FileState.CLOSED:
                     memory.open_file()
             case "]":
-                chip.close_file()
+                chip.close_file(now)
             case "\\":
-                chip.software_reset()
+                chip.software_reset(now)
             case "@":
                 memory.label(command.number or 0)
             case "C" if command.number == CLEAR_KILL:
-                chip.clear_kill()
+                chip.clear_kill(now)
             case _:
-                self._store_command(command)
+                self._store_command(command, now)
 
-    def _store_command(self, command: Command) -> None:
+    def _store_command(self, command: Command, now: Nanos) -> None:
         chip = self._chip
         memory = chip.memory
         if memory.file is FileState.REFUSED:
@@ -295,27 +326,28 @@ class Receiver(Stateful):
         raw = encode(command)
         if memory.file is FileState.OPEN and not memory.fits_file(len(raw)):
             memory.refuse_file()
-            chip.send(NO_ROOM)
-            chip.event("file-refused", f"the file is larger than the command memory of {chip.variant.memory_bits} bits")
+            chip.send(NO_ROOM, now)
+            bits = chip.variant.memory_bits
+            chip.event("file-refused", f"the file is larger than the command memory of {bits} bits", now, ("memory", bits))
             return
         memory.store(raw)
         if chip.variant.store is Store.EEPROM:
-            self.busy_until = chip.now + chip.variant.write_ns
+            self.busy_until = now + chip.variant.write_ns
         elif memory.file is FileState.CLOSED:
             memory.enable()
 
-    def erase(self) -> None:
+    def erase(self, now: Nanos) -> None:
         """The EEPROM is being erased; what arrives meanwhile is lost."""
-        self.busy_until = self._chip.now + self._chip.variant.erase_ns
+        self.busy_until = now + self._chip.variant.erase_ns
         self.is_deaf = True
 
-    def eeprom_done(self) -> None:
+    def eeprom_done(self, now: Nanos) -> None:
         """Writing or erasing has ended: what was written may run, and what waits goes on."""
         self.busy_until = None
         self.is_deaf = False
         if self._chip.memory.file is FileState.CLOSED:
             self._chip.memory.enable()
-        self.compress()
+        self.compress(now)
 
 
 @lru_cache(_LINES_KEPT)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Register:
+class ChipRegister:
     number: int
     bits: int
     name: str
@@ -17,10 +17,10 @@ class Register:
 POSITION_REGISTER = 9
 REMAINDER_REGISTER = 10
 
-REGISTERS: tuple[Register, ...] = (
-    *(Register(n, 16, f"general purpose {n}", True) for n in range(1, 9)),
-    Register(POSITION_REGISTER, 24, "position counter", False),
-    Register(REMAINDER_REGISTER, 8, "remainder of the last division", False),
+REGISTERS: tuple[ChipRegister, ...] = (
+    *(ChipRegister(n, 16, f"general purpose {n}", True) for n in range(1, 9)),
+    ChipRegister(POSITION_REGISTER, 24, "position counter", False),
+    ChipRegister(REMAINDER_REGISTER, 8, "remainder of the last division", False),
 )
 
 #: The registers that share the command memory on some variants.

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from steptwin.m1486.commands import When, memory_bits, when
-from steptwin.m1486.syntax import Command, Program
+from steptwin.m1486.syntax import Command, JumpCondition, ProgramText
 
 
 def stored_bits(command: Command) -> int:
@@ -17,6 +17,13 @@ def stored_bits(command: Command) -> int:
     if when(command.key, command.number) is not When.QUEUED:
         return 0
     return memory_bits(command.key)
+
+
+def written_label(command: Command) -> int | None:
+    """The label a jump, condition or call names as a number."""
+    if isinstance(command.argument, JumpCondition):
+        return command.argument.label
+    return command.argument if command.key in ("J", "'") else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +103,7 @@ class Stream:
         return self.bits_before[self.present(index) + 1] - self.bits_before[start]
 
 
-def streams(program: Program) -> list[Stream]:
+def streams(program: ProgramText) -> list[Stream]:
     """What each chip gets. Without ``X`` there is one stream; with it one for each address named, and commands sent while all
     listen go to each of them."""
     commands = program.all_commands

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.m1486 import findings
 from steptwin.m1486.commands import When, find, when
-from steptwin.m1486.structure import Stream
-from steptwin.m1486.syntax import Command, Condition
+from steptwin.m1486.structure import Stream, written_label
+from steptwin.m1486.syntax import JumpCondition
 from steptwin.m1486.variants import VARIANTS, Store, Variant
 
 #: Levels of loop that work (M-5).
@@ -30,17 +30,10 @@ def structure_rules(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
         yield from _stored_file(stream)
 
 
-def written_label(command: Command) -> int | None:
-    """The label a jump, condition or call names as a number."""
-    if isinstance(command.argument, Condition):
-        return command.argument.label
-    return command.argument if command.key in ("J", "'") else None
-
-
 def label_problem(stream: Stream, index: int, label: int, variant: Variant) -> Iterator[Diagnostic]:
     """Why the command at ``index`` does not find ``label``."""
     command = stream.commands[index]
-    span = command.argument.label_span if isinstance(command.argument, Condition) else command.argument_span
+    span = command.argument.label_span if isinstance(command.argument, JumpCondition) else command.argument_span
     target = stream.resolve(index, label)
     if target is not None:
         if bits := _overwritten(stream, index, target, variant):
@@ -49,7 +42,7 @@ def label_problem(stream: Stream, index: int, label: int, variant: Variant) -> I
         return
     later = [at for at in stream.labels.get(label, ()) if at > index and stream.resets[at] == stream.resets[index]]
     if later:
-        hint = "enclose both in [ ]" if stream.in_file[index] is None else "it stands behind the ] that runs this file"
+        hint = "enclose both in [ ]" if stream.in_file[index] is None else "it follows the ] that runs this file"
         yield findings.LABEL_NOT_THERE_YET(span, f"label {label} is defined later than this command runs", hint)
         return
     known = sorted(stream.visible_labels(index))

@@ -14,7 +14,7 @@ from typing import NamedTuple, NoReturn
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.m1486 import findings
 from steptwin.m1486.commands import CONDITIONS, LARGEST_LABEL, LETTERS, rows, takes_number, takes_variable
-from steptwin.m1486.findings import Finding
+from steptwin.m1486.findings import ChipFinding
 
 _NOWHERE = Span(0, 0)
 _LINE_END = re.compile(r"\r\n|\r|\n")
@@ -31,7 +31,7 @@ _MEANT_DIGIT = {"l": "1", "I": "1", "|": "1", "O": "0", "o": "0"}
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class JumpCondition:
     """The argument of ``I``: jump to ``label`` when line or flag ``line`` is ``high``."""
 
     line: int
@@ -49,14 +49,14 @@ class Command:
     """
 
     key: str
-    argument: int | Condition | None = None
+    argument: int | JumpCondition | None = None
     span: Span = field(default=_NOWHERE, compare=False)
     argument_span: Span = field(default=_NOWHERE, compare=False)
 
     @property
     def number(self) -> int | None:
         """The number given: for ``I`` the line or flag, None where the internal variable stands for it or nothing is taken."""
-        return self.argument.line if isinstance(self.argument, Condition) else self.argument
+        return self.argument.line if isinstance(self.argument, JumpCondition) else self.argument
 
     @property
     def from_variable(self) -> bool:
@@ -64,7 +64,7 @@ class Command:
         return self.argument is None and takes_variable(self.key)
 
     def __str__(self) -> str:
-        if isinstance(self.argument, Condition):
+        if isinstance(self.argument, JumpCondition):
             return f"I{self.argument.line}{'H' if self.argument.high else 'L'}{self.argument.label}"
         if self.argument is None:
             return self.key
@@ -72,7 +72,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ProgramLine:
     """One line: a command, a comment, both or nothing; or ``broken``, its whole text, where there is no sound command.
 
     ``salvaged`` holds what of a broken line could be understood, for checks that would otherwise miss a label or a bracket.
@@ -93,8 +93,8 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
-    lines: tuple[Line, ...]
+class ProgramText:
+    lines: tuple[ProgramLine, ...]
 
     @property
     def commands(self) -> list[Command]:
@@ -108,18 +108,18 @@ class Program:
 
 
 class Parsed(NamedTuple):
-    program: Program
+    program: ProgramText
     diagnostics: list[Diagnostic]
 
 
 class ParsedLine(NamedTuple):
-    line: Line
+    line: ProgramLine
     diagnostics: list[Diagnostic]
 
 
 def parse(text: str) -> Parsed:
     """Read a whole program. Never raises: a broken line is reported, kept as it is, and does not hide the next one."""
-    lines: list[Line] = []
+    lines: list[ProgramLine] = []
     diagnostics: list[Diagnostic] = []
     start = 0
     for end in (*_LINE_END.finditer(text), None):
@@ -130,13 +130,13 @@ def parse(text: str) -> Parsed:
             diagnostics += found
         if end is not None:
             start = end.end()
-    return Parsed(Program(tuple(lines)), diagnostics)
+    return Parsed(ProgramText(tuple(lines)), diagnostics)
 
 
 def parse_line(text: str, offset: int = 0) -> ParsedLine:
     """Read one line without its end. ``offset`` is where it begins in the text that spans point into."""
     body, semicolon, rest = text.partition(";")
-    reader = _Reader(body, offset)
+    reader = _LineReader(body, offset)
     commands: list[Command] = []
     try:
         while reader.left:
@@ -145,11 +145,11 @@ def parse_line(text: str, offset: int = 0) -> ParsedLine:
     except _BrokenLine:
         pass
     if reader.is_broken:
-        return ParsedLine(Line(broken=text, salvaged=tuple(commands)), reader.diagnostics)
-    return ParsedLine(Line(commands[0] if commands else None, rest.strip() if semicolon else None), reader.diagnostics)
+        return ParsedLine(ProgramLine(broken=text, salvaged=tuple(commands)), reader.diagnostics)
+    return ParsedLine(ProgramLine(commands[0] if commands else None, rest.strip() if semicolon else None), reader.diagnostics)
 
 
-def format_program(program: Program, end: str = "\n") -> str:
+def format_program(program: ProgramText, end: str = "\n") -> str:
     """The program as text in one form: capitals, no blanks, comments in a column, each line followed by ``end``."""
     return "".join(f"{line}{end}" for line in program.lines)
 
@@ -158,7 +158,7 @@ class _BrokenLine(Exception):
     """The rest of the line cannot be read; what is wrong has been reported."""
 
 
-class _Reader:
+class _LineReader:
     """The characters of a line that are no blanks, each with its place."""
 
     def __init__(self, body: str, offset: int) -> None:
@@ -201,16 +201,18 @@ class _Reader:
     def rest_span(self) -> Span:
         return self.span(self.at, len(self.chars))
 
-    def error(self, finding: Finding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
+    def error(self, finding: ChipFinding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
         self.diagnostics.append(finding(span, message, hint, fix))
         self.is_broken = True
 
-    def give_up(self, finding: Finding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> NoReturn:
+    def give_up(
+        self, finding: ChipFinding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None
+    ) -> NoReturn:
         self.error(finding, span, message, hint, fix)
         raise _BrokenLine
 
 
-def _command(reader: _Reader) -> Command:
+def _command(reader: _LineReader) -> Command:
     start = reader.at
     if reader.next not in LETTERS:
         _unknown(reader)
@@ -218,7 +220,7 @@ def _command(reader: _Reader) -> Command:
     if key + reader.next in ("G+", "G-", "XG"):
         key += reader.take()
     argument_start = reader.at
-    argument: int | Condition | None = None
+    argument: int | JumpCondition | None = None
     argument_end: int | None = None
     if key == "I":
         argument, argument_end = _condition(reader)
@@ -232,12 +234,12 @@ def _command(reader: _Reader) -> Command:
         _no_word(reader, key, argument)
         _no_other_notation(reader, key, argument_start)
         if argument is None and not takes_variable(key):
-            hint = "the internal variable cannot stand for it"
+            hint = "the internal variable cannot replace it"
             reader.give_up(findings.ARGUMENT_MISSING, reader.span(reader.at), f"number expected, {reader.found}", hint)
     return Command(key, argument, reader.span(start), reader.span(argument_start, argument_end))
 
 
-def _number(reader: _Reader) -> int | None:
+def _number(reader: _LineReader) -> int | None:
     """The digits that come next as a number, None if there are none."""
     start = reader.at
     while reader.next in _DIGITS:
@@ -254,14 +256,14 @@ def _number(reader: _Reader) -> int | None:
     return int(digits)
 
 
-def _no_word(reader: _Reader, key: str, number: int | None) -> None:
+def _no_word(reader: _LineReader, key: str, number: int | None) -> None:
     """Letters in the place of a number are no row of commands."""
     if number is None and _WORD.match(reader.left):
         hint = "a number, or the end of the line for the internal variable" if takes_variable(key) else "a number"
         reader.give_up(findings.BAD_ARGUMENT, reader.rest_span(), f"{reader.left} is no number", hint)
 
 
-def _no_other_notation(reader: _Reader, key: str, start: int) -> None:
+def _no_other_notation(reader: _LineReader, key: str, start: int) -> None:
     """After the digits of a number: refuse a letter meant as a digit, a sign and a fraction, each with what would be right."""
     rest, has_digits = reader.left, reader.at > start
     if not rest:
@@ -283,7 +285,7 @@ def _no_other_notation(reader: _Reader, key: str, start: int) -> None:
         reader.give_up(findings.BAD_ARGUMENT, reader.span(start, len(reader.chars)), f"{number} is not a whole number")
 
 
-def _condition(reader: _Reader) -> tuple[Condition, int]:
+def _condition(reader: _LineReader) -> tuple[JumpCondition, int]:
     """The condition and where its first number ends."""
     start = reader.at
     line = _number(reader)
@@ -297,10 +299,10 @@ def _condition(reader: _Reader) -> tuple[Condition, int]:
     label = _number(reader)
     if label is None:
         _bad_condition(reader, "label")
-    return Condition(line, high, label, reader.span(label_start)), line_end
+    return JumpCondition(line, high, label, reader.span(label_start)), line_end
 
 
-def _bad_condition(reader: _Reader, expected: str, fix: Fix | None = None) -> NoReturn:
+def _bad_condition(reader: _LineReader, expected: str, fix: Fix | None = None) -> NoReturn:
     hint = "such as I2H5: if line 2 is high, go to label 5"
     span = reader.span(reader.at) if fix is None else fix.span
     reader.give_up(findings.BAD_CONDITION, span, f"{expected} expected, {reader.found}", hint, fix)
@@ -315,7 +317,7 @@ def _level_read_as_one(span: Span, digits: str) -> Fix | None:
     return None
 
 
-def _unknown(reader: _Reader) -> NoReturn:
+def _unknown(reader: _LineReader) -> NoReturn:
     char = reader.chars[reader.at]
     span = reader.span(reader.at, reader.at + 1)
     meant = _MEANT.get(char)
@@ -324,7 +326,7 @@ def _unknown(reader: _Reader) -> NoReturn:
     reader.give_up(findings.UNKNOWN_COMMAND, span, f"no command begins with {char!r}", None, fix)
 
 
-def _end_of_command(reader: _Reader, command: Command) -> None:
+def _end_of_command(reader: _LineReader, command: Command) -> None:
     """Nothing may follow a command on its line. A second command is reported and may be read; anything else ends the line."""
     rest = reader.left
     if not rest:

@@ -8,27 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from steptwin.machine import Nanos
+from steptwin.mic488.axis import Axis
+from steptwin.mic488.core import Action, CoilAction, ControllerCore
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, wrapped_dint
-from steptwin.mic488.registermap import Per, Row, Type
-from steptwin.mic488.registers import ROWS, axes_of_mask
+from steptwin.mic488.registermap import MapRow, Per, Type
+from steptwin.mic488.registers import MOTION_REGISTERS, ROWS, axes_of_mask
 from steptwin.tables import IncompleteTable, complete
 from steptwin.wire.pdu import DEVICE_FAILURE, WRITE_SINGLE_COIL, ModbusException
 
-if TYPE_CHECKING:
-    from steptwin.mic488.axis import Axis
-    from steptwin.mic488.device import Mic488
-
-BitGetter: TypeAlias = "Callable[[int], Callable[[Mic488], bool]]"
+BitGetter: TypeAlias = Callable[[int], Callable[[ControllerCore], bool]]
 """Number of the axis, input or output (from 0) → what reads it."""
-CoilAction: TypeAlias = "Callable[[Mic488, int, bool, Nanos], None]"
-"""Takes the number of the axis or output, from 0."""
-Getter: TypeAlias = "Callable[[Any, Nanos], float]"
+Getter: TypeAlias = Callable[[Any, Nanos], float]
 """Of the controller or of an axis, and a moment: the number that travels."""
-Action: TypeAlias = "Callable[[Mic488, float, Nanos], None]"
-AxisAction: TypeAlias = "Callable[[Axis, float, Nanos], None]"
+AxisAction: TypeAlias = Callable[[Axis, float, Nanos], None]
 
 
 def _nothing(*_: object) -> Any:
@@ -70,7 +65,7 @@ class OfAxis:
 Behaviour: TypeAlias = Bit | OfDevice | OfAxis
 
 
-def checked(rows: Iterable[Row], given: Mapping[str, Behaviour]) -> Mapping[str, Any]:
+def checked(rows: Iterable[MapRow], given: Mapping[str, Behaviour]) -> Mapping[str, Any]:
     """``given``, read-only. `IncompleteTable` for a row without behaviour, a behaviour without row, or one that does not fit its
     row. User registers are plain memory and have none."""
     served = {row.key: row for row in rows if row.type is not Type.MEMORY}
@@ -87,7 +82,7 @@ def checked(rows: Iterable[Row], given: Mapping[str, Behaviour]) -> Mapping[str,
     return found
 
 
-def _check(name: str, row: Row, function: object, *, wanted: bool) -> None:
+def _check(name: str, row: MapRow, function: object, *, wanted: bool) -> None:
     if (function is _nothing) is wanted:
         problem = f"lacks its {name}" if wanted else f"has a {name} that its row does not permit"
         raise IncompleteTable(f"register {row.key} ({row.type.value}, reads {row.reads}, writes {row.writes}) {problem}")
@@ -96,7 +91,7 @@ def _check(name: str, row: Row, function: object, *, wanted: bool) -> None:
 # ---------------------------------------------------------------------- coils
 
 
-def _enable(device: Mic488, number: int, on: bool, now: Nanos) -> None:
+def _enable(device: ControllerCore, number: int, on: bool, now: Nanos) -> None:
     axis = device.axes[number]
     if on:
         axis.enable(now)
@@ -104,34 +99,34 @@ def _enable(device: Mic488, number: int, on: bool, now: Nanos) -> None:
         axis.disable(now)
 
 
-def _stop(device: Mic488, number: int, on: bool, now: Nanos) -> None:
+def _stop(device: ControllerCore, number: int, on: bool, now: Nanos) -> None:
     if on:
         device.axes[number].stop(now)
 
 
 def _jog(direction: int) -> CoilAction:
-    def jog(device: Mic488, number: int, on: bool, now: Nanos) -> None:
+    def jog(device: ControllerCore, number: int, on: bool, now: Nanos) -> None:
         axis = device.axes[number]
         axis.jog(direction, on, device.jog_speed_u * axis.gear, now)
 
     return jog
 
 
-def _load(device: Mic488, number: int, on: bool, now: Nanos) -> None:
+def _load(device: ControllerCore, number: int, on: bool, now: Nanos) -> None:
     if on:
         device.load_memory()
 
 
-def _save(device: Mic488, number: int, on: bool, now: Nanos) -> None:
+def _save(device: ControllerCore, number: int, on: bool, now: Nanos) -> None:
     if on:
         try:
             device.save_memory()
         except OSError as error:
-            device.event("memory-failure", str(error))
+            device.event("memory-failure", str(error), now)
             raise ModbusException(WRITE_SINGLE_COIL, DEVICE_FAILURE) from error
 
 
-def _zero(device: Mic488, number: int, on: bool, now: Nanos) -> None:
+def _zero(device: ControllerCore, number: int, on: bool, now: Nanos) -> None:
     if on:
         device.zero_memory()
 
@@ -139,34 +134,34 @@ def _zero(device: Mic488, number: int, on: bool, now: Nanos) -> None:
 # ---------------------------------------------------------------------- registers of the controller
 
 
-def _set_data_type(device: Mic488, value: float, now: Nanos) -> None:
+def _set_data_type(device: ControllerCore, value: float, now: Nanos) -> None:
     """MIC-17: only the representation changes."""
     device.data_type = int(value)
 
 
-def _set_program_bank(device: Mic488, value: float, now: Nanos) -> None:
+def _set_program_bank(device: ControllerCore, value: float, now: Nanos) -> None:
     device.program.program_bank = int(value)
 
 
-def _set_position_bank(device: Mic488, value: float, now: Nanos) -> None:
+def _set_position_bank(device: ControllerCore, value: float, now: Nanos) -> None:
     device.program.position_bank = int(value)
 
 
-def _set_mode(device: Mic488, value: float, now: Nanos) -> None:
+def _set_mode(device: ControllerCore, value: float, now: Nanos) -> None:
     device.trigger_mode = int(value)
 
 
-def _set_jog_speed(device: Mic488, value: float, now: Nanos) -> None:
+def _set_jog_speed(device: ControllerCore, value: float, now: Nanos) -> None:
     device.jog_speed_u = float(value)
 
 
-def _axes_chosen(device: Mic488, mask: float) -> list[Axis]:
+def _axes_chosen(device: ControllerCore, mask: float) -> list[Axis]:
     """The axes of a mask register (MIC-25)."""
     return [device.axes[number - 1] for number in axes_of_mask(int(mask))]
 
 
 def _drives(action: Callable[[Axis, Nanos], None]) -> OfDevice:
-    def act(device: Mic488, value: float, now: Nanos) -> None:
+    def act(device: ControllerCore, value: float, now: Nanos) -> None:
         for axis in _axes_chosen(device, value):
             action(axis, now)
 
@@ -175,17 +170,21 @@ def _drives(action: Callable[[Axis, Nanos], None]) -> OfDevice:
 
 # ---------------------------------------------------------------------- motion registers and their trigger registers
 
-MOTIONS: Mapping[str, AxisAction] = {
-    "VEL_ABS": lambda axis, value, now: axis.move_velocity(value, now),
-    "VEL_REL": lambda axis, value, now: axis.change_velocity(value, now),
-    "POS_ABS": lambda axis, value, now: axis.move_to(int(value), now),
-    "POS_REL": lambda axis, value, now: axis.move_by(int(value), now),
-}
-"""Each is a register of every axis, and has a trigger register."""
+MOTIONS: Mapping[str, AxisAction] = complete(
+    "motion register",
+    MOTION_REGISTERS,
+    "move",
+    {
+        "VEL_ABS": lambda axis, value, now: axis.move_velocity(value, now),
+        "VEL_REL": lambda axis, value, now: axis.change_velocity(value, now),
+        "POS_ABS": lambda axis, value, now: axis.move_to(int(value), now),
+        "POS_REL": lambda axis, value, now: axis.move_by(int(value), now),
+    },
+)
 
 
 def _trigger(key: str, move: AxisAction) -> OfDevice:
-    def trigger(device: Mic488, value: float, now: Nanos) -> None:
+    def trigger(device: ControllerCore, value: float, now: Nanos) -> None:
         """MIC-16: starts the chosen axes that have a stored value, and uses it up, unless values are kept."""
         device.triggered[key] = int(value)
         if not device.trigger_mode:
@@ -193,7 +192,8 @@ def _trigger(key: str, move: AxisAction) -> OfDevice:
         for axis in _axes_chosen(device, value):
             stored = axis.pending.get(key) if device.config.trigger_keeps else axis.pending.pop(key, None)
             if stored is None:
-                device.axis_event(axis.number, "trigger-empty", f"trigger of M{axis.number} without a new value of {key}")
+                text = f"trigger of M{axis.number} without a new value of {key}"
+                device.axis_event(axis.number, "trigger-empty", text, now)
             else:
                 move(axis, stored, now)
 
@@ -247,7 +247,7 @@ BEHAVIOUR: Mapping[str, Any] = checked(
         "USER_REG_ZERO": Bit(write=_zero),
         "OUT": Bit(
             lambda number: lambda device: device.outputs[number],
-            lambda device, number, on, now: device.set_output(number, on),
+            lambda device, number, on, now: device.set_output(number, on, now),
         ),
         "IN": Bit(lambda number: lambda device: device.inputs.filtered[number]),
         "DATA_TYPE": OfDevice(lambda device, now: device.data_type, _set_data_type, quiet=True),

@@ -16,10 +16,10 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from steptwin.diagnostics import Diagnostic, Fix, Severity, Source, Span, in_order, render
-from steptwin.errors import Misuse
+from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
+from steptwin.errors import SourceErrors
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, REAL_MAX
-from steptwin.mic488.inifile import Entry, IniFile
+from steptwin.mic488.inifile import IniEntry, IniFile
 from steptwin.mic488.ranges import Range
 from steptwin.mic488.registermap import Firmware
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, firmware
@@ -143,17 +143,17 @@ class ControllerConfig:
         return self.ports[0].address
 
 
-class ConfigError(Misuse):
+class ConfigError(SourceErrors):
     """A configuration file with errors; the text shows them all with file, line, key and permitted values."""
 
-    def __init__(self, source: Source, findings: list[Diagnostic]) -> None:
+    def __init__(self, source: SourceText, findings: list[Diagnostic]) -> None:
         self.source = source
         self.findings = findings
         super().__init__(render(source, findings))
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class ConfigKey:
     """A key of the file: the attribute it sets, its permitted values, and their description."""
 
     name: str
@@ -177,16 +177,16 @@ class Key:
         return f"permitted: {'a whole number' if self.whole else 'a number'} {self.permitted}"
 
 
-def _choice(name: str, attribute: str, *texts: str) -> Key:
-    return Key(name, attribute, Range(0, len(texts) - 1), choices=MappingProxyType(dict(enumerate(texts))))
+def _choice(name: str, attribute: str, *texts: str) -> ConfigKey:
+    return ConfigKey(name, attribute, Range(0, len(texts) - 1), choices=MappingProxyType(dict(enumerate(texts))))
 
 
-def _positive(name: str, attribute: str, unit: str) -> Key:
-    return Key(name, attribute, Range(0, REAL_MAX, above=True), whole=False, note=f"a number > 0 in {unit}")
+def _positive(name: str, attribute: str, unit: str) -> ConfigKey:
+    return ConfigKey(name, attribute, Range(0, REAL_MAX, above=True), whole=False, note=f"a number > 0 in {unit}")
 
 
-def _number(name: str, attribute: str) -> Key:
-    return Key(name, attribute, Range(-REAL_MAX, REAL_MAX), whole=False, note="a number")
+def _number(name: str, attribute: str) -> ConfigKey:
+    return ConfigKey(name, attribute, Range(-REAL_MAX, REAL_MAX), whole=False, note="a number")
 
 
 _SWITCHES = f"0…7 (IN1…IN8), 8…19 (channels C, B, A of encoders 1…4), {NO_INPUT} (none)"
@@ -199,19 +199,19 @@ AXIS_KEYS = (
     _positive("Acc", "acc", "units/s²"),
     _positive("Dec", "dec", "units/s²"),
     _positive("Vel", "vel", "units/s"),
-    Key("MotResol", "mot_resol", _COUNT, note="a whole number ≥ 1 in pulses per motor revolution"),
-    Key("EncResol", "enc_resol", _COUNT, note="a whole number ≥ 1 in encoder counts per drive revolution"),
-    Key("EncOffset", "enc_offset", Range(DINT_MIN, DINT_MAX)),
+    ConfigKey("MotResol", "mot_resol", _COUNT, note="a whole number ≥ 1 in pulses per motor revolution"),
+    ConfigKey("EncResol", "enc_resol", _COUNT, note="a whole number ≥ 1 in encoder counts per drive revolution"),
+    ConfigKey("EncOffset", "enc_offset", Range(DINT_MIN, DINT_MAX)),
     _choice("HomeMode", "home_mode", "HOME0", "HOME1", "HOME2", "HOME3", "HOME4"),
     _choice("LimitMode", "limit_mode", "OFF", "KL", "KR", "KL+KR"),
-    Key("InKL", "in_kl", Range(0, NO_INPUT), note=_SWITCHES),
-    Key("InKR", "in_kr", Range(0, NO_INPUT), note=_SWITCHES),
+    ConfigKey("InKL", "in_kl", Range(0, NO_INPUT), note=_SWITCHES),
+    ConfigKey("InKR", "in_kr", Range(0, NO_INPUT), note=_SWITCHES),
     _choice("PosCtrlMode", "pos_ctrl_mode", "OFF", "ENCODER", "ENCFOLLOW"),
     _choice("ErrCtrlMode", "err_ctrl_mode", "NONE", "ERRMODE0", "ERRMODE1", "ERRMODE2"),
-    Key("Kp", "kp", Range(0, REAL_MAX), whole=False, note="a number ≥ 0"),
-    Key("EncTolerance", "enc_tolerance", Range(0, DINT_MAX), note="a whole number ≥ 0 in encoder counts"),
-    Key("EncSettle", "enc_settle_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
-    Key("ErrTime", "err_time_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
+    ConfigKey("Kp", "kp", Range(0, REAL_MAX), whole=False, note="a number ≥ 0"),
+    ConfigKey("EncTolerance", "enc_tolerance", Range(0, DINT_MAX), note="a whole number ≥ 0 in encoder counts"),
+    ConfigKey("EncSettle", "enc_settle_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
+    ConfigKey("ErrTime", "err_time_ms", _DURATION_MS, note=f"a whole number {_DURATION_MS} in ms"),
     _choice("EnWired", "en_wired", "not wired", "wired"),
 )
 INPUT_KEYS = (
@@ -220,20 +220,35 @@ INPUT_KEYS = (
     _choice("Int", "interrupt", "off", "rising", "falling", "both edges"),
 )
 ANALOG_KEYS = (_number("LoVal", "lo_val"), _number("HiVal", "hi_val"))
-BAUD_KEY = Key("Baud", "baud", Range(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
-ADDRESS_KEY = Key("ID", "address", Range(1, 247))
+BAUD_KEY = ConfigKey("Baud", "baud", Range(BAUDS[0], BAUDS[-1]), choices=MappingProxyType(dict.fromkeys(BAUDS, "")))
+ADDRESS_KEY = ConfigKey("ID", "address", Range(1, 247))
 
 
 TRIGGER_KEYS = (_choice("Keep", "trigger_keeps", "a trigger uses values up", "values are kept"),)
 
 
-def _program_keys(generation: Firmware) -> tuple[Key, ...]:
+def program_keys(generation: Firmware) -> tuple[ConfigKey, ...]:
     banks = Range(0, generation.banks - 1)
     return (
         _choice("Activate", "activate", "no program", "run at power-on"),
-        Key("ProgBankToRun", "prog_bank", banks),
-        Key("PosBankToRun", "pos_bank", banks),
+        ConfigKey("ProgBankToRun", "prog_bank", banks),
+        ConfigKey("PosBankToRun", "pos_bank", banks),
     )
+
+
+def sections_of() -> tuple[str, ...]:
+    """The names of the sections, in the order of the vendor's tool."""
+    numbered = (("Axis", AXES), ("IN", INPUTS), ("AIN", ANALOG_INPUTS))
+    return (*(f"{name}{n}" for name, count in numbered for n in range(count)), "WBC_PROGRAM", "TRIGGER")
+
+
+def keys_of(section: str, firmware_name: str = DEFAULT_FIRMWARE) -> tuple[ConfigKey, ...]:
+    """The keys of a section. Raises `Misuse` for an unknown firmware."""
+    if section == "WBC_PROGRAM":
+        return program_keys(firmware(firmware_name))
+    if section == "TRIGGER":
+        return TRIGGER_KEYS
+    return {"Axis": AXIS_KEYS, "IN": INPUT_KEYS, "AIN": (*ANALOG_KEYS, BAUD_KEY, ADDRESS_KEY)}[section.rstrip("0123456789")]
 
 
 def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tuple[ControllerConfig, list[Diagnostic]]:
@@ -241,7 +256,7 @@ def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tupl
 
     A value with an error is replaced by its default. Raises `Misuse` for an unknown firmware.
     """
-    reader = _Reader(file)
+    reader = _ConfigReader(file)
     config = ControllerConfig(
         axes=tuple(AxisConfig(**reader.values(f"Axis{n}", AXIS_KEYS)) for n in range(AXES)),
         inputs=tuple(InputConfig(**reader.values(f"IN{n}", INPUT_KEYS)) for n in range(INPUTS)),
@@ -251,7 +266,7 @@ def examine_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> tupl
             # The slave address is that of COM1; that of COM2 is not even checked.
             PortConfig(**reader.values("AIN1", (BAUD_KEY,))),
         ),
-        program=ProgramConfig(**reader.values("WBC_PROGRAM", _program_keys(firmware(firmware_name)))),
+        program=ProgramConfig(**reader.values("WBC_PROGRAM", program_keys(firmware(firmware_name)))),
         **reader.values("TRIGGER", TRIGGER_KEYS),
     )
     reader.ignore("AIN1", ADDRESS_KEY)
@@ -273,7 +288,7 @@ def read_config(file: IniFile, firmware_name: str = DEFAULT_FIRMWARE) -> Control
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d{1,3})?\Z", re.ASCII)
 
 
-class _Reader:
+class _ConfigReader:
     """Takes typed values from a file and collects what is wrong with them."""
 
     def __init__(self, file: IniFile) -> None:
@@ -281,7 +296,7 @@ class _Reader:
         self._known: dict[str, set[str]] = {}
         self.findings: list[Diagnostic] = []
 
-    def values(self, section: str, keys: Iterable[Key]) -> dict[str, Any]:
+    def values(self, section: str, keys: Iterable[ConfigKey]) -> dict[str, Any]:
         """Attribute -> value of the keys that are there and right."""
         found: dict[str, Any] = {}
         for key in keys:
@@ -292,11 +307,11 @@ class _Reader:
                 found[key.attribute] = value
         return found
 
-    def ignore(self, section: str, key: Key) -> None:
+    def ignore(self, section: str, key: ConfigKey) -> None:
         """A key that is known and not read."""
         self._known[section].add(key.name)
 
-    def _value(self, entry: Entry, key: Key) -> float | None:
+    def _value(self, entry: IniEntry, key: ConfigKey) -> float | None:
         if not _NUMBER.match(entry.value):
             return self._refuse("C006", entry, key, "is no number" if entry.value else "has no value")
         value = float(entry.value.replace(",", "."))
@@ -306,7 +321,7 @@ class _Reader:
             return self._refuse("C008", entry, key, "is not permitted")
         return int(value) if key.whole else value
 
-    def _refuse(self, code: str, entry: Entry, key: Key, why: str) -> None:
+    def _refuse(self, code: str, entry: IniEntry, key: ConfigKey, why: str) -> None:
         message = f"[{entry.section}] {entry.key} = {entry.value} {why}"
         self.findings.append(Diagnostic(code, Severity.ERROR, entry.value_span, message, key.hint))
 
@@ -353,6 +368,16 @@ def _unknown(span: Span, what: str, near: str | None) -> Diagnostic:
     if near is None:
         return Diagnostic("C005", Severity.WARNING, span, f"{what} is not known and has no effect")
     return Diagnostic("C005", Severity.WARNING, span, f"{what} is not known; did you mean {near}?", fix=Fix(span, near))
+
+
+def input_name(number: int) -> str:
+    """What a number of ``InKL``/``InKR`` is, for people; empty for one that is not permitted."""
+    if 0 <= number < _FIRST_CHANNEL:
+        return f"IN{number + 1}"
+    channel = encoder_channel(number)
+    if channel is not None:
+        return f"channel {channel[1]} of encoder {channel[0] + 1}"
+    return "none" if number == NO_INPUT else ""
 
 
 def encoder_channel(number: int) -> tuple[int, str] | None:

@@ -10,7 +10,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
-from steptwin.mic488.registermap import DataType, Kind, Piece, Register, RegisterMap, Space, Type, show_address
+from steptwin.mic488.registermap import DataType, Quantity, Register, RegisterMap, RequestPart, Space, Type, show_address
 from steptwin.mic488.registers import axes_of_mask
 from steptwin.wire import pdu as modbus
 
@@ -18,7 +18,7 @@ MOST_VALUES = 8
 """Longer lists of plain numbers are cut."""
 
 
-class Scale(NamedTuple):
+class AxisScale(NamedTuple):
     """How an axis counts: its configured unit (``mm``) and the pulses per unit (GEAR)."""
 
     unit: str
@@ -33,7 +33,7 @@ class Wording:
 
     __slots__ = ("data_type", "register_map", "scales")
 
-    def __init__(self, register_map: RegisterMap, scales: Sequence[Scale] = (), data_type: DataType = DataType.REAL) -> None:
+    def __init__(self, register_map: RegisterMap, scales: Sequence[AxisScale] = (), data_type: DataType = DataType.REAL) -> None:
         self.register_map = register_map
         self.scales = tuple(scales)
         self.data_type = data_type
@@ -49,13 +49,13 @@ class Wording:
                 return "empty request"
             return f"function {modbus.function_number(pdu[0])}: {refusal.detail or 'not implemented by the device'}"
         match request:
-            case modbus.Read(function, address, count):
+            case modbus.ReadRequest(function, address, count):
                 return f"read {self._names(_SPACES[function], address, count)}"
-            case modbus.WriteCoil(address, on):
+            case modbus.WriteCoilRequest(address, on):
                 return f"write {self._bits(Space.COIL, address, [on])}"
-            case modbus.WriteRegister(address, value):
+            case modbus.WriteRegisterRequest(address, value):
                 return f"write {self._word(address, value)}"
-            case modbus.WriteRegisters(address, values):
+            case modbus.WriteRegistersRequest(address, values):
                 return f"write {self._registers(address, values)}"
 
     def response(self, pdu: bytes, request: bytes | None = None) -> str:
@@ -66,29 +66,29 @@ class Wording:
             return f"malformed: {failure}"
         asked = _decoded(request)
         match response:
-            case modbus.Refused(function, code):
+            case modbus.ExceptionResponse(function, code):
                 name = modbus.EXCEPTION_NAMES.get(code, "unknown exception")
                 where = f"function {modbus.function_number(function)}" if asked is None else str(asked.address)
                 return f"exception {code:02d} {name} ({where})"
-            case modbus.Bits(function, packed):
-                if isinstance(asked, modbus.Read) and asked.function == function and len(packed) == (asked.count + 7) // 8:
+            case modbus.BitsResponse(function, packed):
+                if isinstance(asked, modbus.ReadRequest) and asked.function == function and len(packed) == (asked.count + 7) // 8:
                     states = modbus.unpack_bits(packed, asked.count)
                     return f"read {self._bits(_SPACES[function], asked.address, states)}"
                 return f"read bits {packed.hex(' ')}"
-            case modbus.Registers(values):
-                if isinstance(asked, modbus.Read) and asked.function == pdu[0] and asked.count == len(values):
+            case modbus.RegistersResponse(values):
+                if isinstance(asked, modbus.ReadRequest) and asked.function == pdu[0] and asked.count == len(values):
                     return f"read {self._registers(asked.address, values)}"
                 return f"read registers {_numbers(values)}"
-            case modbus.WriteCoil(address, on):
+            case modbus.WriteCoilRequest(address, on):
                 return f"wrote {self._bits(Space.COIL, address, [on])}"
-            case modbus.WriteRegister(address, value):
+            case modbus.WriteRegisterRequest(address, value):
                 return f"wrote {self._word(address, value)}"
-            case modbus.Written(address, count):
+            case modbus.WriteResponse(address, count):
                 return f"wrote {self._names(Space.HOLDING, address, count)}"
 
     # ------------------------------------------------------------------ parts of a request
 
-    def _groups(self, space: Space, address: int, count: int) -> Iterable[list[Piece]]:
+    def _groups(self, space: Space, address: int, count: int) -> Iterable[list[RequestPart]]:
         """Pieces of a request, those of one row (all axes of a quantity) together; half a value stands alone."""
         pieces = self.register_map.pieces(space, address, count)
         return (list(group) for _, group in groupby(pieces, _group_key))
@@ -125,11 +125,11 @@ class Wording:
         scale = self._scale(register)
         return register.unit(self.data_type, scale.unit if scale else "u")
 
-    def _scale(self, register: Register) -> Scale | None:
+    def _scale(self, register: Register) -> AxisScale | None:
         axis = register.axis
         return self.scales[axis - 1] if axis is not None and axis <= len(self.scales) else None
 
-    def _values(self, group: list[Piece], words: Sequence[int]) -> str:
+    def _values(self, group: list[RequestPart], words: Sequence[int]) -> str:
         registers = [p.register for p in group if p.register is not None]
         if not registers or not group[0].whole:
             return " ".join(f"{word:04X}" for word in words)
@@ -146,7 +146,7 @@ class Wording:
         """DINT values, and what they are in units where that is known."""
         text = _with_units([str(count) for count in counts], [self._unit(r) for r in registers])
         scales = [self._scale(r) for r in registers]
-        if registers[0].kind is Kind.ENCODER or any(s is None or s.unit == "imp" or s.gear == 0 for s in scales):
+        if registers[0].kind is Quantity.ENCODER or any(s is None or s.unit == "imp" or s.gear == 0 for s in scales):
             return text
         known = [s for s in scales if s is not None]
         units = [r.unit(DataType.REAL, s.unit) for r, s in zip(registers, known, strict=True)]
@@ -167,13 +167,13 @@ def _decoded(request: bytes | None) -> modbus.Request | None:
         return None
 
 
-def _group_key(piece: Piece) -> tuple[str | None, int | None]:
+def _group_key(piece: RequestPart) -> tuple[str | None, int | None]:
     if piece.register is None:
         return None, None
     return piece.register.key, None if piece.whole else piece.address
 
 
-def _name(group: list[Piece]) -> str:
+def _name(group: list[RequestPart]) -> str:
     first, last = group[0], group[-1]
     end = last.address + last.size - 1
     if first.register is None or last.register is None:
@@ -188,7 +188,7 @@ def _name(group: list[Piece]) -> str:
     return first.register.name if first is last else f"{first.register.name} … {last.register.name}"
 
 
-def _switches(group: list[Piece], states: Sequence[bool]) -> str:
+def _switches(group: list[RequestPart], states: Sequence[bool]) -> str:
     if len(states) == 1:
         return "ON" if states[0] else "OFF"
     if not any(states):
@@ -201,7 +201,7 @@ def _switches(group: list[Piece], states: Sequence[bool]) -> str:
 
 
 def _meaning(register: Register, word: int) -> str:
-    if register.kind is Kind.MASK:
+    if register.kind is Quantity.MASK:
         return f"{' '.join(f'M{axis}' for axis in axes_of_mask(word)) or 'none'} ({word})"
     text = register.values.get(word)
     return str(word) if text is None else f"{text} ({word})"

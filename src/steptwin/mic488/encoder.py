@@ -25,7 +25,7 @@ class Coupling(enum.Enum):
     """Nothing: the drive is mechanically blocked and its steps are lost."""
 
 
-class Motion(Protocol):
+class ShaftMotion(Protocol):
     """Where mechanics turn the shaft; never changed."""
 
     def count(self, now: Nanos) -> int:
@@ -53,7 +53,7 @@ class Encoder(Stateful):
         """Pulses of the drive that did not turn the shaft while it was coupled to something else."""
         self._standing = 0
         """Pulses at which the shaft stands while nothing turns it."""
-        self._motion: Motion | None = None
+        self._motion: ShaftMotion | None = None
         self._zero = 0
         """Shaft at which the counter shows 0."""
 
@@ -102,7 +102,7 @@ class Encoder(Stateful):
                 self._standing = at
             self.coupling = coupling
 
-    def follow(self, motion: Motion | None) -> None:
+    def follow(self, motion: ShaftMotion | None) -> None:
         """Let mechanics turn the shaft (play, a stop, steps lost, another axis); None is the drive, with not a pulse lost."""
         self._motion = motion
         self._lost = 0

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from steptwin.machine import Nanos
-from steptwin.mic488.config import NO_INPUT
+from steptwin.mic488.config import NO_INPUT, AxisConfig
 from steptwin.mic488.inputs import index_input
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 from steptwin.state import Stateful
-
-if TYPE_CHECKING:
-    from steptwin.mic488.axis import Axis
 
 SLOW_PART = 0.2
 SLOWEST_P = 1.0
 """MIC-21: later legs run at 20 % of the homing velocity, at least 1 pulse/s."""
+
+
+class HomingAxis(Protocol):
+    """What homing asks of its axis."""
+
+    @property
+    def number(self) -> int: ...
+    @property
+    def config(self) -> AxisConfig: ...
+    def input_active(self, number: int) -> bool: ...
+    def run(self, velocity_p: float, status: AxisStatus, now: Nanos) -> None: ...
+    def run_to_stop(self, velocity_p: float, now: Nanos) -> None: ...
+    def halt(self, now: Nanos) -> None: ...
+    def homed(self, now: Nanos) -> None: ...
 
 
 class Homing(Stateful):
@@ -47,24 +58,22 @@ class Homing(Stateful):
             return False
         return self.leg != Homing.TO_SENSOR or self.sensor != NO_INPUT
 
-    def start(self, axis: Axis, velocity_p: float, now: Nanos) -> None:
+    def start(self, axis: HomingAxis, velocity_p: float, now: Nanos) -> None:
         """Begin at ``velocity_p``, not 0."""
         self.mode = axis.config.home_mode
         self.velocity_p = velocity_p
         self.sensor = axis.config.in_kl if velocity_p < 0.0 else axis.config.in_kr
         if self.mode == Homing.HOME3:
             self.leg = Homing.TO_STOP
-            axis.control.reference(axis, now)
-            axis.run(velocity_p, Status.HOMING, now)
-            axis.control.watch(axis, now)
+            axis.run_to_stop(velocity_p, now)
             return
         self.leg = Homing.TO_SENSOR
-        if self.sensor != NO_INPUT and axis.host.input_active(self.sensor):
+        if self.sensor != NO_INPUT and axis.input_active(self.sensor):
             self._at_sensor(axis, now)
         else:
-            axis.run(velocity_p, Status.HOMING, now)
+            axis.run(velocity_p, AxisStatus.HOMING, now)
 
-    def input_changed(self, axis: Axis, number: int, active: bool, now: Nanos) -> None:
+    def input_changed(self, axis: HomingAxis, number: int, active: bool, now: Nanos) -> None:
         """A leg ends at the sensor, where its signal ends, or at channel C."""
         if self.leg == Homing.TO_SENSOR and number == self.sensor and active:
             self._at_sensor(axis, now)
@@ -73,11 +82,11 @@ class Homing(Stateful):
         ):
             axis.homed(now)
 
-    def stop_reached(self, axis: Axis, now: Nanos) -> None:
+    def stop_reached(self, axis: HomingAxis, now: Nanos) -> None:
         """HOME3: the mechanical stop; back to channel C."""
         self._next_leg(axis, Homing.TO_INDEX, -self._slow_p(), now)
 
-    def _at_sensor(self, axis: Axis, now: Nanos) -> None:
+    def _at_sensor(self, axis: HomingAxis, now: Nanos) -> None:
         if self.mode == Homing.HOME0:
             axis.homed(now)
         elif self.mode == Homing.HOME1:
@@ -87,11 +96,11 @@ class Homing(Stateful):
         else:
             self._next_leg(axis, Homing.TO_INDEX, -self._slow_p(), now)
 
-    def _next_leg(self, axis: Axis, leg: int, velocity_p: float, now: Nanos) -> None:
+    def _next_leg(self, axis: HomingAxis, leg: int, velocity_p: float, now: Nanos) -> None:
         """Stop without ramp, then go on slowly (MIC-30)."""
         self.leg = leg
         axis.halt(now)
-        axis.run(velocity_p, Status.HOMING, now)
+        axis.run(velocity_p, AxisStatus.HOMING, now)
 
     def _slow_p(self) -> float:
         speed = max(abs(self.velocity_p) * SLOW_PART, SLOWEST_P)

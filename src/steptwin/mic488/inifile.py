@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from steptwin.diagnostics import Diagnostic, Severity, Source, Span, in_order
+from steptwin.diagnostics import Diagnostic, Severity, SourceText, Span, in_order
 from steptwin.errors import Misuse
 
 _LINE = re.compile(r"([^\r\n]*)(\r\n|\r|\n|\Z)")
@@ -22,7 +22,7 @@ _UTF_16 = ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class IniEntry:
     """A key with its value as written. Spans count characters of the text."""
 
     section: str
@@ -44,10 +44,10 @@ class Header:
 class IniFile:
     """The text of a file and what lies where in it. Made by `parse`, written back by `to_bytes`."""
 
-    source: Source
+    source: SourceText
     encoding: str
     headers: tuple[Header, ...]
-    entries: tuple[Entry, ...]
+    entries: tuple[IniEntry, ...]
     findings: tuple[Diagnostic, ...]
     """What is wrong with the form of the file: codes C001–C004."""
 
@@ -60,24 +60,29 @@ class IniFile:
         try:
             encoding = next((encoding for mark, encoding in _UTF_16 if data.startswith(mark)), None)
             if encoding is not None:
-                return _read(Source(name, data.decode(encoding)), encoding)
-            return _read(Source(name, data.decode("utf-8")), "utf-8")
+                return _read(SourceText(name, data.decode(encoding)), encoding)
+            return _read(SourceText(name, data.decode("utf-8")), "utf-8")
         except UnicodeDecodeError:
             # Bytes outside the code page survive as surrogates, so that every file is written back as it was.
-            return _read(Source(name, data.decode("cp1250", "surrogateescape")), "cp1250")
+            return _read(SourceText(name, data.decode("cp1250", "surrogateescape")), "cp1250")
+
+    @classmethod
+    def of_text(cls, text: str, name: str = "configuration") -> IniFile:
+        """A file that is being edited."""
+        return _read(SourceText(name, text), "utf-8")
 
     def to_bytes(self) -> bytes:
         """The file; unchanged, the very bytes it was parsed from."""
         return self.source.text.encode(self.encoding, "surrogateescape")
 
     @cached_property
-    def _by_name(self) -> dict[tuple[str, str], Entry]:
-        found: dict[tuple[str, str], Entry] = {}
+    def _by_name(self) -> dict[tuple[str, str], IniEntry]:
+        found: dict[tuple[str, str], IniEntry] = {}
         for entry in self.entries:
             found.setdefault((entry.section.lower(), entry.key.lower()), entry)
         return found
 
-    def find(self, section: str, key: str) -> Entry | None:
+    def find(self, section: str, key: str) -> IniEntry | None:
         """The entry that counts for a key, None when there is none."""
         return self._by_name.get((section.lower(), key.lower()))
 
@@ -100,7 +105,7 @@ class IniFile:
         else:
             start = end = self._place(section)
             inserted = self._new_lines(section, key, value, start)
-        changed = _read(Source(self.source.name, text[:start] + inserted + text[end:]), self.encoding)
+        changed = _read(SourceText(self.source.name, text[:start] + inserted + text[end:]), self.encoding)
         wanted = self._values() | {(section.lower(), key.lower()): value}
         if changed._values() != wanted or len(changed.findings) != len(self.findings):
             raise Misuse(f"[{section}] {key} = {value!r} cannot be written to {self.source.name}: it would not read back")
@@ -142,9 +147,9 @@ def _lines(text: str) -> Iterator[tuple[int, str]]:
         place = line.end()
 
 
-def _read(source: Source, encoding: str) -> IniFile:
+def _read(source: SourceText, encoding: str) -> IniFile:
     headers: list[Header] = []
-    entries: list[Entry] = []
+    entries: list[IniEntry] = []
     findings: list[Diagnostic] = []
 
     def find(code: str, severity: Severity, span: Span, message: str, hint: str | None = None) -> None:
@@ -169,12 +174,12 @@ def _read(source: Source, encoding: str) -> IniFile:
         elif headers or "=" not in line:
             find("C001", Severity.WARNING, span, f"{stripped!r} has no effect", "permitted: [section], key=value, ; comment")
         else:
-            find("C001", Severity.WARNING, span, f"{stripped!r} stands before the first [section] and has no effect")
+            find("C001", Severity.WARNING, span, f"{stripped!r} is before the first [section] and has no effect")
     findings += _repeated(headers, entries)
     return IniFile(source, encoding, tuple(headers), tuple(entries), tuple(in_order(findings)))
 
 
-def _entry(line: str, start: int, section: str | None) -> Entry | None:
+def _entry(line: str, start: int, section: str | None) -> IniEntry | None:
     equals = line.find("=")
     key = line[:equals].strip()
     if equals < 0 or not key or section is None:
@@ -184,10 +189,10 @@ def _entry(line: str, start: int, section: str | None) -> Entry | None:
     value = written.strip()
     key_start = start + line.index(key)
     value_start = start + equals + 1 + (len(written) - len(written.lstrip()) if value else 0)
-    return Entry(section, key, value, Span(key_start, key_start + len(key)), Span(value_start, value_start + len(value)))
+    return IniEntry(section, key, value, Span(key_start, key_start + len(key)), Span(value_start, value_start + len(value)))
 
 
-def _repeated(headers: list[Header], entries: list[Entry]) -> Iterator[Diagnostic]:
+def _repeated(headers: list[Header], entries: list[IniEntry]) -> Iterator[Diagnostic]:
     sections: set[str] = set()
     for header in headers:
         if header.section.lower() in sections:

@@ -6,20 +6,46 @@ A control loop, re-planned every 10 ms while it is active; inactive it costs not
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from steptwin.machine import MILLISECOND, Nanos
-from steptwin.mic488.homing import Homing
-from steptwin.mic488.status import Status
+from steptwin.mic488.config import AxisConfig
+from steptwin.mic488.encoder import Encoder
+from steptwin.mic488.status import AxisStatus
+from steptwin.motion import Profile
 from steptwin.state import Stateful
-
-if TYPE_CHECKING:
-    from steptwin.mic488.axis import Axis
 
 PERIOD_NS: Nanos = 10 * MILLISECOND
 
 STOP_LAG_REVOLUTIONS = 0.05
 """HOME3: the mechanical stop is found when the encoder lags the drive by this much of a revolution, and the tolerance."""
+
+
+class ControlledAxis(Protocol):
+    """What position control asks of its axis. Motor positions in pulses."""
+
+    @property
+    def config(self) -> AxisConfig: ...
+    @property
+    def encoder(self) -> Encoder: ...
+    @property
+    def profile(self) -> Profile: ...
+    @property
+    def status(self) -> AxisStatus: ...
+    @property
+    def target_p(self) -> int: ...
+    @property
+    def can_move(self) -> bool: ...
+    @property
+    def seeks_stop(self) -> bool: ...
+    def shaft(self, now: Nanos) -> int: ...
+    def follow(self, target_p: int, now: Nanos) -> None: ...
+    def creep(self, distance_p: int, now: Nanos) -> None: ...
+    def begin_correction(self) -> None: ...
+    def end_correction(self) -> None: ...
+    def drop_lost_steps(self, lost_p: int) -> None: ...
+    def position_lost(self, now: Nanos) -> None: ...
+    def stop_reached(self, now: Nanos) -> None: ...
 
 
 class PositionControl(Stateful):
@@ -44,12 +70,12 @@ class PositionControl(Stateful):
         """When the shaft stood at ``_shaft``, or the correction came as near as ``_best_p``."""
         self._best_p = 0.0
 
-    def reference(self, axis: Axis, now: Nanos) -> None:
+    def reference(self, axis: ControlledAxis, now: Nanos) -> None:
         """From here drive and encoder are taken to agree."""
         self._ref_motor = axis.profile.count(now)
         self._ref_shaft = axis.shaft(now)
 
-    def true_p(self, axis: Axis, now: Nanos) -> float:
+    def true_p(self, axis: ControlledAxis, now: Nanos) -> float:
         """Where the drive is according to the encoder, as motor position."""
         shaft = axis.shaft(now)
         return self._ref_motor + axis.encoder.pulses(shaft - self._ref_shaft)
@@ -61,17 +87,17 @@ class PositionControl(Stateful):
 
     # ------------------------------------------------------------------ when the loop runs
 
-    def watch(self, axis: Axis, now: Nanos) -> None:
+    def watch(self, axis: ControlledAxis, now: Nanos) -> None:
         """Watch a motion that may lose steps. An encoder coupled to the drive without loss cannot disagree."""
-        wanted = axis.config.pos_ctrl_mode == self.ENCODER or axis.homing.leg == Homing.TO_STOP
+        wanted = axis.config.pos_ctrl_mode == self.ENCODER or axis.seeks_stop
         if wanted and not axis.encoder.agrees and axis.profile.moving(now):
             self._expect_progress(axis, now)
             self.tick_ns = _next_tick(now)
 
-    def encoder_moved(self, axis: Axis, now: Nanos) -> None:
+    def encoder_moved(self, axis: ControlledAxis, now: Nanos) -> None:
         """The shaft was turned or its coupling changed from outside."""
-        if axis.config.pos_ctrl_mode != self.ENCFOLLOW or axis.homing.leg == Homing.TO_STOP:
-            if axis.status is not Status.CORRECTION:
+        if axis.config.pos_ctrl_mode != self.ENCFOLLOW or axis.seeks_stop:
+            if axis.status is not AxisStatus.CORRECTION:
                 self.watch(axis, now)
         elif axis.can_move and (self._following or not axis.profile.moving(now)):
             # What is turned during a commanded motion is not followed; see `rested`.
@@ -79,48 +105,48 @@ class PositionControl(Stateful):
             if self.tick_ns is None:
                 self.tick_ns = _next_tick(now)
 
-    def rested(self, axis: Axis, now: Nanos) -> None:
+    def rested(self, axis: ControlledAxis, now: Nanos) -> None:
         """The axis has come to rest by itself or by a command: ENCFOLLOW follows from here on."""
         if axis.config.pos_ctrl_mode == self.ENCFOLLOW and not self._following:
             self.reference(axis, now)
 
-    def arrived(self, axis: Axis, now: Nanos, *, corrects: bool) -> None:
+    def arrived(self, axis: ControlledAxis, now: Nanos, *, corrects: bool) -> None:
         """A motion has ended as planned: after a position move, compare with the encoder."""
         self.rested(axis, now)
         if axis.config.pos_ctrl_mode != self.ENCODER or not corrects:
             return
         self.tick_ns = None
         missing_p = abs(axis.target_p - self.true_p(axis, now))
-        if axis.status is Status.REACHED and axis.encoder.counts(missing_p) > axis.config.enc_tolerance:
-            axis.status = axis.arrival = Status.CORRECTION
+        if axis.status is AxisStatus.REACHED and axis.encoder.counts(missing_p) > axis.config.enc_tolerance:
+            axis.begin_correction()
             self._best_p = missing_p
             self.tick_ns = self._progress_ns = now + axis.config.enc_settle_ms * MILLISECOND
 
-    def _expect_progress(self, axis: Axis, now: Nanos) -> None:
+    def _expect_progress(self, axis: ControlledAxis, now: Nanos) -> None:
         self._progress_ns = now
         self._shaft = axis.shaft(now)
 
     # ------------------------------------------------------------------ the loop
 
-    def tick(self, axis: Axis, now: Nanos) -> None:
+    def tick(self, axis: ControlledAxis, now: Nanos) -> None:
         self.tick_ns = None
-        if axis.homing.leg == Homing.TO_STOP:
+        if axis.seeks_stop:
             self._seek_stop(axis, now)
         elif self._following:
             self._follow(axis, now)
-        elif axis.status is Status.CORRECTION:
+        elif axis.status is AxisStatus.CORRECTION:
             self._correct(axis, now)
         elif axis.profile.moving(now):
             self._supervise(axis, now)
 
-    def _seek_stop(self, axis: Axis, now: Nanos) -> None:
+    def _seek_stop(self, axis: ControlledAxis, now: Nanos) -> None:
         lag = axis.encoder.counts(abs(axis.profile.count(now) - self.true_p(axis, now)))
         if lag > max(STOP_LAG_REVOLUTIONS * axis.encoder.enc_resol, axis.config.enc_tolerance):
-            axis.homing.stop_reached(axis, now)
+            axis.stop_reached(now)
         else:
             self.tick_ns = now + PERIOD_NS
 
-    def _follow(self, axis: Axis, now: Nanos) -> None:
+    def _follow(self, axis: ControlledAxis, now: Nanos) -> None:
         shaft = axis.shaft(now)
         if shaft != self._shaft:
             self._shaft = shaft
@@ -129,20 +155,19 @@ class PositionControl(Stateful):
         if target != axis.profile.count(now) or axis.profile.moving(now):
             axis.follow(target, now)
 
-    def _correct(self, axis: Axis, now: Nanos) -> None:
+    def _correct(self, axis: ControlledAxis, now: Nanos) -> None:
         # Steps that did not reach the shaft are not counted: the coordinate becomes the true one again. Less than a count is
         # no loss: the shaft counts whole ones.
         true_p = self.true_p(axis, now)
         away_p = abs(axis.target_p - true_p)
         lost = axis.profile.count(now) - round(true_p)
         if axis.encoder.counts(abs(lost)) >= 1.0:
-            axis.offset_p -= lost
-            axis.target_p += lost
+            axis.drop_lost_steps(lost)
             self._ref_motor += lost
         missing = axis.target_p - axis.profile.count(now)
         within = axis.encoder.counts(abs(missing)) <= axis.config.enc_tolerance
         if within and not axis.profile.moving(now):
-            axis.status = axis.arrival = Status.REACHED
+            axis.end_correction()
             return
         if away_p < self._best_p:
             self._best_p = away_p
@@ -153,7 +178,7 @@ class PositionControl(Stateful):
         self.tick_ns = now + PERIOD_NS
         axis.creep(missing if within else _part(missing, axis.config.kp), now)
 
-    def _supervise(self, axis: Axis, now: Nanos) -> None:
+    def _supervise(self, axis: ControlledAxis, now: Nanos) -> None:
         """A drive blocked for ERR_TIME is an error [1.74]."""
         if axis.shaft(now) != self._shaft:
             self._expect_progress(axis, now)
@@ -162,7 +187,7 @@ class PositionControl(Stateful):
             return
         self.tick_ns = now + PERIOD_NS
 
-    def _given_up(self, axis: Axis, now: Nanos) -> bool:
+    def _given_up(self, axis: ControlledAxis, now: Nanos) -> bool:
         patience = axis.config.err_time_ms * MILLISECOND
         return now - self._progress_ns >= patience and axis.config.err_ctrl_mode != self.REACTION_NONE
 

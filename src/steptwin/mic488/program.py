@@ -2,48 +2,37 @@
 
 from __future__ import annotations
 
-import enum
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from steptwin.diagnostics import Source, Span
+from steptwin.diagnostics import SourceText, Span
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.mic488 import program_motion as motion
-from steptwin.mic488.axis import MAX_SPEED_P
-from steptwin.mic488.config import NO_INPUT
+from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.config import NO_INPUT, ControllerConfig
 from steptwin.mic488.homing import Homing
+from steptwin.mic488.program_device import ProgramDevice
 from steptwin.mic488.program_registers import ACCESS, ProgramRegisters
 from steptwin.mic488.registers import OUTPUTS
+from steptwin.mic488.status import ProgramState
 from steptwin.state import Stateful
 from steptwin.wbc import steps as s
-from steptwin.wbc.check import Checked
+from steptwin.wbc.check import CheckedProgram
 from steptwin.wbc.compile import Code, compile_program
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.events import EVENTS
-from steptwin.wbc.machine import Machine
+from steptwin.wbc.machine import Interpreter
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.real import ProgramFault, real_text
 from steptwin.wbc.registers import ROW_0
 from steptwin.wbc.usage import Setup, sources
 
-if TYPE_CHECKING:
-    from steptwin.mic488.config import ControllerConfig
-    from steptwin.mic488.device import Mic488
-
 _MODBUS = next(number for number, event in enumerate(EVENTS) if event.name == "MODBUS")
 _DRIVES = {event.axis - 1: number for number, event in enumerate(EVENTS) if event.axis}
-
-
-class ProgramState(enum.IntEnum):
-    """PROGRAM_CTRL as read (MIC-22); the same numbers written are commands."""
-
-    STOPPED = 0
-    RUNNING = 1
-    PAUSED = 2
 
 
 STOPPED, RUNNING, PAUSED = ProgramState
@@ -54,15 +43,17 @@ STOPPED, RUNNING, PAUSED = ProgramState
 class LoadedProgram:
     """A program in a bank, ready to run. Code has no state: any number of controllers may share it."""
 
-    source: Source
+    source: SourceText
     steps: tuple[s.Step, ...]
     code: Code
     position_records: Mapping[int, bytes]
     uses_positions: bool
     """It needs a position table: for more than a row 0 that it writes itself (WBC-25)."""
+    variables: tuple[str, ...] = ()
+    """Their names; their values are the first cells."""
 
 
-class Fault(NamedTuple):
+class ProgramError(NamedTuple):
     """What stopped a program (WBC-5), and the statement of its text."""
 
     span: Span
@@ -75,7 +66,7 @@ def row_values(record: bytes) -> tuple[float | None, ...]:
     return tuple(value if mask >> number & 1 and isfinite(value) else None for number, value in enumerate(values))
 
 
-def load(checked: Checked, name: str = "program") -> LoadedProgram:
+def load(checked: CheckedProgram, name: str = "program") -> LoadedProgram:
     """A program for banks of controllers. `Misuse` when it has errors."""
     executable = checked.executable
     if executable is None:
@@ -84,7 +75,8 @@ def load(checked: Checked, name: str = "program") -> LoadedProgram:
         raise Misuse(f"{name} cannot run: {reason}")
     steps = executable.steps
     code = compile_program(executable, ACCESS)
-    return LoadedProgram(Source(name, checked.text), steps, code, executable.position_records, _uses_positions(steps))
+    source, records = SourceText(name, checked.text), executable.position_records
+    return LoadedProgram(source, steps, code, records, _uses_positions(steps), executable.variables)
 
 
 def setup_of(config: ControllerConfig) -> Setup:
@@ -104,20 +96,20 @@ def setup_of(config: ControllerConfig) -> Setup:
 
 def _uses_positions(steps: Sequence[s.Step]) -> bool:
     """Whether rows are needed that the program does not write itself (WBC-25)."""
-    rows = [step.row for step in steps if isinstance(step, s.RowMotion)]
-    if any(isinstance(step, s.Set) and _is_row_0(step.target) for step in steps):
+    rows = [step.row for step in steps if isinstance(step, s.RowMotionStep)]
+    if any(isinstance(step, s.SetStep) and _is_row_0(step.target) for step in steps):
         return any(row != s.Literal(0.0) for row in rows)
     return bool(rows) or any(_is_row_0(source) for step in steps for source in sources(step))
 
 
 def _is_row_0(source: s.Source) -> bool:
-    return isinstance(source, s.Register) and source.row.key in ROW_0
+    return isinstance(source, s.RegisterOperand) and source.row.key in ROW_0
 
 
 class ProgramControl(Stateful):
     """Which program runs on a controller. Bank selections take effect at the next start (MIC-31).
 
-    To a program it is the controller: what `steptwin.wbc.controller.Controller` asks for.
+    To a program it is the controller: what `steptwin.wbc.controller.ProgramController` asks for.
     """
 
     __slots__ = (
@@ -142,7 +134,7 @@ class ProgramControl(Stateful):
 
     def __init__(
         self,
-        device: Mic488,
+        device: ProgramDevice,
         programs: Mapping[int, LoadedProgram],
         positions: Mapping[int, PositionTable],
         statement_time: Nanos,
@@ -151,14 +143,14 @@ class ProgramControl(Stateful):
         self.dialect = dialect_for(device.firmware.name)
         self.programs: dict[int, LoadedProgram] = {}
         self.positions: dict[int, PositionTable] = {}
-        self.machine = Machine(self, statement_time)
+        self.machine = Interpreter(self, statement_time)
         self.registers = ProgramRegisters()
         self.program_bank = 0
         self.position_bank = 0
         self.state = STOPPED
         self.error = False
         """A program error is pending; cleared by the next start or stop (MIC-26)."""
-        self.fault: Fault | None = None
+        self.fault: ProgramError | None = None
         """The last program error; it outlives ``error`` up to the next start."""
         self._program = 0
         self._table = 0
@@ -238,19 +230,19 @@ class ProgramControl(Stateful):
         self.error = False
         self.fault = None
         if program is None:
-            self._refuse(f"program bank {self.program_bank} is empty")
+            self._refuse(f"program bank {self.program_bank} is empty", now)
         elif program.uses_positions and (table is None or not table.rows):
             # WBC-25
-            self._refuse(f"position bank {self.position_bank} is empty")
+            self._refuse(f"position bank {self.position_bank} is empty", now)
         else:
             self._program, self._table = self.program_bank, self.position_bank
             self.state = RUNNING
             self._begin(now)
             self.machine.start(program.code, now)
 
-    def _refuse(self, text: str) -> None:
+    def _refuse(self, text: str, now: Nanos) -> None:
         self.error = True
-        self.device.event("program-error", text)
+        self.device.event("program-error", text, now)
 
     def _begin(self, now: Nanos) -> None:
         """What belongs to the program is as at its start (WBC-25)."""
@@ -269,7 +261,7 @@ class ProgramControl(Stateful):
         self._pulses = {}
         self._drives_off(now)
         for number in range(OUTPUTS):
-            self.device.set_output(number, False)
+            self.device.set_output(number, False, now)
 
     def _drives_off(self, now: Nanos) -> None:
         for axis in self.device.axes:
@@ -298,12 +290,16 @@ class ProgramControl(Stateful):
         """The program that runs or is paused, whatever bank is selected."""
         return None if self.state is STOPPED else self.programs[self._program]
 
-    @property
-    def statement(self) -> Span | None:
-        """Place, in the source, of the statement in execution or executed next; None when nothing runs."""
+    def variables(self, now: Nanos) -> dict[str, float]:
+        """Values of the variables of the running or paused program, by name."""
+        running = self.running
+        return {} if running is None else dict(zip(running.variables, self.machine.cells_at(now), strict=False))
+
+    def statement(self, now: Nanos) -> Span | None:
+        """Place, in the source, of the statement in execution at ``now`` or executed next; None when nothing runs."""
         if self.state is STOPPED:
             return None
-        return self._span(self.machine.place())
+        return self._span(self.machine.place(now))
 
     def _span(self, number: int) -> Span:
         program = self.programs[self._program]
@@ -325,10 +321,13 @@ class ProgramControl(Stateful):
                 due = at
         return due
 
-    def advance(self, now: Nanos, until: Nanos) -> bool:
-        """Run what is due at ``now``, and of the program alone what follows up to ``until``. True: it acted on anything else."""
+    def advance(self, now: Nanos, until: Nanos) -> Nanos | None:
+        """Run what is due at ``now``, and of the program alone what follows up to ``until``.
+
+        Returns the moment at which it acted on the rest of the controller, where it goes no further; None if it did not.
+        """
         machine = self.machine
-        acted = bool(self._pulses) and self._invert(now)
+        acted = now if self._pulses and self._invert(now) else None
         if self.state is not RUNNING:
             return acted
         code = self._code()
@@ -348,7 +347,7 @@ class ProgramControl(Stateful):
             self._fail(str(fault))
         if machine.acted:
             self._look_at_drives(machine.now, machine.after(machine.now))
-            return True
+            return machine.now
         return acted
 
     def _invert(self, now: Nanos) -> bool:
@@ -356,19 +355,19 @@ class ProgramControl(Stateful):
         over = sorted(number for number, at in self._pulses.items() if at <= now)
         for number in over:
             del self._pulses[number]
-            self.device.set_output(number, not self.device.outputs[number])
+            self.device.set_output(number, not self.device.outputs[number], now)
             self.machine.disturb(now)
         return bool(over)
 
     def _fail(self, text: str) -> None:
         """WBC-5."""
         now = self.machine.now
-        self.machine.present()
+        self.machine.acting()
         span = self._span(self.machine.pc)
-        self.fault = Fault(span, text)
+        self.fault = ProgramError(span, text)
         self._stop()
         line, _ = self.programs[self._program].source.position(span.start)
-        self._refuse(f"line {line}: {text}")
+        self._refuse(f"line {line}: {text}", now)
         for axis in self.device.axes:
             axis.brake(now)
 
@@ -391,7 +390,7 @@ class ProgramControl(Stateful):
                 for axis in (x, y):
                     if axis.on_path:
                         axis.brake(now)
-                        self.device.event("path-left", f"M{axis.number} slows down: the other axis left their path")
+                        self.device.event("path-left", f"M{axis.number} slows down: the other axis left their path", now)
         if self.state is STOPPED:
             return
         m1, m2, m3, m4 = axes
@@ -426,22 +425,17 @@ class ProgramControl(Stateful):
 
     # ------------------------------------------------------------------ what the program asks for
 
-    @property
-    def now(self) -> Nanos:
-        return self.device.now
+    def motion(self, keyword: str, axis: int, value: float, now: Nanos) -> None:
+        motion.move(self.device.axes[axis - 1], keyword, value, now)
 
-    @now.setter
-    def now(self, now: Nanos) -> None:
-        self.device.now = now
+    def halt(self, keyword: str, axis: int, now: Nanos) -> None:
+        motion.halt(self.device.axes[axis - 1], keyword, now)
 
-    def motion(self, keyword: str, axis: int, value: float) -> None:
-        motion.move(self.device.axes[axis - 1], keyword, value, self.now)
-
-    def halt(self, keyword: str, axis: int) -> None:
-        motion.halt(self.device.axes[axis - 1], keyword, self.now)
-
-    def row_motion(self, keyword: str, row: float) -> None:
-        motion.row_motion(self, keyword, row, self.now)
+    def row_motion(self, keyword: str, row: float, now: Nanos) -> None:
+        chosen = motion.ChosenRow(keyword, row, self.row(keyword, row))
+        both_move = motion.row_motion(self.device, chosen, self.registers.lin_acc_u, now)
+        if both_move is not None:
+            self.together = both_move
 
     def row(self, keyword: str, index: float) -> tuple[float | None, ...]:
         """Row ``index`` (from 0) of the table in use."""
@@ -460,19 +454,19 @@ class ProgramControl(Stateful):
         table = self.positions.get(self._table)
         return table.rows[index].values if table is not None and index < len(table.rows) else (None,) * 4
 
-    def at_rest(self) -> bool:
-        return all(motion.finished(axis, self.now) for axis in self.device.axes)
+    def at_rest(self, now: Nanos) -> bool:
+        return all(motion.finished(axis, now) for axis in self.device.axes)
 
-    def pulse(self, output: int, duration: Nanos) -> None:
+    def pulse(self, output: int, duration: Nanos, now: Nanos) -> None:
         if duration <= 0:
             raise ProgramFault(f"PULSE(OUT{output}, …): permitted are 0.001 s and more")
-        self._pulses[output - 1] = self.now + duration
+        self._pulses[output - 1] = now + duration
 
-    def set_output(self, number: int, on: bool) -> bool:
+    def set_output(self, number: int, on: bool, now: Nanos) -> bool:
         """Output ``number`` from 0; whether that changed anything."""
         if self.device.outputs[number] is on:
             return False
-        self.device.set_output(number, on)
+        self.device.set_output(number, on, now)
         return True
 
     def set_switch(self, event: int, mode: int, now: Nanos) -> bool:
@@ -481,11 +475,11 @@ class ProgramControl(Stateful):
             self.machine.pending &= ~(1 << event)
         return self.registers.switch(event, mode, now)
 
-    def end(self) -> None:
-        self._end(self.now)
+    def end(self, now: Nanos) -> None:
+        self._end(now)
 
-    def reset(self) -> None:
-        self._drives_off(self.now)
+    def reset(self, now: Nanos) -> None:
+        self._drives_off(now)
         self._pulses = {}
-        self._begin(self.now)
+        self._begin(now)
         self.machine.restart(self._code())

@@ -1,18 +1,20 @@
 """The motion statements of a program: single axes, rows of the position table, lines and arcs of M1 (X) and M2 (Y).
 
-Suffixes as in `steptwin.mic488.axis`; ``w`` positions along a path, in configured units of M1.
+Suffixes as in `steptwin.mic488.axis_motion`; ``w`` positions along a path, in configured units of M1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.mic488.axis import MAX_SPEED_P, SLOWEST_RAMP_P, Axis
+from steptwin.mic488.axis import Axis
+from steptwin.mic488.axis_motion import MAX_SPEED_P, SLOWEST_RAMP_P
+from steptwin.mic488.program_device import ProgramDevice
 from steptwin.mic488.program_registers import position_p
-from steptwin.mic488.status import LIMIT, Status
+from steptwin.mic488.status import LIMIT, AxisStatus
 from steptwin.motion.paths import Arc, Circular, Straight, arc_between, circle
 from steptwin.motion.planner import MotionState, plan_position
 from steptwin.motion.trig import length
@@ -20,10 +22,6 @@ from steptwin.tables import complete
 from steptwin.wbc.paths import row_problem
 from steptwin.wbc.real import ProgramFault, real_text
 from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS
-
-if TYPE_CHECKING:
-    from steptwin.mic488.device import Mic488
-    from steptwin.mic488.program import ProgramControl
 
 Row: TypeAlias = tuple[float | None, ...]
 
@@ -62,7 +60,7 @@ _HALTS: Mapping[str, Callable[[Axis, Nanos], None]] = complete(
 )
 
 
-_IN_MOTION = (Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION)
+_IN_MOTION = (AxisStatus.VELOCITY, AxisStatus.POSITION, AxisStatus.HOMING, AxisStatus.CORRECTION)
 
 
 def finished(axis: Axis, now: Nanos) -> bool:
@@ -75,23 +73,33 @@ def finished(axis: Axis, now: Nanos) -> bool:
 # ---------------------------------------------------------------------- rows
 
 
-def row_motion(control: ProgramControl, keyword: str, index: float, now: Nanos) -> None:
-    """MOVEPTP, MOVELIN, MOVELIN_REL, MOVETOCIRC, DOCIRC, DOARC with a row. `ProgramFault` when the row does not allow it."""
-    row = control.row(keyword, index)
-    problem = row_problem(keyword, row)
+class ChosenRow(NamedTuple):
+    """The row that a statement names: ``index`` as it was given, and its parameters."""
+
+    keyword: str
+    index: float
+    values: Row
+
+
+def row_motion(device: ProgramDevice, row: ChosenRow, lin_acc_u: float | None, now: Nanos) -> bool | None:
+    """MOVEPTP, MOVELIN, MOVELIN_REL, MOVETOCIRC, DOCIRC, DOARC. `ProgramFault` when the row does not allow it.
+
+    ``lin_acc_u`` is LinAcc, if it is set. Returns whether M1 and M2 both move along the new path; None where there is none.
+    """
+    keyword, index, values = row
+    problem = row_problem(keyword, values)
     if problem is not None:
         raise ProgramFault(f"{keyword} {real_text(index)}: {problem}")
-    device = control.device
     if keyword == "MOVEPTP":
-        for axis, value_u in zip(device.axes, row, strict=True):
+        for axis, value_u in zip(device.axes, values, strict=True):
             if value_u is not None:
                 move(axis, "PABS", value_u, now)
-        return
+        return None
     if not all(axis.can_move for axis in device.axes[:2]):
-        device.event("drive-off", f"{keyword} ignored: M1 and M2 must be enabled")
-        return
+        device.event("drive-off", f"{keyword} ignored: M1 and M2 must be enabled", now)
+        return None
     try:
-        _PATHS[keyword](_Plane(control, now), row)
+        return _PATHS[keyword](_Plane(device, lin_acc_u, now), values)
     except Misuse as refusal:
         raise ProgramFault(f"{keyword} {real_text(index)}: {refusal}") from None
 
@@ -107,9 +115,9 @@ class _Pace(NamedTuple):
 class _Plane:
     """M1 and M2, standing at ``now``: what is still in motion stops without ramp (WBC-26)."""
 
-    def __init__(self, control: ProgramControl, now: Nanos) -> None:
-        self.control = control
-        self.device: Mic488 = control.device
+    def __init__(self, device: ProgramDevice, lin_acc_u: float | None, now: Nanos) -> None:
+        self.device = device
+        self.lin_acc_u = lin_acc_u
         self.now = now
         self.axes = self.device.axes[:2]
         for axis in self.axes:
@@ -130,16 +138,16 @@ class _Plane:
             for axis, value_u, count in zip(self.axes, place_u, self.counts, strict=True)
         ]
 
-    def line(self, targets_p: list[int], speed_u: float | None) -> None:
+    def line(self, targets_p: list[int], speed_u: float | None) -> bool:
         x, y = self.axes
         ways_p = [target - count for target, count in zip(targets_p, self.counts, strict=True)]
         way_u = length(ways_p[0] / x.gear, ways_p[1] / y.gear)
         slopes = [way_p / way_u if way_u else 0.0 for way_p in ways_p]
         courses = [Straight(float(count), slope) for count, slope in zip(self.counts, slopes, strict=True)]
-        pace = _Pace(speed_u, self.control.registers.lin_acc_u, max(map(abs, slopes)))
-        self._follow(courses, way_u, targets_p, pace, corrected=True)
+        pace = _Pace(speed_u, self.lin_acc_u, max(map(abs, slopes)))
+        return self._follow(courses, way_u, targets_p, pace, corrected=True)
 
-    def arc(self, arc: Arc, targets_p: list[int]) -> None:
+    def arc(self, arc: Arc, targets_p: list[int]) -> bool:
         x, y = self.axes
         way_u = arc.length
         turn_q = arc.sweep_q / way_u if way_u else 0.0
@@ -147,7 +155,7 @@ class _Plane:
             Circular(arc.centre_x * x.gear - x.offset_p, arc.radius * x.gear, arc.begin_q, turn_q),
             Circular(arc.centre_y * y.gear - y.offset_p, arc.radius * y.gear, arc.begin_q - 1.0, turn_q),
         ]
-        self._follow(courses, way_u, targets_p, _Pace(None, None, max(x.gear, y.gear)), corrected=False)
+        return self._follow(courses, way_u, targets_p, _Pace(None, None, max(x.gear, y.gear)), corrected=False)
 
     def _follow(
         self,
@@ -157,13 +165,16 @@ class _Plane:
         pace: _Pace,
         *,
         corrected: bool,
-    ) -> None:
-        """Run ``way_u`` along the courses, at most to the first soft limit. WBC-11: what is not given of ``pace`` is M1's."""
+    ) -> bool:
+        """Run ``way_u`` along the courses, at most to the first soft limit; whether both axes move.
+
+        WBC-11: what is not given of ``pace`` is M1's.
+        """
         first = self.axes[0]
         speed_u = first.vmax_p / first.gear if pace.speed_u is None else pace.speed_u
         if speed_u * pace.steepest > MAX_SPEED_P:
             text = f"{real_text(speed_u)} {first.config.unit_name}/s along the path is above {MAX_SPEED_P:g} imp/s"
-            self.device.event("speed-clamped", text)
+            self.device.event("speed-clamped", text, self.now)
             speed_u = MAX_SPEED_P / pace.steepest
         slowest_u = SLOWEST_RAMP_P / first.gear
         up_u = max(pace.acc_u or first.acc_p / first.gear, slowest_u)
@@ -175,11 +186,11 @@ class _Plane:
             edge = met.get(axis.number)
             final_p = target_p if not met else None if edge is None else edge[0]
             count = axis.profile.count(self.now)
-            arrival = Status.REACHED if not met else Status.ON if edge is None else LIMIT[edge[1]]
+            arrival = AxisStatus.REACHED if not met else AxisStatus.ON if edge is None else LIMIT[edge[1]]
             axis.follow_path(course.profile(way, count, final_p), arrival, corrected=corrected and not met)
             if axis.profile.moving(self.now):
                 moving.append(axis)
-        self.control.together = len(moving) == len(self.axes)
+        return len(moving) == len(self.axes)
 
     def _way_to_limits(self, courses: list[Straight] | list[Circular], way_u: float) -> tuple[float, dict[int, tuple[int, int]]]:
         """How far the path goes, and the soft limits (motor position, direction) it then stands on, by axis."""
@@ -200,39 +211,39 @@ class _Plane:
         return end_w, met
 
 
-def _line(plane: _Plane, row: Row) -> None:
-    plane.line(plane.motor_p((row[0], row[1]), "MOVELIN"), row[2])
+def _line(plane: _Plane, row: Row) -> bool:
+    return plane.line(plane.motor_p((row[0], row[1]), "MOVELIN"), row[2])
 
 
-def _line_by(plane: _Plane, row: Row) -> None:
+def _line_by(plane: _Plane, row: Row) -> bool:
     ways_p = [
         position_p(axis, way_u or 0.0, f"MOVELIN_REL M{axis.number}") for axis, way_u in zip(plane.axes, row[:2], strict=True)
     ]
-    plane.line([count + way_p for count, way_p in zip(plane.counts, ways_p, strict=True)], row[2])
+    return plane.line([count + way_p for count, way_p in zip(plane.counts, ways_p, strict=True)], row[2])
 
 
-def _to_circle(plane: _Plane, row: Row) -> None:
+def _to_circle(plane: _Plane, row: Row) -> bool:
     """WBC-26: on a straight line, at M1's VMAX, for p3 is the radius."""
-    plane.line(plane.motor_p(_circle(row, 0.0).begin, "MOVETOCIRC"), None)
+    return plane.line(plane.motor_p(_circle(row, 0.0).begin, "MOVETOCIRC"), None)
 
 
-def _do_circle(plane: _Plane, row: Row) -> None:
+def _do_circle(plane: _Plane, row: Row) -> bool:
     arc = _circle(row, row[3] or 0.0)
     begin_p = plane.motor_p(arc.begin, "DOCIRC")
     if any(abs(begin - count) > 1 for begin, count in zip(begin_p, plane.counts, strict=True)):
         place = "({}, {})".format(*map(real_text, plane.place_u()))
         begin = "({}, {})".format(*map(real_text, arc.begin))
         raise ProgramFault(f"DOCIRC begins at {begin}, but the axes are at {place}: go there with MOVETOCIRC")
-    plane.arc(arc, plane.motor_p(arc.end, "DOCIRC"))
+    return plane.arc(arc, plane.motor_p(arc.end, "DOCIRC"))
 
 
-def _do_arc(plane: _Plane, row: Row) -> None:
+def _do_arc(plane: _Plane, row: Row) -> bool:
     x, y = plane.axes
     x0, y0 = plane.place_u()
     targets_p = plane.motor_p((row[0], row[1]), "DOARC")
     x1, y1 = ((target + axis.offset_p) / axis.gear for target, axis in zip(targets_p, plane.axes, strict=True))
     slack_u = max(1.0 / x.gear, 1.0 / y.gear)
-    plane.arc(arc_between(x0, y0, x1, y1, _given(row[2]), outward=row[3] == 0.0, slack=slack_u), targets_p)
+    return plane.arc(arc_between(x0, y0, x1, y1, _given(row[2]), outward=row[3] == 0.0, slack=slack_u), targets_p)
 
 
 def _circle(row: Row, angle_deg: float) -> Arc:
@@ -247,7 +258,7 @@ def _given(value: float | None) -> float:
     return value
 
 
-_PATHS: Mapping[str, Callable[[_Plane, Row], None]] = complete(
+_PATHS: Mapping[str, Callable[[_Plane, Row], bool]] = complete(
     "statement with a row",
     ROW_MOTIONS - {"MOVEPTP"},
     "path",

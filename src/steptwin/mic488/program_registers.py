@@ -7,27 +7,26 @@ from array import array
 from collections.abc import Callable, Iterable, Mapping
 from math import inf, isnan
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Protocol, TypeAlias
 
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.mic488.axis import MAX_SPEED_P, Axis
+from steptwin.mic488.axis import Axis
+from steptwin.mic488.axis_motion import MAX_SPEED_P
+from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
-from steptwin.mic488.status import Status
+from steptwin.mic488.program_device import ProgramDevice
+from steptwin.mic488.status import AxisStatus
 from steptwin.motion.paths import ArcProfile
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.state import Stateful
-from steptwin.wbc.controller import FOREVER, Access, Reader, Tendency, Writer, complete_access
+from steptwin.wbc.controller import FOREVER, Reader, RegisterFamily, Tendency, Writer, complete_access
+from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_REGISTER, EVENTS, INPUTS
 from steptwin.wbc.machine import HORIZON
 from steptwin.wbc.positions import PARAMETERS
 from steptwin.wbc.real import ProgramFault, real, real_text
 from steptwin.wbc.registers import ROWS, TIMER
-
-if TYPE_CHECKING:
-    from steptwin.mic488.config import ControllerConfig
-    from steptwin.mic488.device import Mic488
-    from steptwin.mic488.program import ProgramControl
 
 TIMERS = 16
 TIMER_PERIODS: Mapping[str, Nanos] = MappingProxyType({"TIMA": 10 * MILLISECOND, "TIMB": SECOND})
@@ -92,6 +91,24 @@ class ProgramRegisters(Stateful):
     def take_record(self, values: Iterable[float]) -> None:
         """N, X, Y, A of a record of the vision system."""
         self.vision = array("f", (1.0, *map(real, values)))
+
+
+class RegisterHost(Protocol):
+    """Whose registers a program reads and writes: the controller's, and the program's own."""
+
+    @property
+    def device(self) -> ProgramDevice: ...
+    @property
+    def registers(self) -> ProgramRegisters: ...
+    @property
+    def dialect(self) -> Dialect: ...
+    def set_output(self, number: int, on: bool, now: Nanos) -> bool:
+        """Output ``number`` from 0; whether that changed anything."""
+        ...
+
+    def set_switch(self, event: int, mode: int, now: Nanos) -> bool:
+        """CFGINT_… of an event by its number; whether that changed anything."""
+        ...
 
 
 # ---------------------------------------------------------------------- axes
@@ -159,7 +176,7 @@ def _motion_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
 
 
 def _set_drive(axis: Axis, on: float, now: Nanos) -> bool:
-    if axis.enabled is bool(on) and (on or axis.status is Status.OFF):
+    if axis.enabled is bool(on) and (on or axis.status is AxisStatus.OFF):
         return False
     if on:
         axis.enable(now)
@@ -206,15 +223,23 @@ def _set_limit_r(axis: Axis, value_u: float, now: Nanos) -> bool:
     return True
 
 
-def _rate(attribute: str) -> Access:
-    def put(axis: Axis, value_u: float, now: Nanos) -> bool:
-        rate_p = min(max(value_u * axis.gear, LEAST), MOST)
-        if rate_p == getattr(axis, attribute):
-            return False
-        setattr(axis, attribute, rate_p)
-        return True
+def _rate_p(axis: Axis, value_u: float) -> float:
+    return min(max(value_u * axis.gear, LEAST), MOST)
 
-    return Access(_axis_reader(lambda axis, at: getattr(axis, attribute) / axis.gear), _axis_writer(put))
+
+def _set_acc(axis: Axis, value_u: float, now: Nanos) -> bool:
+    before, axis.acc_p = axis.acc_p, _rate_p(axis, value_u)
+    return before != axis.acc_p
+
+
+def _set_dec(axis: Axis, value_u: float, now: Nanos) -> bool:
+    before, axis.dec_p = axis.dec_p, _rate_p(axis, value_u)
+    return before != axis.dec_p
+
+
+def _set_vmax(axis: Axis, value_u: float, now: Nanos) -> bool:
+    before, axis.vmax_p = axis.vmax_p, _rate_p(axis, value_u)
+    return before != axis.vmax_p
 
 
 def _set_encoder(axis: Axis, value: float, now: Nanos) -> bool:
@@ -239,15 +264,15 @@ def _out(number: int) -> Reader:
 def _set_out(number: int) -> Writer:
     index = number - 1
 
-    def put(control: ProgramControl, value: float, now: Nanos) -> bool:
-        return control.set_output(index, value > 0.0)
+    def put(control: RegisterHost, value: float, now: Nanos) -> bool:
+        return control.set_output(index, value > 0.0, now)
 
     return put
 
 
-def _set_outs(control: ProgramControl, value: float, now: Nanos) -> bool:
+def _set_outs(control: RegisterHost, value: float, now: Nanos) -> bool:
     bits = int(value)
-    changed = [control.set_output(index, bool(bits >> index & 1)) for index in range(len(control.device.outputs))]
+    changed = [control.set_output(index, bool(bits >> index & 1), now) for index in range(len(control.device.outputs))]
     return any(changed)
 
 
@@ -268,14 +293,14 @@ def _ain(number: int) -> Reader:
 _WORD, _DINT, _REAL = (struct.Struct(layout) for layout in ("<h", "<i", "<f"))
 
 
-def _user(layout: struct.Struct) -> Access:
+def _user(layout: struct.Struct) -> RegisterFamily:
     """One memory: a register of two words has the low word first."""
     words = layout.size // 2
 
     def read(number: int) -> Reader:
         place = slice(number, number + words)
 
-        def get(control: ProgramControl, at: Nanos) -> float:
+        def get(control: RegisterHost, at: Nanos) -> float:
             value = layout.unpack(control.device.user[place])[0]
             return value if layout is _WORD else 0.0 if isnan(value) else real(value)
 
@@ -284,7 +309,7 @@ def _user(layout: struct.Struct) -> Access:
     def write(number: int) -> Writer:
         place = slice(number, number + words)
 
-        def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+        def put(control: RegisterHost, value: float, now: Nanos) -> bool:
             held = array("H", layout.pack(value if layout is _REAL else int(value)))
             if control.device.user[place] == held:
                 return False
@@ -293,34 +318,34 @@ def _user(layout: struct.Struct) -> Access:
 
         return put
 
-    return Access(read, write)
+    return RegisterFamily(read, write)
 
 
 # ---------------------------------------------------------------------- the program's own
 
 
-def _timer(name: str) -> Access:
+def _timer(name: str) -> RegisterFamily:
     def read(number: int) -> Reader:
         return lambda control, at: float(control.registers.timer(name, number - 1, at))
 
     def write(number: int) -> Writer:
-        def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+        def put(control: RegisterHost, value: float, now: Nanos) -> bool:
             control.registers.set_timer(name, number - 1, int(value), now)
             return True
 
         return put
 
     def tendency(number: int) -> Tendency:
-        def stretches(control: ProgramControl, at: Nanos) -> list[Nanos]:
+        def stretches(control: RegisterHost, at: Nanos) -> list[Nanos]:
             missing = _TIMER_MOST - control.registers.timer(name, number - 1, at)
             return [at + missing * TIMER_PERIODS[name]] if missing else []
 
         return stretches
 
-    return Access(read, write, tendency)
+    return RegisterFamily(read, write, tendency)
 
 
-def _switch(name: str) -> Access:
+def _switch(name: str) -> RegisterFamily:
     """CFGINT_…: a family, or a single register (number 0)."""
 
     def event(number: int) -> int:
@@ -334,10 +359,10 @@ def _switch(name: str) -> Access:
         index = event(number)
         return lambda control, value, now: control.set_switch(index, int(value), now)
 
-    return Access(read, write, quiet=False)
+    return RegisterFamily(read, write, quiet=False)
 
 
-def _row_0(parameter: int | None = None) -> Access:
+def _row_0(parameter: int | None = None) -> RegisterFamily:
     """A parameter (from 0) of row 0; None: that of the register's number."""
 
     def index_of(number: int) -> int:
@@ -346,7 +371,7 @@ def _row_0(parameter: int | None = None) -> Access:
     def read(number: int) -> Reader:
         index = index_of(number)
 
-        def get(control: ProgramControl, at: Nanos) -> float:
+        def get(control: RegisterHost, at: Nanos) -> float:
             row = control.registers.row_0
             return 0.0 if row is None else real(row[index] or 0.0)
 
@@ -355,7 +380,7 @@ def _row_0(parameter: int | None = None) -> Access:
     def write(number: int) -> Writer:
         index = index_of(number)
 
-        def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+        def put(control: RegisterHost, value: float, now: Nanos) -> bool:
             """WBC-16: a parameter that was left alone becomes valid."""
             row = list(control.registers.row_0 or (None,) * PARAMETERS)
             before, row[index] = row[index], value
@@ -364,75 +389,74 @@ def _row_0(parameter: int | None = None) -> Access:
 
         return put
 
-    return Access(read, write)
+    return RegisterFamily(read, write)
 
 
-def _lin_acc(control: ProgramControl, at: Nanos) -> float:
+def _lin_acc(control: RegisterHost, at: Nanos) -> float:
     acc_u = control.registers.lin_acc_u
     return real(acc_u if acc_u is not None else control.device.axes[0].acc_p / control.device.axes[0].gear)
 
 
-def _set_lin_acc(control: ProgramControl, value: float, now: Nanos) -> bool:
+def _set_lin_acc(control: RegisterHost, value: float, now: Nanos) -> bool:
     before, control.registers.lin_acc_u = control.registers.lin_acc_u, value
     return before != value
 
 
-def _vision(index: int) -> Access:
-    def put(control: ProgramControl, value: float, now: Nanos) -> bool:
+def _vision(index: int) -> RegisterFamily:
+    def put(control: RegisterHost, value: float, now: Nanos) -> bool:
         before, control.registers.vision[index] = control.registers.vision[index], value
         return before != value
 
     return _single(lambda control, at: control.registers.vision[index], put)
 
 
-def _single(read: Callable[[Any, Nanos], float], write: Writer | None = None, *, quiet: bool = True) -> Access:
-    return Access(lambda number: read, None if write is None else lambda number: write, quiet=quiet)
+def _single(read: Callable[[RegisterHost, Nanos], float], write: Writer | None = None, *, quiet: bool = True) -> RegisterFamily:
+    return RegisterFamily(lambda number: read, None if write is None else lambda number: write, quiet=quiet)
 
 
-def _status(control: ProgramControl, at: Nanos) -> float:
-    device: Mic488 = control.device
-    return float(device.status()) if control.dialect.has(STATUS_SINCE) else 0.0
+def _status(control: RegisterHost, at: Nanos) -> float:
+    return float(control.device.status()) if control.dialect.has(STATUS_SINCE) else 0.0
 
 
 _LIMIT_L = _axis_reader(lambda axis, at: axis.limit_l_p / axis.gear)
 _LIMIT_R = _axis_reader(lambda axis, at: axis.limit_r_p / axis.gear)
 
-ACCESS: Mapping[str, Access] = complete_access(
+ACCESS: Mapping[str, RegisterFamily] = complete_access(
     ROWS,
     {
-        "OUT": Access(_out, _set_out, quiet=False),
+        "OUT": RegisterFamily(_out, _set_out, quiet=False),
         "OUTPUTS": _single(lambda control, at: _bits(control.device.outputs), _set_outs, quiet=False),
-        "IN": Access(_in),
+        "IN": RegisterFamily(_in),
         "INPUTS": _single(lambda control, at: _bits(control.device.inputs.filtered[:16])),
-        "AIN": Access(_ain),
-        "M": Access(
+        "AIN": RegisterFamily(_ain),
+        "M": RegisterFamily(
             _axis_reader(lambda axis, at: axis.profile.moving(at)),
             _axis_writer(_set_drive),
             _axis_tendency(_motion_stretches),
             quiet=False,
         ),
-        "STATM": Access(_axis_reader(lambda axis, at: axis.status)),
-        "VACTM": Access(
+        "STATM": RegisterFamily(_axis_reader(lambda axis, at: axis.status)),
+        "VACTM": RegisterFamily(
             _axis_reader(lambda axis, at: axis.profile.velocity(at) / axis.gear),
             tendency=_axis_tendency(_velocity_stretches),
         ),
-        "POSM": Access(
+        "POSM": RegisterFamily(
             _axis_reader(lambda axis, at: axis.coordinate_p(at) / axis.gear),
             _axis_writer(_set_position),
             _axis_tendency(_position_stretches),
             quiet=False,
         ),
-        "ACCM": _rate("acc_p"),
-        "DECM": _rate("dec_p"),
-        "VMAXM": _rate("vmax_p"),
-        "LIMLM": Access(_LIMIT_L, _axis_writer(_set_limit_l), quiet=False),
-        "LIMRM": Access(_LIMIT_R, _axis_writer(_set_limit_r), quiet=False),
-        "ENC": Access(
+        "ACCM": RegisterFamily(_axis_reader(lambda axis, at: axis.acc_p / axis.gear), _axis_writer(_set_acc)),
+        "DECM": RegisterFamily(_axis_reader(lambda axis, at: axis.dec_p / axis.gear), _axis_writer(_set_dec)),
+        "VMAXM": RegisterFamily(_axis_reader(lambda axis, at: axis.vmax_p / axis.gear), _axis_writer(_set_vmax)),
+        "LIMLM": RegisterFamily(_LIMIT_L, _axis_writer(_set_limit_l), quiet=False),
+        "LIMRM": RegisterFamily(_LIMIT_R, _axis_writer(_set_limit_r), quiet=False),
+        "ENC": RegisterFamily(
             _axis_reader(lambda axis, at: axis.encoder_counts(at)),
             _axis_writer(_set_encoder),
             _axis_tendency(_encoder_stretches),
         ),
-        "XENC": Access(_axis_reader(_xenc), tendency=_axis_tendency(_encoder_stretches)),
+        "XENC": RegisterFamily(_axis_reader(_xenc), tendency=_axis_tendency(_encoder_stretches)),
         **{name: _timer(name) for name in TIMER_PERIODS},
         **{name: _switch(name) for name in ("CFGINT_IN", "CFGINT_MODBUS", "CFGINT_M")},
         **{name: _switch(name) for name in ("CFGINT_TICK", "CFGINT_TICK100", "CFGINT_TICK1000")},

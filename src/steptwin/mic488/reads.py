@@ -8,19 +8,17 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from steptwin.mic488.behaviour import BEHAVIOUR, Getter
+from steptwin.mic488.core import ControllerCore
 from steptwin.mic488.encoding import saturated_dint, saturated_real, swap_bytes
-from steptwin.mic488.registermap import FUNCTION_SPACES, LAST_ADDRESS, DataType, Piece, Register, RegisterMap, Space, Type
+from steptwin.mic488.registermap import FUNCTION_SPACES, LAST_ADDRESS, DataType, Register, RegisterMap, RequestPart, Space, Type
 from steptwin.mic488.registers import AXES
-from steptwin.wire.pdu import ILLEGAL_DATA_ADDRESS, ModbusException, Read, pack_bits
-
-if TYPE_CHECKING:
-    from steptwin.mic488.device import Mic488
+from steptwin.wire.pdu import ILLEGAL_DATA_ADDRESS, ModbusException, ReadRequest, pack_bits
 
 
-class Source(NamedTuple):
+class ValueSource(NamedTuple):
     """Where a value comes from: ``place`` 0–3 is an axis, `DEVICE` the controller."""
 
     place: int
@@ -30,7 +28,9 @@ class Source(NamedTuple):
 DEVICE = AXES
 
 
-def compile_read(registers: RegisterMap, request: Read, data_type: DataType, *, lenient: bool) -> Callable[[Mic488], bytes]:
+def compile_read(
+    registers: RegisterMap, request: ReadRequest, data_type: DataType, *, lenient: bool
+) -> Callable[[ControllerCore], bytes]:
     """The plan for functions 01, 02, 03, or exception 02 (MIC-3). Registers may begin and end inside a value (MIC-5)."""
     space = FUNCTION_SPACES[request.function]
     pieces = list(registers.pieces(space, request.address, request.count))
@@ -48,19 +48,19 @@ def compile_read(registers: RegisterMap, request: Read, data_type: DataType, *, 
 # ---------------------------------------------------------------------- bits
 
 
-def _bits_plan(request: Read, pieces: list[Piece]) -> Callable[[Mic488], bytes]:
+def _bits_plan(request: ReadRequest, pieces: list[RequestPart]) -> Callable[[ControllerCore], bytes]:
     head = bytes((request.function, (request.count + 7) // 8))
-    getters: list[Callable[[Mic488], bool]] = []
+    getters: list[Callable[[ControllerCore], bool]] = []
     for register, _, size in pieces:
         getters += [_off] * size if register is None else [_bit(register)]
     return lambda device: head + pack_bits([get(device) for get in getters])
 
 
-def _off(device: Mic488) -> bool:
+def _off(device: ControllerCore) -> bool:
     return False
 
 
-def _bit(register: Register) -> Callable[[Mic488], bool]:
+def _bit(register: Register) -> Callable[[ControllerCore], bool]:
     key, number = (register.key, register.index), (register.index or 1) - 1
     if register.reads:
         return BEHAVIOUR[register.key].read(number)
@@ -70,18 +70,18 @@ def _bit(register: Register) -> Callable[[Mic488], bool]:
 # ---------------------------------------------------------------------- registers
 
 
-def _registers_plan(request: Read, pieces: list[Piece], data_type: DataType) -> Callable[[Mic488], bytes]:
+def _registers_plan(request: ReadRequest, pieces: list[RequestPart], data_type: DataType) -> Callable[[ControllerCore], bytes]:
     head = bytes((request.function, 2 * request.count))
     if len(pieces) == 1 and pieces[0].register is not None and pieces[0].register.type is Type.MEMORY:
         return _memory_plan(head, request.address, request.count)
     layout = "<"
-    sources: list[Source] = []
+    sources: list[ValueSource] = []
     for register, address, size in pieces:
         if register is None:
-            sources += [Source(DEVICE, lambda device, now: 0)] * size
+            sources += [ValueSource(DEVICE, lambda device, now: 0)] * size
             layout += "H" * size
         elif register.type is Type.MEMORY:
-            sources += [Source(DEVICE, _user_word(a)) for a in range(address, address + size)]
+            sources += [ValueSource(DEVICE, _user_word(a)) for a in range(address, address + size)]
             layout += "H" * size
         else:
             sources.append(_source(register, data_type))
@@ -91,7 +91,9 @@ def _registers_plan(request: Read, pieces: list[Piece], data_type: DataType) -> 
     return _packing_plan(head, struct.Struct(layout), sources, slice(2 * inside, 2 * (inside + request.count)))
 
 
-def _packing_plan(head: bytes, layout: struct.Struct, sources: list[Source], asked: slice) -> Callable[[Mic488], bytes]:
+def _packing_plan(
+    head: bytes, layout: struct.Struct, sources: list[ValueSource], asked: slice
+) -> Callable[[ControllerCore], bytes]:
     """``asked`` are the bytes of the values that the request covers: it may begin and end inside one (MIC-5)."""
     pack = layout.pack
     formats = layout.format[1:]
@@ -99,7 +101,7 @@ def _packing_plan(head: bytes, layout: struct.Struct, sources: list[Source], ask
     of_axes_only = all(place < DEVICE for place, _ in sources)
     all_asked = asked == slice(0, layout.size)
 
-    def plan(device: Mic488) -> bytes:
+    def plan(device: ControllerCore) -> bytes:
         now = device.now
         places = device.axes if of_axes_only else (*device.axes, device)
         values = [get(places[place], now) for place, get in sources]
@@ -117,7 +119,7 @@ def _saturated(layout: str, value: float) -> float:
     return saturated_real(value) if layout == "f" else saturated_dint(value) if layout == "i" else value
 
 
-def _memory_plan(head: bytes, address: int, count: int) -> Callable[[Mic488], bytes]:
+def _memory_plan(head: bytes, address: int, count: int) -> Callable[[ControllerCore], bytes]:
     pack = struct.Struct(f">{count}H").pack
     end = address + count
     return lambda device: head + pack(*device.user[address:end])
@@ -127,14 +129,14 @@ def _user_word(address: int) -> Getter:
     return lambda device, now: device.user[address]
 
 
-def _source(register: Register, data_type: DataType) -> Source:
+def _source(register: Register, data_type: DataType) -> ValueSource:
     if 3 not in register.reads:
-        return Source(DEVICE, _last_written(register, data_type))
+        return ValueSource(DEVICE, _last_written(register, data_type))
     behaviour = BEHAVIOUR[register.key]
     if register.axis is None:
-        return Source(DEVICE, behaviour.read)
+        return ValueSource(DEVICE, behaviour.read)
     in_pulses = register.type is Type.VALUE and data_type is DataType.DINT
-    return Source(register.axis - 1, behaviour.read_p if in_pulses else behaviour.read)
+    return ValueSource(register.axis - 1, behaviour.read_p if in_pulses else behaviour.read)
 
 
 def _last_written(register: Register, data_type: DataType) -> Getter:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
@@ -74,7 +74,7 @@ class Type(enum.Enum):
         return "i" if self is Type.DINT or (self is Type.VALUE and data_type is DataType.DINT) else "f"
 
 
-class Kind(enum.Enum):
+class Quantity(enum.Enum):
     """What quantity a value is; the unit follows from it."""
 
     SWITCH = "switch"
@@ -87,10 +87,10 @@ class Kind(enum.Enum):
     NUMBER = "number"
 
 
-_UNIT_ENDS = {Kind.POSITION: "", Kind.VELOCITY: "/s", Kind.ACCELERATION: "/s²"}
+_UNIT_ENDS = {Quantity.POSITION: "", Quantity.VELOCITY: "/s", Quantity.ACCELERATION: "/s²"}
 
 
-class Effect(enum.Enum):
+class WriteEffect(enum.Enum):
     """What a write does, so that a master knows what repeating it would do."""
 
     NONE = "read only"
@@ -139,7 +139,7 @@ class Firmware:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class MapRow:
     """One line of the table: a register, or its copies for each axis or channel.
 
     ``reads`` and ``writes`` are the function codes the manual lists; what is accepted beyond it is in `Register.accepts`.
@@ -153,8 +153,8 @@ class Row:
     type: Type
     reads: tuple[int, ...]
     writes: tuple[int, ...]
-    kind: Kind
-    effect: Effect
+    kind: Quantity
+    effect: WriteEffect
     meaning: str
     sections: Mapping[str, str]
     """Manual version -> sections."""
@@ -163,8 +163,8 @@ class Row:
     copies: int = 1
     step: int = 1
     """Distance of the copies in addresses."""
-    cells: int | str = 1
-    """Values behind one name: a number, or the name of the `Firmware` field with it (ranged rows)."""
+    cells: int | Callable[[Firmware], int] = 1
+    """Values behind one name; a function where the firmware gives their number (ranged rows)."""
     permitted: Range | Mapping[str, Range] | None = None
     """Permitted written values; by firmware name where they differ; None: whatever the type holds."""
     values: Mapping[int, str] = field(default_factory=dict)
@@ -195,8 +195,8 @@ class Register:
     """Function codes that write it, as the manual lists them."""
     accepts: tuple[int, ...]
     """Function codes with which a write is really taken (MIC-4, MIC-5, MIC-6)."""
-    kind: Kind
-    effect: Effect
+    kind: Quantity
+    effect: WriteEffect
     permitted: Range
     values: Mapping[int, str]
     meaning: str
@@ -230,7 +230,7 @@ class Register:
 
     def unit(self, data_type: DataType = DataType.REAL, unit: str = "u") -> str:
         """Unit of the value: ``u``, ``u/s``, ``u/s²`` with the axis' configured unit for ``u``; ``imp…`` in DINT; else empty."""
-        if self.kind is Kind.ENCODER:
+        if self.kind is Quantity.ENCODER:
             return "imp"
         if self.kind not in _UNIT_ENDS:
             return ""
@@ -238,7 +238,7 @@ class Register:
         return ("imp" if pulses else unit) + _UNIT_ENDS[self.kind]
 
 
-class Piece(NamedTuple):
+class RequestPart(NamedTuple):
     """The part of a request that falls on one register, or on a hole (register None)."""
 
     register: Register | None
@@ -276,7 +276,7 @@ class RegisterMap:
     __slots__ = ("_keys", "_names", "_spaces", "_starts", "firmware", "registers", "rows")
 
     firmware: Firmware
-    rows: tuple[Row, ...]
+    rows: tuple[MapRow, ...]
     """The rows this firmware has."""
     registers: tuple[Register, ...]
     _names: Mapping[str, Register]
@@ -284,7 +284,7 @@ class RegisterMap:
     _spaces: Mapping[Space, tuple[Register, ...]]
     _starts: Mapping[Space, tuple[int, ...]]
 
-    def __init__(self, firmware: Firmware, rows: Iterable[Row]) -> None:
+    def __init__(self, firmware: Firmware, rows: Iterable[MapRow]) -> None:
         known = tuple(row for row in rows if row.firmwares is None or firmware.name in row.firmwares)
         placed = [register for row in known for register in _place(row, firmware)]
         order = list(Space)
@@ -360,7 +360,7 @@ class RegisterMap:
             f"firmware {self.firmware.name} has no {space.value} at {show_address(address)}; nearest: {', '.join(near)}"
         )
 
-    def pieces(self, space: Space, address: int, quantity: int) -> Iterator[Piece]:
+    def pieces(self, space: Space, address: int, quantity: int) -> Iterator[RequestPart]:
         """Cut the addresses of a request at register borders, in order; a hole is one piece."""
         end = address + quantity
         while address < end:
@@ -371,14 +371,14 @@ class RegisterMap:
                 place = bisect_right(self._starts[space], address)
                 starts = self._starts[space]
                 stop = min(end, starts[place]) if place < len(starts) else end
-            yield Piece(register, address, stop - address)
+            yield RequestPart(register, address, stop - address)
             address = stop
 
 
-def _place(row: Row, firmware: Firmware) -> Iterator[Register]:
+def _place(row: MapRow, firmware: Firmware) -> Iterator[Register]:
     _check_row(row, firmware)
     base = row.address + (firmware.control_base if row.control else 0)
-    cells = getattr(firmware, row.cells) if isinstance(row.cells, str) else row.cells
+    cells = row.cells if isinstance(row.cells, int) else row.cells(firmware)
     permitted = row.permitted[firmware.name] if isinstance(row.permitted, Mapping) else row.permitted
     for copy in range(row.copies):
         number = None if row.per is Per.DEVICE else copy + 1
@@ -410,14 +410,14 @@ def _place(row: Row, firmware: Firmware) -> Iterator[Register]:
         yield register
 
 
-def _accepted_writes(row: Row) -> tuple[int, ...]:
+def _accepted_writes(row: MapRow) -> tuple[int, ...]:
     """MIC-4: function 16 also writes WORDs. MIC-5: function 06 would be half of a 32-bit value, but MIC-6 allows it once."""
     if not row.writes or row.space is not Space.HOLDING:
         return row.writes
     return (6, 16) if row.type.size == 1 or row.word_write else (16,)
 
 
-def _check_row(row: Row, firmware: Firmware) -> None:
+def _check_row(row: MapRow, firmware: Firmware) -> None:
     where = f"firmware {firmware.name}: {row.name}"
     for function in row.reads + row.writes:
         if FUNCTION_SPACES.get(function) is not row.space:
@@ -425,7 +425,7 @@ def _check_row(row: Row, firmware: Firmware) -> None:
     wrong = [f for f in row.reads if f not in pdu.READS] + [f for f in row.writes if f in pdu.READS]
     if wrong:
         raise RegisterMapError(f"{where} lists function {pdu.function_number(wrong[0])} on the wrong side of read and write")
-    if bool(row.writes) is (row.effect is Effect.NONE):
+    if bool(row.writes) is (row.effect is WriteEffect.NONE):
         raise RegisterMapError(f"{where} has the effect '{row.effect.value}' but write functions {row.writes}")
     if (row.type is Type.BIT) is (row.space is Space.HOLDING):
         raise RegisterMapError(f"{where} is a {row.space.value} of type {row.type.value}")

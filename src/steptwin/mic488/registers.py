@@ -16,20 +16,23 @@ from steptwin.errors import Misuse
 from steptwin.mic488.ranges import POSITIVE, Range
 from steptwin.mic488.registermap import (
     DataType,
-    Effect,
     Firmware,
-    Kind,
+    MapRow,
     Per,
+    Quantity,
     RegisterMap,
-    Row,
     Space,
     Type,
+    WriteEffect,
 )
-from steptwin.mic488.status import ControllerStatus, Status
+from steptwin.mic488.status import AxisStatus, ControllerStatus
 
 AXES = 4
 OUTPUTS = 8
 INPUTS = 20
+
+MOTION_REGISTERS = ("VEL_ABS", "VEL_REL", "POS_ABS", "POS_REL")
+"""Registers that move an axis; each of an axis, with a trigger register of the controller (MIC-16)."""
 
 # MIC-28: 1.40 has the banks of 1.23 (the manual of 1.70 narrows them to 0…5); position banks number as program banks.
 FIRMWARES: Mapping[str, Firmware] = MappingProxyType(
@@ -50,16 +53,16 @@ AXIS_MASK = 0x000F
 
 AXIS_STATUS_TEXTS: Mapping[int, str] = MappingProxyType(
     {
-        Status.OFF: "off",
-        Status.ON: "on at rest",
-        Status.VELOCITY: "velocity mode",
-        Status.POSITION: "moving to position",
-        Status.REACHED: "position reached",
-        Status.ERROR: "position error",
-        Status.HOMING: "homing",
-        Status.CORRECTION: "position correction",
-        Status.LIMIT_L: "stopped at limit L",
-        Status.LIMIT_R: "stopped at limit R",
+        AxisStatus.OFF: "off",
+        AxisStatus.ON: "on at rest",
+        AxisStatus.VELOCITY: "velocity mode",
+        AxisStatus.POSITION: "moving to position",
+        AxisStatus.REACHED: "position reached",
+        AxisStatus.ERROR: "position error",
+        AxisStatus.HOMING: "homing",
+        AxisStatus.CORRECTION: "position correction",
+        AxisStatus.LIMIT_L: "stopped at limit L",
+        AxisStatus.LIMIT_R: "stopped at limit R",
     }
 )
 CONTROLLER_STATUS_TEXTS: Mapping[int, str] = MappingProxyType(
@@ -86,25 +89,25 @@ def _sections(table: str, manual_1_23: str = "", manual_1_70: str = "") -> Mappi
 # All banks of the generation.
 _BANKS = {name: Range(0, firmware.banks - 1) for name, firmware in FIRMWARES.items()}
 
-_bit = partial(Row, space=Space.COIL, type=Type.BIT, kind=Kind.SWITCH)
+_bit = partial(MapRow, space=Space.COIL, type=Type.BIT, kind=Quantity.SWITCH)
 _axis_coil = partial(_bit, reads=(), writes=(5,), per=Per.AXIS, copies=AXES)
-_word = partial(Row, space=Space.HOLDING, type=Type.WORD, control=True)
-_setting = partial(_word, reads=(3,), writes=(6,), effect=Effect.STORE)
+_word = partial(MapRow, space=Space.HOLDING, type=Type.WORD, control=True)
+_setting = partial(_word, reads=(3,), writes=(6,), effect=WriteEffect.STORE)
 _trigger = partial(
-    _word, reads=(3,), writes=(6,), kind=Kind.MASK, effect=Effect.ADD, sections=_sections("3.2", "4.2, 4.5")
+    _word, reads=(3,), writes=(6,), kind=Quantity.MASK, effect=WriteEffect.ADD, sections=_sections("3.2", "4.2, 4.5")
 )  # MIC-16: reads back as written
-_drives = partial(_word, reads=(), writes=(6,), kind=Kind.MASK, effect=Effect.ACT, sections=_sections("3.2", "4.2"))
-_value = partial(Row, space=Space.HOLDING, type=Type.VALUE, control=True, per=Per.AXIS, copies=AXES, step=2)
-_kept = partial(_value, reads=(3,), writes=(16,), effect=Effect.STORE)
-_motion = partial(_value, reads=(), writes=(16,), effect=Effect.MOVE)
+_drives = partial(_word, reads=(), writes=(6,), kind=Quantity.MASK, effect=WriteEffect.ACT, sections=_sections("3.2", "4.2"))
+_value = partial(MapRow, space=Space.HOLDING, type=Type.VALUE, control=True, per=Per.AXIS, copies=AXES, step=2)
+_kept = partial(_value, reads=(3,), writes=(16,), effect=WriteEffect.STORE)
+_motion = partial(_value, reads=(), writes=(16,), effect=WriteEffect.MOVE)
 
-ROWS: tuple[Row, ...] = (
+ROWS: tuple[MapRow, ...] = (
     # Bits (table 3.1)
     _axis_coil(
         key="EN",
         name="M{n}_EN",
         address=2000,
-        effect=Effect.STORE,
+        effect=WriteEffect.STORE,
         sections=_sections("3.1", "4.2"),
         meaning="Enable output of axis M{n}: ON switches the drive on, OFF switches it off.",
     ),
@@ -112,7 +115,7 @@ ROWS: tuple[Row, ...] = (
         key="STOP",
         name="M{n}_STOP",
         address=2004,
-        effect=Effect.ACT,
+        effect=WriteEffect.ACT,
         sections=_sections("3.1", "4.2"),
         meaning="Writing ON stops axis M{n} at once, without ramp.",
     ),
@@ -121,7 +124,7 @@ ROWS: tuple[Row, ...] = (
         name="M{n}_JOG_PLUS",
         address=2008,
         step=2,
-        effect=Effect.MOVE,
+        effect=WriteEffect.MOVE,
         sections=_sections("3.1", "4.8", "4.9"),
         meaning="While ON, axis M{n} moves in the positive direction at JOG_SPEED.",
     ),
@@ -130,7 +133,7 @@ ROWS: tuple[Row, ...] = (
         name="M{n}_JOG_MINUS",
         address=2009,
         step=2,
-        effect=Effect.MOVE,
+        effect=WriteEffect.MOVE,
         sections=_sections("3.1", "4.8", "4.9"),
         meaning="While ON, axis M{n} moves in the negative direction at JOG_SPEED.",
     ),
@@ -140,7 +143,7 @@ ROWS: tuple[Row, ...] = (
         address=2100,
         reads=(),
         writes=(5,),
-        effect=Effect.ACT,
+        effect=WriteEffect.ACT,
         firmwares=("1.70",),
         sections=_sections("3.1", "", "4.11"),
         meaning="Writing ON reads user registers 1000–1999 from non-volatile memory.",
@@ -151,7 +154,7 @@ ROWS: tuple[Row, ...] = (
         address=2101,
         reads=(),
         writes=(5,),
-        effect=Effect.ACT,
+        effect=WriteEffect.ACT,
         firmwares=("1.70",),
         sections=_sections("3.1", "", "4.11"),
         meaning="Writing ON saves user registers 1000–1999 to non-volatile memory.",
@@ -163,7 +166,7 @@ ROWS: tuple[Row, ...] = (
         address=2102,
         reads=(),
         writes=(5,),
-        effect=Effect.ACT,
+        effect=WriteEffect.ACT,
         firmwares=("1.70",),
         sections=_sections("3.1", "", "4.11"),
         meaning="Writing ON sets user registers 1000–1999 to 0.",
@@ -174,7 +177,7 @@ ROWS: tuple[Row, ...] = (
         address=6000,
         reads=(1,),
         writes=(5,),
-        effect=Effect.STORE,
+        effect=WriteEffect.STORE,
         per=Per.CHANNEL,
         copies=OUTPUTS,
         sections=_sections("3.1"),
@@ -187,24 +190,24 @@ ROWS: tuple[Row, ...] = (
         address=5000,
         reads=(2,),
         writes=(),
-        effect=Effect.NONE,
+        effect=WriteEffect.NONE,
         per=Per.CHANNEL,
         copies=INPUTS,
         sections=_sections("3.1"),
         meaning="Input IN{n}.",
     ),
     # User registers (table 3.2)
-    Row(
+    MapRow(
         key="USER_REGISTER",
         name="USER_REGISTER",
         space=Space.HOLDING,
         address=0,
         type=Type.MEMORY,
-        cells="user_registers",
+        cells=lambda firmware: firmware.user_registers,
         reads=(3,),
         writes=(6, 16),
-        kind=Kind.NUMBER,
-        effect=Effect.STORE,
+        kind=Quantity.NUMBER,
+        effect=WriteEffect.STORE,
         sections=_sections("3.2", "4.10", "4.11"),
         meaning="Memory for the master and the program; DINT and REAL take two registers from an even address.",
     ),
@@ -213,7 +216,7 @@ ROWS: tuple[Row, ...] = (
         key="DATA_TYPE",
         name="DATA_TYPE",
         address=0,
-        kind=Kind.ENUMERATION,
+        kind=Quantity.ENUMERATION,
         permitted=Range(0, 1),
         values={DataType.REAL: "REAL", DataType.DINT: "DINT"},
         sections=_sections("3.2", "4.9", "4.10"),
@@ -223,7 +226,7 @@ ROWS: tuple[Row, ...] = (
         key="PROG_BANK_SEL",
         name="PROG_BANK_SEL",
         address=1,
-        kind=Kind.NUMBER,
+        kind=Quantity.NUMBER,
         permitted=_BANKS,
         sections=_sections("3.2", "4.1"),
         meaning="Program bank the next start runs.",
@@ -232,7 +235,7 @@ ROWS: tuple[Row, ...] = (
         key="POS_BANK_SEL",
         name="POS_BANK_SEL",
         address=2,
-        kind=Kind.NUMBER,
+        kind=Quantity.NUMBER,
         permitted=_BANKS,
         sections=_sections("3.2", "4.1"),
         meaning="Position bank the next start uses.",
@@ -243,8 +246,8 @@ ROWS: tuple[Row, ...] = (
         address=3,
         reads=(3,),
         writes=(6,),
-        kind=Kind.ENUMERATION,
-        effect=Effect.ADD,
+        kind=Quantity.ENUMERATION,
+        effect=WriteEffect.ADD,
         permitted=Range(0, 2),
         values={0: "STOP", 1: "START", 2: "PAUSE"},
         sections=_sections("3.2", "4.1"),
@@ -254,7 +257,7 @@ ROWS: tuple[Row, ...] = (
         key="AXIS_CTR_MODE",
         name="AXIS_CTR_MODE",
         address=4,
-        kind=Kind.ENUMERATION,
+        kind=Quantity.ENUMERATION,
         permitted=Range(0, 1),
         values={0: "DIRECT", 1: "TRIGGER"},
         sections=_sections("3.2", "4.5"),
@@ -290,8 +293,8 @@ ROWS: tuple[Row, ...] = (
         address=9,
         reads=(3,),
         writes=(),
-        kind=Kind.NUMBER,
-        effect=Effect.NONE,
+        kind=Quantity.NUMBER,
+        effect=WriteEffect.NONE,
         firmwares=("1.23", "1.40"),
         sections=_sections("3.2"),
         meaning="Listed but not available in this firmware: reads 0.",
@@ -302,8 +305,8 @@ ROWS: tuple[Row, ...] = (
         address=9,
         reads=(3,),
         writes=(),
-        kind=Kind.ENUMERATION,
-        effect=Effect.NONE,
+        kind=Quantity.ENUMERATION,
+        effect=WriteEffect.NONE,
         values=CONTROLLER_STATUS_TEXTS,
         firmwares=("1.70",),
         sections=_sections("3.2", "", "4.7"),
@@ -315,8 +318,8 @@ ROWS: tuple[Row, ...] = (
         address=10,
         reads=(3,),
         writes=(),
-        kind=Kind.ENUMERATION,
-        effect=Effect.NONE,
+        kind=Quantity.ENUMERATION,
+        effect=WriteEffect.NONE,
         per=Per.AXIS,
         copies=AXES,
         values=AXIS_STATUS_TEXTS,
@@ -327,7 +330,7 @@ ROWS: tuple[Row, ...] = (
     _drives(key="M_DISABLE", name="M_DISABLE", address=15, meaning="Switches the enable outputs of the chosen axes off."),
     _drives(key="M_STOP", name="M_STOP", address=16, meaning="Stops the chosen axes at once, without ramp."),
     # Control registers of type REAL and DINT (table 3.2)
-    Row(
+    MapRow(
         key="JOG_SPEED",
         name="JOG_SPEED",
         space=Space.HOLDING,
@@ -337,8 +340,8 @@ ROWS: tuple[Row, ...] = (
         reads=(),
         writes=(6,),
         word_write=True,  # MIC-6
-        kind=Kind.VELOCITY,
-        effect=Effect.STORE,
+        kind=Quantity.VELOCITY,
+        effect=WriteEffect.STORE,
         sections=_sections("3.2", "4.8", "4.9"),
         meaning="Velocity of all axes while jogging, always REAL in units; function 06 writes it as a signed 16-bit number.",
     ),
@@ -346,7 +349,7 @@ ROWS: tuple[Row, ...] = (
         key="POS_ACT",
         name="M{n}_POS_ACT",
         address=20,
-        kind=Kind.POSITION,
+        kind=Quantity.POSITION,
         sections=_sections("3.2", "4.6"),
         meaning="Counted position of axis M{n}; a write overwrites the counter without motion.",
     ),
@@ -356,8 +359,8 @@ ROWS: tuple[Row, ...] = (
         address=28,
         reads=(3,),
         writes=(),
-        kind=Kind.VELOCITY,
-        effect=Effect.NONE,
+        kind=Quantity.VELOCITY,
+        effect=WriteEffect.NONE,
         sections=_sections("3.2", "4.6"),
         meaning="Present velocity of axis M{n}.",
     ),
@@ -365,7 +368,7 @@ ROWS: tuple[Row, ...] = (
         key="ACC",
         name="M{n}_ACC",
         address=36,
-        kind=Kind.ACCELERATION,
+        kind=Quantity.ACCELERATION,
         permitted=POSITIVE,
         sections=_sections("3.2", "4.3"),
         meaning="Acceleration of axis M{n} in position mode; speeding up and slowing down in velocity mode.",
@@ -374,7 +377,7 @@ ROWS: tuple[Row, ...] = (
         key="DEC",
         name="M{n}_DEC",
         address=44,
-        kind=Kind.ACCELERATION,
+        kind=Quantity.ACCELERATION,
         permitted=POSITIVE,
         sections=_sections("3.2", "4.3"),
         meaning="Deceleration of axis M{n} in position mode.",  # MIC-29
@@ -383,7 +386,7 @@ ROWS: tuple[Row, ...] = (
         key="VMAX",
         name="M{n}_VMAX",
         address=52,
-        kind=Kind.VELOCITY,
+        kind=Quantity.VELOCITY,
         permitted=POSITIVE,
         sections=_sections("3.2", "4.3"),
         meaning="Cruise velocity of axis M{n} in position mode.",
@@ -392,7 +395,7 @@ ROWS: tuple[Row, ...] = (
         key="HOME",
         name="M{n}_HOME",
         address=60,
-        kind=Kind.VELOCITY,
+        kind=Quantity.VELOCITY,
         sections=_sections("3.2", "4.4"),
         meaning="Homes axis M{n} at this velocity at once: negative towards KL, positive towards KR.",
     ),
@@ -400,7 +403,7 @@ ROWS: tuple[Row, ...] = (
         key="VEL_ABS",
         name="M{n}_VEL_ABS",
         address=68,
-        kind=Kind.VELOCITY,
+        kind=Quantity.VELOCITY,
         sections=_sections("3.2", "4.5"),
         meaning="Moves axis M{n} at this velocity.",
     ),
@@ -408,8 +411,8 @@ ROWS: tuple[Row, ...] = (
         key="VEL_REL",
         name="M{n}_VEL_REL",
         address=76,
-        kind=Kind.VELOCITY,
-        effect=Effect.ADD,
+        kind=Quantity.VELOCITY,
+        effect=WriteEffect.ADD,
         sections=_sections("3.2", "4.5"),
         meaning="Moves axis M{n} at its present velocity plus this value.",
     ),
@@ -417,7 +420,7 @@ ROWS: tuple[Row, ...] = (
         key="POS_ABS",
         name="M{n}_POS_ABS",
         address=84,
-        kind=Kind.POSITION,
+        kind=Quantity.POSITION,
         sections=_sections("3.2", "4.5"),
         meaning="Moves axis M{n} to this position.",
     ),
@@ -425,8 +428,8 @@ ROWS: tuple[Row, ...] = (
         key="POS_REL",
         name="M{n}_POS_REL",
         address=92,
-        kind=Kind.POSITION,
-        effect=Effect.ADD,
+        kind=Quantity.POSITION,
+        effect=WriteEffect.ADD,
         sections=_sections("3.2", "4.5"),
         meaning="Moves axis M{n} to its present position plus this value.",
     ),
@@ -435,7 +438,7 @@ ROWS: tuple[Row, ...] = (
         name="ENC{n}_IMP",
         address=100,
         type=Type.DINT,
-        kind=Kind.ENCODER,
+        kind=Quantity.ENCODER,
         sections=_sections("3.2"),
         meaning="Counter of encoder {n} in encoder pulses.",
     ),
@@ -443,7 +446,7 @@ ROWS: tuple[Row, ...] = (
         key="ENC_XPOS",
         name="ENC{n}_XPOS",
         address=108,
-        kind=Kind.POSITION,
+        kind=Quantity.POSITION,
         sections=_sections("3.2"),
         meaning="Counter of encoder {n} converted into a position of its drive.",
     ),
@@ -451,7 +454,7 @@ ROWS: tuple[Row, ...] = (
         key="POSLIM_L",
         name="M{n}_POSLIM_L",
         address=120,
-        kind=Kind.POSITION,
+        kind=Quantity.POSITION,
         sections=_sections("3.2"),
         meaning="Soft limit of axis M{n} towards negative positions (L).",
     ),
@@ -459,7 +462,7 @@ ROWS: tuple[Row, ...] = (
         key="POSLIM_R",
         name="M{n}_POSLIM_R",
         address=128,
-        kind=Kind.POSITION,
+        kind=Quantity.POSITION,
         sections=_sections("3.2"),
         meaning="Soft limit of axis M{n} towards positive positions (R).",
     ),

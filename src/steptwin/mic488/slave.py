@@ -8,21 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
+from steptwin.mic488.core import ControllerCore
 from steptwin.mic488.reads import compile_read
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.writes import WritePlan, compile_coil, compile_registers
-from steptwin.wire.pdu import WRITE_MULTIPLE_REGISTERS, WRITE_SINGLE_REGISTER, ModbusException, Read, WriteCoil, decode_request
-
-if TYPE_CHECKING:
-    from steptwin.mic488.device import Mic488
+from steptwin.wire.pdu import (
+    WRITE_MULTIPLE_REGISTERS,
+    WRITE_SINGLE_REGISTER,
+    ModbusException,
+    ReadRequest,
+    WriteCoilRequest,
+    decode_request,
+)
 
 PLANS_KEPT = 4096
 """For all controllers together; then compiling begins anew, so that a master that tries everything fills no memory."""
 
-Plan: TypeAlias = "Callable[[Mic488], bytes]"
+Plan: TypeAlias = Callable[[ControllerCore], bytes]
 """Serves one request at the controller's present moment."""
 
 
@@ -42,7 +47,7 @@ class Slave:
         """Plans kept at present."""
         return sum(map(len, self._whole + self._heads))
 
-    def answer(self, device: Mic488, pdu: bytes) -> bytes:
+    def answer(self, device: ControllerCore, pdu: bytes) -> bytes:
         """The response to ``pdu``; a request that cannot be served is answered with its exception."""
         data_type = device.data_type
         function = pdu[0] if pdu else 0
@@ -61,9 +66,9 @@ class Slave:
 
     def _compiled(self, data_type: DataType, pdu: bytes) -> Plan:
         request = decode_request(pdu)
-        if isinstance(request, Read):
+        if isinstance(request, ReadRequest):
             plan = compile_read(self._map, request, data_type, lenient=self._lenient)
-        elif isinstance(request, WriteCoil):
+        elif isinstance(request, WriteCoilRequest):
             plan = compile_coil(self._map, request, pdu, lenient=self._lenient)
         else:
             writing = compile_registers(self._map, request, data_type, lenient=self._lenient)

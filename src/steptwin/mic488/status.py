@@ -1,11 +1,11 @@
-"""Status codes (manual 4.7, 4.8)."""
+"""Status codes (manual 4.1, 4.7, 4.8)."""
 
 from __future__ import annotations
 
 import enum
 
 
-class Status(enum.IntEnum):
+class AxisStatus(enum.IntEnum):
     """Mx_STATUS; 7 is not used."""
 
     OFF = 0
@@ -29,5 +29,13 @@ class ControllerStatus(enum.IntEnum):
     MASTER_ERROR = 3
 
 
-LIMIT = {-1: Status.LIMIT_L, 1: Status.LIMIT_R}
+class ProgramState(enum.IntEnum):
+    """PROGRAM_CTRL as read (MIC-22); the same numbers written are commands."""
+
+    STOPPED = 0
+    RUNNING = 1
+    PAUSED = 2
+
+
+LIMIT = {-1: AxisStatus.LIMIT_L, 1: AxisStatus.LIMIT_R}
 """Status of an axis stopped at a limit while moving in a direction."""

@@ -10,13 +10,13 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, words_to_dint, words_to_real
-from steptwin.mic488.registermap import DataType, Effect, Register, RegisterMap, Space, Type
+from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type, WriteEffect
 from steptwin.wire import pdu
 
 Value: TypeAlias = bool | int | float
 
 BRIDGE = {Space.HOLDING: 16, Space.COIL: 256, Space.INPUT: 256}
-"""Addresses nobody asked for that are read along to save a frame: at 38400 bit/s a frame costs as much as 38 characters."""
+"""Addresses read in addition, to save a frame: at 38400 bit/s a frame costs as much as 38 characters."""
 
 _MOST = {Space.HOLDING: pdu.MAX_REGISTERS, Space.COIL: pdu.MAX_BITS, Space.INPUT: pdu.MAX_BITS}
 _READS = {Space.HOLDING: pdu.READ_HOLDING_REGISTERS, Space.COIL: pdu.READ_COILS, Space.INPUT: pdu.READ_DISCRETE_INPUTS}
@@ -43,7 +43,7 @@ class View(enum.Enum):
         return {"word": "0…65535", "int": "−32768…32767", "dint": "−2³¹…2³¹−1", "real": "±3.4e38"}[self.value]
 
 
-class Item:
+class RegisterItem:
     """One value of a controller: a register, or some of the user registers. Items of the same registers and view are equal."""
 
     __slots__ = ("_key", "address", "cell", "register", "size", "view")
@@ -60,17 +60,17 @@ class Item:
         return hash(self._key)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Item) and self._key == other._key
+        return isinstance(other, RegisterItem) and self._key == other._key
 
-    def __lt__(self, other: Item) -> bool:
+    def __lt__(self, other: RegisterItem) -> bool:
         return self._key < other._key
 
     def __repr__(self) -> str:
         return f"<Item {self.name}>"
 
-    def at(self, cell: int) -> Item:
+    def at(self, cell: int) -> RegisterItem:
         """The same view of another user register."""
-        return Item(self.register, cell, self.view)
+        return RegisterItem(self.register, cell, self.view)
 
     @property
     def name(self) -> str:
@@ -79,7 +79,7 @@ class Item:
         return f"{self.register.name}[{self.cell}]{'' if self.view is View.WORD else f':{self.view.value}'}"
 
 
-def named(registers: RegisterMap, text: str) -> Item:
+def named(registers: RegisterMap, text: str) -> RegisterItem:
     """The value of that name: ``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``. Raises `Misuse`."""
     match = _NAME.match(text.strip())
     if match is None:
@@ -88,7 +88,7 @@ def named(registers: RegisterMap, text: str) -> Item:
     if register.type is not Type.MEMORY:
         if match["cell"] or match["view"]:
             raise Misuse(f"{text!r}: {register.name} is one value of type {register.type.value}; name it without [ ] and :")
-        return Item(register)
+        return RegisterItem(register)
     if match["cell"] is None:
         raise Misuse(f"{text!r}: choose one of {register.name}[0] to {register.name}[{register.cells - 1}]")
     try:
@@ -98,7 +98,7 @@ def named(registers: RegisterMap, text: str) -> Item:
     return user_item(registers, int(match["cell"]), view)
 
 
-def user_item(registers: RegisterMap, number: int, view: View, count: int = 1) -> Item:
+def user_item(registers: RegisterMap, number: int, view: View, count: int = 1) -> RegisterItem:
     """User register ``number`` as ``view``. Raises `Misuse` unless ``count`` values from there on are user registers."""
     register = registers.of("USER_REGISTER")
     last = register.cells - view.size * count
@@ -106,7 +106,7 @@ def user_item(registers: RegisterMap, number: int, view: View, count: int = 1) -
         raise Misuse(f"user register {number} as {view.name}{'' if count == 1 else f' × {count}'} is outside 0 to {last}")
     if view.size == 2 and number % 2:
         raise Misuse(f"user register {number} as {view.name}: {view.name}s begin at even registers")
-    return Item(register, number, view)
+    return RegisterItem(register, number, view)
 
 
 def value_of(register: Register, typed: str) -> float:
@@ -128,7 +128,7 @@ def value_of(register: Register, typed: str) -> float:
 # ---------------------------------------------------------------------- values and words
 
 
-def decoded(item: Item, words: Sequence[int], data_type: DataType) -> Value:
+def decoded(item: RegisterItem, words: Sequence[int], data_type: DataType) -> Value:
     """The value in its words (or its bit)."""
     kind = _kind(item, data_type)
     if kind is Type.BIT:
@@ -140,7 +140,7 @@ def decoded(item: Item, words: Sequence[int], data_type: DataType) -> Value:
     return word_to_int(words[0]) if item.view is View.INT else words[0]
 
 
-def _kind(item: Item, data_type: DataType) -> Type:
+def _kind(item: RegisterItem, data_type: DataType) -> Type:
     kind = item.register.type
     if kind is Type.VALUE:
         return Type.DINT if data_type is DataType.DINT else Type.REAL
@@ -149,7 +149,7 @@ def _kind(item: Item, data_type: DataType) -> Type:
     return kind
 
 
-def encoded(item: Item, value: Value, data_type: DataType, unit: str = "u") -> pdu.Request:
+def encoded(item: RegisterItem, value: Value, data_type: DataType, unit: str = "u") -> pdu.Request:
     """The request that writes ``value``, which is in units with DATA_TYPE REAL and in pulses with DINT.
 
     Raises `Misuse` when the register cannot be written or does not take the value.
@@ -160,14 +160,14 @@ def encoded(item: Item, value: Value, data_type: DataType, unit: str = "u") -> p
     if register.type is Type.BIT:
         if value not in (0, 1):
             raise Misuse(f"{register.name} = {value}: permitted are 0 (OFF) and 1 (ON)")
-        return pdu.WriteCoil(register.address, bool(value))
+        return pdu.WriteCoilRequest(register.address, bool(value))
     words = _words(item, value, data_type, unit)
     if len(words) == 1:
-        return pdu.WriteRegister(item.address, words[0])
-    return pdu.WriteRegisters(item.address, words)
+        return pdu.WriteRegisterRequest(item.address, words[0])
+    return pdu.WriteRegistersRequest(item.address, words)
 
 
-def _words(item: Item, value: Value, data_type: DataType, unit: str) -> tuple[int, ...]:
+def _words(item: RegisterItem, value: Value, data_type: DataType, unit: str) -> tuple[int, ...]:
     register = item.register
     kind = _kind(item, data_type)
     shown = f"{item.name} = {value:g} {register.unit(data_type, unit)}".rstrip()
@@ -191,17 +191,17 @@ def _words(item: Item, value: Value, data_type: DataType, unit: str) -> tuple[in
 class Block(NamedTuple):
     """One read and the values in it, each with its place."""
 
-    request: pdu.Read
-    items: tuple[tuple[Item, int], ...]
+    request: pdu.ReadRequest
+    items: tuple[tuple[RegisterItem, int], ...]
 
-    def values(self, words: Sequence[int], data_type: DataType) -> dict[Item, Value]:
+    def values(self, words: Sequence[int], data_type: DataType) -> dict[RegisterItem, Value]:
         return {item: decoded(item, words[place : place + item.size], data_type) for item, place in self.items}
 
 
-def plan(registers: RegisterMap, items: Iterable[Item]) -> list[Block]:
+def plan(registers: RegisterMap, items: Iterable[RegisterItem]) -> list[Block]:
     """The fewest reads that give all values, over what may be read only (MIC-3). Raises `Misuse` for what cannot be read."""
     blocks: list[Block] = []
-    group: list[Item] = []
+    group: list[RegisterItem] = []
     for item in sorted(set(items)):
         if not item.register.reads:
             raise Misuse(f"{item.register.name} can only be written")
@@ -214,7 +214,7 @@ def plan(registers: RegisterMap, items: Iterable[Item]) -> list[Block]:
     return blocks
 
 
-def _joins(registers: RegisterMap, group: list[Item], item: Item) -> bool:
+def _joins(registers: RegisterMap, group: list[RegisterItem], item: RegisterItem) -> bool:
     space = item.register.space
     start, end = group[0].address, max(member.address + member.size for member in group)
     if group[0].register.space is not space or item.address + item.size - start > _MOST[space]:
@@ -226,9 +226,9 @@ def _joins(registers: RegisterMap, group: list[Item], item: Item) -> bool:
     return gap <= BRIDGE[space] and all(p.whole and p.register is not None and p.register.reads for p in between)
 
 
-def _block(group: list[Item]) -> Block:
+def _block(group: list[RegisterItem]) -> Block:
     start, end = group[0].address, max(member.address + member.size for member in group)
-    request = pdu.Read(_READS[group[0].register.space], start, end - start)
+    request = pdu.ReadRequest(_READS[group[0].register.space], start, end - start)
     return Block(request, tuple((item, item.address - start) for item in group))
 
 
@@ -237,21 +237,23 @@ def _block(group: list[Item]) -> Block:
 
 def repeatable(registers: RegisterMap, request: pdu.Request) -> bool:
     """Whether a request whose answer was lost may be sent again: only where that cannot move anything twice."""
-    if isinstance(request, pdu.Read) or _stops(registers, request):
+    if isinstance(request, pdu.ReadRequest) or _stops(registers, request):
         return True
     return all(register is not None and _repeatable(register) for register in _written(registers, request))
 
 
 def moves(registers: RegisterMap, request: pdu.Request) -> bool:
-    """Whether a request may begin a motion, or nobody knows."""
-    if isinstance(request, pdu.Read) or _stops(registers, request):
+    """Whether a request may start a motion, as far as it can be decoded."""
+    if isinstance(request, pdu.ReadRequest) or _stops(registers, request):
         return False
-    return any(register is None or register.effect in (Effect.MOVE, Effect.ADD) for register in _written(registers, request))
+    return any(
+        register is None or register.effect in (WriteEffect.MOVE, WriteEffect.ADD) for register in _written(registers, request)
+    )
 
 
 def _stops(registers: RegisterMap, request: pdu.Request) -> bool:
     """Whether it stops the program. (Starting and pausing it depends on what happened meanwhile.)"""
-    if not isinstance(request, pdu.WriteRegister) or request.value != 0:
+    if not isinstance(request, pdu.WriteRegisterRequest) or request.value != 0:
         return False
     register = registers.find(Space.HOLDING, request.address)
     return register is not None and register.key == "PROGRAM_CTRL"
@@ -259,11 +261,11 @@ def _stops(registers: RegisterMap, request: pdu.Request) -> bool:
 
 def _written(registers: RegisterMap, request: pdu.Request) -> list[Register | None]:
     match request:
-        case pdu.WriteCoil(address):
+        case pdu.WriteCoilRequest(address):
             return [registers.find(Space.COIL, address)]
-        case pdu.WriteRegister(address):
+        case pdu.WriteRegisterRequest(address):
             return [registers.find(Space.HOLDING, address)]
-        case pdu.WriteRegisters(address, values):
+        case pdu.WriteRegistersRequest(address, values):
             return [piece.register for piece in registers.pieces(Space.HOLDING, address, len(values))]
         case _:
             return [None]
@@ -271,4 +273,6 @@ def _written(registers: RegisterMap, request: pdu.Request) -> list[Register | No
 
 def _repeatable(register: Register) -> bool:
     # A homing that has ended already would be done again: the same goal, but a second motion.
-    return register.effect in (Effect.STORE, Effect.ACT) or (register.effect is Effect.MOVE and register.key != "HOME")
+    return register.effect in (WriteEffect.STORE, WriteEffect.ACT) or (
+        register.effect is WriteEffect.MOVE and register.key != "HOME"
+    )

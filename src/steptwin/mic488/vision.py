@@ -6,18 +6,15 @@ COM1 carries Modbus too: what forms a record outside a Modbus frame is taken as 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 from steptwin.machine import Nanos
+from steptwin.mic488.program import LoadedProgram
 from steptwin.state import Stateful
 from steptwin.wbc import steps as s
 from steptwin.wbc.usage import sources
-from steptwin.wire.slave import Direction, RtuSlavePort
+from steptwin.wire.slave import FrameDirection, RtuSlavePort
 from steptwin.wire.timed import TimedRtuSlavePort
-
-if TYPE_CHECKING:
-    from steptwin.mic488.device import Mic488
-    from steptwin.mic488.program import LoadedProgram
 
 VISION = "VISION"
 """How the registers of the vision system begin."""
@@ -29,7 +26,7 @@ _NUMBER = rb"\s*([+-]?\d{1,9}(?:[.,]\d{1,9})?)\s*"
 _RECORD = re.compile(rb"N" + _NUMBER + rb"X" + _NUMBER + rb"Y" + _NUMBER + rb"A" + _NUMBER + rb"\Z", re.ASCII | re.IGNORECASE)
 
 
-class Record(NamedTuple):
+class VisionRecord(NamedTuple):
     """``n`` goes to VisionNo."""
 
     n: float
@@ -46,16 +43,22 @@ class VisionReceiver(Stateful):
     def __init__(self) -> None:
         self._line = b""
 
-    def feed(self, data: bytes) -> list[Record]:
+    def feed(self, data: bytes) -> list[VisionRecord]:
         """The records completed by ``data``."""
         *lines, rest = _LINE_END.split(self._line + data)
         self._line = rest[-LONGEST_RECORD:]
         found = (_RECORD.search(line[-LONGEST_RECORD:]) for line in lines)
-        return [Record(*(float(number.replace(b",", b".")) for number in match.groups())) for match in found if match]
+        return [VisionRecord(*(float(number.replace(b",", b".")) for number in match.groups())) for match in found if match]
 
     def forget(self) -> None:
         """What has come of the present line is no part of a record."""
         self._line = b""
+
+
+class SeeingDevice(Protocol):
+    """What takes records of the vision system."""
+
+    def see(self, record: VisionRecord, now: Nanos) -> None: ...
 
 
 class Com1Port(Stateful):
@@ -66,7 +69,7 @@ class Com1Port(Stateful):
     __slots__ = ("_device", "_frames", "_receiver", "modbus")
     FIXED = frozenset({"_device", "_frames"})
 
-    def __init__(self, device: Mic488, modbus: RtuSlavePort | TimedRtuSlavePort | None = None) -> None:
+    def __init__(self, device: SeeingDevice, modbus: RtuSlavePort | TimedRtuSlavePort | None = None) -> None:
         self._device = device
         self._receiver = VisionReceiver()
         self.modbus = modbus
@@ -74,8 +77,8 @@ class Com1Port(Stateful):
         if modbus is not None:
             told = modbus.on_frame
 
-            def note(now: Nanos, direction: Direction, frame: bytes) -> None:
-                if direction is Direction.IN:
+            def note(now: Nanos, direction: FrameDirection, frame: bytes) -> None:
+                if direction is FrameDirection.IN:
                     self._frames.append(frame)
                 if told is not None:
                     told(now, direction, frame)
@@ -126,5 +129,5 @@ class Com1Port(Stateful):
 def uses_vision(program: LoadedProgram) -> bool:
     """Whether a program reads or writes a register of the vision system."""
     used = [source for step in program.steps for source in sources(step)]
-    used += [step.target for step in program.steps if isinstance(step, s.Set)]
-    return any(isinstance(source, s.Register) and source.row.key.startswith(VISION) for source in used)
+    used += [step.target for step in program.steps if isinstance(step, s.SetStep)]
+    return any(isinstance(source, s.RegisterOperand) and source.row.key.startswith(VISION) for source in used)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 from steptwin.machine import Nanos
-from steptwin.mic488.behaviour import BEHAVIOUR, Action, AxisAction
+from steptwin.mic488.behaviour import BEHAVIOUR, AxisAction
+from steptwin.mic488.core import Action, ControllerCore
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, swap_bytes
-from steptwin.mic488.registermap import DataType, Kind, Register, RegisterMap, Space, Type
+from steptwin.mic488.registermap import DataType, Quantity, Register, RegisterMap, Space, Type
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.wire.pdu import (
     ILLEGAL_DATA_ADDRESS,
@@ -18,22 +19,21 @@ from steptwin.wire.pdu import (
     WRITE_SINGLE_COIL,
     WRITE_SINGLE_REGISTER,
     ModbusException,
-    WriteCoil,
-    WriteRegister,
-    WriteRegisters,
+    WriteCoilRequest,
+    WriteRegisterRequest,
+    WriteRegistersRequest,
 )
 
-if TYPE_CHECKING:
-    from steptwin.mic488.device import Mic488
-
-Check: TypeAlias = "Callable[[Mic488, float], float | None]"
+Check: TypeAlias = Callable[[ControllerCore, float], float | None]
 """The value as it travelled → what is stored (pulses for REAL/DINT registers), None when it may not be written."""
 
 
 # ---------------------------------------------------------------------- function 05
 
 
-def compile_coil(registers: RegisterMap, request: WriteCoil, pdu: bytes, *, lenient: bool) -> Callable[[Mic488], bytes]:
+def compile_coil(
+    registers: RegisterMap, request: WriteCoilRequest, pdu: bytes, *, lenient: bool
+) -> Callable[[ControllerCore], bytes]:
     """The plan for a write of a coil, or exception 02."""
     register = registers.find(Space.COIL, request.address)
     if register is None or WRITE_SINGLE_COIL not in register.accepts:
@@ -42,16 +42,15 @@ def compile_coil(registers: RegisterMap, request: WriteCoil, pdu: bytes, *, leni
     key = (register.key, register.index)
     is_output = register.key == "OUT"
 
-    def plan(device: Mic488) -> bytes:
+    def plan(device: ControllerCore) -> bytes:
         if is_output and device.outputs[number] is on:
             return pdu  # masters write outputs again and again; nothing happens
         try:
-            action(device, number, on, device.now)
+            device.write_coil(action, number, on)
         except ModbusException as refusal:
             return refusal.pdu
         if lenient:
             device.written[key] = on
-        device.touch()
         return pdu
 
     return plan
@@ -67,17 +66,17 @@ class WritePlan(Protocol):
     """Bytes of the PDU before the values."""
     length: int
 
-    def __call__(self, device: Mic488, pdu: bytes) -> bytes:
+    def __call__(self, device: ControllerCore, pdu: bytes) -> bytes:
         """Serve ``pdu``, which has this plan's beginning and length. Raises `ModbusException` 03 when a value is bad."""
         ...
 
 
 def compile_registers(
-    registers: RegisterMap, request: WriteRegister | WriteRegisters, data_type: DataType, *, lenient: bool
+    registers: RegisterMap, request: WriteRegisterRequest | WriteRegistersRequest, data_type: DataType, *, lenient: bool
 ) -> WritePlan:
     """The plan for requests like ``request``, or exception 02 (MIC-3, MIC-5, MIC-24)."""
     function = request.function
-    count = len(request.values) if isinstance(request, WriteRegisters) else 1
+    count = len(request.values) if isinstance(request, WriteRegistersRequest) else 1
     chosen: list[Register] = []
     for piece in registers.pieces(Space.HOLDING, request.address, count):
         register = piece.register
@@ -109,19 +108,16 @@ class _MemoryPlan:
         self._unpack = struct.Struct(f">{count}H").unpack_from
         self._pack = struct.Struct(f"={count}H").pack_into
 
-    def __call__(self, device: Mic488, pdu: bytes) -> bytes:
+    def __call__(self, device: ControllerCore, pdu: bytes) -> bytes:
         self._pack(device.user, self._place, *self._unpack(pdu, self.head))
-        if device.program.state:
-            device.touch()
-            device.program.registers_written(device.now)
-            device.touch()
+        device.user_registers_written()
         return pdu[:5]
 
 
 class _ControlPlan:
     """Control registers: all values are checked, then they take effect in the order of their addresses (MIC-4, MIC-7)."""
 
-    __slots__ = ("_function", "_layout", "_lenient", "_quiet", "_steps", "head", "length")
+    __slots__ = ("_actions", "_checks", "_function", "_keys", "_layout", "_lenient", "_quiet", "head", "length")
 
     def __init__(self, function: int, chosen: list[Register], data_type: DataType, *, lenient: bool) -> None:
         self._function = function
@@ -129,26 +125,24 @@ class _ControlPlan:
         one_word = function == WRITE_SINGLE_REGISTER and chosen[0].word_write
         layout = "h" if one_word else "".join(register.type.layout(data_type) for register in chosen)
         self._layout = struct.Struct("<" + layout)
-        self._steps = [(register, _check(register, data_type), _action(register)) for register in chosen]
+        self._checks = [_check(register, data_type) for register in chosen]
+        self._actions = [_action(register) for register in chosen]
+        self._keys = [(register.key, register.index) for register in chosen]
         self._lenient = lenient
         self._quiet = all(BEHAVIOUR[register.key].quiet for register in chosen)
         self.head = _head(function)
         self.length = self.head + self._layout.size
 
-    def __call__(self, device: Mic488, pdu: bytes) -> bytes:
+    def __call__(self, device: ControllerCore, pdu: bytes) -> bytes:
         checked: list[float] = []
-        for (_, check, _), value in zip(self._steps, self._layout.unpack(swap_bytes(pdu[self.head :])), strict=True):
+        for check, value in zip(self._checks, self._layout.unpack(swap_bytes(pdu[self.head :])), strict=True):
             stored = check(device, value)
             if stored is None:
                 raise ModbusException(self._function, ILLEGAL_DATA_VALUE)
             checked.append(stored)
-        now = device.now
-        for (register, _, action), stored in zip(self._steps, checked, strict=True):
-            action(device, stored, now)
-            if self._lenient:
-                device.written[register.key, register.index] = stored
-        if not self._quiet or device.program.state:
-            device.touch()
+        device.write_registers(self._actions, checked, quiet=self._quiet)
+        if self._lenient:
+            device.written.update(zip(self._keys, checked, strict=True))
         return pdu[:5]
 
 
@@ -158,7 +152,7 @@ def _check(register: Register, data_type: DataType) -> Check:
     if register.type is not Type.VALUE:
         return lambda device, value: value if permits(value) else None
     number = (register.axis or 1) - 1
-    held = _position_p if register.kind is Kind.POSITION else _rate_p if register.permitted.above else _velocity_p
+    held = _position_p if register.kind is Quantity.POSITION else _rate_p if register.permitted.above else _velocity_p
     if data_type is DataType.DINT:
         return lambda device, value: held(value) if permits(value) else None
     if register.key in ("POSLIM_L", "POSLIM_R"):
@@ -208,7 +202,7 @@ def _action(register: Register) -> Action:
 
 
 def _motion(move: AxisAction, key: str, number: int) -> Action:
-    def command(device: Mic488, value: float, now: Nanos) -> None:
+    def command(device: ControllerCore, value: float, now: Nanos) -> None:
         """DIRECT: at once. TRIGGER: kept for the trigger register (MIC-16)."""
         axis = device.axes[number]
         if device.trigger_mode:

@@ -22,8 +22,8 @@ from steptwin.mic488.registermap import DataType, Register, Type
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.values import value_of
 from steptwin.monitor.groups import USER, USER_SHOWN, groups_of, permitted, shown
-from steptwin.monitor.session import Picture, Session
-from steptwin.wire.slave import Direction
+from steptwin.monitor.session import MonitorSession, Picture
+from steptwin.wire.slave import FrameDirection
 
 NOTHING = "–"
 PROGRAM_STATES = ("stopped", "running", "paused")
@@ -39,10 +39,10 @@ h             home at a velocity: negative towards KL, positive towards KR
 Tab           axes, registers, …      ↑ ↓ Enter   write a register
 \\[ ]           groups of registers     n p   next, previous user registers
 f             frames or registers     r   reads among the frames
-q             quit; axes go on with what they were told
+q             quit; axes continue their motions
 ?             close this
 (*) While Axes has the focus. A held key is one that your terminal repeats:
-until it does, and when it is let go, the axis comes to rest by itself."""
+until it does, and when you release it, the axis comes to rest by itself."""
 
 
 class Monitor(App[None]):
@@ -87,7 +87,7 @@ class Monitor(App[None]):
         Binding("q", "quit", "Quit"),
     ]
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: MonitorSession) -> None:
         super().__init__()
         self.session = session
         self._axis = 1
@@ -225,7 +225,7 @@ class Monitor(App[None]):
         is_read = ": read " in heard.meaning
         if (is_read and not self._shows_reads) or not self._is_shown:
             return
-        arrow = "?" if heard.direction is None else "→" if heard.direction is Direction.IN else "←"
+        arrow = "?" if heard.direction is None else "→" if heard.direction is FrameDirection.IN else "←"
         style = "red" if "exception" in heard.meaning or heard.direction is None else "dim" if is_read else ""
         since = heard.time - self._began
         self.query_one("#frames", RichLog).write(Text(f"{since / SECOND:10.3f} s {arrow} {heard.meaning}", style=style))

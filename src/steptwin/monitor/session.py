@@ -7,11 +7,11 @@ import contextlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from steptwin.drivers import AsyncJog, AsyncMic488, Mic488Status
-from steptwin.drivers.address import DEFAULT, parse_device
+from steptwin.drivers import AsyncMic488, AsyncMic488Jog, Mic488Status
 from steptwin.drivers.mic488.frames import Heard
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.errors import Misuse, SteptwinError
+from steptwin.live.twins import find_device
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import Value
@@ -34,7 +34,7 @@ class Picture:
     trouble: str | None = None
 
 
-class Session:
+class MonitorSession:
     """A controller that is watched. ``on_picture`` is told of every look, ``on_frame`` of every frame.
 
     ``watched`` are names of registers to read besides the status, in as few frames as may be.
@@ -113,7 +113,7 @@ class Session:
     async def stop(self) -> str:
         """Stop all axes at once, without ramp. A program that runs is paused, else it would move them again.
 
-        Goes before everything that waits for the line. Gives what was done; raises `Untold` when the controller cannot be told.
+        Goes before everything that waits for the line. Returns what was done. Raises `Unconfirmed`.
         """
         self._jog = None
         self._ignore_held_key()
@@ -183,17 +183,17 @@ class _Jogging:
     def let_go(self) -> None:
         self._is_let_go = True
 
-    async def run(self, jog: AsyncJog, is_wanted: Callable[[], bool]) -> None:
+    async def run(self, jog: AsyncMic488Jog, is_wanted: Callable[[], bool]) -> None:
         loop = asyncio.get_running_loop()
         while not self._is_let_go and is_wanted() and loop.time() - self._pressed < KEY_S and await jog.hold():
             pass
 
 
-def session_at(device: str | None, hz: float) -> Session:
-    """A session with the controller at an address as `steptwin … --device` takes it. Raises `Misuse`."""
-    address = parse_device(device or DEFAULT)
+def session_at(device: str | None, hz: float) -> MonitorSession:
+    """A session with the controller that ``device`` names, as of `steptwin.live.twins.find_device`."""
+    address = find_device(device)
     if address.kind != "mic488":
-        raise Misuse("the monitor shows a MIC488; of an M1486 'steptwin watch', 'info' and 'terminal' tell")
+        raise Misuse("the monitor shows a MIC488; for an M1486 use 'steptwin watch', 'info' or 'terminal'")
     mic = AsyncMic488(
         address.place,
         address.unit,
@@ -204,4 +204,4 @@ def session_at(device: str | None, hz: float) -> Session:
         observe=True,
         log=lambda _: None,  # there have to be words for frames to be shown
     )
-    return Session(mic, str(address), hz)
+    return MonitorSession(mic, str(address), hz)

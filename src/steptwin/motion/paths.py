@@ -69,12 +69,13 @@ def arc_between(x0: float, y0: float, x1: float, y1: float, radius: float, *, ou
     ``outward``: bulging away from (0, 0), else towards it; where the chord points at (0, 0), outward is clockwise. A radius
     that is up to ``slack`` too small to reach is taken as half the distance. `Misuse` where there is no such arc.
     """
+    _check(radius)
     chord = length(x1 - x0, y1 - y0)
     half = 0.5 * chord
     if chord == 0.0:
         raise Misuse("an arc needs an end point other than its beginning")
     if radius < half:
-        if radius <= 0.0 or half - radius > slack:
+        if half - radius > slack:
             raise Misuse(f"radius = {radius:g}: must be at least {half:g}, half the distance of the ends")
         radius = half
     # To the left of the chord, and on which side of it the origin is.
@@ -86,11 +87,10 @@ def arc_between(x0: float, y0: float, x1: float, y1: float, radius: float, *, ou
     centre_x, centre_y = middle_x - bulge * left_x * rise, middle_y - bulge * left_y * rise
     # From both legs of the triangle: its sine alone would lose half the digits of an arc of nearly half a turn.
     sweep_q = 2.0 * direction(rise, half)
-    _check(radius, sweep_q)
     return Arc(centre_x, centre_y, radius, direction(x0 - centre_x, y0 - centre_y), -bulge * sweep_q)
 
 
-def _check(radius: float, sweep_q: float) -> None:
+def _check(radius: float, sweep_q: float = 0.0) -> None:
     if not 0.0 < radius < inf:
         raise Misuse(f"radius = {radius:g}: must be greater than 0")
     if not abs(sweep_q) <= 4 * MOST_TURNS:
@@ -155,7 +155,7 @@ class Circular:
             return min(max((_angle_q(self, part.half, edge_p) - self.angle_q) / self.turn_q, part.begin_w), part.end_w)
         return None
 
-    def parts(self, begin_w: float, end_w: float) -> Iterator[Part]:
+    def parts(self, begin_w: float, end_w: float) -> Iterator[CircularPart]:
         """The stretches of one direction."""
         forward = self.turn_q > 0.0
         angle_q = self.angle_q + self.turn_q * begin_w
@@ -167,10 +167,12 @@ class Circular:
             until_w = (turning_q - self.angle_q) / self.turn_q
             falls = (half & 1 == 0) is forward
             if until_w >= end_w:
-                yield Part(begin_w, end_w, half, -1 if falls else 1, self.position(end_w))
+                yield CircularPart(begin_w, end_w, half, -1 if falls else 1, self.position(end_w))
                 return
             if until_w > begin_w:
-                yield Part(begin_w, until_w, half, -1 if falls else 1, self.centre_p + self.radius_p * (-1.0 if falls else 1.0))
+                yield CircularPart(
+                    begin_w, until_w, half, -1 if falls else 1, self.centre_p + self.radius_p * (-1.0 if falls else 1.0)
+                )
             begin_w = until_w
             half += 1 if forward else -1
 
@@ -201,7 +203,7 @@ class Circular:
         return ArcProfile(way.start, count, tuple(segments), float(final - count))
 
 
-class Part(NamedTuple):
+class CircularPart(NamedTuple):
     """A stretch of a `Circular` course in which the axis does not turn round.
 
     The angle is between ``2 · half`` and ``2 · half + 2`` quarter turns; the axis goes in ``direction`` to ``end_p``.
@@ -215,7 +217,7 @@ class Part(NamedTuple):
 
 
 def _angle_q(course: Circular, half: int, position: float) -> float:
-    """The angle within ``half`` (as in `Part`) at which the axis is at ``position``; beyond a turning point, that point.
+    """The angle within ``half`` (as in `CircularPart`) at which the axis is at ``position``; beyond a turning point, that point.
 
     `steptwin.motion.pulses` does the same operations in the same order.
     """
@@ -239,7 +241,7 @@ class ArcSegment:
     way: Segment
     course: Circular
     half: int
-    """As in `Part`."""
+    """As in `CircularPart`."""
     end_p: float
 
     def position(self, t_s: float) -> float:

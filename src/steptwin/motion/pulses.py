@@ -138,7 +138,7 @@ def _along_arc(s: ArcSegment, u: Reals, buffers: Reals) -> None:
     course = s.course
     u -= course.centre_p
     u /= course.radius_p
-    np.clip(u, -1.0, 1.0, out=u)
+    # Inside a run nothing is beyond a turning point: its first and last pulses come from the profile.
     folded = (u < 0.0) if s.half & 1 == 0 else (u >= 0.0)
     np.abs(u, out=u)
     np.subtract(1.0, u, out=u)

@@ -1,4 +1,4 @@
-"""``--device``: which real device stands where a test asks for a twin."""
+"""``--device``: the real device that replaces a twin in a test."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
-from steptwin.drivers.place import parse_place
+from steptwin.drivers.place import parse_line_address
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ControllerConfig
 
@@ -29,7 +29,7 @@ def parse_devices(given: Sequence[str]) -> Mapping[str, str]:
         if name in found:
             raise Misuse(f"--device {text}: {f'{name} has' if name else 'there is'} an address already: {found[name]}")
         parsed = parse_device(address)
-        parse_place(parsed.place, parsed.baud)
+        parse_line_address(parsed.place, parsed.baud)
         found[name] = address
     return found
 

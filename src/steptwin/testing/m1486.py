@@ -12,27 +12,29 @@ import pytest
 
 from steptwin.drivers import m1486 as host
 from steptwin.drivers.address import parse_device
-from steptwin.drivers.place import Channel, parse_place
+from steptwin.drivers.place import Channel, parse_line_address
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486, OPEN_ADDRESS
-from steptwin.m1486.lines import interface
-from steptwin.m1486.variants import DEFAULT, variant
+from steptwin.files.beginning import set_faults
+from steptwin.files.world import World
+from steptwin.inputfiles import read_bytes
+from steptwin.live.world import LiveWorld
+from steptwin.m1486.chip import OPEN_ADDRESS, M1486Chip
+from steptwin.m1486.variants import DEFAULT
 from steptwin.machine import Nanos, Port
-from steptwin.served.m1486 import ChainOptions, M1486Line, chip_name, pin_change
-from steptwin.served.serve_m1486 import program_image
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip
+from steptwin.world.small import Whole, chip_name, m1486_world
 
 T = TypeVar("T")
 
 MARKER = "m1486"
 BAUD = 4800
-"""Of a serial port, where ``--device`` does not say another: the highest that pins can choose at 12 MHz."""
+"""Of a serial port, where ``--device`` gives no other: the highest that pins can choose at 12 MHz."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class M1486Options:
+class M1486Marker:
     """What ``@pytest.mark.m1486`` takes. Files are looked for beside the test."""
 
     variant: str = DEFAULT.name
@@ -61,54 +63,51 @@ class M1486Options:
     """Skip the test before it begins where a device stands in the twin's place."""
 
 
-class M1486Rig(LineRig[M1486Line]):
+class M1486Rig(LineRig):
     """A running M1486: a twin of its own for each test, or the device that ``--device`` names.
 
     ``driver`` drives it, ``channel`` carries bare characters to it and back, ``address`` is for a program under test. A serial
-    port and a pty are for one of them at a time. What is said to be *the twin's* skips the test on a device.
+    port and a pty are for one of them at a time. What is marked as *the twin's* skips the test on a device.
     """
 
-    def __init__(self, options: M1486Options, device: str | None, directory: Path, base: Path) -> None:
+    def __init__(self, options: M1486Marker, device: str | None, directory: Path, base: Path) -> None:
         check_time(MARKER, options.time)
         check_word(MARKER, "link", options.link, ("tcp", "pty"))
         self.options = options
         self._channel: Channel | None = None
         self._opened: list[host.M1486] = []
-        line, time = None, None
+        self._name_there = chip_name(options.address)
+        live, time = None, None
         if device is None:
-            line = self._make(base)
-            time = VirtualTime(line.kernel) if options.time == "virtual" else RealTime(line.kernel, options.speed, "the M1486")
+            live = LiveWorld(self._make(base))
+            time = VirtualTime(live) if options.time == "virtual" else RealTime(live, options.speed, "the M1486")
         super().__init__(
             MARKER,
             time or WallTime(),
             device,
             directory,
-            line=line,
-            machine=chip_name(options.address),
+            live=live,
+            machine=self._name_there,
             twin_only=options.twin_only,
         )
 
-    def _make(self, base: Path) -> M1486Line:
+    def _make(self, base: Path) -> World:
         options = self.options
-        chain = ChainOptions(
-            variant=variant(options.variant),
-            addresses=[options.address],
-            interface=interface(options.interface),
-            baud=options.baud,
-            is_timed=options.line_timing,
-            is_written_down=True,
-        )
-        image = None if options.program is None else program_image(base / options.program, chain)
-        line = M1486Line(chain, image=image)
-        line.faults.start(options.faults, options.seed)
-        return line
+        program = None if options.program is None else str(base / options.program)
+        files = {} if program is None else {program: read_bytes(Path(program))}
+        line = {"tcp": "127.0.0.1:0", "baud": options.baud, "timing": "real" if options.line_timing else None}
+        values = {"variant": options.variant, "interface": options.interface, "program": program}
+        text = m1486_world(Whole(name=MARKER, line=line, seed=options.seed), [options.address], values)
+        world = World.from_toml(text, files, name=f"@pytest.mark.{MARKER}", keep_inputs=False)
+        set_faults(world, options.faults)
+        return world
 
     # ------------------------------------------------------------------ talking to it
 
     @cached_property
     def address(self) -> str:
-        """Where a program finds it: ``tcp://127.0.0.1:PORT`` or a path, as ``link`` says. Raises `Misuse` in virtual time."""
-        if self._line is None:
+        """Where a program finds it: ``tcp://127.0.0.1:PORT`` or a path, by ``link``. Raises `Misuse` in virtual time."""
+        if self._live is None:
             return str(self._device).partition(",")[0]
         time = self._time
         if not isinstance(time, RealTime):
@@ -118,8 +117,7 @@ class M1486Rig(LineRig[M1486Line]):
         return f"tcp://{time.open_tcp(self._port)}"
 
     def _port(self) -> Port:
-        line = self._line or self.twin_only("a port")
-        return line.client_port()
+        return self._place("tcp", "raw")
 
     @property
     def channel(self) -> Channel:
@@ -128,7 +126,7 @@ class M1486Rig(LineRig[M1486Line]):
             if isinstance(self._time, VirtualTime):
                 self._channel = MemoryEndpoint(self._time, self._port, "the M1486").open()
             else:
-                self._channel = parse_place(self.address, self._baud()).endpoint.open()
+                self._channel = parse_line_address(self.address, self._baud()).endpoint.open()
         return self._channel
 
     @cached_property
@@ -171,16 +169,15 @@ class M1486Rig(LineRig[M1486Line]):
 
     # ------------------------------------------------------------------ inputs, faults, power
 
-    def call(self, act: Callable[[M1486, Nanos], T]) -> T:
+    def call(self, act: Callable[[M1486Chip, Nanos], T]) -> T:
         """Do anything with the twin at the present moment; it is not to be kept. The twin's."""
         __tracebackhide__ = True
-        return self._on("the machine behind call()", lambda line, now: act(line.chips[self.options.address], now))
+        return self._on("the machine behind call()", lambda world: act(world.m1486[self._name_there].chip, world.now))
 
     def set_pin(self, pin: str, value: float) -> None:
         """Pull B1–B21, JOG, LIMIT, SD or RST low (0) or let it go high (1). Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
-        change = pin_change(pin, value)
-        self._set_pin(change.pin, float(change.level))
+        self._set_pin(pin, float(value))
 
     @property
     def position(self) -> int:
@@ -194,17 +191,12 @@ class M1486Rig(LineRig[M1486Line]):
         __tracebackhide__ = True
         return self.call(lambda chip, _: chip.drive.is_busy)
 
-    def power_cycle(self) -> None:
-        """Switch it off and on again. Connections stay. The twin's."""
-        __tracebackhide__ = True
-        self.call(lambda chip, now: chip.power_cycle(now))
-
     # ------------------------------------------------------------------ end
 
     def close(self) -> None:
-        """After the test. A device is told to stop (Kill), motion and program, whichever chip of the line it is."""
+        """After the test. A device is stopped (Kill), motion and program, whichever chip of the line it is."""
         try:
-            if self._line is None and not self._is_twin_only:
+            if self._live is None and not self._is_twin_only:
                 self.send("XG", "K")
         finally:
             for driver in self._opened:

@@ -10,34 +10,41 @@ from typing import Literal, NamedTuple, TypeVar
 
 import pytest
 
-from steptwin.diagnostics import render
 from steptwin.drivers import Mic488, load_config
 from steptwin.drivers.address import parse_device
 from steptwin.errors import Misuse
-from steptwin.files.programbanks import Banks, ProgramErrors, read_banks
+from steptwin.files.beginning import set_faults
+from steptwin.files.world import World
+from steptwin.inputfiles import read_bytes
+from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos, Port
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.device import Mic488 as Twin
-from steptwin.mic488.device import check_pin
+from steptwin.mic488.configtext import config_text
+from steptwin.mic488.core import check_pin
+from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, register_map
-from steptwin.mic488.status import Status
-from steptwin.served.demo import demo_config
-from steptwin.served.mic488 import LineOptions, Mic488Line
+from steptwin.mic488.registers import firmware as known_firmware
+from steptwin.mic488.status import AxisStatus
 from steptwin.testing.devices import driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
-from steptwin.wbc.dialect import dialect_for
-from steptwin.world.faults import Line
+from steptwin.world import script as do
+from steptwin.world.small import Whole, mic488_world
 
 T = TypeVar("T")
 
 MARKER = "mic488"
-LINKS: Mapping[str, Line] = {"tcp": Line.TCP, "rtu": Line.RTU, "pty": Line.RTU}
+NAME = "mic488"
+"""Of the controller in its world."""
+CONFIG = "machine.cfg"
+"""What its configuration is called there."""
+LINKS: Mapping[str, tuple[str, str]] = {"tcp": ("tcp", "tcp"), "rtu": ("rtu_tcp", "rtu"), "pty": ("pty", "rtu")}
+"""The key of the line and the kind of place of each link."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mic488Options:
+class Mic488Marker:
     """What ``@pytest.mark.mic488`` takes. Files are looked for beside the test."""
 
     firmware: str | None = None
@@ -81,20 +88,20 @@ class TwinAxis(NamedTuple):
     unit: str
     position_p: int
     """Counted, in pulses."""
-    status: Status
+    status: AxisStatus
     enabled: bool
     encoder: int
     """In counts."""
 
 
-class Mic488Rig(LineRig[Mic488Line]):
+class Mic488Rig(LineRig):
     """A running MIC488: a twin of its own for each test, or the device that ``--device`` names.
 
     ``driver`` talks to it, ``address`` is for a program under test. A serial port and a pty are for one of them at a time. What
-    is said to be *the twin's* skips the test on a device.
+    is marked as *the twin's* skips the test on a device.
     """
 
-    def __init__(self, options: Mic488Options, device: str | None, directory: Path, base: Path) -> None:
+    def __init__(self, options: Mic488Marker, device: str | None, directory: Path, base: Path) -> None:
         check_time(MARKER, options.time)
         check_word(MARKER, "link", options.link, tuple(LINKS))
         if not 1 <= options.unit <= 247:
@@ -102,45 +109,54 @@ class Mic488Rig(LineRig[Mic488Line]):
         self.options = options
         self._opened: list[Mic488] = []
         self._config = _config(options, base)
-        line, time = None, None
+        live, time = None, None
         if device is None:
-            line = self._make(base)
-            time = VirtualTime(line.kernel) if options.time == "virtual" else RealTime(line.kernel, options.speed, "the MIC488")
+            live = LiveWorld(self._make(base))
+            time = VirtualTime(live) if options.time == "virtual" else RealTime(live, options.speed, "the MIC488")
         super().__init__(
             "mic488",
             time or WallTime(),
             device,
             directory,
-            line=line,
-            machine=str(options.unit),
+            live=live,
+            machine=NAME,
             twin_only=options.twin_only,
         )
 
-    def _make(self, base: Path) -> Mic488Line:
+    def _make(self, base: Path) -> World:
         options = self.options
-        config = self._config or demo_config()
-        line = Mic488Line(
-            config,
-            [options.unit],
-            options.firmware or DEFAULT_FIRMWARE,
-            _banks(options, config, base),
-            lenient=options.lenient,
-            demo=self._config is None,
-            options=LineOptions(baud=options.baud, timing=options.line_timing, frames=True),
-        )
-        line.faults.lines = {LINKS[options.link]}
-        line.faults.start(options.faults, options.seed)
-        return line
+        firmware = options.firmware or DEFAULT_FIRMWARE
+        files: dict[str, bytes] = {}
+        if self._config is not None:
+            files[CONFIG] = config_text(self._config, known_firmware(firmware)).encode()
+        for file in (options.program, options.positions):
+            if file is not None:
+                files[str(base / file)] = read_bytes(base / file)
+        key, _ = LINKS[options.link]
+        # That the line is open tells which faults can happen on it.
+        line = {key: "127.0.0.1:0", "baud": options.baud, "timing": "real" if options.line_timing else None}
+        values = {
+            "firmware": firmware,
+            "config": CONFIG if files and self._config is not None else None,
+            "program": None if options.program is None else str(base / options.program),
+            "positions": None if options.positions is None else {0: str(base / options.positions)},
+            "lenient": options.lenient or None,
+        }
+        whole = Whole(name=MARKER, line=line, seed=options.seed)
+        text = mic488_world(whole, [options.unit], values, demo=self._config is None)
+        world = World.from_toml(text, files, name=f"@pytest.mark.{MARKER}", keep_inputs=False)
+        set_faults(world, options.faults)
+        return world
 
     # ------------------------------------------------------------------ talking to it
 
     @cached_property
     def address(self) -> str:
-        """Where a program finds it: ``tcp://127.0.0.1:PORT``, ``rtu-tcp://127.0.0.1:PORT`` or a path, as ``link`` says.
+        """Where a program finds it: ``tcp://127.0.0.1:PORT``, ``rtu-tcp://127.0.0.1:PORT`` or a path, according to ``link``.
 
         Raises `Misuse` in virtual time: programs outside need a clock.
         """
-        if self._line is None:
+        if self._live is None:
             return parse_device(str(self._device)).place
         time = self._time
         if not isinstance(time, RealTime):
@@ -156,8 +172,8 @@ class Mic488Rig(LineRig[Mic488Line]):
         return self._device or f"{self.address},unit={self.options.unit}"
 
     def _port(self) -> Port:
-        line = self._line or self.twin_only("a port")
-        return line.tcp_port() if self.options.link == "tcp" else line.rtu_client_port()
+        _, kind = LINKS[self.options.link]
+        return self._place(kind, kind)
 
     @cached_property
     def driver(self) -> Mic488:
@@ -172,7 +188,7 @@ class Mic488Rig(LineRig[Mic488Line]):
         if self._device is not None:
             return driver_of(self._device, self._config)
         firmware = options.firmware or DEFAULT_FIRMWARE
-        config = self._config or demo_config()
+        config = self.call(lambda device, _: device.config)
         if not isinstance(time, VirtualTime):
             return Mic488(self.address, options.unit, firmware=firmware, config=config)
         endpoint = MemoryEndpoint(time, self._port, "the MIC488")
@@ -180,15 +196,15 @@ class Mic488Rig(LineRig[Mic488Line]):
 
     # ------------------------------------------------------------------ inputs, faults, power
 
-    def call(self, act: Callable[[Twin, Nanos], T]) -> T:
+    def call(self, act: Callable[[Mic488Device, Nanos], T]) -> T:
         """Do anything with the twin at the present moment; it is not to be kept. The twin's."""
         __tracebackhide__ = True
-        return self._on("the machine behind call()", lambda line, now: act(line.devices[self.options.unit], now))
+        return self._on("the machine behind call()", lambda world: act(world.mic488[NAME].device, world.now))
 
     def set_pin(self, pin: str, value: float) -> None:
         """Set IN1–IN20 (0 or 1), AIN1 or AIN2 (0 to 10 V) from outside. Raises `Misuse`. The twin's.
 
-        The controller notices after the filter of the input, 10 ms unless the configuration says otherwise.
+        The controller notices after the filter of the input, 10 ms unless configured otherwise.
         """
         __tracebackhide__ = True
         check_pin(pin, float(value))
@@ -200,8 +216,8 @@ class Mic488Rig(LineRig[Mic488Line]):
         if not 1 <= number <= AXES:
             raise Misuse(f"no axis {number}: axes are 1 to {AXES}")
 
-        def act(line: Mic488Line, now: Nanos) -> TwinAxis:
-            axis = line.devices[self.options.unit].axes[number - 1]
+        def act(device: Mic488Device, now: Nanos) -> TwinAxis:
+            axis = device.axes[number - 1]
             position_p = axis.coordinate_p(now)
             return TwinAxis(
                 position=position_p / axis.gear,
@@ -213,30 +229,25 @@ class Mic488Rig(LineRig[Mic488Line]):
                 encoder=axis.encoder_counts(now),
             )
 
-        return self._on(f"axis({number})", act)
+        return self._on(f"axis({number})", lambda world: act(world.mic488[NAME].device, world.now))
 
     def turn_encoder(self, axis: int, counts: int) -> None:
         """Turn the shaft of axis 1 to 4 by hand, by encoder counts. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
-        self.call(lambda device, now: device.turn_encoder(axis, counts, now))
-
-    def power_cycle(self) -> None:
-        """Switch it off and on again. Connections stay. The twin's."""
-        __tracebackhide__ = True
-        self.call(lambda device, now: device.power_cycle(now))
+        self._do("turn_encoder()", do.Turn(NAME, axis, counts))
 
     # ------------------------------------------------------------------ beginning and end
 
     def begin(self) -> None:
         super().begin()
         wanted = self.options.firmware
-        if self._line is None and wanted is not None and _addresses(self.driver.firmware) != _addresses(wanted):
+        if self._live is None and wanted is not None and _addresses(self.driver.firmware) != _addresses(wanted):
             pytest.skip(f"this test is for firmware {wanted}, {self._device} has {self.driver.firmware}")
 
     def close(self) -> None:
         """After the test. The axes of a device and its program are stopped."""
         try:
-            if self._line is None and not self._is_twin_only:
+            if self._live is None and not self._is_twin_only:
                 driver = self.driver
                 if driver.status().program:
                     driver.program.stop()
@@ -252,19 +263,8 @@ def _addresses(firmware: str) -> int:
     return register_map(firmware).of("DATA_TYPE").address
 
 
-def _config(options: Mic488Options, base: Path) -> ControllerConfig | None:
+def _config(options: Mic488Marker, base: Path) -> ControllerConfig | None:
     config = options.config
     if config is None or isinstance(config, ControllerConfig):
         return config
     return load_config(base / config, options.firmware or DEFAULT_FIRMWARE)
-
-
-def _banks(options: Mic488Options, config: ControllerConfig, base: Path) -> Banks:
-    firmware = options.firmware or DEFAULT_FIRMWARE
-    programs = {} if options.program is None else {0: base / options.program}
-    positions = {} if options.positions is None else {0: base / options.positions}
-    try:
-        return read_banks(programs, positions, config, dialect_for(firmware))
-    except ProgramErrors as errors:
-        texts = [render(source, found) for source, found in errors.findings if found]
-        raise Misuse("\n".join([str(errors), *texts])) from None

@@ -14,10 +14,11 @@ from typing import Any, TypeVar
 
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.cell import Advancing, Cell
+from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.links import Link
-from steptwin.live.pty import PtyLink
-from steptwin.live.tcp import Clients, TcpLink
+from steptwin.live.ptys import pty_link
+from steptwin.live.tcp import TcpLink
 from steptwin.machine import SECOND, Nanos, Port
 from steptwin.world.addresses import LOOPBACK, Address
 
@@ -94,7 +95,7 @@ class RealTime:
         return asyncio.run_coroutine_threadsafe(made(), self._loop).result(ANSWER_S)
 
     def close(self) -> None:
-        """End it; raises what went wrong in it and nobody was told."""
+        """End it; raises what failed in it and was not reported yet."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._ended.set)
             self._thread.join(ANSWER_S)
@@ -162,7 +163,7 @@ class RealTime:
         """A pseudo terminal behind the link ``path``."""
 
         async def opened() -> Path:
-            link = PtyLink(self.cell, path, make_port)
+            link = pty_link(self.cell, path, make_port)
             self._links.append(link)
             return await link.open()
 

@@ -1,33 +1,41 @@
-"""What all rigs have in common: time and waiting, faults, what is told when a test fails."""
+"""What all rigs have in common: time and waiting, faults, the report of a failed test."""
 
 from __future__ import annotations
 
 import textwrap
 from collections import deque
 from collections.abc import Callable, Mapping
+from itertools import count
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeAlias, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.live.lines import ServedLine
-from steptwin.machine import SECOND, Event, Nanos
-from steptwin.served.faults import FaultDesk
+from steptwin.files.world import World
+from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world_frames import follow_frames
+from steptwin.machine import SECOND, Nanos, Port
+from steptwin.subject import commands as command
+from steptwin.subject.commands import Command, row_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.virtualtime import VirtualTime
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 from steptwin.words.frames import FrameLine
-from steptwin.world.kernel import Kernel
+from steptwin.world import script as do
+from steptwin.world.faults import read as read_fault
+from steptwin.world.records import describe
+from steptwin.world.small import LINE
+from steptwin.world.trace import TraceRecord
 
 T = TypeVar("T")
 
-TOLD = 24
+MOST_SHOWN = 24
 """So many of the last frames and events are shown when a test fails."""
 WIDTH = 200
 """Of the meaning of a frame, there."""
 WITHIN_S = 10.0
-"""How long `Rig.until` waits, where nothing else is said."""
+"""How long `Rig.until` waits, where no other limit is given."""
 
 
 Time: TypeAlias = VirtualTime | RealTime | WallTime
@@ -42,7 +50,7 @@ class FaultSeen(NamedTuple):
 
 
 class Happened(NamedTuple):
-    """Something that happened in a twin: ``code`` is stable, ``text`` is for people."""
+    """Something that happened in a twin: ``code`` is stable, ``text`` describes it."""
 
     time_s: float
     code: str
@@ -53,19 +61,14 @@ class Happened(NamedTuple):
 
 
 class Rig:
-    """Base of the rigs. What is said to be *the twin's* skips the test where a device stands in its place (``--device``)."""
+    """Base of the rigs. What is marked as *the twin's* skips the test where a device replaces it (``--device``)."""
 
     def __init__(self, name: str, time: Time, device: str | None, directory: Path) -> None:
         self._name = name
         self._time = time
         self._device = device
         self._directory = directory
-        self._told: deque[object] = deque(maxlen=TOLD)
-
-    @property
-    def is_twin(self) -> bool:
-        """Whether this is a twin, not a device."""
-        return self._device is None
+        self._shown: deque[object] = deque(maxlen=MOST_SHOWN)
 
     @property
     def time(self) -> float:
@@ -79,7 +82,7 @@ class Rig:
     def until(self, condition: Callable[[], object], within_s: float = WITHIN_S, what: str = "") -> None:
         """Let time pass until a condition holds. The test fails where it does not within ``within_s`` seconds of the twin.
 
-        ``what`` says in the message what was waited for.
+        ``what`` is named in the message.
         """
         __tracebackhide__ = True
         if not self._time.until(condition, within_s):
@@ -95,12 +98,12 @@ class Rig:
 
     def story(self) -> str:
         """The last frames and events, one in a line."""
-        return "\n".join(map(str, self._told))
+        return "\n".join(map(str, self._shown))
 
     def twin_only(self, what: str) -> NoReturn:
-        """Skip the test: a device stands where ``what`` would be needed."""
+        """Skip the test: ``what`` needs a twin, and there is a device."""
         __tracebackhide__ = True
-        pytest.skip(f"{what} is there on a twin only, and --device says {self._device}")
+        pytest.skip(f"{what} exists on a twin only, and --device names {self._device}")
 
     def begin(self) -> None:
         """Before the test: skip it where a device is not what it is for."""
@@ -117,76 +120,99 @@ class Rig:
         return self._time.call(act)
 
 
-class Twins(ServedLine, Protocol):
-    """What a rig needs of the controllers on a line."""
-
-    kernel: Kernel
-    faults: FaultDesk
-
-
-L = TypeVar("L", bound=Twins)
-
-
-class LineRig(Rig, Generic[L]):
-    """A rig of one controller on a line; ``line`` is None where it is a device. ``machine`` is its name in the kernel."""
+class LineRig(Rig):
+    """A rig of one controller on a line, alone in a world; ``live`` is None where it is a device. ``machine`` is its name."""
 
     def __init__(
-        self, name: str, time: Time, device: str | None, directory: Path, *, line: L | None, machine: str, twin_only: bool
+        self, name: str, time: Time, device: str | None, directory: Path, *, live: LiveWorld | None, machine: str, twin_only: bool
     ) -> None:
         super().__init__(name, time, device, directory)
-        self._line = line
+        self._live = live
         self._machine = machine
         self._is_twin_only = twin_only
         self._events: list[Happened] = []
-        if line is not None:
-            line.frames.sinks.append(self._heard)
-            line.faults.tell(self._told.append)
-            line.watch_events(self._happened)
+        self._places = count(1)
+        if live is not None:
+            for record in live.world.trace.events(machine):  # what power-on had to say
+                self._happened(record)
+            live.world.stop_recording()
+            follow_frames(live, self._heard)
+            live.world.trace.watchers.append(self._happened)
 
-    def _happened(self, unit: int, event: Event) -> None:
-        happened = Happened(event.time / SECOND, getattr(event, "code", ""), event.text)
-        self._events.append(happened)
-        self._told.append(happened)
+    def _happened(self, record: TraceRecord) -> None:
+        if record.kind == "event" and record.machine == self._machine:
+            happened = Happened(record.time / SECOND, record.subject, str(record.value))
+            self._events.append(happened)
+            self._shown.append(happened)
+        elif record.kind == "fault":
+            self._shown.append(describe(record))
 
     def _heard(self, frame: FrameLine) -> None:
-        told = self._told
+        told = self._shown
         told.append(frame)
         last = [one.meaning if isinstance(one, FrameLine) else None for one in list(told)[-4:]]
         if len(last) == 4 and None not in last and last[:2] == last[2:]:
             del told[-4], told[-3]  # the same was asked and answered before: a poll
 
     def story(self) -> str:
-        return "\n".join(_shortened(told) for told in self._told)
+        return "\n".join(_shortened(told) for told in self._shown)
 
     def begin(self) -> None:
-        if self._line is None and self._is_twin_only:
+        if self._live is None and self._is_twin_only:
             self.twin_only("what this test needs")
 
-    def _on(self, what: str, act: Callable[[L, Nanos], T]) -> T:
+    def _on(self, what: str, act: Callable[[World], T]) -> T:
         __tracebackhide__ = True
-        line = self._line
-        if line is None:
-            self.twin_only(what)
-        return self._at_present(lambda now: act(line, now))
+        live = self._live or self.twin_only(what)
+
+        def at(_: Nanos) -> T:
+            kernel = live.world.touch(self._machine)
+            try:
+                return act(live.world)
+            finally:
+                kernel.mark()  # what acted on the machine itself has changed it behind the kernel's back
+                live.stale = True
+
+        return self._at_present(at)
+
+    def _place(self, link: str, kind: str) -> Port:
+        """A place on its line for one more program."""
+        live = self._live or self.twin_only("a port")
+        return PlacePort(live, LINE, f"{link}-{next(self._places)}", kind)
 
     # ------------------------------------------------------------------ inputs, faults, power
+
+    def do(self, wanted: Command) -> Any:
+        """Do a command (`steptwin.subject.commands`), as over the control endpoint; its answer. Raises `Misuse`. The twin's."""
+        __tracebackhide__ = True
+        return self._do(row_of(wanted).name, wanted)
+
+    def _do(self, what: str, wanted: Command) -> Any:
+        __tracebackhide__ = True
+        live = self._live or self.twin_only(what)
+        return self._on(what, lambda _: live.subject.do(wanted).value)
 
     @property
     def pins(self) -> Mapping[str, float]:
         """The level of every pin: 0 or 1, analog ones in volts. The twin's."""
         __tracebackhide__ = True
-        return self._on("pins", lambda line, _: dict(line.kernel.machines[self._machine].pins()))
+        levels: Mapping[str, float] = self._do("pins", command.ReadPins(self._machine))
+        return {name.partition(".")[2]: level for name, level in levels.items()}
 
     def _set_pin(self, pin: str, level: float) -> None:
         __tracebackhide__ = True
-        # The kernel's machine has the faults before it: a switch that is stuck stays stuck.
-        self._on(f"set_pin({pin!r})", lambda line, now: line.kernel.machines[self._machine].set_pin(pin, level, now))
+        self._do(f"set_pin({pin!r})", do.Set(((self._machine, pin, level),)))
 
     @property
     def events(self) -> list[Happened]:
         """What happened in it so far. The twin's."""
         __tracebackhide__ = True
-        return self._on("events", lambda _, __: list(self._events))
+        return self._on("events", lambda _: list(self._events))
+
+    def power_cycle(self) -> None:
+        """Switch it off and on again. Connections stay. The twin's."""
+        __tracebackhide__ = True
+        self._do("power_cycle()", do.PowerCycle(self._machine))
 
     # ------------------------------------------------------------------ faults
 
@@ -196,30 +222,26 @@ class LineRig(Rig, Generic[L]):
         ``steptwin fault --kinds`` lists all of them. Raises `Misuse`. The twin's.
         """
         __tracebackhide__ = True
-        self._on("fault()", lambda line, _: line.faults.start(faults, line.faults.faults.seed))
+        for fault in map(read_fault, faults):
+            self._do("fault()", do.SetFault(fault))
 
     def clear_faults(self, *names: str) -> None:
         """Let it be well again; without names all of it. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
-
-        def act(line: L, now: Nanos) -> None:
-            faults = line.faults.faults
-            for name in names or [active.name for active in faults.active]:
-                faults.remove(name, now)
-
-        self._on("clear_faults()", act)
+        for name in names or [fault.name for fault in self.faults]:
+            self._do("clear_faults()", do.ClearFault(name))
 
     @property
     def faults(self) -> list[FaultSeen]:
         """The faults that are set, and how often each has struck. The twin's."""
         __tracebackhide__ = True
-        return self._on("faults", lambda line, _: [FaultSeen(a.name, str(a.fault), a.struck) for a in line.faults.faults.active])
+        return [FaultSeen(one["name"], one["fault"], one["happened"]) for one in self._do("faults", command.ListFaults())]
 
 
 def _shortened(told: object) -> str:
     if not isinstance(told, FrameLine):
         return str(told)
-    arrow = "→" if told.direction is Direction.IN else "←"
+    arrow = "→" if told.direction is FrameDirection.IN else "←"
     return f"{told.time / SECOND:12.6f} s  {arrow} {textwrap.shorten(told.meaning, WIDTH, placeholder=' …')}"
 
 

@@ -12,7 +12,7 @@ from steptwin.drivers import LineLost, Mic488
 from steptwin.drivers.m1486 import M1486
 from steptwin.drivers.m1486.lines import BAUD, TALK, talking
 from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
-from steptwin.drivers.place import Channel, Place
+from steptwin.drivers.place import Channel, LineAddress
 from steptwin.drivers.threads import ThreadLine
 from steptwin.live.cell import Advancing
 from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
@@ -132,7 +132,7 @@ def joined_driver(
     endpoint: MemoryEndpoint, time: VirtualTime, unit: int, *, framed: bool, firmware: str, config: ControllerConfig
 ) -> Mic488:
     """A driver whose waiting makes the twin's time pass. ``framed``: Modbus TCP rather than RTU."""
-    exchanger, notes = modbus_exchanger(Place(endpoint, framed=framed), FRAMES_PER_SECOND, None)
+    exchanger, notes = modbus_exchanger(LineAddress(endpoint, framed=framed), FRAMES_PER_SECOND, None)
     line = ThreadLine(endpoint, exchanger, clock=time.now, sleeping=time.sleep)
     line.notes.update(notes)
     return Mic488(line, unit, firmware=firmware, config=config)

@@ -6,24 +6,29 @@ from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from itertools import count
 from pathlib import Path
-from typing import Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
-from steptwin.drivers.place import Channel, parse_place
+from steptwin.drivers.place import Channel, parse_line_address
+from steptwin.durations import duration
 from steptwin.errors import Misuse
+from steptwin.files.textfiles import read_text
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import Nanos
-from steptwin.mic488.device import Mic488 as Twin
+from steptwin.subject.commands import Command, ListFaults
 from steptwin.testing.devices import ANY, driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import Rig, check_time
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
-from steptwin.words.records import describe, is_told
 from steptwin.world import script as do
+from steptwin.world.description import read_world
 from steptwin.world.faults import read
-from steptwin.world.trace import Record
+from steptwin.world.kinds import line_kinds
+from steptwin.world.records import describe, is_shown
+from steptwin.world.spec import WorldSpec
+from steptwin.world.trace import TraceRecord
 
 T = TypeVar("T")
 
@@ -47,11 +52,11 @@ class WorldOptions:
 
 def controllers_in(file: Path) -> list[str]:
     """Names of the controllers in the world that a file describes. Raises `Misuse`."""
-    return _controllers(World.load(file))
+    return _controllers(read_world(str(file), read_text(file).source.text))
 
 
-def _controllers(world: World) -> list[str]:
-    return [spec.name for spec in (*world.spec.mic488, *world.spec.m1486)]
+def _controllers(spec: WorldSpec) -> list[str]:
+    return [controller.name for controller in spec.controllers]
 
 
 class WorldAxis(NamedTuple):
@@ -83,7 +88,8 @@ class WorldRig(Rig):
         self._addresses: dict[str, str] = {}
         self._channels: dict[str, Channel] = {}
         self._spec = world.spec
-        names = _controllers(world)
+        self._mic488 = world.mic488
+        names = _controllers(world.spec)
         self._given = {name: devices[name] for name in names if name in devices}
         if ANY in devices and not self._given:
             self._given = {names[0]: devices[ANY]} if len(names) == 1 else {ANY: devices[ANY]}
@@ -99,13 +105,13 @@ class WorldRig(Rig):
         )
         world.trace.watchers.append(self._happened)
 
-    def _happened(self, record: Record) -> None:
-        if is_told(record):
-            self._told.append(describe(record))
+    def _happened(self, record: TraceRecord) -> None:
+        if is_shown(record):
+            self._shown.append(describe(record))
 
     def begin(self) -> None:
         if self._given and (self.options.twin_only or ANY in self._given):
-            self.twin_only("a world of several controllers (--device NAME=ADDRESS says which of them is there)")
+            self.twin_only("a world of several controllers (--device NAME=ADDRESS replaces one of them)")
 
     # ------------------------------------------------------------------ talking to it
 
@@ -118,9 +124,7 @@ class WorldRig(Rig):
             return self._addresses[line]
         kind = self._kind(line)
         if self._given:
-            there = [
-                spec.name for spec in (*self._spec.mic488, *self._spec.m1486) if spec.line == line and spec.name in self._given
-            ]
+            there = [spec.name for spec in self._spec.controllers if spec.line == line and spec.name in self._given]
             if not there:
                 self.twin_only(f"line {line!r}")
             return parse_device(self._given[there[0]]).place
@@ -134,7 +138,7 @@ class WorldRig(Rig):
         found = next((spec for spec in self._spec.lines if spec.name == line), None)
         if found is None:
             raise World.unknown("line", line, [spec.name for spec in self._spec.lines])
-        return "tcp" if found.kind == "modbus" else "raw"
+        return line_kinds()[found.kind].links["tcp"].place_kind
 
     def _port(self, line: str, kind: str) -> PlacePort:
         return PlacePort(self._live, line, f"test-{next(self._places)}", kind)
@@ -148,24 +152,19 @@ class WorldRig(Rig):
         return self._drivers[controller]
 
     def _driver(self, controller: str) -> Mic488:
-        spec = next((spec for spec in self._spec.mic488 if spec.name == controller), None)
-        if spec is None:
-            raise World.unknown("MIC488", controller, [spec.name for spec in self._spec.mic488])
+        device = self._mic488[controller].device
         if self._given:
             if controller not in self._given:
                 self.twin_only(f"controller {controller!r}")
             return driver_of(self._given[controller])
-        if spec.line is None:
+        on = self._live.world.plan.line_of.get(controller)
+        if on is None:
             raise Misuse(f"{controller!r} is on no line: its table in {self.options.file} needs line = NAME")
-        line = spec.line
-        device = self.call(lambda world: world.machines[controller])
-        if not isinstance(device, Twin):
-            raise Misuse(f"{controller!r} is no MIC488")
-        unit = device.config.address if spec.unit is None else spec.unit
+        line, unit, firmware = on[0].name, on[1], device.firmware.name
         if not isinstance(self._time, VirtualTime):
-            return Mic488(self.address(line), unit, firmware=spec.firmware, config=device.config)
+            return Mic488(self.address(line), unit, firmware=firmware, config=device.config)
         endpoint = MemoryEndpoint(self._time, lambda: self._port(line, "tcp"), f"line {line!r}")
-        return joined_driver(endpoint, self._time, unit, framed=True, firmware=spec.firmware, config=device.config)
+        return joined_driver(endpoint, self._time, unit, framed=True, firmware=firmware, config=device.config)
 
     def channel(self, line: str) -> Channel:
         """Characters to the M1486 chips of a line and back; closed after the test. Raises `Misuse`."""
@@ -176,7 +175,7 @@ class WorldRig(Rig):
                 self._channels[line] = endpoint.open()
             else:
                 address = self.address(line)
-                self._channels[line] = parse_place(address, 4800).endpoint.open()
+                self._channels[line] = parse_line_address(address, 4800).endpoint.open()
         return self._channels[line]
 
     # ------------------------------------------------------------------ inputs, faults, power
@@ -205,6 +204,11 @@ class WorldRig(Rig):
 
         return self.call(act)
 
+    def do(self, wanted: Command) -> Any:
+        """Do a command (`steptwin.subject.commands`), as over the control endpoint; its answer. Raises `Misuse`. The twin's."""
+        __tracebackhide__ = True
+        return self.call(lambda _: self._live.subject.do(wanted).value)
+
     def value(self, signal: str) -> float:
         """A signal as conditions of the world name it: ``x.position``, ``table.IN1``, ``table.M1.status``. The twin's."""
         __tracebackhide__ = True
@@ -215,34 +219,30 @@ class WorldRig(Rig):
         __tracebackhide__ = True
         machine, dot, name = pin.rpartition(".")
         if not dot:
-            raise Misuse(f"{pin!r}: expected MACHINE.PIN, such as {next(iter(self._spec.mic488), self._spec).name}.IN1")
-        self.call(lambda world: world.outside(do.Set(((machine, name.upper(), float(value)),))))
+            raise Misuse(f"{pin!r}: expected MACHINE.PIN, such as {next(iter(self._spec.controllers), self._spec).name}.IN1")
+        self.do(do.Set(((machine, name.upper(), float(value)),)))
 
     def press(self, button: str, for_s: float | None = None) -> None:
         """Press a button of the world, until `release` or for so many seconds. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
-        self.call(lambda world: world.press(button, for_s))
+        self.do(do.Press(button, None if for_s is None else duration(for_s)))
 
     def release(self, button: str) -> None:
         """The twin's."""
         __tracebackhide__ = True
-        self.call(lambda world: world.release(button))
+        self.do(do.Release(button))
 
     def fault(self, *faults: str) -> None:
         """Let something go wrong from now on, as `Mic488Rig.fault`. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
         for fault in map(read, faults):
-            self.call(lambda world, fault=fault: world.outside(do.SetFault(fault)))
+            self.do(do.SetFault(fault))
 
     def clear_faults(self, *names: str) -> None:
         """Let it be well again; without names all of it. The twin's."""
         __tracebackhide__ = True
-
-        def act(world: World) -> None:
-            for name in names or [active.name for active in world.plan.faults.active]:
-                world.outside(do.ClearFault(name))
-
-        self.call(act)
+        for name in names or [fault["name"] for fault in self.do(ListFaults())]:
+            self.do(do.ClearFault(name))
 
     # ------------------------------------------------------------------ end
 

@@ -30,6 +30,9 @@ _NOT_OPENED: dict[str, tuple[Finding, str]] = {
 }
 
 
+BLOCK_WORDS = frozenset({*_NOT_CLOSED, *_NOT_OPENED})
+"""What `BlockMatcher` takes of sound statements."""
+
 _OF_IF = frozenset(finding.code for finding in (f.IF_NOT_CLOSED, f.ELSE_WITHOUT_IF, f.ENDIF_WITHOUT_IF, f.SECOND_ELSE))
 
 

@@ -1,4 +1,4 @@
-"""The checker: everything that can be said of a program before it runs."""
+"""The checker: errors and warnings of a program before it runs."""
 
 from __future__ import annotations
 
@@ -7,21 +7,23 @@ from dataclasses import dataclass
 from steptwin.diagnostics import Diagnostic, Severity, in_order
 from steptwin.wbc import flow, mistaken, usage
 from steptwin.wbc.dialect import DEFAULT, Dialect
+from steptwin.wbc.memory import StepMemory
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.resolve import resolve
-from steptwin.wbc.steps import Executable, Illegal
+from steptwin.wbc.scope import Scope
+from steptwin.wbc.steps import Executable, IllegalStep
 from steptwin.wbc.syntax import parse
-from steptwin.wbc.tree import Program
+from steptwin.wbc.tree import ProgramTree
 from steptwin.wbc.usage import Setup
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
+class CheckedProgram:
     """``executable`` is None when there are errors, or positions without a table. ``lines`` counts the executable lines, wrong
     ones included. ``diagnostics`` are in text order."""
 
     text: str
-    program: Program
+    program: ProgramTree
     executable: Executable | None
     lines: int
     diagnostics: list[Diagnostic]
@@ -31,18 +33,34 @@ class Checked:
         return [d for d in self.diagnostics if d.severity is Severity.ERROR]
 
 
-def check(text: str, positions: PositionTable | None = None, setup: Setup | None = None, dialect: Dialect = DEFAULT) -> Checked:
-    """Everything wrong or doubtful in a program. Never raises.
+def check(
+    text: str, positions: PositionTable | None = None, setup: Setup | None = None, dialect: Dialect = DEFAULT
+) -> CheckedProgram:
+    """All errors and warnings of a program. Never raises.
 
     Without ``positions`` the names after @ are not checked (one warning says so); without ``setup`` nothing is said of
     gears, ramps and input interrupts. What depends on the whole program is said once every line it depends on is understood.
     """
     program, diagnostics = parse(text)
-    resolution = resolve(program, positions, dialect)
+    return check_program(text, program, diagnostics, positions, setup, dialect)[0]
+
+
+def check_program(
+    text: str,
+    program: ProgramTree,
+    diagnostics: list[Diagnostic],
+    positions: PositionTable | None,
+    setup: Setup | None,
+    dialect: Dialect,
+    *,
+    memory: StepMemory | None = None,
+) -> tuple[CheckedProgram, Scope]:
+    """As `check`, of a program that was read already, with what its names mean. ``memory`` is that of `resolve`."""
+    resolution = resolve(program, positions, dialect, memory)
     executable = resolution.executable
     diagnostics += resolution.diagnostics
     diagnostics += usage.endless_waits(executable)
-    wrong = [step for step in executable.steps if isinstance(step, Illegal)]
+    wrong = [step for step in executable.steps if isinstance(step, IllegalStep)]
     if not any(step.opaque for step in wrong):
         paths = flow.flow_of(executable)
         diagnostics += flow.interrupt_ends(paths, executable)
@@ -59,4 +77,5 @@ def check(text: str, positions: PositionTable | None = None, setup: Setup | None
             diagnostics += usage.too_fast(executable, setup)
     wrong_somewhere = any(d.severity is Severity.ERROR for d in diagnostics)
     runs = resolution.complete and not wrong_somewhere
-    return Checked(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics))
+    checked = CheckedProgram(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics))
+    return checked, resolution.scope

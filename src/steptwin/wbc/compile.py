@@ -1,73 +1,32 @@
-"""Steps to code: a function for every step, made once, without state, shared by all controllers that run the program.
-
-The function of a step takes the machine and its cells (variables, then constants) and returns the number of the step that
-follows; with all bits turned round (``~number``) when the machine has to look around before it goes on.
-"""
+"""Steps to code: a function for every step, made once, without state, shared by all controllers that run the program."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.tables import complete
 from steptwin.wbc import steps as s
-from steptwin.wbc.controller import Access, Reader, Tendency
+from steptwin.wbc.code import Cells, Code, Execution, InterruptEntry, Seen, StepCode, WatchedValue
+from steptwin.wbc.controller import Reader, RegisterFamily, Tendency
 from steptwin.wbc.events import EVENTS
 from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, real, real_text
 from steptwin.wbc.registers import REAL, REAL_MAX, RegisterRow
 from steptwin.wbc.statements import COMPARISONS as SIGNS
 from steptwin.wbc.usage import sources
 
-if TYPE_CHECKING:
-    from steptwin.wbc.machine import Machine
-
-Cells: TypeAlias = "array[float]"
-StepCode: TypeAlias = "Callable[[Machine, Cells], int]"
-Value: TypeAlias = "Callable[[Machine, Cells], float]"
-Seen: TypeAlias = Callable[[Any, Cells, Nanos], float]
-"""(controller, cells, moment) → what a look at that moment depends on."""
-
-# WBC-7
-SHORTEST_DELAY: Nanos = 10 * MILLISECOND
+Value: TypeAlias = Callable[[Execution, Cells], float]
 
 
-class Watch(NamedTuple):
-    """Something a step sees that changes with time. ``tendency`` None: how it changes is not known."""
-
-    seen: Seen
-    tendency: Tendency | None
-
-
-class Entry(NamedTuple):
-    """An interrupt label: its step, and whether it waits for the end of the statement in progress."""
-
-    step: int
-    hard: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Code:
-    """``steps`` has one more than the program: the end. ``cells`` are variables (0) and constants at the start.
-
-    ``watches`` of every step; ``entries`` by number of the event in `EVENTS`.
-    """
-
-    steps: tuple[StepCode, ...]
-    watches: tuple[tuple[Watch, ...], ...]
-    cells: Cells
-    entries: Mapping[int, Entry]
-
-
-def compile_program(executable: s.Executable, registers: Mapping[str, Access]) -> Code:
+def compile_program(executable: s.Executable, registers: Mapping[str, RegisterFamily]) -> Code:
     """Code for controllers that give their registers by ``registers`` (family in upper case)."""
     return _Compiler(executable, registers).code()
 
 
 class _Compiler:
-    def __init__(self, executable: s.Executable, registers: Mapping[str, Access]) -> None:
+    def __init__(self, executable: s.Executable, registers: Mapping[str, RegisterFamily]) -> None:
         self._executable = executable
         self._registers = registers
         self._cells = array("f", [0.0] * len(executable.variables))
@@ -78,9 +37,9 @@ class _Compiler:
         made.append(_end(len(made)))
         watches = [tuple(self._watches(step)) for step in self._executable.steps]
         entries = {
-            EVENTS.index(step.event): Entry(number, step.hard)
+            EVENTS.index(step.event): InterruptEntry(number, step.hard)
             for number, step in enumerate(self._executable.steps)
-            if isinstance(step, s.Entry)
+            if isinstance(step, s.InterruptStep)
         }
         return Code(tuple(made), (*watches, ()), self._cells, entries)
 
@@ -88,7 +47,7 @@ class _Compiler:
 
     def _cell(self, source: s.Source) -> int | None:
         """The cell of a variable or constant; None for a register."""
-        return None if isinstance(source, s.Register) else self._cell_of(source)
+        return None if isinstance(source, s.RegisterOperand) else self._cell_of(source)
 
     def _cell_of(self, source: s.Variable | s.Literal) -> int:
         if isinstance(source, s.Variable):
@@ -99,22 +58,22 @@ class _Compiler:
             self._cells.append(value)
         return self._constants[value]
 
-    def _reader(self, register: s.Register) -> Reader:
+    def _reader(self, register: s.RegisterOperand) -> Reader:
         return self._registers[register.row.key].read(register.number)
 
     def value(self, source: s.Source) -> Value:
-        if isinstance(source, s.Register):
+        if isinstance(source, s.RegisterOperand):
             read = self._reader(source)
             return lambda m, cells: read(m.controller, m.now)
         cell = self._cell_of(source)
         return lambda m, cells: cells[cell]
 
-    def _calculated(self, value: s.Source | s.Operation | s.Function) -> Value:
+    def _calculated(self, value: s.Source | s.Operation | s.FunctionOperation) -> Value:
         if isinstance(value, s.Operation):
             apply = OPERATIONS[value.operator]
             left, right = self.value(value.left), self.value(value.right)
             return lambda m, cells: apply(left(m, cells), right(m, cells))
-        if isinstance(value, s.Function):
+        if isinstance(value, s.FunctionOperation):
             function = FUNCTIONS[value.name]
             arguments = [self.value(argument) for argument in value.arguments]
             if len(arguments) == 1:
@@ -123,23 +82,23 @@ class _Compiler:
             return lambda m, cells: function(*[argument(m, cells) for argument in arguments])
         return self.value(value)
 
-    def test(self, condition: s.Comparison) -> Callable[[Machine, Cells], bool]:
+    def test(self, condition: s.StepCondition) -> Callable[[Execution, Cells], bool]:
         holds = COMPARISONS[condition.sign]
         left, right = self.value(condition.left), self.value(condition.right)
         return lambda m, cells: holds(left(m, cells), right(m, cells))
 
     # -- branches and assignments; what only concerns cells is written out, for compute loops consist of it
 
-    def branch(self, condition: s.Comparison, inside: int, outside: int) -> StepCode:
+    def branch(self, condition: s.StepCondition, inside: int, outside: int) -> StepCode:
         a, b = self._cell(condition.left), self._cell(condition.right)
         if a is not None and b is not None:
             return _BRANCHES[condition.sign](a, b, inside, outside)
         test = self.test(condition)
         return lambda m, cells: inside if test(m, cells) else outside
 
-    def assign(self, step: s.Set, following: int) -> StepCode:
-        if isinstance(step.target, s.Register):
-            calculated = isinstance(step.value, s.Operation | s.Function)
+    def assign(self, step: s.SetStep, following: int) -> StepCode:
+        if isinstance(step.target, s.RegisterOperand):
+            calculated = isinstance(step.value, s.Operation | s.FunctionOperation)
             return self._set_register(step.target, self._calculated(step.value), following, calculated=calculated)
         target, value = step.target.index, step.value
         if isinstance(value, s.Operation):
@@ -150,7 +109,7 @@ class _Compiler:
                 return _set_cell_of_cells(target, OPERATIONS[value.operator], (a, b), following)
         return _set_cell(target, self._calculated(value), following)
 
-    def _set_register(self, register: s.Register, value: Value, following: int, *, calculated: bool) -> StepCode:
+    def _set_register(self, register: s.RegisterOperand, value: Value, following: int, *, calculated: bool) -> StepCode:
         access = self._registers[register.row.key]
         if access.write is None:
             raise ValueError(f"{register.name} cannot be written")
@@ -158,7 +117,7 @@ class _Compiler:
         taken = _taken(register.row, register.name, calculated=calculated)
         if access.quiet:
 
-            def set_quietly(m: Machine, cells: Cells) -> int:
+            def set_quietly(m: Execution, cells: Cells) -> int:
                 if write(m.controller, taken(value(m, cells)), m.now):
                     m.effects += 1
                 return following
@@ -167,9 +126,9 @@ class _Compiler:
 
         around = ~following
 
-        def set_register(m: Machine, cells: Cells) -> int:
+        def set_register(m: Execution, cells: Cells) -> int:
             number = taken(value(m, cells))
-            if not write(m.present(), number, m.now):
+            if not write(m.acting(), number, m.now):
                 return following
             m.effects += 1
             return around
@@ -178,24 +137,24 @@ class _Compiler:
 
     # -- what changes with time
 
-    def _watches(self, step: s.Step) -> list[Watch]:
-        if isinstance(step, s.If | s.While | s.Wait):
+    def _watches(self, step: s.Step) -> list[WatchedValue]:
+        if isinstance(step, s.IfStep | s.WhileStep | s.WaitStep):
             condition = step.condition
             tendencies = [t for side in (condition.left, condition.right) if (t := self._tendency(side)) is not None]
             if not tendencies:
                 return []
             left, right = self._seen(condition.left), self._seen(condition.right)
-            return [Watch(_side(left, right), tendencies[0] if len(tendencies) == 1 else None)]
-        return [Watch(self._seen(source), t) for source in sources(step) if (t := self._tendency(source)) is not None]
+            return [WatchedValue(_side(left, right), tendencies[0] if len(tendencies) == 1 else None)]
+        return [WatchedValue(self._seen(source), t) for source in sources(step) if (t := self._tendency(source)) is not None]
 
     def _tendency(self, source: s.Source) -> Tendency | None:
-        if not isinstance(source, s.Register):
+        if not isinstance(source, s.RegisterOperand):
             return None
         tendency = self._registers[source.row.key].tendency
         return None if tendency is None else tendency(source.number)
 
     def _seen(self, source: s.Source) -> Seen:
-        if isinstance(source, s.Register):
+        if isinstance(source, s.RegisterOperand):
             read = self._reader(source)
             return lambda controller, cells, at: read(controller, at)
         cell = self._cell_of(source)
@@ -245,7 +204,7 @@ def _goes_to(following: int) -> StepCode:
 
 
 def _set_cell(target: int, value: Value, following: int) -> StepCode:
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         x = value(m, cells)
         cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
         return following
@@ -258,7 +217,7 @@ def _set_cell_of_cells(
 ) -> StepCode:
     a, b = operands
 
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         x = apply(cells[a], cells[b])
         cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
         return following
@@ -267,7 +226,7 @@ def _set_cell_of_cells(
 
 
 def _sum(target: int, a: int, b: int, following: int) -> StepCode:
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         x = cells[a] + cells[b]
         cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
         return following
@@ -276,7 +235,7 @@ def _sum(target: int, a: int, b: int, following: int) -> StepCode:
 
 
 def _difference(target: int, a: int, b: int, following: int) -> StepCode:
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         x = cells[a] - cells[b]
         cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
         return following
@@ -285,7 +244,7 @@ def _difference(target: int, a: int, b: int, following: int) -> StepCode:
 
 
 def _product(target: int, a: int, b: int, following: int) -> StepCode:
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         x = cells[a] * cells[b]
         cells[target] = x if -REAL_MAX <= x <= REAL_MAX else real(x)
         return following
@@ -309,10 +268,10 @@ _BRANCHES: Mapping[str, Callable[[int, int, int, int], StepCode]] = complete(
 )
 
 
-def _wait(holds: Callable[[Machine, Cells], bool], number: int) -> StepCode:
+def _wait(holds: Callable[[Execution, Cells], bool], number: int) -> StepCode:
     following, again = number + 1, ~number
 
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         if holds(m, cells):
             return following
         m.waiting = True
@@ -322,14 +281,14 @@ def _wait(holds: Callable[[Machine, Cells], bool], number: int) -> StepCode:
 
 
 def _wait_for_rest(number: int) -> StepCode:
-    return _wait(lambda m, cells: m.present().at_rest(), number)
+    return _wait(lambda m, cells: m.acting().at_rest(m.now), number)
 
 
 def _delay(seconds: Value, following: int) -> StepCode:
     around = ~following
 
-    def step(m: Machine, cells: Cells) -> int:
-        m.not_before = m.now + max(duration(seconds(m, cells)), SHORTEST_DELAY)
+    def step(m: Execution, cells: Cells) -> int:
+        m.not_before = m.now + duration(max(seconds(m, cells), s.SHORTEST_DELAY_S))
         return around
 
     return step
@@ -338,7 +297,7 @@ def _delay(seconds: Value, following: int) -> StepCode:
 def _jump(target: int, following: int) -> StepCode:
     around = ~target
 
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         m.push(following, 0)
         if m.handling:
             # WBC-3: from here on new interrupts are let in.
@@ -349,7 +308,7 @@ def _jump(target: int, following: int) -> StepCode:
     return step
 
 
-def _return(m: Machine, cells: Cells) -> int:
+def _return(m: Execution, cells: Cells) -> int:
     if not m.stack:
         # WBC-1
         if m.forgotten:
@@ -366,26 +325,26 @@ def _return(m: Machine, cells: Cells) -> int:
 
 
 def _end(number: int) -> StepCode:
-    def step(m: Machine, cells: Cells) -> int:
-        m.present().end()
+    def step(m: Execution, cells: Cells) -> int:
+        m.acting().end(m.now)
         return ~number
 
     return step
 
 
-def _reset(m: Machine, cells: Cells) -> int:
-    m.present().reset()
+def _reset(m: Execution, cells: Cells) -> int:
+    m.acting().reset(m.now)
     return ~0
 
 
-def _illegal(m: Machine, cells: Cells) -> int:
+def _illegal(m: Execution, cells: Cells) -> int:
     raise ProgramFault("unknown instruction")
 
 
-def _acting(act: Callable[[Machine, Cells], None], following: int) -> StepCode:
+def _acting(act: Callable[[Execution, Cells], None], following: int) -> StepCode:
     around = ~following
 
-    def step(m: Machine, cells: Cells) -> int:
+    def step(m: Execution, cells: Cells) -> int:
         act(m, cells)
         m.effects += 1
         return around
@@ -393,24 +352,24 @@ def _acting(act: Callable[[Machine, Cells], None], following: int) -> StepCode:
     return step
 
 
-def _motion(compiler: _Compiler, step: s.Motion, number: int) -> StepCode:
+def _motion(compiler: _Compiler, step: s.MotionStep, number: int) -> StepCode:
     keyword, axis, value = step.keyword, step.axis, compiler.value(step.value)
-    return _acting(lambda m, cells: m.present().motion(keyword, axis, value(m, cells)), number + 1)
+    return _acting(lambda m, cells: m.acting().motion(keyword, axis, value(m, cells), m.now), number + 1)
 
 
-def _halt(compiler: _Compiler, step: s.Halt, number: int) -> StepCode:
+def _halt(compiler: _Compiler, step: s.HaltStep, number: int) -> StepCode:
     keyword, axis = step.keyword, step.axis
-    return _acting(lambda m, cells: m.present().halt(keyword, axis), number + 1)
+    return _acting(lambda m, cells: m.acting().halt(keyword, axis, m.now), number + 1)
 
 
-def _row_motion(compiler: _Compiler, step: s.RowMotion, number: int) -> StepCode:
+def _row_motion(compiler: _Compiler, step: s.RowMotionStep, number: int) -> StepCode:
     keyword, row = step.keyword, compiler.value(step.row)
-    return _acting(lambda m, cells: m.present().row_motion(keyword, row(m, cells)), number + 1)
+    return _acting(lambda m, cells: m.acting().row_motion(keyword, row(m, cells), m.now), number + 1)
 
 
-def _pulse(compiler: _Compiler, step: s.Pulse, number: int) -> StepCode:
+def _pulse(compiler: _Compiler, step: s.PulseStep, number: int) -> StepCode:
     output, seconds = step.output, compiler.value(step.seconds)
-    return _acting(lambda m, cells: m.present().pulse(output, duration(seconds(m, cells))), number + 1)
+    return _acting(lambda m, cells: m.acting().pulse(output, duration(seconds(m, cells)), m.now), number + 1)
 
 
 _CODES: Mapping[type[s.Step], Callable[[_Compiler, Any, int], StepCode]] = complete(
@@ -418,25 +377,25 @@ _CODES: Mapping[type[s.Step], Callable[[_Compiler, Any, int], StepCode]] = compl
     s.STEPS,
     "code",
     {
-        s.Set: lambda c, step, number: c.assign(step, number + 1),
-        s.If: lambda c, step, number: c.branch(step.condition, number + 1, step.otherwise),
-        s.Else: lambda c, step, number: _goes_to(step.close),
-        s.EndIf: lambda c, step, number: _goes_to(number + 1),
-        s.While: lambda c, step, number: c.branch(step.condition, number + 1, step.close + 1),
-        s.EndWhile: lambda c, step, number: _goes_to(step.open),
-        s.Wait: lambda c, step, number: _wait(c.test(step.condition), number),
-        s.WaitPos: lambda c, step, number: _wait_for_rest(number),
-        s.Delay: lambda c, step, number: _delay(c.value(step.seconds), number + 1),
-        s.Jump: lambda c, step, number: _jump(step.target, number + 1),
-        s.Return: lambda c, step, number: _return,
-        s.End: lambda c, step, number: _end(number),
-        s.ProgReset: lambda c, step, number: _reset,
-        s.Motion: _motion,
-        s.Halt: _halt,
-        s.RowMotion: _row_motion,
-        s.Pulse: _pulse,
-        s.Entry: lambda c, step, number: _goes_to(number + 1),
-        s.Illegal: lambda c, step, number: _illegal,
+        s.SetStep: lambda c, step, number: c.assign(step, number + 1),
+        s.IfStep: lambda c, step, number: c.branch(step.condition, number + 1, step.otherwise),
+        s.ElseStep: lambda c, step, number: _goes_to(step.close),
+        s.EndIfStep: lambda c, step, number: _goes_to(number + 1),
+        s.WhileStep: lambda c, step, number: c.branch(step.condition, number + 1, step.close + 1),
+        s.EndWhileStep: lambda c, step, number: _goes_to(step.open),
+        s.WaitStep: lambda c, step, number: _wait(c.test(step.condition), number),
+        s.WaitPosStep: lambda c, step, number: _wait_for_rest(number),
+        s.DelayStep: lambda c, step, number: _delay(c.value(step.seconds), number + 1),
+        s.JumpStep: lambda c, step, number: _jump(step.target, number + 1),
+        s.ReturnStep: lambda c, step, number: _return,
+        s.EndStep: lambda c, step, number: _end(number),
+        s.ProgResetStep: lambda c, step, number: _reset,
+        s.MotionStep: _motion,
+        s.HaltStep: _halt,
+        s.RowMotionStep: _row_motion,
+        s.PulseStep: _pulse,
+        s.InterruptStep: lambda c, step, number: _goes_to(number + 1),
+        s.IllegalStep: lambda c, step, number: _illegal,
     },
 )
 """The code of a step by its class: compiler, step, its number."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from steptwin.tables import complete
 from steptwin.wbc.real import COMPARISONS
 from steptwin.wbc.registers import Domain
-from steptwin.wbc.steps import Comparison, Literal, Register, Source
+from steptwin.wbc.steps import Literal, RegisterOperand, Source, StepCondition
 
 _MIRRORED = complete("comparison", COMPARISONS, "mirror image", {"=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="})
 
 
-def outcome(condition: Comparison) -> bool | None:
+def outcome(condition: StepCondition) -> bool | None:
     """True or False when the condition always is, from its numbers or from the values its register can have; else None."""
     left, sign, right = condition.left, condition.sign, condition.right
     if isinstance(left, Literal):
@@ -28,4 +28,4 @@ def outcome(condition: Comparison) -> bool | None:
 
 
 def _domain(source: Source) -> Domain | None:
-    return source.row.reads if isinstance(source, Register) else None
+    return source.row.reads if isinstance(source, RegisterOperand) else None

@@ -1,4 +1,4 @@
-"""What a running program asks of its controller. The controller is whatever has these; the language knows no machine."""
+"""The interface of a controller for a running program. The language depends on no particular machine."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FOREVER: Nanos = 2**62
 
 
 @dataclass(frozen=True, slots=True)
-class Access:
+class RegisterFamily:
     """A family of registers: what each function makes of the register's number.
 
     Values written are within what the register takes, whole where it is whole. ``quiet``: a write touches nothing that has a
@@ -37,7 +37,7 @@ class Access:
     quiet: bool = True
 
 
-def complete_access(rows: Mapping[str, RegisterRow], given: Mapping[str, Access]) -> Mapping[str, Access]:
+def complete_access(rows: Mapping[str, RegisterRow], given: Mapping[str, RegisterFamily]) -> Mapping[str, RegisterFamily]:
     """``given``, read-only, by family in upper case. `IncompleteTable` for a register of the language without its access, an
     access without its register, and one that can be written where the register cannot or the other way round."""
     found = complete("register", rows, "access", given)
@@ -49,41 +49,33 @@ def complete_access(rows: Mapping[str, RegisterRow], given: Mapping[str, Access]
     return found
 
 
-class Controller(Protocol):
-    """Everything raises `steptwin.wbc.real.ProgramFault` when it cannot be done."""
+class ProgramController(Protocol):
+    """Actions of statements, each at the moment ``now``. `steptwin.wbc.real.ProgramFault` when it cannot be done."""
 
-    @property
-    def now(self) -> Nanos:
-        """The present moment, which the program sets before it asks for anything."""
-        ...
-
-    @now.setter
-    def now(self, now: Nanos) -> None: ...
-
-    def motion(self, keyword: str, axis: int, value: float) -> None:
+    def motion(self, keyword: str, axis: int, value: float, now: Nanos) -> None:
         """HOME, VABS, VREL, PABS, PREL of ``axis`` (from 1) in configured units."""
         ...
 
-    def halt(self, keyword: str, axis: int) -> None:
+    def halt(self, keyword: str, axis: int, now: Nanos) -> None:
         """BRAKE, STOP."""
         ...
 
-    def row_motion(self, keyword: str, row: float) -> None:
+    def row_motion(self, keyword: str, row: float, now: Nanos) -> None:
         """A motion with the parameters of row ``row`` of the position table."""
         ...
 
-    def at_rest(self) -> bool:
+    def at_rest(self, now: Nanos) -> bool:
         """Whether every enabled drive has finished (WBC-8)."""
         ...
 
-    def pulse(self, output: int, duration: Nanos) -> None:
+    def pulse(self, output: int, duration: Nanos, now: Nanos) -> None:
         """PULSE of ``output`` (from 1)."""
         ...
 
-    def end(self) -> None:
+    def end(self, now: Nanos) -> None:
         """END: the program is over, drives and outputs go off."""
         ...
 
-    def reset(self) -> None:
+    def reset(self, now: Nanos) -> None:
         """PROGRESET: drives go off, everything else that belongs to the program is as at its start."""
         ...

@@ -13,7 +13,7 @@ import struct
 from dataclasses import dataclass
 from itertools import pairwise
 
-from steptwin.diagnostics import Diagnostic, Source, Span
+from steptwin.diagnostics import Diagnostic, SourceText, Span
 from steptwin.errors import Misuse
 from steptwin.wbc import image as im
 from steptwin.wbc.check import check
@@ -108,7 +108,7 @@ def decompile(data: bytes) -> Decompiled:
         raw = attempt.raw | wrong
 
 
-def program_of(data: bytes, name: str) -> tuple[Source, PositionTable, list[Diagnostic]]:
+def program_of(data: bytes, name: str) -> tuple[SourceText, PositionTable, list[Diagnostic]]:
     """The program and position table of an image that is to be run, and what is doubtful in it.
 
     Raises `Misuse` for what is no image, or has records that are not known.
@@ -127,14 +127,14 @@ def program_of(data: bytes, name: str) -> tuple[Source, PositionTable, list[Diag
         message = f"{statements} inferred from the order of the vendor's keywords (WBC-40)"
         hint = f"they are marked '{MARK}' by steptwin decompile; whether the device does the same is not known"
         doubts.append(INFERRED.at(Span(place, place + len(MARK)), message, hint))
-    return Source(name, found.text), found.positions, doubts
+    return SourceText(name, found.text), found.positions, doubts
 
 
 def _differing(text: str, attempt: _Attempt, table: PositionTable, image: Image) -> set[int]:
     """The slots whose line is refused by the checker, or would be built into other bytes."""
     checked = check(text, table)
     if checked.executable is None:
-        lines = Source("", text)
+        lines = SourceText("", text)
         return {attempt.slot_of_line(lines.position(d.span.start)[0]) for d in checked.errors}
     built, refused = im.build(checked.executable, table, inferred=True)
     if built is None:

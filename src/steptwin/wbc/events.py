@@ -14,7 +14,7 @@ INPUTS_WITH_REGISTER = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class InterruptEvent:
     """``name`` is the label without its prefix (``IN3``), ``register`` the enabling register's name in upper case.
 
     ``input`` is the number of the input (0 for other events), ``axis`` that of the drive, ``period`` that of a tick.
@@ -28,27 +28,27 @@ class Event:
     period: Nanos = 0
 
 
-def _inputs() -> list[Event]:
+def _inputs() -> list[InterruptEvent]:
     numbers = range(1, INPUT_LABELS + 1)
-    return [Event(f"IN{n}", f"CFGINT_IN{n}" if n <= INPUTS_WITH_REGISTER else None, input=n) for n in numbers]
+    return [InterruptEvent(f"IN{n}", f"CFGINT_IN{n}" if n <= INPUTS_WITH_REGISTER else None, input=n) for n in numbers]
 
 
 # WBC-20: the manual of 1.74 has ticks of 10, 100 and 1000 ms but no names for them: TICK is the known one of 10 ms,
 # the others carry their period in the name. Drive-state interrupts are switched like MODBUS and TICK (0 off, 4 on).
 EVENTS = (
     *_inputs(),
-    Event("MODBUS", "CFGINT_MODBUS"),
-    Event("TICK", "CFGINT_TICK", period=10 * MILLISECOND),
-    Event("TICK100", "CFGINT_TICK100", since="1.70", period=100 * MILLISECOND),
-    Event("TICK1000", "CFGINT_TICK1000", since="1.70", period=1000 * MILLISECOND),
-    *(Event(f"M{n}", f"CFGINT_M{n}", since="1.70", axis=n) for n in range(1, 5)),
+    InterruptEvent("MODBUS", "CFGINT_MODBUS"),
+    InterruptEvent("TICK", "CFGINT_TICK", period=10 * MILLISECOND),
+    InterruptEvent("TICK100", "CFGINT_TICK100", since="1.70", period=100 * MILLISECOND),
+    InterruptEvent("TICK1000", "CFGINT_TICK1000", since="1.70", period=1000 * MILLISECOND),
+    *(InterruptEvent(f"M{n}", f"CFGINT_M{n}", since="1.70", axis=n) for n in range(1, 5)),
 )
 
 PREFIX = "INT_"
 HARD_PREFIX = "HARDINT_"
 HARD_SINCE = "1.70"
 
-BY_LABEL: dict[str, tuple[Event, bool]] = {
+BY_LABEL: dict[str, tuple[InterruptEvent, bool]] = {
     prefix + event.name: (event, prefix == HARD_PREFIX) for prefix in (PREFIX, HARD_PREFIX) for event in EVENTS
 }
 """Event of an interrupt label in upper case, and whether it waits for the end of the statement in progress."""

@@ -19,7 +19,7 @@ from steptwin.wbc.conditions import outcome
 
 
 @dataclass(frozen=True, slots=True)
-class Flow:
+class ControlFlow:
     """Per step: where it goes on within its level (``after``, past the end is ``len(steps)``) and whether it can return."""
 
     steps: tuple[s.Step, ...]
@@ -27,10 +27,10 @@ class Flow:
     returns: list[bool]
 
 
-def flow_of(executable: s.Executable) -> Flow:
+def flow_of(executable: s.Executable) -> ControlFlow:
     steps = executable.steps
     after = [_after(number, step) for number, step in enumerate(steps)]
-    return Flow(steps, after, _returns(steps, after))
+    return ControlFlow(steps, after, _returns(steps, after))
 
 
 def _after(number: int, step: s.Step) -> tuple[int, ...]:
@@ -38,8 +38,8 @@ def _after(number: int, step: s.Step) -> tuple[int, ...]:
     return _AFTER[type(step)](number, step)
 
 
-def _branch(number: int, step: s.If | s.While) -> tuple[int, ...]:
-    failed = step.otherwise if isinstance(step, s.If) else step.close + 1
+def _branch(number: int, step: s.IfStep | s.WhileStep) -> tuple[int, ...]:
+    failed = step.otherwise if isinstance(step, s.IfStep) else step.close + 1
     known = outcome(step.condition)
     if known is None:
         return number + 1, failed
@@ -51,13 +51,15 @@ _AFTER: Mapping[type[s.Step], Callable[[int, Any], tuple[int, ...]]] = complete(
     s.STEPS,
     "successors",
     {
-        **dict.fromkeys((s.If, s.While), _branch),
-        s.Else: lambda number, step: (step.close,),
-        s.EndWhile: lambda number, step: (step.open,),
-        **dict.fromkeys((s.Return, s.End, s.ProgReset), lambda number, step: ()),
-        **dict.fromkeys((s.Set, s.EndIf, s.Wait, s.WaitPos, s.Delay, s.Jump), lambda number, step: (number + 1,)),
-        **dict.fromkeys((s.Motion, s.Halt, s.RowMotion, s.Pulse), lambda number, step: (number + 1,)),
-        **dict.fromkeys((s.Entry, s.Illegal), lambda number, step: (number + 1,)),
+        **dict.fromkeys((s.IfStep, s.WhileStep), _branch),
+        s.ElseStep: lambda number, step: (step.close,),
+        s.EndWhileStep: lambda number, step: (step.open,),
+        **dict.fromkeys((s.ReturnStep, s.EndStep, s.ProgResetStep), lambda number, step: ()),
+        **dict.fromkeys(
+            (s.SetStep, s.EndIfStep, s.WaitStep, s.WaitPosStep, s.DelayStep, s.JumpStep), lambda number, step: (number + 1,)
+        ),
+        **dict.fromkeys((s.MotionStep, s.HaltStep, s.RowMotionStep, s.PulseStep), lambda number, step: (number + 1,)),
+        **dict.fromkeys((s.InterruptStep, s.IllegalStep), lambda number, step: (number + 1,)),
     },
 )
 
@@ -68,13 +70,13 @@ def _returns(steps: tuple[s.Step, ...], after: list[tuple[int, ...]]) -> list[bo
     before: list[list[int]] = [[] for _ in range(count + 1)]
     callers: list[list[int]] = [[] for _ in range(count + 1)]
     for number, step in enumerate(steps):
-        if isinstance(step, s.Jump):
+        if isinstance(step, s.JumpStep):
             callers[step.target].append(number)
         else:
             for following in after[number]:
                 before[following].append(number)
     can = [False] * (count + 1)
-    work = [number for number, step in enumerate(steps) if isinstance(step, s.Return)]
+    work = [number for number, step in enumerate(steps) if isinstance(step, s.ReturnStep)]
     while work:
         number = work.pop()
         if can[number]:
@@ -84,12 +86,12 @@ def _returns(steps: tuple[s.Step, ...], after: list[tuple[int, ...]]) -> list[bo
         work += [caller for caller in callers[number] if can[caller + 1]]
         if number:
             previous = steps[number - 1]
-            if isinstance(previous, s.Jump) and can[previous.target]:
+            if isinstance(previous, s.JumpStep) and can[previous.target]:
                 work.append(number - 1)
     return can
 
 
-def _level(flow: Flow, start: int, barriers: frozenset[int] = frozenset()) -> Iterator[int]:
+def _level(flow: ControlFlow, start: int, barriers: frozenset[int] = frozenset()) -> Iterator[int]:
     """The steps reached from one without following JUMPs, past the end included, but not beyond other ``barriers``."""
     seen: set[int] = set()
     work = [start]
@@ -101,22 +103,22 @@ def _level(flow: Flow, start: int, barriers: frozenset[int] = frozenset()) -> It
         yield number
         if number < len(flow.steps) and (number == start or number not in barriers):
             step = flow.steps[number]
-            if not isinstance(step, s.Jump) or flow.returns[step.target]:
+            if not isinstance(step, s.JumpStep) or flow.returns[step.target]:
                 work += flow.after[number]
 
 
-def interrupt_ends(flow: Flow, executable: s.Executable) -> list[Diagnostic]:
+def interrupt_ends(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
     """Interrupt labels that never come to a RETURN of their own."""
     found: list[Diagnostic] = []
     entries = frozenset(executable.entries.values())
     for event, entry in executable.entries.items():
         numbers = [number for number in _level(flow, entry, entries) if number != entry]
         ends = [flow.steps[number] if number < len(flow.steps) else None for number in numbers]
-        if any(isinstance(step, s.Return) for step in ends):
+        if any(isinstance(step, s.ReturnStep) for step in ends):
             continue
         place = flow.steps[entry]
-        falls = any(step is None or isinstance(step, s.Entry) for step in ends)
-        if falls or not any(isinstance(step, s.Jump | s.End | s.ProgReset) for step in ends):
+        falls = any(step is None or isinstance(step, s.InterruptStep) for step in ends)
+        if falls or not any(isinstance(step, s.JumpStep | s.EndStep | s.ProgResetStep) for step in ends):
             message = f"the interrupt label of {event.name} has no RETURN"
             found.append(f.NO_RETURN.at(place, message, "end it with RETURN, or leave it by JUMP"))
         else:
@@ -125,7 +127,7 @@ def interrupt_ends(flow: Flow, executable: s.Executable) -> list[Diagnostic]:
     return found
 
 
-def unreached(flow: Flow, executable: s.Executable) -> list[Diagnostic]:
+def unreached(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
     """The first line of every stretch of code that nothing leads to. A RETURN or END that only closes a stretch is no finding."""
     steps, count = flow.steps, len(flow.steps)
     seen = [False] * (count + 1)
@@ -138,7 +140,7 @@ def unreached(flow: Flow, executable: s.Executable) -> list[Diagnostic]:
         if number == count:
             continue
         step = steps[number]
-        if isinstance(step, s.Jump):
+        if isinstance(step, s.JumpStep):
             work.append(step.target)
             if not flow.returns[step.target]:
                 continue
@@ -148,16 +150,16 @@ def unreached(flow: Flow, executable: s.Executable) -> list[Diagnostic]:
     for number, step in enumerate(steps):
         if seen[number]:
             told = False
-        elif not told and not isinstance(step, s.Else | s.EndIf | s.EndWhile | s.Return | s.End):
+        elif not told and not isinstance(step, s.ElseStep | s.EndIfStep | s.EndWhileStep | s.ReturnStep | s.EndStep):
             told = True
             found.append(f.NEVER_REACHED.at(step, "this line is never reached", "no label or interrupt leads here"))
     return found
 
 
-def stray_returns(flow: Flow) -> list[Diagnostic]:
+def stray_returns(flow: ControlFlow) -> list[Diagnostic]:
     """RETURNs the program can come to with no JUMP to take back."""
     if not flow.steps or not flow.returns[0]:
         return []
     hint = "end the program above with END or JUMP; a RETURN without JUMP is a program error"
     strays = [flow.steps[number] for number in _level(flow, 0) if number < len(flow.steps)]
-    return [f.STRAY_RETURN.at(step, "RETURN without a JUMP", hint) for step in strays if isinstance(step, s.Return)]
+    return [f.STRAY_RETURN.at(step, "RETURN without a JUMP", hint) for step in strays if isinstance(step, s.ReturnStep)]

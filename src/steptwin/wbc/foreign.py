@@ -13,19 +13,19 @@ from typing import NamedTuple
 
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD, OPERATOR_WORDS, TIME_UNITS, UNITS
-from steptwin.wbc.lexer import NUMBER, OPERATOR, WORD, Token, is_name
+from steptwin.wbc.lexer import NUMBER, OPERATOR, WORD, Lexeme, is_name
 from steptwin.wbc.positions import number_text
 from steptwin.wbc.registers import BIT, ROWS, parts
-from steptwin.wbc.statements import COMPARISONS, SET, STATEMENTS, Kind
+from steptwin.wbc.statements import COMPARISONS, SET, STATEMENTS, OperandKind
 
 
-class Line(NamedTuple):
+class ForeignLine(NamedTuple):
     """A refused line: its words, its text without comment and where that begins; ``jumps`` are the labels named by JUMPs.
 
     ``reads`` tells whether a text would be accepted in place of the line.
     """
 
-    words: Sequence[Token]
+    words: Sequence[Lexeme]
     code: str
     start: int
     jumps: frozenset[str]
@@ -57,7 +57,7 @@ class Advice(NamedTuple):
     keyword: str | None = None
 
 
-def explain(line: Line, found: Diagnostic) -> tuple[Diagnostic, str | None]:
+def explain(line: ForeignLine, found: Diagnostic) -> tuple[Diagnostic, str | None]:
     """The best message for a refused line, and the keyword that was meant if it is another than the reader saw."""
     for look in _LOOKS:
         advice = look(line)
@@ -68,12 +68,12 @@ def explain(line: Line, found: Diagnostic) -> tuple[Diagnostic, str | None]:
     return found, None
 
 
-def _over(line: Line, span: tuple[int, int], message: str, hint: str | None = None, fix: str | None = None) -> Advice:
+def _over(line: ForeignLine, span: tuple[int, int], message: str, hint: str | None = None, fix: str | None = None) -> Advice:
     """Advice about the words from the first to the second number in ``span``."""
     return Advice(line.words[span[0]].start, line.words[span[1]].end, message, hint, fix)
 
 
-def _of_all(line: Line, message: str, hint: str, fix: str | None = None, keyword: str | None = None) -> Advice:
+def _of_all(line: ForeignLine, message: str, hint: str, fix: str | None = None, keyword: str | None = None) -> Advice:
     return Advice(line.words[0].start, line.words[-1].end, message, hint, fix, keyword)
 
 
@@ -89,7 +89,7 @@ _COMMENT = re.compile(r"/\*|\(\*|;|(?:^|(?<=\s))'|^\s*(?:--|REM\b|!|/)", re.IGNO
 _SLASHES = "comments begin with //"
 
 
-def _comment(line: Line) -> Advice | None:
+def _comment(line: ForeignLine) -> Advice | None:
     match = _COMMENT.search(line.code)
     if match is None:
         return _hash(line)
@@ -108,7 +108,7 @@ def _comment(line: Line) -> Advice | None:
     return Advice(start, line.words[-1].end, _SLASHES, "write // in front of every line of the comment")
 
 
-def _hash(line: Line) -> Advice | None:
+def _hash(line: ForeignLine) -> Advice | None:
     words = line.words
     if words[0].text == "#" and len(words) > 3 and all(word.kind == WORD for word in words[1:]):
         if words[1].text.upper() == "DEFINE":
@@ -117,7 +117,7 @@ def _hash(line: Line) -> Advice | None:
     return None
 
 
-def _colon(line: Line) -> Advice | None:
+def _colon(line: ForeignLine) -> Advice | None:
     """``M1 = ON : M2 = ON``."""
     for number, word in enumerate(line.words[1:-1], 1):
         if word.text == ":" and line.reads(line.text(0, number - 1)) and line.reads(line.text(number + 1)):
@@ -134,7 +134,7 @@ LABEL = "LABEL"
 """The keyword of a line that means a label."""
 
 
-def _blocks(line: Line) -> Advice | None:
+def _blocks(line: ForeignLine) -> Advice | None:
     words, key = line.words, line.key
     second = words[1].text.upper() if len(words) > 1 else ""
     if key in ELSE_IF or (key == "ELSE" and second == "IF"):
@@ -150,13 +150,13 @@ def _blocks(line: Line) -> Advice | None:
             if word.text.upper() == then:
                 if number == len(words) - 1:
                     return _over(line, (number, number), f"{key} is written without {then}", None, "")
-                message = f"nothing stands behind the condition of {key}"
+                message = f"no text is permitted after the condition of {key}"
                 hint = f"the lines of the {key} follow below it, up to END{key}"
                 return Advice(word.start, words[-1].end, message, hint, keyword=IF_UNKNOWN if key == "IF" else None)
     return None
 
 
-def _label(line: Line) -> Advice | None:
+def _label(line: ForeignLine) -> Advice | None:
     words = line.words
     name = words[-1]
     if (len(words) == 1 or (len(words) == 2 and line.key in ("LABEL", "SUB", "PROC", "FUNCTION"))) and (
@@ -166,7 +166,7 @@ def _label(line: Line) -> Advice | None:
     return None
 
 
-def _instead(line: Line) -> Advice | None:
+def _instead(line: ForeignLine) -> Advice | None:
     """A first word that WBC does not have."""
     words, key = line.words, line.key
     if key in STATEMENTS or key == SET or (len(words) > 1 and words[1].text in ("=", ":")):
@@ -185,7 +185,7 @@ def _instead(line: Line) -> Advice | None:
     return None if hint is None else _over(line, (0, 0), f"WBC has no {key}", hint)
 
 
-def _declaration(line: Line) -> Advice | None:
+def _declaration(line: ForeignLine) -> Advice | None:
     if line.key == "LET" and line.reads(f"SET {line.text(1)}"):
         return _over(line, (0, 0), "WBC has no LET", "write SET, or leave it out", SET)
     if line.key in ("CONST", "DEFINE") and len(line.words) >= 3:
@@ -195,13 +195,13 @@ def _declaration(line: Line) -> Advice | None:
     return _over(line, (0, 0), "variables are not declared", "a variable comes into being when it is first set, and is a REAL")
 
 
-def declared(words: Sequence[Token]) -> Token | None:
+def declared(words: Sequence[Lexeme]) -> Lexeme | None:
     """The name that a refused line would have given a value in another language."""
     known = words[0].text.upper() in DECLARATIONS | {"FOR"}
     return words[1] if known and len(words) > 1 and is_name(words[1].text) else None
 
 
-def _define(line: Line) -> Advice | None:
+def _define(line: ForeignLine) -> Advice | None:
     """``#define speed 60``."""
     words = line.words
     if words[0].text != "#" or len(words) < 3 or words[1].text.upper() != "DEFINE":
@@ -210,7 +210,7 @@ def _define(line: Line) -> Advice | None:
     return _over(line, (0, 1), "a constant is written #name value", f"write {fix}", "#") if line.reads(fix) else None
 
 
-def _waitpos(line: Line) -> Advice | None:
+def _waitpos(line: ForeignLine) -> Advice | None:
     if line.key != "WAITPOS" or len(line.words) < 2:
         return None
     names = [word.text for word in line.words[1:] if re.fullmatch(r"M[1-4]", word.text, re.IGNORECASE)]
@@ -223,10 +223,10 @@ def _waitpos(line: Line) -> Advice | None:
 # ---------------------------------------------------------------------- conditions
 
 
-def _condition(line: Line) -> Advice | None:
+def _condition(line: ForeignLine) -> Advice | None:
     words, key = line.words, line.key
     row = STATEMENTS.get(key)
-    if row is None or len(words) < 2 or not row.operands or row.operands[0].kind is not Kind.CONDITION:
+    if row is None or len(words) < 2 or not row.operands or row.operands[0].kind is not OperandKind.CONDITION:
         return None
     if words[1].text == "(" and words[-1].text == ")":
         inside = line.text(2, -2).strip() if len(words) > 3 else ""
@@ -239,7 +239,7 @@ def _condition(line: Line) -> Advice | None:
     return None
 
 
-def _negation(line: Line) -> Advice | None:
+def _negation(line: ForeignLine) -> Advice | None:
     words = line.words
     if words[1].text.upper() not in ("NOT", "!") or len(words) < 3:
         return None
@@ -248,7 +248,7 @@ def _negation(line: Line) -> Advice | None:
     return Advice(words[1].start, words[-1].end, "WBC has no NOT", f"write {line.key} {words[2].text} = {off}", fix)
 
 
-def _unequal(line: Line) -> Advice | None:
+def _unequal(line: ForeignLine) -> Advice | None:
     words = line.words
     place = next((n for n, word in enumerate(words) if word.text in ("<>", "!=")), None)
     if place is None:
@@ -268,7 +268,7 @@ _AND = frozenset({"AND", "&&", "&"})
 _CONNECTING = _AND | {"OR", "XOR", "||", "|"}
 
 
-def _connected(line: Line) -> Advice | None:
+def _connected(line: ForeignLine) -> Advice | None:
     for number, word in enumerate(line.words):
         if word.text.upper() in _CONNECTING and number > 1:
             if word.text.upper() in _AND and line.key == "IF":
@@ -279,7 +279,7 @@ def _connected(line: Line) -> Advice | None:
     return None
 
 
-def _calculated(line: Line) -> Advice | None:
+def _calculated(line: ForeignLine) -> Advice | None:
     """``IF a + 1 > 2``."""
     words = line.words
     sign = next((n for n, word in enumerate(words) if word.text in COMPARISONS), None)
@@ -293,7 +293,7 @@ def _calculated(line: Line) -> Advice | None:
     return None
 
 
-def _incomplete(line: Line) -> Advice | None:
+def _incomplete(line: ForeignLine) -> Advice | None:
     words, key = line.words, line.key
     if len(words) == 3 and words[1].kind == WORD and words[2].kind in (WORD, NUMBER):
         fix = f"{words[1].text} = {words[2].text}"
@@ -323,7 +323,7 @@ _OTHER_BASE = re.compile(
 _EXPONENT = re.compile(r"(?<![\w.,])[0-9]{1,15}(?:[.,][0-9]{1,15})?E[+-]?[0-9]{1,2}(?![\w.])", re.IGNORECASE)
 
 
-def _unit(line: Line) -> Advice | None:
+def _unit(line: ForeignLine) -> Advice | None:
     match = _WITH_UNIT.search(line.code)
     if match is None:
         return None
@@ -339,7 +339,7 @@ def _unit(line: Line) -> Advice | None:
     )
 
 
-def _notation(line: Line) -> Advice | None:
+def _notation(line: ForeignLine) -> Advice | None:
     if match := _OTHER_BASE.search(line.code):
         digits, base = (match[2], 16) if match[2] else (match[4], 2) if match[4] else (match[5], 16)
         return _number(line, match, "numbers are decimal", str(int(digits, base)))
@@ -351,7 +351,7 @@ def _notation(line: Line) -> Advice | None:
     return None
 
 
-def _number(line: Line, match: re.Match[str], message: str, fix: str) -> Advice | None:
+def _number(line: ForeignLine, match: re.Match[str], message: str, fix: str) -> Advice | None:
     changed = line.code[: match.start()] + fix + line.code[match.end() :]
     place = line.start + match.start(), line.start + match.end()
     return Advice(*place, message, f"write {fix}", fix if line.reads(changed) else None)
@@ -363,7 +363,7 @@ def _number(line: Line, match: re.Match[str], message: str, fix: str) -> Advice 
 _SPLIT = re.compile(r"(?<![\w$])(\$?[A-Za-z_]+)(?:\s*\[\s*([0-9]+)\s*\]|\s*\(\s*([0-9]+)\s*\)|\s+([0-9]+))(?![\w.,])")
 
 
-def _register(line: Line) -> Advice | None:
+def _register(line: ForeignLine) -> Advice | None:
     """``OUT 1``, ``OUT[1]``, ``$I 5``."""
     found = [match for match in _SPLIT.finditer(line.code) if _is_family(match[1])]
     for match in found:
@@ -386,7 +386,7 @@ def _joined(match: re.Match[str]) -> str:
     return match[1] + (match[2] or match[3] or match[4])
 
 
-def _arguments(line: Line) -> Advice | None:
+def _arguments(line: ForeignLine) -> Advice | None:
     """Parentheses, commas and signs around the arguments of a statement, and drives by number."""
     row, words = STATEMENTS.get(line.key), line.words
     if row is None or len(words) < 2:
@@ -402,14 +402,14 @@ def _arguments(line: Line) -> Advice | None:
             if changed and line.reads(changed):
                 message = "arguments are separated by blanks" if word.text == "," else f"{line.key} is written without ="
                 return _over(line, (number, number), message, f"write {row.usage}", "")
-    if row.operands and row.operands[0].kind is Kind.AXIS and words[1].kind == NUMBER and words[1].text in "1234":
+    if row.operands and row.operands[0].kind is OperandKind.AXIS and words[1].kind == NUMBER and words[1].text in "1234":
         fix = f"M{words[1].text}"
         if line.reads(f"{line.key} {fix} {line.text(2) if len(words) > 2 else ''}"):
             return _over(line, (1, 1), f"drives are named M1…M4, not {words[1].text}", f"write {row.usage}", fix)
     return None
 
 
-def _assignment(line: Line) -> Advice | None:
+def _assignment(line: ForeignLine) -> Advice | None:
     words = line.words[1:] if line.key == SET else line.words
     first = len(line.words) - len(words)
     if len(words) < 2 or words[0].kind != WORD:
@@ -436,18 +436,18 @@ def _assignment(line: Line) -> Advice | None:
     return None
 
 
-def _set_alone(line: Line, words: Sequence[Token]) -> Advice | None:
+def _set_alone(line: ForeignLine, words: Sequence[Lexeme]) -> Advice | None:
     if line.key == SET and len(words) == 1 and parts(words[0].text.upper()) and _is_bit(words[0].text):
         fix = f"{words[0].text} = ON"
         return _over(line, (1, 1), f"= is missing after {words[0].text}", f"write SET {fix}", fix if line.reads(fix) else None)
     return None
 
 
-def _counted(line: Line, first: int, fix: str, message: str) -> Advice | None:
+def _counted(line: ForeignLine, first: int, fix: str, message: str) -> Advice | None:
     return _over(line, (first, len(line.words) - 1), message, f"write {fix}", fix if line.reads(fix) else None)
 
 
-_LOOKS: tuple[Callable[[Line], Advice | None], ...] = (
+_LOOKS: tuple[Callable[[ForeignLine], Advice | None], ...] = (
     _comment,
     _define,
     _blocks,

@@ -7,13 +7,14 @@ their CRC. Little-endian, except the axis mask of a row and both CRCs.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.positions import PARAMETERS, PositionRow, PositionTable
-from steptwin.wbc.statements import STATEMENTS
 from steptwin.wire.crc import crc16
 
 SLOTS = 1000
@@ -121,9 +122,6 @@ def row_bytes(row: PositionRow, before: bytes | None) -> bytes:
     return row.mask.to_bytes(2, "big") + b"".join(values)
 
 
-_ALONE: dict[type[s.Step], int] = {s.EndIf: ENDIF, s.Return: RETURN, s.WaitPos: WAITPOS}
-
-
 class _Record:
     """The record of the step with this number. ``inferred`` names what of it follows from the order of the keywords only."""
 
@@ -132,51 +130,34 @@ class _Record:
         self.inferred: list[str] = []
 
     def of(self, step: s.Step) -> bytes:
-        if type(step) in _ALONE:
-            return bytes((_ALONE[type(step)],))
-        match step:
-            case s.Set():
-                return self._set(step)
-            case s.If(condition=condition, middle=middle, close=close):
-                return bytes((IF,)) + self._condition(condition) + _slot(close) + _slot(middle or 0)
-            case s.Else(close=close):
-                return bytes((ELSE,)).ljust(12, b"\0") + _slot(close)
-            case s.While(condition=condition, close=close):
-                return bytes((WHILE,)) + self._condition(condition) + _slot(close)
-            case s.EndWhile(condition=condition, open=opened):
-                return bytes((ENDWHILE,)) + self._condition(condition) + _slot(opened)
-            case s.Wait(condition=condition):
-                return bytes((WAIT,)) + self._condition(condition)
-            case s.Delay(seconds=seconds):
-                return bytes((DELAY,)) + self._value(seconds)
-            case s.Jump(target=target):
-                return bytes((JUMP,)) + _slot(target)
-            case s.Entry(event=event, hard=hard):
-                if hard or not event.input:
-                    raise _NotEncodable(f"the label {'HARDINT' if hard else 'INT'}_{event.name}")
-                return bytes((ENTRY, event.input - 1)) + _slot(self._number)
-            case s.Illegal(data=data):
-                return data
-            case _:
-                return self._motion(step)
+        return _ENCODINGS[type(step)](self, step)
 
-    def _motion(self, step: s.Step) -> bytes:
-        match step:
-            case s.Motion(keyword="HOME", axis=axis, value=value):
-                return bytes((HOME, DRIVE, axis)) + self._value(value)
-            case s.Motion(keyword=keyword, axis=axis, value=value):
-                return bytes((self._inferred(keyword, INFERRED_MOTIONS), DRIVE, axis)) + self._value(value)
-            case s.Halt(keyword=keyword, axis=axis):
-                return bytes((self._inferred(keyword, INFERRED_HALTS), DRIVE, axis))
-            case s.RowMotion(keyword="MOVEPTP", row=row):
-                return bytes((MOVEPTP,)) + self._value(row)
-            case s.RowMotion(keyword=keyword, row=row):
-                return bytes((self._inferred(keyword, INFERRED_ROW_MOTIONS),)) + self._value(row)
-            case s.ProgReset():
-                return bytes((self._infer("PROGRESET", INFERRED_PROGRESET),))
-            case _:
-                name = type(step).__name__.upper()
-                raise _NotEncodable(name if name in STATEMENTS else f"the step {name}")
+    def if_(self, step: s.IfStep) -> bytes:
+        return bytes((IF,)) + self.condition(step.condition) + _slot(step.close) + _slot(step.middle or 0)
+
+    def entry(self, step: s.InterruptStep) -> bytes:
+        event = step.event
+        if step.hard or not event.input:
+            raise _NotEncodable(f"the label {'HARDINT' if step.hard else 'INT'}_{event.name}")
+        return bytes((ENTRY, event.input - 1)) + _slot(self._number)
+
+    def motion(self, step: s.MotionStep) -> bytes:
+        code = HOME if step.keyword == "HOME" else self._inferred(step.keyword, INFERRED_MOTIONS)
+        return bytes((code, DRIVE, step.axis)) + self.value(step.value)
+
+    def halt(self, step: s.HaltStep) -> bytes:
+        return bytes((self._inferred(step.keyword, INFERRED_HALTS), DRIVE, step.axis))
+
+    def row_motion(self, step: s.RowMotionStep) -> bytes:
+        code = MOVEPTP if step.keyword == "MOVEPTP" else self._inferred(step.keyword, INFERRED_ROW_MOTIONS)
+        return bytes((code,)) + self.value(step.row)
+
+    def prog_reset(self) -> bytes:
+        return bytes((self._infer("PROGRESET", INFERRED_PROGRESET),))
+
+    def unknown(self, keyword: str) -> bytes:
+        """A statement without a documented form."""
+        raise _NotEncodable(keyword)
 
     def _inferred(self, keyword: str, codes: Mapping[str, int]) -> int:
         if keyword not in codes:
@@ -187,26 +168,26 @@ class _Record:
         self.inferred.append(name)
         return code
 
-    def _set(self, step: s.Set) -> bytes:
+    def set_(self, step: s.SetStep) -> bytes:
         value = step.value
         if isinstance(value, s.Operation):
             raise _NotEncodable(f"the operator {value.operator}")
-        if isinstance(value, s.Function):
+        if isinstance(value, s.FunctionOperation):
             raise _NotEncodable(f"the function {value.name}")
-        return bytes((SET, *self._class_and_number(step.target), 0, 0)) + self._value(value) + NO_OPERATOR
+        return bytes((SET, *self._class_and_number(step.target), 0, 0)) + self.value(value) + NO_OPERATOR
 
-    def _condition(self, condition: s.Comparison) -> bytes:
+    def condition(self, condition: s.StepCondition) -> bytes:
         if condition.sign not in CONDITION_SIGNS:
             raise _NotEncodable(f"the comparison {condition.sign}")
-        return self._value(condition.left) + condition.sign.encode("ascii") + self._value(condition.right)
+        return self.value(condition.left) + condition.sign.encode("ascii") + self.value(condition.right)
 
-    def _value(self, source: s.Source) -> bytes:
+    def value(self, source: s.Source) -> bytes:
         if isinstance(source, s.Literal):
             whole = source.value == int(source.value)
             return bytes((WHOLE if whole else FRACTION,)) + _REAL.pack(source.value)
         return bytes((*self._class_and_number(source), 0, 0, 0))
 
-    def _class_and_number(self, source: s.Register | s.Variable) -> tuple[int, int]:
+    def _class_and_number(self, source: s.RegisterOperand | s.Variable) -> tuple[int, int]:
         if isinstance(source, s.Variable):
             raise _NotEncodable(f"the variable {source.name}")
         key = source.row.key
@@ -215,6 +196,35 @@ class _Record:
         if key not in REGISTER_CLASSES:
             raise _NotEncodable(f"the register {source.name}")
         return REGISTER_CLASSES[key], source.number
+
+
+_ENCODINGS: Mapping[type[s.Step], Callable[[_Record, Any], bytes]] = complete(
+    "step",
+    s.STEPS,
+    "encoding",
+    {
+        s.SetStep: _Record.set_,
+        s.IfStep: _Record.if_,
+        s.ElseStep: lambda record, step: bytes((ELSE,)).ljust(12, b"\0") + _slot(step.close),
+        s.EndIfStep: lambda record, step: bytes((ENDIF,)),
+        s.WhileStep: lambda record, step: bytes((WHILE,)) + record.condition(step.condition) + _slot(step.close),
+        s.EndWhileStep: lambda record, step: bytes((ENDWHILE,)) + record.condition(step.condition) + _slot(step.open),
+        s.WaitStep: lambda record, step: bytes((WAIT,)) + record.condition(step.condition),
+        s.WaitPosStep: lambda record, step: bytes((WAITPOS,)),
+        s.DelayStep: lambda record, step: bytes((DELAY,)) + record.value(step.seconds),
+        s.JumpStep: lambda record, step: bytes((JUMP,)) + _slot(step.target),
+        s.ReturnStep: lambda record, step: bytes((RETURN,)),
+        s.EndStep: lambda record, step: record.unknown("END"),
+        s.ProgResetStep: lambda record, step: record.prog_reset(),
+        s.MotionStep: _Record.motion,
+        s.HaltStep: _Record.halt,
+        s.RowMotionStep: _Record.row_motion,
+        s.PulseStep: lambda record, step: record.unknown("PULSE"),
+        s.InterruptStep: _Record.entry,
+        s.IllegalStep: lambda record, step: step.data,
+    },
+)
+"""The record of a step by its class."""
 
 
 def _slot(number: int) -> bytes:

@@ -7,14 +7,25 @@ from typing import NamedTuple
 
 from steptwin.wbc.lexer import BLANKS
 from steptwin.wbc.statements import CLOSING, OPENING
-from steptwin.wbc.tree import Broken, Command, Constant, Label, Line, PositionRecord, Record, Statement
+from steptwin.wbc.tree import (
+    Broken,
+    ConstantDefinition,
+    ImageRecord,
+    KeywordStatement,
+    Label,
+    PositionRecord,
+    SourceLine,
+    Statement,
+)
 
 INDENT = 4
+_MOST_LEVELS = 40
+"""Deeper blocks are indented no further: the text would grow with the square of its lines."""
 _TABS = (4, 8)
 """Widths of a tab that editors use: what is aligned with one of them is aligned."""
 
 
-class Cell(NamedTuple):
+class LayoutCell(NamedTuple):
     """Something in a line that may stand below its like in other lines.
 
     ``columns`` are where it stands, as pairs of tab width and column, ``least`` is the first column it can have in print.
@@ -38,7 +49,7 @@ def indentation(text: str) -> int:
     return len(text[: len(text) - len(text.lstrip(BLANKS))].expandtabs(_TABS[0]))
 
 
-def aligned(cells: Sequence[Cell | None], borders: Sequence[bool]) -> list[int | None]:
+def aligned(cells: Sequence[LayoutCell | None], borders: Sequence[bool]) -> list[int | None]:
     """The column of every cell in print; None for a cell that is aligned to no other.
 
     Cells are aligned where they follow each other in one column, whatever lines without a cell are between them. Nothing is
@@ -73,10 +84,10 @@ def aligned(cells: Sequence[Cell | None], borders: Sequence[bool]) -> list[int |
 
 
 def keyword_of(statement: Statement | None) -> str | None:
-    return statement.keyword if isinstance(statement, Command | Broken) else None
+    return statement.keyword if isinstance(statement, KeywordStatement | Broken) else None
 
 
-def indentations(lines: Sequence[Line], written: Sequence[str]) -> list[int]:
+def indentations(lines: Sequence[SourceLine], written: Sequence[str]) -> list[int]:
     """The indentation of every line in print: by its blocks, and one level more below a label whose lines were indented."""
     levels = _levels(lines)
     found: list[int] = []
@@ -85,14 +96,14 @@ def indentations(lines: Sequence[Line], written: Sequence[str]) -> list[int]:
         statement = line.statement
         if isinstance(statement, Label):
             below = _below(lines, written, levels, number)
-        left = isinstance(statement, Label | Constant | Record | PositionRecord)
+        left = isinstance(statement, Label | ConstantDefinition | ImageRecord | PositionRecord)
         # A comment at the margin belongs to the next label rather than to the lines above it.
         left = left or (statement is None and not level and not indentation(written[number]))
-        found.append(0 if left else INDENT * (below + level))
+        found.append(0 if left else INDENT * min(below + level, _MOST_LEVELS))
     return found
 
 
-def _levels(lines: Sequence[Line]) -> list[int]:
+def _levels(lines: Sequence[SourceLine]) -> list[int]:
     """In how many blocks each line is."""
     levels: list[int] = []
     level = 0
@@ -106,14 +117,14 @@ def _levels(lines: Sequence[Line]) -> list[int]:
     return levels
 
 
-def _below(lines: Sequence[Line], written: Sequence[str], levels: Sequence[int], label: int) -> int:
+def _below(lines: Sequence[SourceLine], written: Sequence[str], levels: Sequence[int], label: int) -> int:
     """How many levels the lines below a label are indented under it: 1 when all are that are in no further block, else 0."""
     section: list[int] = []
     for number in range(label + 1, len(lines)):
         statement = lines[number].statement
         if isinstance(statement, Label):
             break
-        if statement is not None and not isinstance(statement, Constant | Record | PositionRecord):
+        if statement is not None and not isinstance(statement, ConstantDefinition | ImageRecord | PositionRecord):
             section.append(number)
     lowest = min((levels[number] for number in section), default=0)
     margin = indentation(written[label]) + INDENT * lowest

@@ -20,7 +20,7 @@ BLANKS = " \t\v\f"
 """What separates words. Other white space, such as a no-break space, is a strange character."""
 
 
-class Token(NamedTuple):
+class Lexeme(NamedTuple):
     kind: int
     text: str
     start: int
@@ -44,10 +44,10 @@ _TOKEN = re.compile(
 )
 
 
-def tokens(text: str, offset: int) -> list[Token]:
+def tokens(text: str, offset: int) -> list[Lexeme]:
     """Tokens of a line without its comment. ``offset`` is where the line begins in the source."""
     return [
-        Token(match.lastindex or STRANGE, match[0], match.start() + offset, match.end() + offset)
+        Lexeme(match.lastindex or STRANGE, match[0], match.start() + offset, match.end() + offset)
         for match in _TOKEN.finditer(text)
     ]
 

@@ -13,15 +13,15 @@ from __future__ import annotations
 
 from array import array
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.state import Stateful
-from steptwin.wbc.compile import Code
-from steptwin.wbc.controller import Controller
+from steptwin.wbc.code import Code
+from steptwin.wbc.controller import ProgramController
 from steptwin.wbc.looks import first_change
 
 # WBC-6
@@ -64,7 +64,7 @@ class Visit(NamedTuple):
     cells: bytes
 
 
-class Machine(Stateful):
+class Interpreter(Stateful):
     """One program in execution, or none. `Misuse` for a ``statement_time`` that is not permitted.
 
     All state is plain data: a snapshot in the middle of a program is complete but for the program itself.
@@ -100,7 +100,7 @@ class Machine(Stateful):
     )
     FIXED = frozenset({"controller", "rests", "statement_time"})
 
-    def __init__(self, controller: Controller, statement_time: Nanos = STATEMENT_TIME) -> None:
+    def __init__(self, controller: ProgramController, statement_time: Nanos = STATEMENT_TIME) -> None:
         if statement_time and not SHORTEST_STATEMENT_TIME <= statement_time <= LONGEST_STATEMENT_TIME:
             permitted = f"0 and {SHORTEST_STATEMENT_TIME / MILLISECOND:g} to {LONGEST_STATEMENT_TIME / MILLISECOND:g} ms"
             raise Misuse(f"statement time = {statement_time / MILLISECOND:g} ms: permitted are {permitted}")
@@ -112,7 +112,7 @@ class Machine(Stateful):
         self.now: Nanos = 0
         """The moment of the statement being executed."""
         self.acted = False
-        """The controller has been asked for something since somebody set this to False."""
+        """A statement has acted on the controller since this was set to False."""
         self.effects = 0
         """How often the program has changed something outside its cells since the mark."""
         self._moment: Nanos = -1
@@ -244,10 +244,9 @@ class Machine(Stateful):
 
     # ------------------------------------------------------------------ execution
 
-    def present(self) -> Controller:
-        """The controller at the moment of the statement in execution."""
+    def acting(self) -> ProgramController:
+        """The controller, for the statement in execution, which acts on it."""
         self.acted = True
-        self.controller.now = self.now
         return self.controller
 
     def run(self, code: Code, until: Nanos) -> None:
@@ -461,10 +460,19 @@ class Machine(Stateful):
         self.not_before = self.due if visit.held else 0
         self._loop = ()
 
-    def place(self) -> int:
-        """The step in execution (a DELAY until it ends), or executed next."""
+    def cells_at(self, now: Nanos) -> Sequence[float]:
+        """Variables, then constants, as the statement in execution at ``now`` finds them."""
+        if not self._loop:
+            return self.cells
+        cells = array("f")
+        cells.frombytes(self._next_visit(self.after(now))[1].cells)
+        return cells
+
+    def place(self, now: Nanos) -> int:
+        """The step in execution at ``now`` (a DELAY until it ends), or executed next."""
         if self._loop:
-            visit = self._next_visit(self.after(self.controller.now))[1]
+            visit = self._next_visit(self.after(now))[1]
             return visit.step - 1 if visit.held else visit.step
-        now = self.controller.now if self.paused_at is None else self.paused_at
+        if self.paused_at is not None:
+            now = self.paused_at
         return self.pc - 1 if self.not_before > now else self.pc

@@ -38,7 +38,7 @@ _CERTAIN = frozenset(
     {"OUTPUT", "DOUT", "DO", "INPUT", "DIN", "DI", "AINPUT", "VELM", "SPEEDM", "VELOCITYM", "STATUSM", "LIMITLM", "LIMITRM"}
     | {"ACCELM", "DECELM", "POSITIONM", "ENCM"}
 )
-"""Names that nobody gives a variable. The others are only told of where the variable is of no use."""
+"""Names that are never meant for a variable. Others are reported only where the variable has no use."""
 _NAME = re.compile(r"([A-Z_]+?)([0-9]{1,4})$")
 
 
@@ -72,7 +72,7 @@ def waits_for_variables(executable: s.Executable, dialect: Dialect) -> list[Diag
         return []
     found: list[Diagnostic] = []
     for step in executable.steps:
-        names = list(_variables(step)) if isinstance(step, s.Wait) else []
+        names = list(_variables(step)) if isinstance(step, s.WaitStep) else []
         if not names:
             continue
         meant = next((meant for name in names if (meant := register_meant(name.upper(), dialect))), None)
@@ -82,8 +82,8 @@ def waits_for_variables(executable: s.Executable, dialect: Dialect) -> list[Diag
     return found
 
 
-def _variables(step: s.Wait) -> Iterator[str]:
+def _variables(step: s.WaitStep) -> Iterator[str]:
     """The variables of a condition; none where it has a register too."""
     sides = step.condition.left, step.condition.right
-    if not any(isinstance(side, s.Register) for side in sides):
+    if not any(isinstance(side, s.RegisterOperand) for side in sides):
         yield from dict.fromkeys(side.name for side in sides if isinstance(side, s.Variable))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from steptwin.wbc.statements import CIRCLES, LINES
+from collections.abc import Callable, Mapping
+
+from steptwin.tables import complete
+from steptwin.wbc.statements import LINES, ROW_MOTIONS
 
 Parameters = tuple[float | None, ...]
 
@@ -13,22 +16,55 @@ def row_problem(keyword: str, values: Parameters) -> str | None:
     MOVEPTP takes any row. A line needs p1 or p2 (the axis left alone stays), a circle its centre and radius, DOCIRC its angle
     too, DOARC all four. p3 of a line may be left out (WBC-11).
     """
-    p1, p2, p3, p4 = values
-    if keyword in LINES:
-        return "the path velocity p3 must be greater than 0" if p3 is not None and p3 <= 0 else None
-    if keyword not in CIRCLES:
-        return None
-    needed = {"p1": p1, "p2": p2, "p3": p3}
-    if keyword != "MOVETOCIRC":
-        needed["p4"] = p4
-    missing = [name for name, value in needed.items() if value is None]
-    if missing:
-        return f"{', '.join(missing)} missing"
-    if p3 is not None and p3 <= 0:
-        return f"the radius p3 is {p3:g} and must be greater than 0"
-    if keyword == "DOARC" and p4 not in (0, 1):
-        return f"p4 is {p4:g} and must be 0 (external arc) or 1 (internal arc)"
+    return _PROBLEMS[keyword](values)
+
+
+def _any_row(values: Parameters) -> str | None:
     return None
+
+
+def _line(values: Parameters) -> str | None:
+    velocity = values[2]
+    return "the path velocity p3 must be greater than 0" if velocity is not None and velocity <= 0 else None
+
+
+def _begin_of_circle(values: Parameters) -> str | None:
+    return _lacking(values[:3]) or _radius(values)
+
+
+def _circle(values: Parameters) -> str | None:
+    return _lacking(values) or _radius(values)
+
+
+def _arc(values: Parameters) -> str | None:
+    side = values[3]
+    wrong = side is not None and side not in (0, 1)
+    return _circle(values) or (f"p4 is {side:g} and must be 0 (external arc) or 1 (internal arc)" if wrong else None)
+
+
+def _lacking(values: Parameters) -> str | None:
+    missing = [f"p{number}" for number, value in enumerate(values, 1) if value is None]
+    return f"{', '.join(missing)} missing" if missing else None
+
+
+def _radius(values: Parameters) -> str | None:
+    radius = values[2]
+    return f"the radius p3 is {radius:g} and must be greater than 0" if radius is not None and radius <= 0 else None
+
+
+_PROBLEMS: Mapping[str, Callable[[Parameters], str | None]] = complete(
+    "statement with a row",
+    ROW_MOTIONS,
+    "check",
+    {
+        "MOVEPTP": _any_row,
+        "MOVELIN": _line,
+        "MOVELIN_REL": _line,
+        "MOVETOCIRC": _begin_of_circle,
+        "DOCIRC": _circle,
+        "DOARC": _arc,
+    },
+)
 
 
 def names_no_axis(keyword: str, values: Parameters) -> bool:

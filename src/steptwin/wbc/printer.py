@@ -10,23 +10,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from steptwin.diagnostics import split_lines
-from steptwin.wbc.layout import Cell, aligned, columns_of, indentations
+from steptwin.wbc.layout import LayoutCell, aligned, columns_of, indentations
 from steptwin.wbc.statements import SET, STATEMENTS
 from steptwin.wbc.syntax import POSITION_MARK, RECORD_MARK, parse
 from steptwin.wbc.tree import (
     Assign,
     Binary,
     Broken,
-    Call,
-    Command,
-    Condition,
-    Constant,
+    ConstantDefinition,
+    FunctionCall,
+    ImageRecord,
+    KeywordStatement,
     Label,
-    Line,
     Operand,
     Position,
     PositionRecord,
-    Record,
+    Relation,
+    SourceLine,
     Statement,
 )
 
@@ -47,29 +47,29 @@ def format_text(text: str) -> str:
     return "".join(line + (end or last) for line, end in zip(printed, ends, strict=False))
 
 
-def _bodies(lines: Sequence[Line], written: Sequence[str]) -> list[str]:
+def _bodies(lines: Sequence[SourceLine], written: Sequence[str]) -> list[str]:
     """The lines without their comments; of a line that is only a comment, its indentation."""
     columns = aligned([_value_cell(line, text) for line, text in zip(lines, written, strict=True)], _borders(lines))
     bodies: list[str] = []
     for line, indent, column in zip(lines, indentations(lines, written), columns, strict=True):
         statement = line.statement
         body = "" if statement is None else print_statement(statement)
-        if isinstance(statement, Constant) and column is not None:
+        if isinstance(statement, ConstantDefinition) and column is not None:
             body = f"{f'#{statement.name.text}':<{column}}{statement.value.text}"
         bodies.append(" " * indent + body if body or line.comment else "")
     return bodies
 
 
-def _value_cell(line: Line, text: str) -> Cell | None:
+def _value_cell(line: SourceLine, text: str) -> LayoutCell | None:
     """The value of a constant."""
     statement = line.statement
-    if not isinstance(statement, Constant):
+    if not isinstance(statement, ConstantDefinition):
         return None
     place, end = statement.value.start - line.start, statement.name.end - line.start
-    return Cell(columns_of(text, place), len(statement.name.text) + 2, arranged=place - end > 1 or "\t" in text[end:place])
+    return LayoutCell(columns_of(text, place), len(statement.name.text) + 2, arranged=place - end > 1 or "\t" in text[end:place])
 
 
-def _with_comments(lines: Sequence[Line], written: Sequence[str], bodies: Sequence[str]) -> list[str]:
+def _with_comments(lines: Sequence[SourceLine], written: Sequence[str], bodies: Sequence[str]) -> list[str]:
     """The lines with their comments."""
     cells = [_comment_cell(*each) for each in zip(lines, written, bodies, strict=True)]
     printed: list[str] = []
@@ -83,16 +83,16 @@ def _with_comments(lines: Sequence[Line], written: Sequence[str], bodies: Sequen
     return printed
 
 
-def _comment_cell(line: Line, text: str, body: str) -> Cell | None:
+def _comment_cell(line: SourceLine, text: str, body: str) -> LayoutCell | None:
     if line.comment is None:
         return None
     columns = columns_of(text, line.comment.start - line.start)
     if line.statement is None:
-        return Cell(columns, 0, follows=True)
-    return Cell(columns, len(body) + _BEFORE_COMMENT)
+        return LayoutCell(columns, 0, follows=True)
+    return LayoutCell(columns, len(body) + _BEFORE_COMMENT)
 
 
-def _borders(lines: Sequence[Line]) -> list[bool]:
+def _borders(lines: Sequence[SourceLine]) -> list[bool]:
     """Empty lines and labels end what is aligned."""
     return [isinstance(line.statement, Label) or (line.statement is None and line.comment is None) for line in lines]
 
@@ -102,16 +102,16 @@ def print_statement(statement: Statement) -> str:
     match statement:
         case Assign(has_set=has_set, target=target, value=value):
             return f"{SET + ' ' if has_set else ''}{target.text} = {_expression(value)}"
-        case Command(keyword=keyword, operands=operands):
+        case KeywordStatement(keyword=keyword, operands=operands):
             words = [_expression(operand) for operand in operands]
             if STATEMENTS[keyword].in_parentheses:
                 return f"{keyword}({', '.join(words)})"
             return " ".join([keyword, *words])
         case Label(name=name):
             return f"{name.text}:"
-        case Constant(name=name, value=value):
+        case ConstantDefinition(name=name, value=value):
             return f"#{name.text} {value.text}"
-        case Record(data=data):
+        case ImageRecord(data=data):
             return f"{RECORD_MARK} {data.hex().upper()}"
         case PositionRecord(index=index, data=data):
             return f"{POSITION_MARK} {index} {data.hex().upper()}"
@@ -119,13 +119,13 @@ def print_statement(statement: Statement) -> str:
             return text
 
 
-def _expression(node: Operand | Binary | Call) -> str:
+def _expression(node: Operand | Binary | FunctionCall) -> str:
     match node:
         case Position(name=name):
             return f"@{name.text}"
-        case Condition(left=left, comparison=sign, right=right) | Binary(left=left, operator=sign, right=right):
+        case Relation(left=left, comparison=sign, right=right) | Binary(left=left, operator=sign, right=right):
             return f"{left.text} {sign} {right.text}"
-        case Call(function=function, arguments=arguments):
+        case FunctionCall(function=function, arguments=arguments):
             return f"{function.text}({', '.join(argument.text for argument in arguments)})"
         case _:
             return node.text

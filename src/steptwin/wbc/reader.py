@@ -8,11 +8,11 @@ from __future__ import annotations
 import re
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.nearmiss import NearMiss
 from steptwin.wbc import findings as f
 from steptwin.wbc.findings import Finding
 from steptwin.wbc.foreign_words import DECLARATIONS, ELSE_IF, INSTEAD
-from steptwin.wbc.lexer import COMPARISON, NUMBER, OPERATOR, STRANGE, WORD, WRONG_NUMBER, Token, is_name
-from steptwin.wbc.nearmiss import NearMiss
+from steptwin.wbc.lexer import COMPARISON, NUMBER, OPERATOR, STRANGE, WORD, WRONG_NUMBER, Lexeme, is_name
 from steptwin.wbc.registers import parts
 from steptwin.wbc.statements import (
     COMPARISONS,
@@ -25,23 +25,23 @@ from steptwin.wbc.statements import (
     SET,
     SET_USAGE,
     STATEMENTS,
-    Kind,
+    OperandKind,
     StatementRow,
 )
 from steptwin.wbc.statements import Operand as Wanted
 from steptwin.wbc.tree import (
     Assign,
     Binary,
-    Call,
-    Command,
-    Condition,
-    Constant,
+    ConstantDefinition,
+    DecimalNumber,
     Expression,
+    FunctionCall,
+    Identifier,
+    KeywordStatement,
     Label,
-    Name,
-    Number,
     Operand,
     Position,
+    Relation,
     Statement,
     Value,
 )
@@ -72,14 +72,14 @@ class StatementReader:
 
     __slots__ = ("_at", "_diagnostics", "_last", "_near", "_tokens", "keyword", "target")
 
-    def __init__(self, words: list[Token], near: NearMiss, diagnostics: list[Diagnostic]) -> None:
+    def __init__(self, words: list[Lexeme], near: NearMiss, diagnostics: list[Diagnostic]) -> None:
         self._tokens = words
         self._last = len(words)
         self._at = 0
         self._near = near
         self._diagnostics = diagnostics
         self.keyword: str | None = None
-        self.target: Name | None = None
+        self.target: Identifier | None = None
 
     # -- statements
 
@@ -110,7 +110,7 @@ class StatementReader:
             raise self._bad_label(first)
         raise Rejected(f.UNKNOWN_STATEMENT.at(first, f"{first.text!r} does not begin a statement"))
 
-    def _command(self, row: StatementRow) -> Command:
+    def _command(self, row: StatementRow) -> KeywordStatement:
         start = self._tokens[0].start
         usage = f"write {row.usage}"
         if row.in_parentheses:
@@ -124,14 +124,14 @@ class StatementReader:
             self._mark(")", usage)
         if self._at < self._last:
             raise self._rest(row)
-        return Command(start, self._tokens[-1].end, row.keyword, tuple(operands))
+        return KeywordStatement(start, self._tokens[-1].end, row.keyword, tuple(operands))
 
     def _rest(self, row: StatementRow) -> Rejected:
         """What to say of the tokens after a complete statement."""
         token = self._tokens[self._at]
         rest = self._place_of_rest()
         usage = f"write {row.usage}"
-        if row.operands and row.operands[0].kind is Kind.CONDITION:
+        if row.operands and row.operands[0].kind is OperandKind.CONDITION:
             if token.kind == OPERATOR:
                 return Rejected(f.TRAILING.at(rest, f"a condition has no {token.text}", "calculate before, in a SET"))
             return Rejected(f.TRAILING.at(rest, f"nothing may follow the condition of {row.keyword}", usage))
@@ -166,7 +166,7 @@ class StatementReader:
             raise Rejected(f.TRAILING.at(rest, "nothing may follow the value here", hint))
         return Assign(start, self._tokens[-1].end, has_set, target, value)
 
-    def _target(self) -> Name:
+    def _target(self) -> Identifier:
         token = self._take()
         if token is None:
             raise Rejected(f.MISSING_VALUE.at(self._end(), "SET lacks the name to set", f"write {SET_USAGE}"))
@@ -178,7 +178,7 @@ class StatementReader:
             raise Rejected(_reserved_target(token))
         return self._name(token)
 
-    def _constant(self) -> Constant:
+    def _constant(self) -> ConstantDefinition:
         usage = "write #name value, like #speed 60 or #pump OUT3"
         start = self._tokens[0].start
         self._at = 1
@@ -193,9 +193,9 @@ class StatementReader:
         value = self._value(f.BAD_CONSTANT, f.BAD_CONSTANT, f"the constant {name.text}", usage)
         if self._at < self._last:
             raise Rejected(f.TRAILING.at(self._place_of_rest(), "nothing may follow the value of a constant", usage))
-        return Constant(start, self._tokens[-1].end, name, value)
+        return ConstantDefinition(start, self._tokens[-1].end, name, value)
 
-    def _label(self, first: Token) -> Label:
+    def _label(self, first: Lexeme) -> Label:
         key = first.text.upper()
         if key in _BLOCK_WORDS:
             self.keyword = key
@@ -205,11 +205,11 @@ class StatementReader:
         if self._last > 2:
             self._at = 2
             raise Rejected(
-                f.TRAILING.at(self._place_of_rest(), "a label stands on a line of its own", "put this on the next line")
+                f.TRAILING.at(self._place_of_rest(), "a label must be on a line of its own", "put this on the next line")
             )
-        return Label(first.start, self._tokens[-1].end, Name(first.start, first.end, first.text, key))
+        return Label(first.start, self._tokens[-1].end, Identifier(first.start, first.end, first.text, key))
 
-    def _bad_label(self, first: Token) -> Rejected:
+    def _bad_label(self, first: Lexeme) -> Rejected:
         hint = "a label is a name of letters, digits and _ and a ':', like MAIN:"
         if first.text == ":":
             return Rejected(f.BAD_LABEL.at(first, "the name of the label is missing before ':'", hint))
@@ -217,7 +217,7 @@ class StatementReader:
             return Rejected(f.NUMERIC_LABEL.at(first, f"{first.text} is a number, not a label", hint))
         return Rejected(f.BAD_LABEL.at(first, f"{first.text!r} cannot be a label", hint))
 
-    def _unknown(self, first: Token, second: Token | None) -> Rejected:
+    def _unknown(self, first: Lexeme, second: Lexeme | None) -> Rejected:
         """A first word that is neither a statement nor followed by =."""
         key = first.text.upper()
         if key in NOT_SUPPORTED:
@@ -251,20 +251,27 @@ class StatementReader:
     # -- operands
 
     def _operand(self, row: StatementRow, wanted: Wanted) -> Operand:
-        kind = wanted.kind
-        if kind is Kind.CONDITION:
-            return self._condition(row)
-        if kind is Kind.VALUE:
-            return self._value(f.TOO_FEW, f.WRONG_ARGUMENT, row.keyword, f"write {row.usage}", f"the {wanted.name}")
-        if kind is Kind.ROW:
-            return self._row(row)
+        match wanted.kind:
+            case OperandKind.CONDITION:
+                return self._condition(row)
+            case OperandKind.VALUE:
+                return self._value(f.TOO_FEW, f.WRONG_ARGUMENT, row.keyword, f"write {row.usage}", f"the {wanted.name}")
+            case OperandKind.ROW:
+                return self._row(row)
+            case OperandKind.LABEL:
+                return self._jump_label(self._take())
+            case OperandKind.AXIS:
+                return self._named(row, wanted.kind, "M1…M4")
+            case OperandKind.OUTPUT:
+                return self._named(row, wanted.kind, "OUT1…OUT8")
+
+    def _named(self, row: StatementRow, kind: OperandKind, permitted: str) -> Identifier:
+        """A drive or an output."""
         token = self._take()
-        if kind is Kind.LABEL:
-            return self._jump_label(token)
         if token is not None and token.kind == WORD:
             return self._name(token)
         place = token or self._end()
-        usage = f"write {row.usage}, {'M1…M4' if kind is Kind.AXIS else 'OUT1…OUT8'}"
+        usage = f"write {row.usage}, {permitted}"
         if row.keyword in HALTS:
             raise Rejected(f.HALT_WITHOUT_DRIVE.at(place, f"{row.keyword} lacks the drive", usage))
         if row.keyword in MOTIONS and token is not None:
@@ -272,7 +279,7 @@ class StatementReader:
         finding = f.TOO_FEW if token is None else f.WRONG_ARGUMENT
         raise Rejected(finding.at(place, f"{row.keyword} lacks the {kind.value}", usage))
 
-    def _jump_label(self, token: Token | None) -> Name:
+    def _jump_label(self, token: Lexeme | None) -> Identifier:
         if token is None:
             raise Rejected(f.MISSING_LABEL.at(self._end(), "JUMP lacks the label", "write JUMP LABEL"))
         if token.kind == NUMBER:
@@ -281,7 +288,7 @@ class StatementReader:
             )
         if token.kind != WORD or not is_name(token.text):
             raise Rejected(f.BAD_LABEL.at(token, f"{token.text!r} cannot be a label", "write JUMP LABEL"))
-        return Name(token.start, token.end, token.text, token.text.upper())
+        return Identifier(token.start, token.end, token.text, token.text.upper())
 
     def _row(self, row: StatementRow) -> Operand:
         if self._at == self._last or self._tokens[self._at].text != "@":
@@ -297,7 +304,7 @@ class StatementReader:
         name = self._name(token)
         return Position(at.start, token.end, name)
 
-    def _condition(self, row: StatementRow) -> Condition:
+    def _condition(self, row: StatementRow) -> Relation:
         usage = f"write {row.keyword} X = Y with one of {' '.join(COMPARISONS)}"
         left = self._value(f.MISSING_WAIT, f.WRONG_WAIT, row.keyword, usage)
         token = self._take()
@@ -310,7 +317,7 @@ class StatementReader:
                 raise Rejected(f.WRONG_OPERATOR.at(token, f"{row.keyword} cannot compare with {token.text}", usage, fix=meant))
             raise Rejected(f.WRONG_WAIT.at(token, f"a comparison is expected before {token.text}", usage))
         right = self._value(f.MISSING_WAIT, f.WRONG_WAIT, row.keyword, usage)
-        return Condition(left.start, right.end, left, token.text, right)
+        return Relation(left.start, right.end, left, token.text, right)
 
     def _expression(self) -> Expression:
         first = self._tokens[self._at] if self._at < self._last else None
@@ -332,7 +339,7 @@ class StatementReader:
         right = self._value(f.MISSING_VALUE, f.WRONG_NUMBER, f"the {token.text} of SET", f"write {SET_USAGE}")
         return Binary(left.start, right.end, left, token.text, right)
 
-    def _call(self) -> Call:
+    def _call(self) -> FunctionCall:
         token = self._tokens[self._at]
         row = FUNCTIONS.get(token.text.upper())
         if row is None:
@@ -354,19 +361,21 @@ class StatementReader:
             count = "one argument" if row.arguments == 1 else f"{row.arguments} arguments"
             raise Rejected(finding.at(place, f"{row.name} takes {count}, not {len(arguments)}", usage))
         self._mark(")", usage)
-        return Call(place.start, place.end, Name(token.start, token.end, token.text, token.text.upper()), tuple(arguments))
+        return FunctionCall(
+            place.start, place.end, Identifier(token.start, token.end, token.text, token.text.upper()), tuple(arguments)
+        )
 
     def _divided(self, only: Value) -> list[Value]:
         """``min(1,2)``: the comma looked like a decimal comma, but two numbers are needed."""
-        if not isinstance(only, Number) or "," not in only.text:
+        if not isinstance(only, DecimalNumber) or "," not in only.text:
             return [only]
         left, right = only.text.split(",")
         middle = only.end - len(right)
         hint = f"write {left}, {right} with a blank, or a decimal point in numbers"
         self._diagnostics.append(f.AMBIGUOUS_COMMA.at(only, f"read as the two numbers {left} and {right}", hint))
         return [
-            Number(only.start, middle - 1, left, float(left)),
-            Number(middle, only.end, right, float(right)),
+            DecimalNumber(only.start, middle - 1, left, float(left)),
+            DecimalNumber(middle, only.end, right, float(right)),
         ]
 
     def _value(self, missing: Finding, wrong: Finding, what: str, usage: str, part: str = "a number or a name") -> Value:
@@ -377,7 +386,7 @@ class StatementReader:
         kind = token.kind
         if kind == NUMBER:
             text = token.text
-            return Number(token.start, token.end, text, float(text.replace(",", ".")))
+            return DecimalNumber(token.start, token.end, text, float(text.replace(",", ".")))
         if kind == WORD:
             return self._name(token)
         if kind == WRONG_NUMBER:
@@ -387,30 +396,30 @@ class StatementReader:
             self._at += 1
             if following.kind == NUMBER:
                 text = "-" + following.text
-                return Number(token.start, following.end, text, float(text.replace(",", ".")))
+                return DecimalNumber(token.start, following.end, text, float(text.replace(",", ".")))
             if following.kind == WRONG_NUMBER:
                 raise Rejected(_wrong_number(following))
             if following.kind == WORD:
                 place = _Place(token.start, following.end)
                 hint = f"calculate it before: SET X = 0 - {following.text}"
-                raise Rejected(wrong.at(place, "a minus sign stands before numbers only", hint))
+                raise Rejected(wrong.at(place, "a minus sign is permitted before numbers only", hint))
         if token.text == "," and what in STATEMENTS:
             raise Rejected(wrong.at(token, "arguments are separated by blanks", usage))
         if token.kind == STRANGE:
             raise Rejected(f.ILLEGAL_CHARACTER.at(token, f"{token.text!r} has no meaning in WBC", usage))
         raise Rejected(wrong.at(token, f"{what} needs a number or a name here, not {token.text!r}", usage))
 
-    def _name(self, token: Token) -> Name:
+    def _name(self, token: Lexeme) -> Identifier:
         text = token.text
         if not is_name(text) and not _USER_REGISTER.match(text):
             strange = next((c for c in text if not (c.isascii() and (c.isalnum() or c == "_"))), text[0])
             hint = "names have letters without accents, digits and _, and do not begin with a digit"
             raise Rejected(f.ILLEGAL_CHARACTER.at(token, f"illegal character {strange!r} in the name {text}", hint))
-        return Name(token.start, token.end, text, text.upper())
+        return Identifier(token.start, token.end, text, text.upper())
 
     # -- tokens
 
-    def _take(self) -> Token | None:
+    def _take(self) -> Lexeme | None:
         if self._at == self._last:
             return None
         self._at += 1
@@ -446,11 +455,11 @@ class _Place:
         self.end = end
 
 
-def _reserved_target(token: Token) -> Diagnostic:
+def _reserved_target(token: Lexeme) -> Diagnostic:
     return f.RESERVED.at(token, f"{token.text} is a statement and cannot be set", "take another name")
 
 
-def _wrong_number(token: Token) -> Diagnostic:
+def _wrong_number(token: Lexeme) -> Diagnostic:
     text = token.text
     fix = None
     if re.fullmatch(r"\.[0-9]+", text):

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from steptwin.diagnostics import Diagnostic, Severity
+from steptwin.nearmiss import NearMiss
 from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
-from steptwin.wbc.blocks import BlockMatcher, Blocks
+from steptwin.wbc.blocks import BLOCK_WORDS, BlockMatcher, Blocks
 from steptwin.wbc.dialect import Dialect
-from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS, PREFIX, Event
+from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS, PREFIX, InterruptEvent
 from steptwin.wbc.foreign import IF_UNKNOWN
-from steptwin.wbc.nearmiss import NearMiss
+from steptwin.wbc.memory import StepMemory
 from steptwin.wbc.paths import names_no_axis, row_problem
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.registers import PREDEFINED, ROW_0, parts
@@ -23,23 +24,20 @@ from steptwin.wbc.tree import (
     Assign,
     Binary,
     Broken,
-    Call,
-    Command,
-    Condition,
-    Expression,
+    DecimalNumber,
+    FunctionCall,
+    Identifier,
+    ImageRecord,
+    KeywordStatement,
     Label,
-    Name,
-    Number,
     Operand,
     Position,
     PositionRecord,
-    Program,
-    Record,
+    ProgramTree,
+    Relation,
     Statement,
 )
 
-# WBC-7
-SHORTEST_DELAY_S = 0.01
 _LOOKS_LIKE_MS = 100
 """Seconds from which on a time is doubted."""
 _BRANCHING = frozenset({"IF", "ELSE", IF_UNKNOWN, "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
@@ -47,7 +45,7 @@ _BRANCHING = frozenset({"IF", "ELSE", IF_UNKNOWN, "WHILE", "ENDWHILE", "JUMP", "
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """``complete`` tells whether the executable may be run: no errors, and every position known."""
+    """``complete``: the executable may be run, there are no errors and every position is known."""
 
     executable: s.Executable
     scope: Scope
@@ -55,14 +53,22 @@ class Resolution:
     diagnostics: list[Diagnostic]
 
 
-def resolve(program: Program, positions: PositionTable | None, dialect: Dialect) -> Resolution:
-    """The steps of a program and what is wrong with it beyond single lines. Without a table, positions are not checked."""
-    return _Resolver(program, positions, dialect).resolution()
+def resolve(
+    program: ProgramTree, positions: PositionTable | None, dialect: Dialect, memory: StepMemory | None = None
+) -> Resolution:
+    """The steps of a program and what is wrong with it beyond single lines. Without a table, positions are not checked.
+
+    ``memory`` has steps of an earlier state of the program, and gets those of this one.
+    """
+    return _Resolver(program, positions, dialect, memory).resolution()
 
 
 class _Resolver:
-    def __init__(self, program: Program, positions: PositionTable | None, dialect: Dialect) -> None:
+    def __init__(
+        self, program: ProgramTree, positions: PositionTable | None, dialect: Dialect, memory: StepMemory | None
+    ) -> None:
         self._program = program
+        self._memory = memory
         self._positions = positions
         self._dialect = dialect
         self._diagnostics: list[Diagnostic] = []
@@ -70,7 +76,7 @@ class _Resolver:
         self._near = NearMiss()
         self._labels: dict[str, int] = {}
         self._broken_labels = False
-        self._entries: dict[Event, int] = {}
+        self._entries: dict[InterruptEvent, int] = {}
         self._records: dict[int, bytes] = {}
         self._lines: list[Statement] = []
         self._unchecked = False
@@ -80,7 +86,7 @@ class _Resolver:
 
     def resolution(self) -> Resolution:
         self._blocks = self._outline()
-        steps = tuple(self._step(number, statement) for number, statement in enumerate(self._lines))
+        steps = tuple(self._steps(StepMemory() if self._memory is None else self._memory))
         executable = s.Executable(
             steps, tuple(name.text for name in self._scope.variables.values()), self._labels, self._entries, self._records
         )
@@ -93,17 +99,21 @@ class _Resolver:
     def _outline(self) -> Blocks:
         matcher = BlockMatcher(self._diagnostics)
         lines = self._lines
-        defined: dict[str, Name] = {}
+        defined: dict[str, Identifier] = {}
+        assigned: dict[str, Identifier] = {}
         last: Label | None = None
         for line in self._program.lines:
             statement = line.statement
+            if statement is None:
+                continue
             if isinstance(statement, Assign):
-                self._writes_row_0 = self._writes_row_0 or self._scope.family(statement.target) in ROW_0
+                assigned.setdefault(statement.target.key, statement.target)
                 lines.append(statement)
-            elif isinstance(statement, Record):
+            elif isinstance(statement, ImageRecord):
                 lines.append(statement)
-            elif isinstance(statement, Command):
-                matcher.take(statement.keyword, len(lines), statement)
+            elif isinstance(statement, KeywordStatement):
+                if statement.keyword in BLOCK_WORDS:
+                    matcher.take(statement.keyword, len(lines), statement)
                 lines.append(statement)
             elif isinstance(statement, Label):
                 self._define_label(statement, defined)
@@ -125,6 +135,7 @@ class _Resolver:
             else:
                 continue
             last = None
+        self._writes_row_0 = any(self._scope.family(name) in ROW_0 for name in assigned.values())
         if last is not None:
             self._say(f.LABEL_AT_END.at(last.name, f"nothing follows the label {last.name.text}", "put an END after it"))
         limit = self._dialect.max_steps
@@ -133,7 +144,7 @@ class _Resolver:
             self._say(f.TOO_MANY_LINES.at(lines[limit], f"{len(lines)} executable lines", hint))
         return matcher.finish()
 
-    def _define_label(self, label: Label, defined: dict[str, Name]) -> None:
+    def _define_label(self, label: Label, defined: dict[str, Identifier]) -> None:
         name, key = label.name, label.name.key
         found = BY_LABEL.get(key)
         if key in defined:
@@ -176,37 +187,50 @@ class _Resolver:
 
     # -- second pass: the steps
 
+    def _steps(self, memory: StepMemory) -> Iterator[s.Step]:
+        memory.begin(self._scope, self._positions, (self._dialect, self._writes_row_0, tuple(self._records)))
+        for number, (statement, kept) in enumerate(zip(self._lines, memory.steps(self._lines), strict=True)):
+            if kept is not None:
+                yield kept
+                continue
+            said = len(self._diagnostics)
+            step = self._step(number, statement)
+            if len(self._diagnostics) == said:
+                memory.keep(statement, step, self._scope)
+            yield step
+        memory.end()
+
     def _step(self, number: int, statement: Statement) -> s.Step:
         start, end = statement.start, statement.end
         made: s.Step | None = None
         keyword: str | None = None
         if isinstance(statement, Assign):
             made, keyword = self._assign(statement), SET
-        elif isinstance(statement, Command):
+        elif isinstance(statement, KeywordStatement):
             made, keyword = self._command(number, statement), statement.keyword
         elif isinstance(statement, Label):
             event, hard = BY_LABEL[statement.name.key]
-            made = s.Entry(start, end, event, hard)
-        elif isinstance(statement, Record):
+            made = s.InterruptStep(start, end, event, hard)
+        elif isinstance(statement, ImageRecord):
             hint = "the program stops with an error when it gets here"
             self._say(f.NOT_EXECUTABLE.at(statement, "an unknown record cannot be executed", hint))
-            made = s.Illegal(start, end, statement.data, True)
+            made = s.IllegalStep(start, end, statement.data, True)
         elif isinstance(statement, Broken):
             keyword = SET if statement.target is not None else statement.keyword
-        return made or s.Illegal(start, end, b"", keyword is None or keyword in _BRANCHING)
+        return made or s.IllegalStep(start, end, b"", keyword is None or keyword in _BRANCHING)
 
     def _assign(self, statement: Assign) -> s.Step | None:
         name = statement.target
         target = self._scope.target(name)
         node = statement.value
-        value = self._scope.value(node, name) if isinstance(node, Name | Number) else self._expression(node)
-        if isinstance(target, s.Register) and isinstance(value, s.Literal):
+        value = self._scope.value(node, name) if isinstance(node, Identifier | DecimalNumber) else self._expression(node)
+        if isinstance(target, s.RegisterOperand) and isinstance(value, s.Literal):
             self._check_range(target, value.value, statement)
         if target is None or value is None:
             return None
-        return s.Set(statement.start, statement.end, target, value)
+        return s.SetStep(statement.start, statement.end, target, value)
 
-    def _check_range(self, target: s.Register, value: float, statement: Assign) -> None:
+    def _check_range(self, target: s.RegisterOperand, value: float, statement: Assign) -> None:
         domain = target.row.writes
         if domain is None or domain.has(value):
             return
@@ -217,7 +241,7 @@ class _Resolver:
         else:
             self._say(f.OUT_OF_RANGE.at(place, f"{value:.10g} is out of range for {target.name}", f"permitted: {domain}"))
 
-    def _expression(self, node: Expression) -> s.Source | s.Operation | s.Function | None:
+    def _expression(self, node: Binary | FunctionCall) -> s.Operation | s.FunctionOperation | None:
         value = self._scope.value
         if isinstance(node, Binary):
             left, right = value(node.left), value(node.right)
@@ -226,30 +250,28 @@ class _Resolver:
             if node.operator in "/%" and isinstance(right, s.Literal) and right.value == 0:
                 self._say(f.ALWAYS_FAILS.at(node, "division by zero", "the program stops here with an error"))
             return s.Operation(left, node.operator, right)
-        if isinstance(node, Call):
-            arguments = [value(argument) for argument in node.arguments]
-            found = [argument for argument in arguments if argument is not None]
-            if found and isinstance(found[0], s.Literal):
-                self._check_argument(node, found[0].value)
-            return s.Function(node.function.key, tuple(found)) if len(found) == len(arguments) else None
-        return value(node)
+        arguments = [value(argument) for argument in node.arguments]
+        found = [argument for argument in arguments if argument is not None]
+        if found and isinstance(found[0], s.Literal):
+            self._check_argument(node, found[0].value)
+        return s.FunctionOperation(node.function.key, tuple(found)) if len(found) == len(arguments) else None
 
-    def _check_argument(self, node: Call, argument: float) -> None:
+    def _check_argument(self, node: FunctionCall, argument: float) -> None:
         # WBC-5
         impossible = argument < 0 if node.function.key == "SQRT" else node.function.key in ("ASIN", "ACOS") and abs(argument) > 1
         if impossible:
             message = f"{node.function.text}({argument:g}) does not exist"
             self._say(f.ALWAYS_FAILS.at(node, message, "the program stops here with an error"))
 
-    def _comparison(self, node: Operand) -> s.Comparison | None:
-        if not isinstance(node, Condition):
+    def _comparison(self, node: Operand) -> s.StepCondition | None:
+        if not isinstance(node, Relation):
             return None
         left, right = self._scope.value(node.left, node.right), self._scope.value(node.right, node.left)
         if left is None or right is None:
             return None
-        return s.Comparison(left, node.comparison, right)
+        return s.StepCondition(left, node.comparison, right)
 
-    def _command(self, number: int, statement: Command) -> s.Step | None:
+    def _command(self, number: int, statement: KeywordStatement) -> s.Step | None:
         keyword = statement.keyword
         row = STATEMENTS[keyword]
         if not self._dialect.has(row.since):
@@ -257,42 +279,42 @@ class _Resolver:
             self._say(f.NOT_IN_FIRMWARE.at(statement, f"{keyword} needs firmware {row.since}", hint))
         return _STEPS[keyword](self, number, statement)
 
-    def _if(self, number: int, statement: Command) -> s.Step | None:
+    def _if(self, number: int, statement: KeywordStatement) -> s.Step | None:
         condition, close = self._comparison(statement.operands[0]), self._blocks.close.get(number)
         if condition is None or close is None:
             return None
-        return s.If(statement.start, statement.end, condition, self._blocks.middle.get(number), close)
+        return s.IfStep(statement.start, statement.end, condition, self._blocks.middle.get(number), close)
 
-    def _else(self, number: int, statement: Command) -> s.Step | None:
+    def _else(self, number: int, statement: KeywordStatement) -> s.Step | None:
         close = self._blocks.close.get(number)
-        return None if close is None else s.Else(statement.start, statement.end, close)
+        return None if close is None else s.ElseStep(statement.start, statement.end, close)
 
-    def _while(self, number: int, statement: Command) -> s.Step | None:
+    def _while(self, number: int, statement: KeywordStatement) -> s.Step | None:
         condition, close = self._comparison(statement.operands[0]), self._blocks.close.get(number)
-        return None if condition is None or close is None else s.While(statement.start, statement.end, condition, close)
+        return None if condition is None or close is None else s.WhileStep(statement.start, statement.end, condition, close)
 
-    def _end_while(self, number: int, statement: Command) -> s.Step | None:
+    def _end_while(self, number: int, statement: KeywordStatement) -> s.Step | None:
         opened = self._blocks.open.get(number)
         opening = None if opened is None else self._lines[opened]
-        if opened is None or not isinstance(opening, Command):
+        if opened is None or not isinstance(opening, KeywordStatement):
             return None
         # The names of this condition were judged at the WHILE.
         judged = len(self._diagnostics)
         condition = self._comparison(opening.operands[0])
         del self._diagnostics[judged:]
-        return None if condition is None else s.EndWhile(statement.start, statement.end, condition, opened)
+        return None if condition is None else s.EndWhileStep(statement.start, statement.end, condition, opened)
 
-    def _wait(self, number: int, statement: Command) -> s.Step | None:
+    def _wait(self, number: int, statement: KeywordStatement) -> s.Step | None:
         condition = self._comparison(statement.operands[0])
-        return None if condition is None else s.Wait(statement.start, statement.end, condition)
+        return None if condition is None else s.WaitStep(statement.start, statement.end, condition)
 
-    def _delay(self, number: int, statement: Command) -> s.Step | None:
+    def _delay(self, number: int, statement: KeywordStatement) -> s.Step | None:
         seconds = self._value(statement.operands[0])
-        if isinstance(seconds, s.Literal) and seconds.value < SHORTEST_DELAY_S:
-            message = f"DELAY {seconds.value:g} waits {SHORTEST_DELAY_S:g} s"
-            self._say(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {SHORTEST_DELAY_S:g} s"))
+        if isinstance(seconds, s.Literal) and seconds.value < s.SHORTEST_DELAY_S:
+            message = f"DELAY {seconds.value:g} waits {s.SHORTEST_DELAY_S:g} s"
+            self._say(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {s.SHORTEST_DELAY_S:g} s"))
         self._check_time("DELAY", statement.operands[0], seconds)
-        return None if seconds is None else s.Delay(statement.start, statement.end, seconds)
+        return None if seconds is None else s.DelayStep(statement.start, statement.end, seconds)
 
     def _check_time(self, keyword: str, operand: Operand, seconds: s.Source | None) -> None:
         """Hundreds of seconds are meant as milliseconds, unless they are whole minutes."""
@@ -301,24 +323,24 @@ class _Resolver:
         whole, rest = divmod(seconds.value, 60)
         message = f"{keyword} {seconds.value:.10g} is {whole:.0f} min {rest:.10g} s"
         milliseconds = f"{seconds.value / 1000:.10g}"
-        fix = milliseconds if isinstance(operand, Number) else None
+        fix = milliseconds if isinstance(operand, DecimalNumber) else None
         hint = f"the time is in seconds: {seconds.value:.10g} ms are {milliseconds}"
         self._say(f.LONG_TIME.at(operand, message, hint, fix=fix))
 
-    def _jump(self, number: int, statement: Command) -> s.Step | None:
+    def _jump(self, number: int, statement: KeywordStatement) -> s.Step | None:
         name = statement.operands[0]
-        if not isinstance(name, Name):
+        if not isinstance(name, Identifier):
             return None
         target = self._labels.get(name.key)
         if target is not None:
-            return s.Jump(statement.start, statement.end, target)
+            return s.JumpStep(statement.start, statement.end, target)
         if not self._broken_labels:
             meant = self._near.of(name.text, self._labels)
             hint = f"did you mean {meant}?" if meant else f"write {name.text}: on a line of its own where it should go on"
             self._say(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
         return None
 
-    def _motion(self, number: int, statement: Command) -> s.Step | None:
+    def _motion(self, number: int, statement: KeywordStatement) -> s.Step | None:
         axis = self._axis(statement)
         operand = statement.operands[1]
         value = self._value(operand)
@@ -327,16 +349,16 @@ class _Resolver:
         if statement.keyword == "HOME" and isinstance(value, s.Literal) and value.value == 0:
             hint = "negative homes to KL, positive to KR"
             self._say(f.OUT_OF_RANGE.at(operand, "HOME needs a velocity other than 0", hint))
-        return s.Motion(statement.start, statement.end, statement.keyword, axis, value)
+        return s.MotionStep(statement.start, statement.end, statement.keyword, axis, value)
 
-    def _halt(self, number: int, statement: Command) -> s.Step | None:
+    def _halt(self, number: int, statement: KeywordStatement) -> s.Step | None:
         axis = self._axis(statement)
-        return None if axis is None else s.Halt(statement.start, statement.end, statement.keyword, axis)
+        return None if axis is None else s.HaltStep(statement.start, statement.end, statement.keyword, axis)
 
-    def _axis(self, statement: Command) -> int | None:
+    def _axis(self, statement: KeywordStatement) -> int | None:
         """The drive a statement names, from 1."""
         name = statement.operands[0]
-        if not isinstance(name, Name):
+        if not isinstance(name, Identifier):
             return None
         register = self._scope.register(name)
         if register is not None and register.row.key == "M":
@@ -348,22 +370,22 @@ class _Resolver:
             self._say(finding.at(name, message, f"write {STATEMENTS[statement.keyword].usage}, M1…M4"))
         return None
 
-    def _pulse(self, number: int, statement: Command) -> s.Step | None:
+    def _pulse(self, number: int, statement: KeywordStatement) -> s.Step | None:
         name, operand = statement.operands
         seconds = self._value(operand)
-        register = self._scope.register(name) if isinstance(name, Name) else None
+        register = self._scope.register(name) if isinstance(name, Identifier) else None
         if register is None or register.row.key != "OUT":
-            if register is not None or (isinstance(name, Name) and parts(name.key) is None):
+            if register is not None or (isinstance(name, Identifier) and parts(name.key) is None):
                 self._say(f.WRONG_ARGUMENT.at(name, "PULSE needs an output", f"write {STATEMENTS['PULSE'].usage}, OUT1…OUT8"))
             return None
         if isinstance(seconds, s.Literal) and seconds.value <= 0:
             self._say(f.OUT_OF_RANGE.at(operand, f"PULSE cannot last {seconds.value:g} s", "permitted: greater than 0"))
         self._check_time("PULSE", operand, seconds)
-        return None if seconds is None else s.Pulse(statement.start, statement.end, register.number, seconds)
+        return None if seconds is None else s.PulseStep(statement.start, statement.end, register.number, seconds)
 
     # -- rows of the position table
 
-    def _row_motion(self, number: int, statement: Command) -> s.Step | None:
+    def _row_motion(self, number: int, statement: KeywordStatement) -> s.Step | None:
         operand = statement.operands[0]
         row = self._position(operand) if isinstance(operand, Position) else self._value(operand, is_row=True)
         if row is None:
@@ -375,7 +397,7 @@ class _Resolver:
             if index is None:
                 return None
             self._check_row(statement, index)
-        return s.RowMotion(statement.start, statement.end, statement.keyword, row)
+        return s.RowMotionStep(statement.start, statement.end, statement.keyword, row)
 
     def _position(self, position: Position) -> s.Literal | None:
         name = position.name
@@ -405,7 +427,7 @@ class _Resolver:
         self._say(f.UNKNOWN_POSITION.at(place, f"there is no row {value:g}", hint))
         return None
 
-    def _check_row(self, statement: Command, index: int) -> None:
+    def _check_row(self, statement: KeywordStatement, index: int) -> None:
         """Row 0 is left alone when the program writes it: its parameters are known when it runs."""
         if self._positions is None or index in self._records or (index == 0 and self._writes_row_0):
             return
@@ -419,37 +441,37 @@ class _Resolver:
             self._say(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
 
     def _value(self, operand: Operand, *, is_row: bool = False) -> s.Source | None:
-        return self._scope.value(operand, is_row=is_row) if isinstance(operand, Name | Number) else None
+        return self._scope.value(operand, is_row=is_row) if isinstance(operand, Identifier | DecimalNumber) else None
 
     def _say(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)
 
 
-def _alone(step: type[s.Step]) -> Callable[[_Resolver, int, Command], s.Step]:
+def _alone(step: type[s.Step]) -> Callable[[_Resolver, int, KeywordStatement], s.Step]:
     """Of a statement without operands."""
     return lambda resolver, number, statement: step(statement.start, statement.end)
 
 
-_STEPS: Mapping[str, Callable[[_Resolver, int, Command], s.Step | None]] = complete(
+_STEPS: Mapping[str, Callable[[_Resolver, int, KeywordStatement], s.Step | None]] = complete(
     "statement",
     STATEMENTS,
     "step",
     {
         "IF": _Resolver._if,
         "ELSE": _Resolver._else,
-        "ENDIF": _alone(s.EndIf),
+        "ENDIF": _alone(s.EndIfStep),
         "WHILE": _Resolver._while,
         "ENDWHILE": _Resolver._end_while,
         "WAIT": _Resolver._wait,
         "DELAY": _Resolver._delay,
         "JUMP": _Resolver._jump,
-        "RETURN": _alone(s.Return),
-        "END": _alone(s.End),
-        "PROGRESET": _alone(s.ProgReset),
+        "RETURN": _alone(s.ReturnStep),
+        "END": _alone(s.EndStep),
+        "PROGRESET": _alone(s.ProgResetStep),
         **dict.fromkeys(MOTIONS, _Resolver._motion),
         **dict.fromkeys(HALTS, _Resolver._halt),
         **dict.fromkeys(ROW_MOTIONS, _Resolver._row_motion),
-        "WAITPOS": _alone(s.WaitPos),
+        "WAITPOS": _alone(s.WaitPosStep),
         "PULSE": _Resolver._pulse,
     },
 )

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.nearmiss import NearMiss
 from steptwin.wbc import findings as f
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_LABEL
 from steptwin.wbc.foreign_words import VALUES
-from steptwin.wbc.nearmiss import NearMiss
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.registers import PREDEFINED, REAL_MAX, REGISTERS, ROWS, VALUE_NAMES, RegisterRow, parts
 from steptwin.wbc.statements import FUNCTIONS, KEYWORDS, NOT_SUPPORTED
-from steptwin.wbc.steps import Literal, Register, Source, Target, Variable
-from steptwin.wbc.tree import Assign, Broken, Constant, Name, Number, Program, Value
+from steptwin.wbc.steps import Literal, RegisterOperand, Source, Target, Variable
+from steptwin.wbc.tree import Assign, Broken, ConstantDefinition, DecimalNumber, Identifier, ProgramTree, Value
 
 _STATUS_SINCE = "1.70"
 
@@ -23,7 +23,7 @@ class Scope:
     """Names of a program. Built from the whole text first, so that a name may be used above the line that defines it."""
 
     def __init__(
-        self, program: Program, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
+        self, program: ProgramTree, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
     ) -> None:
         self._dialect = dialect
         self._positions = positions
@@ -32,26 +32,39 @@ class Scope:
         self._near_registers = NearMiss()
         self._broken: set[str] = set()
         self.known: dict[str, Source] = {}
-        self.constants: dict[str, Name] = {}
-        self.variables: dict[str, Name] = {}
+        self.constants: dict[str, Identifier] = {}
+        self.variables: dict[str, Identifier] = {}
         """First assignment of every variable, in order."""
-        for line in program.lines:
-            statement = line.statement
-            if isinstance(statement, Constant):
+        self.remarked: set[str] = set()
+        """Names that stand for something about which something was said when they were first used."""
+        # One text is looked at many times while it is edited: only names that come for the first time are looked at further.
+        statements = [line.statement for line in program.lines]
+        for statement in statements:
+            if isinstance(statement, ConstantDefinition):
                 self._define(statement)
-        for line in program.lines:
-            statement = line.statement
+        assigned: dict[str, Identifier] = {}
+        for statement in statements:
             if isinstance(statement, Assign):
-                if statement.target.key not in self.known:
-                    self._assigned(statement.target)
+                assigned.setdefault(statement.target.key, statement.target)
             elif isinstance(statement, Broken) and statement.target is not None:
                 self._broken.add(statement.target.key)
+        for key, name in assigned.items():
+            if key not in self.known:
+                self._assigned(name)
+        refused = {key for key in assigned if key in self._broken and key not in self.known}
+        for statement in statements if refused else ():
+            if (
+                isinstance(statement, Assign)
+                and (key := statement.target.key) in refused
+                and statement.target is not assigned[key]
+            ):
+                self._assigned(statement.target)
 
     # -- defining
 
-    def _define(self, constant: Constant) -> None:
+    def _define(self, constant: ConstantDefinition) -> None:
         name, key = constant.name, constant.name.key
-        reason = self._reserved(key)
+        reason = self.reserved(key)
         if reason is not None:
             self._say(f.RESERVED.at(name, f"{name.text} cannot be a constant: it is {reason}", "take another name"))
             return
@@ -60,7 +73,7 @@ class Scope:
             return
         self.constants[key] = name
         value = constant.value
-        if isinstance(value, Name) and parts(value.key) is None and value.key not in PREDEFINED:
+        if isinstance(value, Identifier) and parts(value.key) is None and value.key not in PREDEFINED:
             hint = "the value of a constant is a number or a register, like #speed 60 or #pump OUT3"
             self._say(f.BAD_CONSTANT.at(value, f"{value.text} is neither a number nor a register", hint))
             self._broken.add(key)
@@ -71,11 +84,11 @@ class Scope:
         else:
             self.known[key] = resolved
 
-    def _assigned(self, name: Name) -> None:
+    def _assigned(self, name: Identifier) -> None:
         key = name.key
         if key in self.constants or parts(key) is not None or key in PREDEFINED:
             return
-        reason = self._reserved(key)
+        reason = self.reserved(key)
         if reason is not None:
             self._broken.add(key)
             self._say(f.RESERVED.at(name, f"{name.text} cannot be a variable: it is {reason}", "take another name"))
@@ -87,7 +100,7 @@ class Scope:
         self.variables[key] = name
         self.known[key] = Variable(index, name.text)
 
-    def _reserved(self, key: str) -> str | None:
+    def reserved(self, key: str) -> str | None:
         """Why a name cannot be given to a constant or variable."""
         if parts(key) is not None:
             return "a register"
@@ -103,6 +116,12 @@ class Scope:
             return "a position"
         return None
 
+    def meanings(self) -> dict[str, object]:
+        """What the program itself says of names, to be compared with what it said before."""
+        meanings: dict[str, object] = dict.fromkeys(self._broken, "broken")
+        meanings.update((key, (source, key in self.constants)) for key, source in self.known.items())
+        return meanings
+
     # -- using
 
     def value(self, node: Value, other: Value | None = None, *, is_row: bool = False) -> Source | None:
@@ -111,7 +130,7 @@ class Scope:
         ``other`` is what it is compared with or given to: that tells which names were possible. ``is_row``: a row of the
         position table is wanted.
         """
-        if isinstance(node, Number):
+        if isinstance(node, DecimalNumber):
             if not -REAL_MAX <= node.value <= REAL_MAX:
                 self._say(f.OUT_OF_RANGE.at(node, f"{node.text} is out of range", f"REAL reaches ±{REAL_MAX:.3g}"))
                 return None
@@ -119,7 +138,7 @@ class Scope:
         known = self.known.get(node.key)
         return known if known is not None else self._look_up(node, other, is_row=is_row)
 
-    def target(self, name: Name) -> Target | None:
+    def target(self, name: Identifier) -> Target | None:
         """The variable or register an assignment goes to; None after saying why there is none."""
         found = self.known.get(name.key)
         if found is None:
@@ -132,28 +151,28 @@ class Scope:
             kind = "a constant" if name.key in self.constants else "predefined"
             self._say(f.NOT_ASSIGNABLE.at(name, f"{name.text} is {kind} and cannot be set", "set a variable or a register"))
             return None
-        if isinstance(found, Register) and found.row.writes is None:
+        if isinstance(found, RegisterOperand) and found.row.writes is None:
             alias = "" if name.text.upper() == found.name.upper() else f" ({found.name})"
             self._say(f.READ_ONLY.at(name, f"{name.text}{alias} is read-only", f"{found.row.name}: {found.row.meaning}"))
             return None
         return found
 
-    def register(self, name: Name) -> Register | None:
+    def register(self, name: Identifier) -> RegisterOperand | None:
         """The register a name or alias means, None (silently) when it means something else."""
         found = self.known.get(name.key)
         if found is None and parts(name.key) is not None:
             found = self._look_up(name)
-        return found if isinstance(found, Register) else None
+        return found if isinstance(found, RegisterOperand) else None
 
-    def family(self, name: Name) -> str | None:
+    def family(self, name: Identifier) -> str | None:
         """Key of the register family a name or alias belongs to, existing number or not; None when it belongs to none."""
         found = self.known.get(name.key)
-        if isinstance(found, Register):
+        if isinstance(found, RegisterOperand):
             return found.row.key
         family = parts(name.key)
         return family[0].key if family is not None else None
 
-    def _look_up(self, name: Name, other: Value | None = None, *, is_row: bool = False) -> Source | None:
+    def _look_up(self, name: Identifier, other: Value | None = None, *, is_row: bool = False) -> Source | None:
         """Registers and predefined names enter ``known`` when they are first used; anything else is a mistake."""
         key = name.key
         found = parts(key)
@@ -169,7 +188,7 @@ class Scope:
             self._unknown(name, other, is_row=is_row)
         return None
 
-    def _register(self, name: Name, row: RegisterRow, number: int) -> Register | None:
+    def _register(self, name: Identifier, row: RegisterRow, number: int) -> RegisterOperand | None:
         dialect = self._dialect
         if not dialect.has(row.since):
             self._say(f.NOT_IN_FIRMWARE.at(name, f"{name.text} needs firmware {row.since}", f"checked for {dialect.firmware}"))
@@ -187,10 +206,11 @@ class Scope:
             return None
         if row.key == "STATUS" and not dialect.has(_STATUS_SINCE):
             hint = f"it gives M_STATUS from firmware {_STATUS_SINCE} on"
+            self.remarked.add(name.key)
             self._say(f.STATUS_IS_ZERO.at(name, f"STATUS is always 0 in firmware {dialect.firmware}", hint))
-        return Register(row, number)
+        return RegisterOperand(row, number)
 
-    def _unknown(self, name: Name, other: Value | None, *, is_row: bool) -> None:
+    def _unknown(self, name: Identifier, other: Value | None, *, is_row: bool) -> None:
         key = name.key
         if self._positions is not None and self._positions.index(key) is not None:
             hint = f"write @{name.text} after a motion statement"
@@ -198,7 +218,7 @@ class Scope:
                 f.RESERVED.at(name, f"{name.text} is a position, not a value", hint, fix=f"@{name.text}" if is_row else None)
             )
             return
-        reason = self._reserved(key)
+        reason = self.reserved(key)
         if reason is not None:
             self._say(f.RESERVED.at(name, f"{name.text} is {reason}, not a value"))
             return
@@ -209,7 +229,7 @@ class Scope:
 
     def _names_for(self, other: Value | None) -> str:
         """The predefined names that make sense with a register; nothing where there are none."""
-        family = self.family(other) if isinstance(other, Name) else None
+        family = self.family(other) if isinstance(other, Identifier) else None
         row = None if family is None else ROWS[family]
         names = () if row is None else VALUE_NAMES.get(row.writes or row.reads) or VALUE_NAMES.get(row.reads) or ()
         return f"with {row.name} go {', '.join(names)}" if row is not None and names else ""

@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 
 
-class Kind(enum.Enum):
+class OperandKind(enum.Enum):
     """What an operand is."""
 
     AXIS = "drive"
@@ -19,13 +19,13 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Operand:
-    kind: Kind
+    kind: OperandKind
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class StatementRow:
-    """``since`` is the firmware generation it came with; ``in_parentheses`` tells that it is written like a function."""
+    """``since`` is the firmware generation it came with; ``in_parentheses``: it is written like a function."""
 
     keyword: str
     operands: tuple[Operand, ...]
@@ -42,13 +42,13 @@ class StatementRow:
         return " ".join([self.keyword, *names])
 
 
-_AXIS = Operand(Kind.AXIS, "Mx")
-_CONDITION = Operand(Kind.CONDITION, "X = Y")
-_ROW = Operand(Kind.ROW, "@name")
+_AXIS = Operand(OperandKind.AXIS, "Mx")
+_CONDITION = Operand(OperandKind.CONDITION, "X = Y")
+_ROW = Operand(OperandKind.ROW, "@name")
 
 
 def _value(name: str) -> Operand:
-    return Operand(Kind.VALUE, name)
+    return Operand(OperandKind.VALUE, name)
 
 
 _ROWS = (
@@ -59,7 +59,7 @@ _ROWS = (
     StatementRow("ENDWHILE", (), "Ends a WHILE."),
     StatementRow("WAIT", (_CONDITION,), "Waits until the condition is true."),
     StatementRow("DELAY", (_value("seconds"),), "Waits this many seconds, at least 0.01."),
-    StatementRow("JUMP", (Operand(Kind.LABEL, "LABEL"),), "Goes on at the label and remembers the next line for RETURN."),
+    StatementRow("JUMP", (Operand(OperandKind.LABEL, "LABEL"),), "Goes on at the label and remembers the next line for RETURN."),
     StatementRow("RETURN", (), "Goes to the line after the last JUMP taken; ends an interrupt."),
     StatementRow("END", (), "Ends the program; drives and outputs are switched off."),
     StatementRow("PROGRESET", (), "Switches the drives off and starts the program again from its first line."),
@@ -79,7 +79,7 @@ _ROWS = (
     StatementRow("WAITPOS", (), "Waits until every enabled drive has finished its motion."),
     StatementRow(
         "PULSE",
-        (Operand(Kind.OUTPUT, "OUTn"), _value("seconds")),
+        (Operand(OperandKind.OUTPUT, "OUTn"), _value("seconds")),
         "Inverts the output after this many seconds without waiting for it.",
         since="1.70",
         in_parentheses=True,

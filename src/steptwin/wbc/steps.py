@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from steptwin.wbc.events import Event
+from steptwin.wbc.events import InterruptEvent
 from steptwin.wbc.registers import RegisterRow
+
+SHORTEST_DELAY_S = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +30,7 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True)
-class Register:
+class RegisterOperand:
     """``number`` is the number in the name (``OUT3`` → 3, ``$D10`` → 10), 0 for a single register."""
 
     row: RegisterRow
@@ -39,12 +41,12 @@ class Register:
         return f"{self.row.name}{self.number}" if self.row.last or self.row.words else self.row.name
 
 
-Source: TypeAlias = Literal | Variable | Register
-Target: TypeAlias = Variable | Register
+Source: TypeAlias = Literal | Variable | RegisterOperand
+Target: TypeAlias = Variable | RegisterOperand
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class StepCondition:
     """``sign`` is one of ``= < > <= >=``."""
 
     left: Source
@@ -60,7 +62,7 @@ class Operation:
 
 
 @dataclass(frozen=True, slots=True)
-class Function:
+class FunctionOperation:
     """``name`` is in upper case."""
 
     name: str
@@ -74,16 +76,16 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Set(Step):
+class SetStep(Step):
     target: Target
-    value: Source | Operation | Function
+    value: Source | Operation | FunctionOperation
 
 
 @dataclass(frozen=True, slots=True)
-class If(Step):
+class IfStep(Step):
     """``middle`` is the step of ELSE, None without one; ``close`` that of ENDIF."""
 
-    condition: Comparison
+    condition: StepCondition
     middle: int | None
     close: int
 
@@ -94,63 +96,65 @@ class If(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class Else(Step):
+class ElseStep(Step):
     """Reached only from the lines above it: goes on at ``close``, the ENDIF."""
 
     close: int
 
 
 @dataclass(frozen=True, slots=True)
-class EndIf(Step):
+class EndIfStep(Step):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class While(Step):
-    condition: Comparison
+class WhileStep(Step):
+    condition: StepCondition
     close: int
 
 
 @dataclass(frozen=True, slots=True)
-class EndWhile(Step):
+class EndWhileStep(Step):
     """``condition`` is that of the WHILE at ``open``."""
 
-    condition: Comparison
+    condition: StepCondition
     open: int
 
 
 @dataclass(frozen=True, slots=True)
-class Wait(Step):
-    condition: Comparison
+class WaitStep(Step):
+    condition: StepCondition
 
 
 @dataclass(frozen=True, slots=True)
-class Delay(Step):
+class DelayStep(Step):
+    """At least `SHORTEST_DELAY_S` (WBC-7)."""
+
     seconds: Source
 
 
 @dataclass(frozen=True, slots=True)
-class Jump(Step):
+class JumpStep(Step):
     target: int
 
 
 @dataclass(frozen=True, slots=True)
-class Return(Step):
+class ReturnStep(Step):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class End(Step):
+class EndStep(Step):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class ProgReset(Step):
+class ProgResetStep(Step):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class Motion(Step):
+class MotionStep(Step):
     """HOME, VABS, VREL, PABS or PREL. ``axis`` counts from 1."""
 
     keyword: str
@@ -159,7 +163,7 @@ class Motion(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class Halt(Step):
+class HaltStep(Step):
     """BRAKE or STOP. ``axis`` counts from 1."""
 
     keyword: str
@@ -167,7 +171,7 @@ class Halt(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class RowMotion(Step):
+class RowMotionStep(Step):
     """A motion with the parameters of a row of the position table; ``row`` gives its index from 0."""
 
     keyword: str
@@ -175,12 +179,12 @@ class RowMotion(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class WaitPos(Step):
+class WaitPosStep(Step):
     pass
 
 
 @dataclass(frozen=True, slots=True)
-class Pulse(Step):
+class PulseStep(Step):
     """``output`` counts from 1."""
 
     output: int
@@ -188,15 +192,15 @@ class Pulse(Step):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry(Step):
+class InterruptStep(Step):
     """An interrupt label. ``hard`` waits for the end of the statement in progress."""
 
-    event: Event
+    event: InterruptEvent
     hard: bool
 
 
 @dataclass(frozen=True, slots=True)
-class Illegal(Step):
+class IllegalStep(Step):
     """A line that cannot be executed: an unknown record of an image, or (in a program with errors) a wrong line.
 
     ``opaque``: where the program goes on after it is not known.
@@ -220,5 +224,5 @@ class Executable:
     steps: tuple[Step, ...]
     variables: tuple[str, ...]
     labels: Mapping[str, int]
-    entries: Mapping[Event, int]
+    entries: Mapping[InterruptEvent, int]
     position_records: Mapping[int, bytes]

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from steptwin.diagnostics import Diagnostic, split_lines
+from steptwin.nearmiss import NearMiss
 from steptwin.wbc import findings as f
-from steptwin.wbc.foreign import LABEL, declared, explain
-from steptwin.wbc.foreign import Line as ForeignLine
+from steptwin.wbc.foreign import LABEL, ForeignLine, declared, explain
 from steptwin.wbc.foreign_words import LOOK_ALIKES
 from steptwin.wbc.lexer import BLANKS as _BLANKS
-from steptwin.wbc.lexer import STRANGE, Token, tokens
-from steptwin.wbc.nearmiss import NearMiss
+from steptwin.wbc.lexer import STRANGE, Lexeme, tokens
 from steptwin.wbc.reader import Rejected, StatementReader
-from steptwin.wbc.tree import Broken, Comment, Line, Name, PositionRecord, Program, Record, Statement
+from steptwin.wbc.tree import Broken, Comment, Identifier, ImageRecord, PositionRecord, ProgramTree, SourceLine, Statement
 
 RECORD_MARK = "//!record"
 POSITION_MARK = "//!position"
 _RECORD = re.compile(rf"{RECORD_MARK}\s+([0-9a-f]{{32}})$", re.IGNORECASE)
-_JUMP = re.compile(r"^[ \t]*JUMP[ \t]+(\w+)", re.IGNORECASE | re.MULTILINE)
+_JUMP = re.compile(r"[ \t]*JUMP[ \t]+(\w+)", re.IGNORECASE)
 _LONGEST_EXPLAINED = 500
 """Characters of a line up to which it is looked at for what other languages write: looking takes time."""
 _MOST_LOOK_ALIKES = 3
@@ -26,44 +26,54 @@ _MOST_LOOK_ALIKES = 3
 _POSITION = re.compile(rf"{POSITION_MARK}\s+([0-9]{{1,5}})\s+([0-9a-f]{{36}})$", re.IGNORECASE)
 
 
-def parse(text: str) -> tuple[Program, list[Diagnostic]]:
+def parse(text: str) -> tuple[ProgramTree, list[Diagnostic]]:
     """The tree of a program and what is wrong with single lines of it, in the order of the text. Never raises."""
-    return _Parser(text).program()
+    written = list(split_lines(text))
+    parser = Parser([content for content, _ in written])
+    lines: list[SourceLine] = []
+    start = 0
+    for number, (content, end) in enumerate(written):
+        lines.append(parser.line(number, start))
+        start += len(content) + len(end)
+    return ProgramTree(tuple(lines)), parser.diagnostics
 
 
-class _Parser:
-    def __init__(self, text: str) -> None:
-        self._text = text
-        self._diagnostics: list[Diagnostic] = []
+class Parser:
+    """Reads the lines of one text, given without their ends, in their order. What is wrong goes into ``diagnostics``.
+
+    A sound line depends on no other, so it may be left out by who has read it before, unless it is ``in_comment``: inside a
+    comment of another language, begun with ``/*``, nothing is a statement.
+    """
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        self._lines = lines
+        self.diagnostics: list[Diagnostic] = []
+        self.in_comment = False
         self._near = NearMiss()
         self._jumps: frozenset[str] | None = None
-        self._comment_ends = 0
-        """Where a comment of another language ends that was begun with ``/*``."""
+        self._last_end: int | None = None
+        """The last line in which a comment begun with ``/*`` could end."""
 
-    def program(self) -> tuple[Program, list[Diagnostic]]:
-        lines: list[Line] = []
-        start = 0
-        for line, end in split_lines(self._text):
-            lines.append(self._line(line.rstrip(_BLANKS), start))
-            start += len(line) + len(end)
-        return Program(tuple(lines)), self._diagnostics
-
-    def _line(self, content: str, start: int) -> Line:
+    def line(self, number: int, start: int) -> SourceLine:
+        """Read a line, counted from 0. ``start`` is where it begins, so that its nodes know their places."""
+        content = self._lines[number].rstrip(_BLANKS)
         code, slashes, _ = content.partition("//")
         end = start + len(content)
         comment = Comment(start + len(code), end, content[len(code) :]) if slashes else None
         words = tokens(code, start)
-        if words and start < self._comment_ends:
-            return Line(start, end, Broken(words[0].start, words[-1].end, code.strip(_BLANKS)), comment)
-        if words:
-            return Line(start, end, self._statement(words, code, start), comment)
+        if self.in_comment:
+            self.in_comment = "*/" not in content
+            if words:
+                return SourceLine(start, end, Broken(words[0].start, words[-1].end, code.strip(_BLANKS)), comment)
+        elif words:
+            return SourceLine(start, end, self._statement(number, words, code, start), comment)
         if comment and comment.text.startswith("//!"):
-            record = _record(comment, self._diagnostics)
+            record = _record(comment, self.diagnostics)
             if record is not None:
-                return Line(start, end, record, None)
-        return Line(start, end, None, comment)
+                return SourceLine(start, end, record, None)
+        return SourceLine(start, end, None, comment)
 
-    def _statement(self, words: list[Token], code: str, start: int) -> Statement:
+    def _statement(self, number: int, words: list[Lexeme], code: str, start: int) -> Statement:
         found: list[Diagnostic] = []
         plain = self._without_look_alikes(words, code, start)
         reader = StatementReader(words if plain is None else tokens(plain, start) or words, self._near, found)
@@ -72,18 +82,18 @@ class _Parser:
             statement = reader.statement()
         except Rejected as rejected:
             if plain is None:
-                keyword, label = self._reject(rejected.diagnostic, words, code, start)
+                keyword, label = self._reject(rejected.diagnostic, number, words, code, start)
         else:
             if plain is None:
-                self._diagnostics += found
+                self.diagnostics += found
                 return statement
         text = code.strip(_BLANKS)
         target = reader.target
         if target is None and (name := declared(words)) is not None:
-            target = Name(name.start, name.end, name.text, name.text.upper())
+            target = Identifier(name.start, name.end, name.text, name.text.upper())
         return Broken(words[0].start, words[-1].end, text, keyword or reader.keyword, target, label)
 
-    def _without_look_alikes(self, words: list[Token], code: str, start: int) -> str | None:
+    def _without_look_alikes(self, words: list[Lexeme], code: str, start: int) -> str | None:
         """The line as it is meant, after reporting characters that only look like those of WBC; None where there are none."""
         strange = [word for word in words if word.kind == STRANGE and word.text in LOOK_ALIKES]
         if not strange:
@@ -92,24 +102,28 @@ class _Parser:
             what, meant = LOOK_ALIKES[word.text]
             shown = f"{word.text} (U+{ord(word.text):04X})" if word.text.isprintable() else f"U+{ord(word.text):04X}"
             hint = f"write {meant}" if meant.strip() else "write a blank" if meant else "remove it"
-            self._diagnostics.append(f.ILLEGAL_CHARACTER.at(word, f"{shown} is {what}", hint, fix=meant))
+            self.diagnostics.append(f.ILLEGAL_CHARACTER.at(word, f"{shown} is {what}", hint, fix=meant))
         return "".join(LOOK_ALIKES.get(character, ("", character))[1] for character in code)
 
-    def _reject(self, found: Diagnostic, words: list[Token], code: str, start: int) -> tuple[str | None, Name | None]:
+    def _reject(
+        self, found: Diagnostic, number: int, words: list[Lexeme], code: str, start: int
+    ) -> tuple[str | None, Identifier | None]:
         """Report a refused line; the keyword and the label that were meant, where they are known."""
         if len(code) > _LONGEST_EXPLAINED:
-            self._diagnostics.append(found)
+            self.diagnostics.append(found)
             return None, None
         if self._jumps is None:
-            self._jumps = frozenset(match[1].upper() for match in _JUMP.finditer(self._text))
+            self._jumps = frozenset(match[1].upper() for line in self._lines if (match := _JUMP.match(line)))
         advice, keyword = explain(ForeignLine(words, code, start, self._jumps, self._reads), found)
-        self._diagnostics.append(advice)
+        self.diagnostics.append(advice)
         opened = code.find("/*")
-        if opened >= 0 and "*/" not in code[opened:]:
-            self._comment_ends = self._text.find("*/", start + len(code)) + 1
+        if opened >= 0 and "*/" not in code[opened:] and "*/" not in self._lines[number][len(code) :]:
+            if self._last_end is None:
+                self._last_end = max((n for n, line in enumerate(self._lines) if "*/" in line), default=-1)
+            self.in_comment = number < self._last_end
         if keyword == LABEL:
             name = words[-1]
-            return None, Name(name.start, name.end, name.text, name.text.upper())
+            return None, Identifier(name.start, name.end, name.text, name.text.upper())
         return keyword, None
 
     def _reads(self, text: str) -> bool:
@@ -124,7 +138,7 @@ def _record(comment: Comment, diagnostics: list[Diagnostic]) -> Statement | None
     """The raw data that decompiling leaves in comments a vendor tool skips; None for any other comment."""
     text = comment.text
     if match := _RECORD.match(text):
-        return Record(comment.start, comment.end, bytes.fromhex(match[1]))
+        return ImageRecord(comment.start, comment.end, bytes.fromhex(match[1]))
     if match := _POSITION.match(text):
         return PositionRecord(comment.start, comment.end, int(match[1]), bytes.fromhex(match[2]))
     word = text.split(None, 1)[0].lower()

@@ -23,7 +23,7 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True)
-class Number(Node):
+class DecimalNumber(Node):
     """``20,5`` or ``-20.5``: the text as written, without blanks, and its value."""
 
     text: str
@@ -31,7 +31,7 @@ class Number(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Name(Node):
+class Identifier(Node):
     """A register, constant, variable, label, function or predefined name as written; ``key`` is it in upper case."""
 
     text: str
@@ -42,14 +42,14 @@ class Name(Node):
 class Position(Node):
     """``@name``."""
 
-    name: Name
+    name: Identifier
 
 
-Value: TypeAlias = Number | Name
+Value: TypeAlias = DecimalNumber | Identifier
 
 
 @dataclass(frozen=True, slots=True)
-class Condition(Node):
+class Relation(Node):
     left: Value
     comparison: str
     right: Value
@@ -63,20 +63,20 @@ class Binary(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Call(Node):
-    function: Name
+class FunctionCall(Node):
+    function: Identifier
     arguments: tuple[Value, ...]
 
 
-Expression: TypeAlias = Value | Binary | Call
-Operand: TypeAlias = Value | Position | Condition
+Expression: TypeAlias = Value | Binary | FunctionCall
+Operand: TypeAlias = Value | Position | Relation
 
 
 @dataclass(frozen=True, slots=True)
-class Constant(Node):
+class ConstantDefinition(Node):
     """``#name value``."""
 
-    name: Name
+    name: Identifier
     value: Value
 
 
@@ -84,20 +84,20 @@ class Constant(Node):
 class Label(Node):
     """``NAME:``."""
 
-    name: Name
+    name: Identifier
 
 
 @dataclass(frozen=True, slots=True)
 class Assign(Node):
-    """``SET target = value``; ``has_set`` tells whether the word SET was written."""
+    """``SET target = value``; ``has_set``: the word SET was written."""
 
     has_set: bool
-    target: Name
+    target: Identifier
     value: Expression
 
 
 @dataclass(frozen=True, slots=True)
-class Command(Node):
+class KeywordStatement(Node):
     """Any other statement: its keyword in upper case and its operands as the statement table lists them."""
 
     keyword: str
@@ -105,7 +105,7 @@ class Command(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Record(Node):
+class ImageRecord(Node):
     """``//!record`` and 32 hexadecimal digits: a record of a compiled image that is not a known statement."""
 
     data: bytes
@@ -126,11 +126,11 @@ class Broken(Node):
 
     text: str
     keyword: str | None = None
-    target: Name | None = None
-    label: Name | None = None
+    target: Identifier | None = None
+    label: Identifier | None = None
 
 
-Statement: TypeAlias = Constant | Label | Assign | Command | Record | PositionRecord | Broken
+Statement: TypeAlias = ConstantDefinition | Label | Assign | KeywordStatement | ImageRecord | PositionRecord | Broken
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,11 +141,11 @@ class Comment(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Line(Node):
+class SourceLine(Node):
     statement: Statement | None
     comment: Comment | None
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
-    lines: tuple[Line, ...]
+class ProgramTree:
+    lines: tuple[SourceLine, ...]

@@ -12,7 +12,7 @@ from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
-from steptwin.wbc.events import BY_REGISTER, INPUTS, Event
+from steptwin.wbc.events import BY_REGISTER, INPUTS, InterruptEvent
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.real import real_text
 from steptwin.wbc.statements import CIRCLES, LINES
@@ -43,14 +43,14 @@ def sources(step: s.Step) -> Iterable[s.Source]:
     return _SOURCES[type(step)](step)
 
 
-def _of_value(step: s.Set) -> tuple[s.Source, ...]:
+def _of_value(step: s.SetStep) -> tuple[s.Source, ...]:
     value = step.value
     if isinstance(value, s.Operation):
         return value.left, value.right
-    return value.arguments if isinstance(value, s.Function) else (value,)
+    return value.arguments if isinstance(value, s.FunctionOperation) else (value,)
 
 
-def _of_condition(step: s.If | s.While | s.Wait) -> tuple[s.Source, ...]:
+def _of_condition(step: s.IfStep | s.WhileStep | s.WaitStep) -> tuple[s.Source, ...]:
     return step.condition.left, step.condition.right
 
 
@@ -59,13 +59,15 @@ _SOURCES: Mapping[type[s.Step], Callable[[Any], tuple[s.Source, ...]]] = complet
     s.STEPS,
     "sources",
     {
-        s.Set: _of_value,
-        **dict.fromkeys((s.If, s.While, s.Wait), _of_condition),
-        s.Motion: lambda step: (step.value,),
-        **dict.fromkeys((s.Delay, s.Pulse), lambda step: (step.seconds,)),
-        s.RowMotion: lambda step: (step.row,),
-        **dict.fromkeys((s.Else, s.EndIf, s.EndWhile, s.Jump, s.Return, s.End, s.ProgReset), lambda step: ()),
-        **dict.fromkeys((s.Halt, s.WaitPos, s.Entry, s.Illegal), lambda step: ()),
+        s.SetStep: _of_value,
+        **dict.fromkeys((s.IfStep, s.WhileStep, s.WaitStep), _of_condition),
+        s.MotionStep: lambda step: (step.value,),
+        **dict.fromkeys((s.DelayStep, s.PulseStep), lambda step: (step.seconds,)),
+        s.RowMotionStep: lambda step: (step.row,),
+        **dict.fromkeys(
+            (s.ElseStep, s.EndIfStep, s.EndWhileStep, s.JumpStep, s.ReturnStep, s.EndStep, s.ProgResetStep), lambda step: ()
+        ),
+        **dict.fromkeys((s.HaltStep, s.WaitPosStep, s.InterruptStep, s.IllegalStep), lambda step: ()),
     },
 )
 
@@ -74,13 +76,13 @@ def endless_waits(executable: s.Executable) -> list[Diagnostic]:
     return [
         f.NEVER_ENDS.at(step, "this WAIT never ends: its condition is never true", _domain_hint(step.condition))
         for step in executable.steps
-        if isinstance(step, s.Wait) and outcome(step.condition) is False
+        if isinstance(step, s.WaitStep) and outcome(step.condition) is False
     ]
 
 
-def _domain_hint(condition: s.Comparison) -> str | None:
+def _domain_hint(condition: s.StepCondition) -> str | None:
     for side in (condition.left, condition.right):
-        if isinstance(side, s.Register):
+        if isinstance(side, s.RegisterOperand):
             return f"{side.name} reads {side.row.reads}"
     return None
 
@@ -100,9 +102,9 @@ def axes_never_enabled(executable: s.Executable, positions: PositionTable | None
     return found
 
 
-def _register_writes(executable: s.Executable) -> Iterator[tuple[s.Register, s.Set]]:
+def _register_writes(executable: s.Executable) -> Iterator[tuple[s.RegisterOperand, s.SetStep]]:
     for step in executable.steps:
-        if isinstance(step, s.Set) and isinstance(step.target, s.Register):
+        if isinstance(step, s.SetStep) and isinstance(step.target, s.RegisterOperand):
             yield step.target, step
 
 
@@ -113,14 +115,14 @@ def _is_zero(value: object) -> bool:
 def _moved(step: s.Step, positions: PositionTable | None) -> tuple[int, ...]:
     """The drives a step moves, as far as they are known."""
     match step:
-        case s.Motion(axis=axis):
+        case s.MotionStep(axis=axis):
             return (axis,)
-        case s.RowMotion(keyword="MOVEPTP", row=s.Literal(value=index)):
+        case s.RowMotionStep(keyword="MOVEPTP", row=s.Literal(value=index)):
             if positions is None or not index < len(positions.rows):
                 return ()
             mask = positions.rows[int(index)].mask
             return tuple(axis for axis in range(1, 5) if mask & 1 << axis - 1)
-        case s.RowMotion(keyword=keyword) if keyword != "MOVEPTP":
+        case s.RowMotionStep(keyword=keyword) if keyword != "MOVEPTP":
             return _PLANAR_AXES
         case _:
             return ()
@@ -130,7 +132,7 @@ def homing_sides(steps: Sequence[s.Step]) -> dict[int, frozenset[int]]:
     """The drives a program homes, each with the sides it goes to: -1 KL, 1 KR, 0 where the velocity is not known before."""
     sides: dict[int, frozenset[int]] = {}
     for step in steps:
-        if isinstance(step, s.Motion) and step.keyword == "HOME":
+        if isinstance(step, s.MotionStep) and step.keyword == "HOME":
             sides[step.axis] = sides.get(step.axis, frozenset()) | _signs(step.value, steps)
     return sides
 
@@ -139,7 +141,7 @@ def _signs(source: s.Source, steps: Sequence[s.Step]) -> frozenset[int]:
     """Signs a value can have; 0 where that is not known, none for the number 0."""
     if isinstance(source, s.Literal):
         return frozenset({1 if source.value > 0 else -1}) if source.value else frozenset()
-    values = [step.value for step in steps if isinstance(step, s.Set) and step.target == source]
+    values = [step.value for step in steps if isinstance(step, s.SetStep) and step.target == source]
     if isinstance(source, s.Variable) and values and all(isinstance(value, s.Literal) for value in values):
         return frozenset().union(*(_signs(value, steps) for value in values if isinstance(value, s.Literal)))
     return frozenset({0})
@@ -149,7 +151,7 @@ def homing_without_end(executable: s.Executable, setup: Setup) -> list[Diagnosti
     """HOMEs to a side for which the configuration has no input."""
     found: list[Diagnostic] = []
     for step in executable.steps:
-        if not isinstance(step, s.Motion) or step.keyword != "HOME":
+        if not isinstance(step, s.MotionStep) or step.keyword != "HOME":
             continue
         signs = _signs(step.value, executable.steps)
         to_kl, to_kr = setup.homing_ends[step.axis - 1]
@@ -169,9 +171,9 @@ def too_fast(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
     """Velocities, known before, that are more than the pulse outputs give."""
     found: list[Diagnostic] = []
     for step in executable.steps:
-        if isinstance(step, s.Motion) and step.keyword in ("VABS", "HOME"):
+        if isinstance(step, s.MotionStep) and step.keyword in ("VABS", "HOME"):
             axis, value = step.axis, step.value
-        elif isinstance(step, s.Set) and isinstance(step.target, s.Register) and step.target.row.key == "VMAXM":
+        elif isinstance(step, s.SetStep) and isinstance(step.target, s.RegisterOperand) and step.target.row.key == "VMAXM":
             axis, value = step.target.number, step.value
         else:
             continue
@@ -189,8 +191,8 @@ def too_fast(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
 def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic]:
     """Interrupts switched on that have no label, and labels whose interrupt nothing switches on."""
     found: list[Diagnostic] = []
-    switched_on: set[Event] = set()
-    told: set[Event] = set()
+    switched_on: set[InterruptEvent] = set()
+    told: set[InterruptEvent] = set()
     for register, step in _register_writes(executable):
         event = BY_REGISTER.get(register.name.upper())
         if event is None or _is_zero(step.value):
@@ -205,7 +207,7 @@ def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic
             if event.input > INPUTS:
                 hint = f"the controller has the inputs IN1…IN{INPUTS}"
             elif event.register is None:
-                hint = f"IN{event.input} interrupts only when the configuration says so (Int)"
+                hint = f"IN{event.input} interrupts only if the configuration enables it (Int)"
             else:
                 hint = f"set {event.register} to enable it"
             message = f"the interrupt of {event.name} is never enabled"
@@ -213,7 +215,7 @@ def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic
     return found
 
 
-def _stays_off(event: Event, setup: Setup | None) -> bool:
+def _stays_off(event: InterruptEvent, setup: Setup | None) -> bool:
     """Whether an interrupt the program does not enable is off: inputs can be preset by the configuration."""
     if event.input == 0 or event.input > INPUTS:
         return True
@@ -222,7 +224,7 @@ def _stays_off(event: Event, setup: Setup | None) -> bool:
 
 def unequal_axes(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
     """The first circle when the gears of M1 and M2 differ, the first line when their ramps do."""
-    paths = [step for step in executable.steps if isinstance(step, s.RowMotion)]
+    paths = [step for step in executable.steps if isinstance(step, s.RowMotionStep)]
     circle = next((step for step in paths if step.keyword in CIRCLES), None)
     line = next((step for step in paths if step.keyword in LINES), None)
     written = (register for register, _ in _register_writes(executable))

@@ -17,7 +17,7 @@ from steptwin.state import Plain, Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, exception_pdu
-from steptwin.wire.slave import Direction, FrameObserver, SlavePort, tcp_response
+from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort, tcp_response
 from steptwin.wire.timed import TimedUnits
 
 QUEUE_REQUESTS = 16
@@ -138,7 +138,7 @@ class GatewayPort(SlavePort):
         self._gateway.requeue(self)
 
     def close(self) -> None:
-        """The connection is gone, and with it the requests that wait."""
+        """The connection is closed; its waiting requests are dropped."""
         self.waiting.clear()
         self._gateway.requeue(self)
 
@@ -170,7 +170,7 @@ class GatewayPort(SlavePort):
             moment, response = self._responses.pop(0)
             out.append((moment, response))
             if self.on_frame is not None:
-                self.on_frame(moment, Direction.OUT, response)
+                self.on_frame(moment, FrameDirection.OUT, response)
         return out
 
     def deadline(self) -> Nanos | None:
@@ -199,7 +199,7 @@ class TcpGatewayPort(GatewayPort):
         requests = [frame.raw for frame in self._framer.feed(data)]
         if self.on_frame is not None:
             for raw in requests:
-                self.on_frame(now, Direction.IN, raw)
+                self.on_frame(now, FrameDirection.IN, raw)
         return requests
 
     def _addressed(self, raw: bytes) -> tuple[tuple[int, ...], bytes]:
@@ -247,7 +247,7 @@ class ScriptPort(GatewayPort):
 
     def on_line(self, raw: bytes, moment: Nanos) -> None:
         if self.on_frame is not None:
-            self.on_frame(moment, Direction.IN, raw)
+            self.on_frame(moment, FrameDirection.IN, raw)
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         for frame in self._framer.expire(now):

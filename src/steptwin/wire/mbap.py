@@ -15,7 +15,6 @@ from steptwin.wire.pdu import MAX_PDU
 
 HEADER_BYTES = 7
 MIN_LENGTH = 2
-MAX_LENGTH = MAX_PDU + 1
 """Of unit and PDU together, as the header states it."""
 MAX_FRAME = HEADER_BYTES + MAX_PDU
 LONGEST_LENGTH = 1 + 6 + 255

@@ -84,7 +84,7 @@ class BadResponse(LineFailure):
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class ReadRequest:
     """Request 01, 02 or 03."""
 
     function: int
@@ -93,7 +93,7 @@ class Read:
 
 
 @dataclass(frozen=True, slots=True)
-class WriteCoil:
+class WriteCoilRequest:
     """Request 05, and its response, which repeats it."""
 
     function: ClassVar[int] = WRITE_SINGLE_COIL
@@ -102,7 +102,7 @@ class WriteCoil:
 
 
 @dataclass(frozen=True, slots=True)
-class WriteRegister:
+class WriteRegisterRequest:
     """Request 06, and its response, which repeats it."""
 
     function: ClassVar[int] = WRITE_SINGLE_REGISTER
@@ -111,7 +111,7 @@ class WriteRegister:
 
 
 @dataclass(frozen=True, slots=True)
-class WriteRegisters:
+class WriteRegistersRequest:
     """Request 16."""
 
     function: ClassVar[int] = WRITE_MULTIPLE_REGISTERS
@@ -120,7 +120,7 @@ class WriteRegisters:
 
 
 @dataclass(frozen=True, slots=True)
-class Bits:
+class BitsResponse:
     """Response 01 or 02. A frame carries whole bytes: ``packed`` has up to seven bits more than were asked for."""
 
     function: int
@@ -128,7 +128,7 @@ class Bits:
 
 
 @dataclass(frozen=True, slots=True)
-class Registers:
+class RegistersResponse:
     """Response 03."""
 
     function: ClassVar[int] = READ_HOLDING_REGISTERS
@@ -136,7 +136,7 @@ class Registers:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WriteResponse:
     """Response 16."""
 
     function: ClassVar[int] = WRITE_MULTIPLE_REGISTERS
@@ -145,15 +145,17 @@ class Written:
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class ExceptionResponse:
     """Exception response to ``function``."""
 
     function: int
     code: int
 
 
-Request: TypeAlias = Read | WriteCoil | WriteRegister | WriteRegisters
-Response: TypeAlias = Bits | Registers | WriteCoil | WriteRegister | Written | Refused
+Request: TypeAlias = ReadRequest | WriteCoilRequest | WriteRegisterRequest | WriteRegistersRequest
+Response: TypeAlias = (
+    BitsResponse | RegistersResponse | WriteCoilRequest | WriteRegisterRequest | WriteResponse | ExceptionResponse
+)
 
 
 def exception_pdu(function: int, code: int) -> bytes:
@@ -200,13 +202,13 @@ def _register_bytes(values: Sequence[int]) -> bytes:
 def encode_request(request: Request) -> bytes:
     """The PDU of a request; `Misuse` when a field is outside the protocol's range."""
     match request:
-        case Read(function, address, count):
+        case ReadRequest(function, address, count):
             if function not in READS:
                 raise Misuse(f"function {function_number(function)} does not read: permitted are 1, 2 and 3")
             bits = function in BIT_READS
             _check_span(address, count, MAX_BITS if bits else MAX_REGISTERS, "bits" if bits else "registers")
             return _THREE_FIELDS.pack(function, address, count)
-        case WriteRegisters(address, values):
+        case WriteRegistersRequest(address, values):
             _check_span(address, len(values), MAX_WRITTEN_REGISTERS, "registers")
             payload = _register_bytes(values)
             return _WRITE_HEAD.pack(WRITE_MULTIPLE_REGISTERS, address, len(values), len(payload)) + payload
@@ -227,7 +229,7 @@ def decode_request(pdu: bytes) -> Request:
         most = MAX_REGISTERS if function == READ_HOLDING_REGISTERS else MAX_BITS
         if not 1 <= count <= most:
             raise ModbusException(function, ILLEGAL_DATA_VALUE, f"quantity {count} is outside 1 to {most}")
-        return Read(function, address, count)
+        return ReadRequest(function, address, count)
     if function not in WRITES:
         raise ModbusException(function, ILLEGAL_FUNCTION)
     if function == WRITE_MULTIPLE_REGISTERS:
@@ -236,13 +238,13 @@ def decode_request(pdu: bytes) -> Request:
         raise _bad_length(function, len(pdu), 5)
     _, address, value = _THREE_FIELDS.unpack(pdu)
     if function == WRITE_SINGLE_REGISTER:
-        return WriteRegister(address, value)
+        return WriteRegisterRequest(address, value)
     if value not in (COIL_ON, COIL_OFF):
         raise ModbusException(function, ILLEGAL_DATA_VALUE, f"coil value {value:04X} is neither FF00 nor 0000")
-    return WriteCoil(address, value == COIL_ON)
+    return WriteCoilRequest(address, value == COIL_ON)
 
 
-def _decode_write_registers(pdu: bytes) -> WriteRegisters:
+def _decode_write_registers(pdu: bytes) -> WriteRegistersRequest:
     function = WRITE_MULTIPLE_REGISTERS
     if len(pdu) < 6:
         raise _bad_length(function, len(pdu), 8)
@@ -253,7 +255,7 @@ def _decode_write_registers(pdu: bytes) -> WriteRegisters:
         raise ModbusException(function, ILLEGAL_DATA_VALUE, f"byte count {byte_count} does not match {count} registers")
     if len(pdu) != 6 + byte_count:
         raise _bad_length(function, len(pdu), 6 + byte_count)
-    return WriteRegisters(address, struct.unpack_from(f">{count}H", pdu, 6))
+    return WriteRegistersRequest(address, struct.unpack_from(f">{count}H", pdu, 6))
 
 
 def _bad_length(function: int, length: int, wanted: int) -> ModbusException:
@@ -263,23 +265,23 @@ def _bad_length(function: int, length: int, wanted: int) -> ModbusException:
 def encode_response(response: Response) -> bytes:
     """The PDU of a response; `Misuse` when a field is outside the protocol's range."""
     match response:
-        case Bits(function, packed):
+        case BitsResponse(function, packed):
             if function not in BIT_READS:
                 raise Misuse(f"function {function_number(function)} does not answer with bits: permitted are 1 and 2")
             return bytes((function, _within("number of bytes", len(packed), 1, MAX_BITS // 8))) + packed
-        case Registers(values):
+        case RegistersResponse(values):
             count = _within("number of registers", len(values), 1, MAX_REGISTERS)
             return bytes((READ_HOLDING_REGISTERS, 2 * count)) + _register_bytes(values)
-        case WriteCoil(address, on):
+        case WriteCoilRequest(address, on):
             _within("address", address, 0, 0xFFFF)
             return _THREE_FIELDS.pack(WRITE_SINGLE_COIL, address, COIL_ON if on else COIL_OFF)
-        case WriteRegister(address, value):
+        case WriteRegisterRequest(address, value):
             _within("address", address, 0, 0xFFFF)
             return _THREE_FIELDS.pack(WRITE_SINGLE_REGISTER, address, _within("register value", value, 0, 0xFFFF))
-        case Written(address, count):
+        case WriteResponse(address, count):
             _check_span(address, count, MAX_WRITTEN_REGISTERS, "registers")
             return _THREE_FIELDS.pack(WRITE_MULTIPLE_REGISTERS, address, count)
-        case Refused(function, code):
+        case ExceptionResponse(function, code):
             return exception_pdu(_within("function", function, 1, 0x7F), _within("exception code", code, 1, 0xFF))
 
 
@@ -294,27 +296,27 @@ def decode_response(pdu: bytes) -> Response:
     if function & REFUSED:
         if len(pdu) != 2:
             raise _bad_response(pdu, 2)
-        return Refused(function & ~REFUSED, pdu[1])
+        return ExceptionResponse(function & ~REFUSED, pdu[1])
     if function in READS:
         if len(pdu) != 2 + pdu[1]:
             raise _bad_response(pdu, 2 + pdu[1])
         if function in BIT_READS:
-            return Bits(function, pdu[2:])
+            return BitsResponse(function, pdu[2:])
         if pdu[1] % 2:
             raise BadResponse(f"response to function 3 (03h) has an odd byte count: {pdu[1]}")
-        return Registers(struct.unpack_from(f">{pdu[1] // 2}H", pdu, 2))
+        return RegistersResponse(struct.unpack_from(f">{pdu[1] // 2}H", pdu, 2))
     if function not in WRITES:
         raise BadResponse(f"response to function {function_number(function)}, which is none of 1, 2, 3, 5, 6 and 16 (10h)")
     if len(pdu) != 5:
         raise _bad_response(pdu, 5)
     _, address, value = _THREE_FIELDS.unpack(pdu)
     if function == WRITE_MULTIPLE_REGISTERS:
-        return Written(address, value)
+        return WriteResponse(address, value)
     if function == WRITE_SINGLE_REGISTER:
-        return WriteRegister(address, value)
+        return WriteRegisterRequest(address, value)
     if value not in (COIL_ON, COIL_OFF):
         raise BadResponse(f"response to function 5 (05h) repeats the coil value {value:04X}, neither FF00 nor 0000")
-    return WriteCoil(address, value == COIL_ON)
+    return WriteCoilRequest(address, value == COIL_ON)
 
 
 def _bad_response(pdu: bytes, wanted: int) -> BadResponse:
@@ -328,14 +330,18 @@ def answer(request: Request, pdu: bytes) -> Response:
     """
     response = decode_response(pdu)
     match request, response:
-        case _, Refused(function, code) if function == request.function:
+        case _, ExceptionResponse(function, code) if function == request.function:
             raise ModbusException(function, code)
-        case Read(function, _, count), Bits(answered, packed) if function == answered and len(packed) == (count + 7) // 8:
+        case ReadRequest(function, _, count), BitsResponse(answered, packed) if (
+            function == answered and len(packed) == (count + 7) // 8
+        ):
             return response
-        case Read(function, _, count), Registers(values) if function == READ_HOLDING_REGISTERS and len(values) == count:
+        case ReadRequest(function, _, count), RegistersResponse(values) if (
+            function == READ_HOLDING_REGISTERS and len(values) == count
+        ):
             return response
-        case WriteRegisters(address, values), Written(written, count) if address == written and len(values) == count:
+        case WriteRegistersRequest(address, values), WriteResponse(written, count) if address == written and len(values) == count:
             return response
-        case ((WriteCoil() | WriteRegister()), _) if response == request:
+        case ((WriteCoilRequest() | WriteRegisterRequest()), _) if response == request:
             return response
     raise BadResponse(f"{response} does not answer {request}")

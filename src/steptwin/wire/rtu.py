@@ -68,7 +68,7 @@ _KNOWN = re.escape(bytes(sorted(_REQUEST_LENGTHS | _RESPONSE_LENGTHS)))
 _FRAME_START = re.compile(rb"[\x00-\xf7](?:[" + _KNOWN + rb"]|\Z)", re.DOTALL)
 
 
-class Role(enum.Enum):
+class FrameRole(enum.Enum):
     """What a frame is. A response that repeats its request (05, 06) is recognised only when the request was seen before."""
 
     REQUEST = "request"
@@ -80,7 +80,7 @@ class Role(enum.Enum):
 class RtuFrame(NamedTuple):
     raw: bytes
     """The whole frame with unit and CRC."""
-    role: Role
+    role: FrameRole
     end: int
     """How many bytes had been fed up to and with the last of this frame."""
     begin: Nanos = 0
@@ -213,7 +213,7 @@ class RtuFramer(Stateful):
         held = self.held
         while held:
             if self._is_one_unknown():
-                self._take(self._burst, len(held) - self._burst, Role.UNKNOWN, frames)
+                self._take(self._burst, len(held) - self._burst, FrameRole.UNKNOWN, frames)
                 self._drop(len(held))
                 break
             beginning = len(held)
@@ -274,10 +274,10 @@ class RtuFramer(Stateful):
         found = _FRAME_START.search(self.held, start)
         return len(self.held) if found is None else found.start()
 
-    def _take(self, start: int, length: int, role: Role, frames: list[RtuFrame]) -> None:
+    def _take(self, start: int, length: int, role: FrameRole, frames: list[RtuFrame]) -> None:
         raw = bytes(self.held[start : start + length])
         self._framed += length
-        self._asked = (raw[0], raw[1]) if role is Role.REQUEST else None
+        self._asked = (raw[0], raw[1]) if role is FrameRole.REQUEST else None
         first = self._fed - len(self.held) + start
         end = first + length
         begin, pause, before = None, 0, 0
@@ -301,23 +301,23 @@ class RtuFramer(Stateful):
         while pieces and pieces[0].first + pieces[0].size <= first:
             pieces.popleft()
 
-    def _look(self, start: int, *, waiting: bool) -> tuple[int, Role]:
+    def _look(self, start: int, *, waiting: bool) -> tuple[int, FrameRole]:
         """Length and role of the frame that begins at ``start``; length 0: it may still become one, -1: it cannot."""
         held = self.held
         unit = held[start]
         if unit > MAX_UNIT:
-            return _IMPOSSIBLE, Role.UNKNOWN
+            return _IMPOSSIBLE, FrameRole.UNKNOWN
         have = len(held) - start
         mine = unit == BROADCAST or unit in self._own
         request = _length(_REQUESTS, held, start)
         response = _IMPOSSIBLE if mine else _length(_RESPONSES, held, start)
-        first, first_role, second, second_role = request, Role.REQUEST, response, Role.RESPONSE
+        first, first_role, second, second_role = request, FrameRole.REQUEST, response, FrameRole.RESPONSE
         if not mine and have > 1 and self._asked == (unit, held[start + 1]):
-            first, first_role, second, second_role = response, Role.RESPONSE, request, Role.REQUEST
+            first, first_role, second, second_role = response, FrameRole.RESPONSE, request, FrameRole.REQUEST
         if first > have:
             # A short response can be the beginning of a longer request by chance; the next bytes or the gap decide.
             if waiting and first <= 8:
-                return 0, Role.UNKNOWN
+                return 0, FrameRole.UNKNOWN
         elif first > 0 and crc16(held[start : start + first]) == 0:
             # The CRC stays right when zeros follow: the shorter of two that both match is the frame.
             if 0 < second < first and crc16(held[start : start + second]) == 0:
@@ -325,4 +325,4 @@ class RtuFramer(Stateful):
             return first, first_role
         if 0 < second <= have and crc16(held[start : start + second]) == 0:
             return second, second_role
-        return (0 if max(first, second) > have else _IMPOSSIBLE), Role.UNKNOWN
+        return (0 if max(first, second) > have else _IMPOSSIBLE), FrameRole.UNKNOWN

@@ -15,7 +15,7 @@ from steptwin.state import Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import crc16, with_crc
 from steptwin.wire.line import SerialLine
-from steptwin.wire.pdu import GATEWAY_TARGET_FAILED, REFUSED, WRITE_MULTIPLE_REGISTERS, WRITES, exception_pdu
+from steptwin.wire.pdu import GATEWAY_TARGET_FAILED, READS, REFUSED, WRITE_MULTIPLE_REGISTERS, WRITES, exception_pdu
 
 _PLAIN = bytes(3)
 """Protocol 0 and a length below 256, in an MBAP header from its third byte."""
@@ -29,12 +29,12 @@ class Device(Protocol):
         ...
 
 
-class Direction(enum.Enum):
+class FrameDirection(enum.Enum):
     IN = "in"
     OUT = "out"
 
 
-FrameObserver: TypeAlias = Callable[[Nanos, Direction, bytes], None]
+FrameObserver: TypeAlias = Callable[[Nanos, FrameDirection, bytes], None]
 """Called with every whole frame as it is on the wire, foreign ones and broadcasts too."""
 
 PauseObserver: TypeAlias = Callable[[int, Nanos], None]
@@ -53,6 +53,15 @@ class SlavePort(Stateful):
 
     def __init__(self, on_frame: FrameObserver | None) -> None:
         self.on_frame = on_frame
+
+    @property
+    def rubbish(self) -> int:
+        """Bytes so far that belonged to no frame; 0 where such bytes end the connection."""
+        return 0
+
+    def is_lone_read(self, data: bytes) -> bool:
+        """Whether ``data`` is a whole read request, and nothing is held from before: once answered, the port is as it was."""
+        return False
 
     def close(self) -> None:
         """Nothing is kept that would have to be given up."""
@@ -149,6 +158,10 @@ class RtuSlavePort(SlavePort):
         """Bytes received so far that belonged to no frame."""
         return self._framer.rubbish
 
+    def is_lone_read(self, data: bytes) -> bool:
+        is_whole = len(data) == 8 and not self._held and self._line is None
+        return is_whole and data[0] in self._devices and data[1] in READS and crc16(data) == 0
+
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         # Nearly always one whole request comes alone; this is that case without a framer.
         size = len(data)
@@ -161,8 +174,8 @@ class RtuSlavePort(SlavePort):
                     response = data[:1] + device.execute(data[1:-2], now)
                     response += crc16(response).to_bytes(2, "little")
                     if self.on_frame is not None:
-                        self.on_frame(now, Direction.IN, data)
-                        self.on_frame(now, Direction.OUT, response)
+                        self.on_frame(now, FrameDirection.IN, data)
+                        self.on_frame(now, FrameDirection.OUT, response)
                     return response
         begin = now if self._line is None else now - self._line.duration(size)
         return self._execute(self._framer.feed(data, begin, now), now)
@@ -172,9 +185,9 @@ class RtuSlavePort(SlavePort):
         for frame in frames:
             response = execute_frame(self._devices, frame, now)
             if self.on_frame is not None:
-                self.on_frame(now, Direction.IN, frame.raw)
+                self.on_frame(now, FrameDirection.IN, frame.raw)
                 if response:
-                    self.on_frame(now, Direction.OUT, response)
+                    self.on_frame(now, FrameDirection.OUT, response)
             if frame.pause and (frame.unit == rtu.BROADCAST or frame.unit in self._devices):
                 self._pauses.served(frame, now)
             responses.append(response)
@@ -196,7 +209,7 @@ class TcpSlavePort(SlavePort):
     and closes the connection.
     """
 
-    __slots__ = ("_devices", "_framer")
+    __slots__ = ("_devices", "_framer", "broken")
     FIXED = frozenset({"_devices"}) | SlavePort.FIXED
 
     def __init__(self, devices: Mapping[int, Device], *, on_frame: FrameObserver | None = None) -> None:
@@ -207,11 +220,13 @@ class TcpSlavePort(SlavePort):
             (device,) = devices.values()
             self._devices[0] = self._devices[255] = device
         self._framer = mbap.TcpFramer()
-
-    @property
-    def broken(self) -> str | None:
+        self.broken: str | None = None
         """Why the connection has to be closed, or None."""
-        return self._framer.broken
+
+    def is_lone_read(self, data: bytes) -> bool:
+        framer = self._framer
+        is_whole = len(data) == 12 and data[2:5] == _PLAIN and data[5] == 6 and not framer.held and not framer.broken
+        return is_whole and data[7] in READS
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         # Nearly always one whole request comes alone; this is that case without a framer.
@@ -222,7 +237,9 @@ class TcpSlavePort(SlavePort):
             if device is not None and self.on_frame is None:
                 pdu = device.execute(data[7:], now)
                 return data[:4] + (len(pdu) + 1).to_bytes(2, "big") + data[6:7] + pdu
-        return b"".join([self._answer(frame.raw, now) for frame in framer.feed(data)])
+        frames = framer.feed(data)
+        self.broken = framer.broken
+        return b"".join([self._answer(frame.raw, now) for frame in frames])
 
     def _answer(self, raw: bytes, now: Nanos) -> bytes:
         unit, pdu = raw[6], raw[7:]
@@ -235,9 +252,9 @@ class TcpSlavePort(SlavePort):
         else:
             response = tcp_response(raw, exception_pdu(pdu[0], GATEWAY_TARGET_FAILED))
         if self.on_frame is not None:
-            self.on_frame(now, Direction.IN, raw)
+            self.on_frame(now, FrameDirection.IN, raw)
             if response:
-                self.on_frame(now, Direction.OUT, response)
+                self.on_frame(now, FrameDirection.OUT, response)
         return response
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:

@@ -18,7 +18,7 @@ from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import CharacterClock, SerialLine
 from steptwin.wire.pdu import REFUSED, WRITES
-from steptwin.wire.slave import Device, Direction, FrameObserver, PauseObserver, PauseReports, SlavePort, check_units
+from steptwin.wire.slave import Device, FrameDirection, FrameObserver, PauseObserver, PauseReports, SlavePort, check_units
 
 # MIC-32: the highest rate the manual gives.
 FRAME_INTERVAL_NS: Nanos = 10 * MILLISECOND
@@ -167,7 +167,7 @@ class TimedRtuSlavePort(SlavePort):
             moment, response = self._responses.popleft()
             out.append((moment, response))
             if self.on_frame is not None:
-                self.on_frame(moment, Direction.OUT, response)
+                self.on_frame(moment, FrameDirection.OUT, response)
         return out
 
     def deadline(self) -> Nanos | None:
@@ -199,7 +199,7 @@ class TimedRtuSlavePort(SlavePort):
     def _arrive(self, moment: Nanos) -> None:
         _, frame = self._arriving.popleft()
         if self.on_frame is not None:
-            self.on_frame(moment, Direction.IN, frame.raw)
+            self.on_frame(moment, FrameDirection.IN, frame.raw)
         for unit in self._units.addressed(frame.unit, frame.raw[1]):
             if frame.begin < max(self._units.busy_until((unit,)), self._outgoing.end):
                 self.dropped += 1

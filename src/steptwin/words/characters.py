@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from steptwin.m1486.chip import Event
-from steptwin.m1486.commands import Kind, find, grouped
+from steptwin.m1486.commands import ArgType, find, grouped
 from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.registers import UPLOADS
-from steptwin.m1486.syntax import Command, Condition, parse_line
+from steptwin.m1486.syntax import Command, JumpCondition, parse_line
 from steptwin.m1486.variants import Variant
 from steptwin.machine import Nanos
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 from steptwin.words.frames import FrameLine
 
 LONGEST_LINE = 256
@@ -25,7 +24,7 @@ REPORTS = {
     EMPTY: "the input buffer is empty",
     THREE_FREE: "three places are free in the input buffer",
 }
-"""What chips say by themselves."""
+"""What chips send unasked."""
 
 
 class CharacterLog:
@@ -36,18 +35,16 @@ class CharacterLog:
         self._uploads: deque[tuple[int, str]] = deque(maxlen=UPLOADS_WAITING)
         self.sinks: list[Callable[[FrameLine], None]] = []
 
-    def upload(self, event: Event) -> None:
-        """A chip says that it sends a byte; it comes over the line later. ``event`` reads ``U1 sends 80H``."""
-        command, _, byte = event.text.split()
-        number = int(command[1:])
-        self._uploads.append((int(byte[:2], 16), f"{command} {UPLOADS.get(number, 'reserved')}"))
+    def upload(self, command: int, byte: int) -> None:
+        """A chip announces the byte that it sends for ``U<command>``; it comes over the line later."""
+        self._uploads.append((byte, f"U{command} {UPLOADS.get(command, 'reserved')}"))
 
     def received(self, now: Nanos, link: str, raw: bytes) -> None:
         """What a host typed up to CR."""
-        self._tell(FrameLine(now, link, Direction.IN, raw, _typed(raw, self._variant)))
+        self._report(FrameLine(now, link, FrameDirection.IN, raw, _typed(raw, self._variant)))
 
     def sent(self, now: Nanos, byte: int) -> None:
-        self._tell(FrameLine(now, "line", Direction.OUT, bytes((byte,)), self._sent(byte)))
+        self._report(FrameLine(now, "line", FrameDirection.OUT, bytes((byte,)), self._sent(byte)))
 
     def _sent(self, byte: int) -> str:
         upload = next((i for i, (announced, _) in enumerate(self._uploads) if announced == byte), None)
@@ -61,7 +58,7 @@ class CharacterLog:
             return f"{chr(~byte & 0xFF)!r} inverted: it took one of the last three places of the input buffer"
         return f"echo of {chr(byte)!r}"
 
-    def _tell(self, line: FrameLine) -> None:
+    def _report(self, line: FrameLine) -> None:
         for sink in self.sinks:
             sink(line)
 
@@ -98,7 +95,7 @@ def _typed(raw: bytes, variant: Variant) -> str:
 def in_words(command: Command, variant: Variant) -> str:
     """``Forward 12 800 min. microsteps``."""
     argument = command.argument
-    if isinstance(argument, Condition):
+    if isinstance(argument, JumpCondition):
         what = "line" if argument.line < 80 else "flag"
         return f"If {what} {argument.line} is {'high' if argument.high else 'low'} go to {argument.label}"
     spec = find(command.key, argument, variant)
@@ -108,5 +105,5 @@ def in_words(command: Command, variant: Variant) -> str:
         return "out of range"
     if argument is None:
         return spec.name
-    number = f"{argument:X}" if spec.kind is Kind.ADDRESS else grouped(argument)
+    number = f"{argument:X}" if spec.kind is ArgType.ADDRESS else grouped(argument)
     return f"{spec.name} {number} {spec.unit}".rstrip()

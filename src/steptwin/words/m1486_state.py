@@ -1,21 +1,21 @@
-"""An M1486 chip as plain data and in words, for people who look at it."""
+"""An M1486 chip as plain data and in words."""
 
 from __future__ import annotations
 
-from steptwin.m1486.chip import M1486
-from steptwin.m1486.drive import Motion
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.drive import MotionMode
 from steptwin.m1486.encoding import decode
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.m1486.program import Waiting
+from steptwin.m1486.program import WaitReason
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.syntax import Command
 from steptwin.machine import SECOND, Nanos
 
-_MOTIONS = {Motion.MOVE: "move", Motion.ENDLESS: "endless move", Motion.SEEK: "seek"}
+_MOTIONS = {MotionMode.MOVE: "move", MotionMode.ENDLESS: "endless move", MotionMode.SEEK: "seek"}
 
 
-def program_words(chip: M1486, now: Nanos) -> str:
+def program_words(chip: M1486Chip, now: Nanos) -> str:
     """What the program of a chip does."""
     program = chip.program
     if chip.is_shut_down:
@@ -26,16 +26,16 @@ def program_words(chip: M1486, now: Nanos) -> str:
         return "stopped by LIMIT"
     if program.is_halted:
         return "halted"
-    if program.waiting is Waiting.MOTION:
+    if program.waiting is WaitReason.MOTION:
         return f"waits for the end of the {_MOTIONS.get(chip.drive.motion, 'motion')}"
-    if program.waiting is Waiting.LINE:
+    if program.waiting is WaitReason.LINE:
         return f"waits until B{program.line} is {'high' if program.line_level else 'low'}"
     if program.ready - now > program.statement_ns:
         return f"waits {(program.ready - now) / SECOND:.3f} s more"
     return "has nothing to do" if program.is_at_end else "runs"
 
 
-def next_command(chip: M1486) -> Command | None:
+def next_command(chip: M1486Chip) -> Command | None:
     """The command the program stands before, None at the end of what is stored."""
     if chip.program.is_at_end or chip.program.pc == chip.memory.end:
         return None
@@ -43,27 +43,27 @@ def next_command(chip: M1486) -> Command | None:
     return None if stored is None else stored.command
 
 
-def used_bits(chip: M1486) -> int:
+def used_bits(chip: M1486Chip) -> int:
     """Command memory written since the program's beginning; all of it once the ring has come round (M-12)."""
     memory = chip.memory
     return 8 * (memory.size if memory.begin is None else memory.age(memory.begin))
 
 
-def velocity(chip: M1486, now: Nanos) -> float:
+def velocity(chip: M1486Chip, now: Nanos) -> float:
     """Commanded velocity in full steps per second."""
-    return 0.0 if chip.drive.motion is Motion.REST else chip.drive.profile.velocity(now) / FULL_STEP
+    return 0.0 if chip.drive.motion is MotionMode.REST else chip.drive.profile.velocity(now) / FULL_STEP
 
 
-def functions_on(chip: M1486) -> list[int]:
+def functions_on(chip: M1486Chip) -> list[int]:
     return [number for number in FUNCTIONS if chip.unit.on(number)]
 
 
-def flags_on(chip: M1486) -> list[int]:
+def flags_on(chip: M1486Chip) -> list[int]:
     flags = [number for number, on in zip(USER_FLAGS, chip.unit.flags, strict=True) if on]
     return [*flags, CARRY] if chip.unit.carry else flags
 
 
-def state_of(chip: M1486, now: Nanos) -> dict[str, object]:
+def state_of(chip: M1486Chip, now: Nanos) -> dict[str, object]:
     """Everything a person asks for, as plain data; positions in minimum microsteps, speeds in full steps per second."""
     drive, following = chip.drive, next_command(chip)
     return {

@@ -6,16 +6,13 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486
-from steptwin.m1486.pins import known_pin
-from steptwin.mic488.vision import Record as VisionRecord
 from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
 from steptwin.world.kernel import PinName
-from steptwin.world.lines import SCRIPTS, Line, ModbusLine
-from steptwin.world.master import ANSWER_NS, Master
-from steptwin.world.trace import Record
+from steptwin.world.lines import SCRIPTS
+from steptwin.world.master import ANSWER_NS
+from steptwin.world.trace import TraceRecord
 
 if TYPE_CHECKING:
     from steptwin.world.plant import Plant
@@ -64,12 +61,12 @@ def act(plant: Plant, what: Outside) -> None:
 
 
 def _record(plant: Plant, machine: str, what: str, value: object) -> None:
-    plant.trace.add(Record(plant.now, machine, "input", what, value))
+    plant.trace.add(TraceRecord(plant.now, machine, "input", what, value))
 
 
 def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, value in step.levels:
-        known = known_pin(pin) if isinstance(plant.machine(name), M1486) else pin
+        known = plant.input_pin(name, pin, value)
         kernel = plant.touch(name)
         kernel.give(PinName(name, known), value)
         kernel.settle()
@@ -101,30 +98,23 @@ def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
 
 def _write(plant: Plant, step: do.Write) -> None:
     for name, values in plant.by_machine(step):
-        device = plant.controller(name, "registers")
+        registers = plant.registers(name)
         kernel = plant.touch(name)
         on = plant.plan.line_of.get(name)
-        for pdu in plant.requests(device, values):
+        for pdu in plant.requests(name, values):
             if on is not None:
                 line, unit = on
-                master_of(line).ask(encode_frame(unit, pdu), ANSWER_NS, plant.now)
+                line.master.ask(encode_frame(unit, pdu), ANSWER_NS, plant.now)
             else:
                 _record(plant, name, "request", pdu)
-                device.execute(pdu, plant.now)
+                registers.execute(plant.machine(name), pdu, plant.now)
         kernel.settle()
-
-
-def master_of(line: Line) -> Master:
-    """The master of a line for scripts. `Misuse` for a line without one."""
-    if not isinstance(line, ModbusLine):
-        raise Misuse(f"line {line.name!r} is of kind m1486: requests need one of kind modbus")
-    return line.master
 
 
 def _request(plant: Plant, step: do.Request) -> None:
     line = plant.line_called(step.line)
     kernel = plant.touch(step.line)
-    master_of(line).ask(encode_frame(step.unit, step.pdu), step.within, plant.now)
+    line.master.ask(encode_frame(step.unit, step.pdu), step.within, plant.now)
     kernel.settle()
 
 
@@ -144,10 +134,10 @@ def _bytes(plant: Plant, given: Bytes) -> None:
 
 
 def _see(plant: Plant, given: See) -> None:
-    device = plant.controller(given.machine, "vision registers")
+    vision = plant.vision(given.machine)
     kernel = plant.touch(given.machine)
     _record(plant, given.machine, "vision", given[1:])
-    device.see(VisionRecord(*given[1:]), plant.now)
+    vision.see(plant.machine(given.machine), given[1:], plant.now)
     kernel.settle()
 
 
@@ -166,10 +156,18 @@ def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
 
 
 def _turn(plant: Plant, step: do.Turn) -> None:
-    device = plant.controller(step.machine, "encoder")
+    encoders = plant.encoders(step.machine)
     kernel = plant.touch(step.machine)
     _record(plant, step.machine, f"M{step.axis} turned", step.counts)
-    device.turn_encoder(step.axis, step.counts, plant.now)
+    encoders.reader(plant.machine(step.machine)).turn_encoder(step.axis, step.counts, plant.now)
+    kernel.settle()
+
+
+def _couple(plant: Plant, step: do.Couple) -> None:
+    encoders = plant.encoders(step.machine)
+    kernel = plant.touch(step.machine)
+    _record(plant, step.machine, f"M{step.axis} coupled", step.coupling)
+    encoders.couple(plant.machine(step.machine), step.axis, step.coupling, plant.now)
     kernel.settle()
 
 
@@ -189,7 +187,9 @@ def _expect(plant: Plant, step: do.Expect) -> None:
 
 
 def _note(plant: Plant, step: do.Note) -> None:
-    plant.trace.add(Record(plant.now, "world", "event", "note", step.text))
+    if plant.trace.watchers:
+        plant.settle_all()  # what happened before is shown before
+    plant.trace.add(TraceRecord(plant.now, "world", "event", "note", step.text))
 
 
 ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
@@ -205,6 +205,7 @@ ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.Send: _send,
         do.PowerCycle: _power_cycle,
         do.Turn: _turn,
+        do.Couple: _couple,
         do.SetFault: _set_fault,
         do.ClearFault: _clear_fault,
         do.Expect: _expect,

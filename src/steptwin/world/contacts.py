@@ -142,9 +142,9 @@ class Circuit:
         """One of the contacts bounces from now on."""
         self._kernel.mark()
 
-    def tell(self, lane: str, level: float) -> None:
+    def report(self, lane: str, level: float) -> None:
         """The level of one of the contacts, whatever the input has of it."""
-        self._kernel.tell(self.target.machine, "edge", lane, level)
+        self._kernel.report(self.target.machine, "edge", lane, level)
 
 
 class Contact(Stateful):
@@ -191,7 +191,7 @@ class Contact(Stateful):
     def rest_at(self, closed: bool) -> None:
         """Its state before anything has happened, which its input takes with `Circuit.close`."""
         self.closed = self.level = closed
-        self._tell()
+        self._report()
 
     def change(self, closed: bool, now: Nanos) -> None:
         if closed == self.closed:
@@ -213,12 +213,12 @@ class Contact(Stateful):
 
     def _put(self, closed: bool) -> None:
         self.level = closed
-        self._tell()
+        self._report()
         self._circuit.close()
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         if self.lane:
-            self._circuit.tell(self.lane, float(self.level))
+            self._circuit.report(self.lane, float(self.level))
 
 
 class Button(Contact):

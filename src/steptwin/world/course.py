@@ -23,7 +23,7 @@ from typing import NamedTuple
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Segment
 from steptwin.motion.divisions import Plan, profile_of
-from steptwin.world.motor import Motor
+from steptwin.world.motor import StepperMotor
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Build:
     play: int = 0
     period_p: int = 1
     """An electrical period of the motor, four full steps: a rotor that was held is caught at a multiple of it."""
-    motor: Motor | None = None
+    motor: StepperMotor | None = None
 
     @property
     def ideal(self) -> bool:
@@ -59,7 +59,7 @@ class Standing(NamedTuple):
     """How far behind the field the place is to which it draws the rotor. The rotor is there, unless something holds it."""
 
 
-class Piece(NamedTuple):
+class CoursePiece(NamedTuple):
     """From ``begin`` on the rotor is the field and ``rotor``, or at ``rotor``; likewise the load."""
 
     begin: Nanos
@@ -96,7 +96,7 @@ class Course:
         self.plan = plan
         self.begin = begin
         self.blocked = blocked
-        self._laid: list[Piece] = []
+        self._laid: list[CoursePiece] = []
         motor = build.motor
         if motor is not None and not motor.follows(jump) and profile_of(plan).moving(begin):
             standing = standing._replace(stalled=True)
@@ -105,8 +105,8 @@ class Course:
     # ------------------------------------------------------------------ questions
 
     @property
-    def pieces(self) -> list[Piece]:
-        """Laid out when somebody asks."""
+    def pieces(self) -> list[CoursePiece]:
+        """Computed on first use."""
         if not self._laid:
             self._lay(self.begin)
         return self._laid
@@ -158,9 +158,9 @@ class Course:
         return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
 
     def carried(self) -> tuple[Carried, ...]:
-        """Where the load is, in as few words as say it; of a drive at rest it is said how far the load is from it."""
+        """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""
         build, end = self.build, profile_of(self.plan).end
-        said: list[Carried] = []
+        found: list[Carried] = []
         for piece in self.pieces:
             if piece.load_follows:
                 now = Carried(piece.begin, True, piece.load * build.sign)
@@ -168,13 +168,13 @@ class Course:
                 now = Carried(piece.begin, True, (piece.load - self.field(piece.begin)) * build.sign)
             else:
                 now = Carried(piece.begin, False, (piece.load - build.zero) * build.sign)
-            if said and said[-1].begin == now.begin:
-                said.pop()
-            if not said or said[-1][1:] != now[1:]:
-                said.append(now)
-        return tuple(said)
+            if found and found[-1].begin == now.begin:
+                found.pop()
+            if not found or found[-1][1:] != now[1:]:
+                found.append(now)
+        return tuple(found)
 
-    def _piece(self, now: Nanos) -> Piece:
+    def _piece(self, now: Nanos) -> CoursePiece:
         return self.pieces[max(bisect_right(self.pieces, now, key=attrgetter("begin")) - 1, 0)]
 
     def _time(self, field: int, after: Nanos) -> Nanos | None:
@@ -263,11 +263,11 @@ class Course:
             met = None
         if held != begin:
             if met != begin:
-                self._laid.append(Piece(begin, direction, True, offset, False, load, False, behind))
+                self._laid.append(CoursePiece(begin, direction, True, offset, False, load, False, behind))
             if met is not None:
-                self._laid.append(Piece(met, direction, True, offset, True, offset + slack, False, behind))
+                self._laid.append(CoursePiece(met, direction, True, offset, True, offset + slack, False, behind))
         if held is not None and stop is not None:
-            self._laid.append(Piece(held, direction, False, stop, False, stop + slack, False, behind))
+            self._laid.append(CoursePiece(held, direction, False, stop, False, stop + slack, False, behind))
         if end is not None:
             rotor = offset + self.field(end)
             if stop is not None and (rotor - stop) * direction > 0:
@@ -285,7 +285,7 @@ class Course:
 
     def _stand(self, now: Nanos, direction: int) -> None:
         rotor, load, stalled, behind = self._now
-        self._laid.append(Piece(now, direction, False, rotor, False, load, stalled, behind))
+        self._laid.append(CoursePiece(now, direction, False, rotor, False, load, stalled, behind))
 
     def _catch(self, now: Nanos) -> None:
         """The rotor goes to the nearest place that has the electrical angle of the field, or towards it as far as a stop."""

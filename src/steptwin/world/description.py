@@ -1,20 +1,19 @@
-"""From the TOML file of a world to what it says, or to everything that is wrong with it."""
+"""Reads the TOML file of a world: its content as values, or all errors in it."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from steptwin.errors import Misuse
-from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, NO_INPUT, ControllerConfig
-from steptwin.mic488.config import Key as ConfigKey
-from steptwin.mic488.registers import AXES
 from steptwin.world.faults import Fault, parse
+from steptwin.world.kinds import KINDS
+from steptwin.world.links import LINK_KEYS
 from steptwin.world.names import check_names
 from steptwin.world.overrides import NO_OVERRIDES, Overrides, override
-from steptwin.world.reader import Key, Path, Text, read_table
+from steptwin.world.reader import TomlText, read_table
 from steptwin.world.script import STEPS, read_steps
 from steptwin.world.sense import check_sense
 from steptwin.world.spec import (
@@ -22,8 +21,6 @@ from steptwin.world.spec import (
     ButtonSpec,
     EncoderSpec,
     LineSpec,
-    M1486Spec,
-    Mic488Spec,
     MotorSpec,
     ScriptSpec,
     SourceSpec,
@@ -31,7 +28,7 @@ from steptwin.world.spec import (
     WireSpec,
     WorldSpec,
 )
-from steptwin.world.tables import KEYS, SEED
+from steptwin.world.tables import KEYS, SEED, all_keys
 
 
 def read_world(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
@@ -47,20 +44,24 @@ def read_world(name: str, text: str, seed: int | None = None, overrides: Overrid
 def describe(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
     """As `read_world`, but raises `WorldError` only for what is no TOML. What is wrong is in ``text`` of the result, for more may
     be found when the world is built."""
-    toml = Text(name, text)
+    toml = TomlText(name, text, tuple(KINDS))
     data = toml.data
     override(data, overrides)
-    known = [key for key in KEYS if key not in ("switch", "encoder", "motor")]
+    known = [key for key in all_keys() if key not in ("switch", "encoder", "motor")]
     for key in data:
         if key not in known and key != "fault":
             near = toml.near(key, [*known, "fault"])
-            toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join([*known, 'fault'])}")
+            fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, [*known, "fault"])
+            toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join([*known, 'fault'])}", fix)
     world = read_table(toml, ("world",), data.get("world", {}), KEYS["world"])
     spec = WorldSpec(
         **world,
-        lines=tuple(LineSpec(**row) for row in _rows(toml, "line")),
-        mic488=tuple(_mic488(toml, row, table) for row, table in _tables(toml, "mic488", _CONTROLLER_TABLES)),
-        m1486=tuple(M1486Spec(**row) for row in _rows(toml, "m1486")),
+        lines=tuple(map(_line, _rows(toml, "line"))),
+        controllers=tuple(
+            kind.read(toml, row | {"kind": kind}, table)
+            for kind in KINDS.values()
+            for row, table in _tables(toml, kind.name, kind.inner_tables)
+        ),
         axes=tuple(_axis(toml, row, table) for row, table in _tables(toml, "axis", ("switch", "encoder", "motor"))),
         wires=tuple(WireSpec(**row) for row in _rows(toml, "wire")),
         buttons=tuple(ButtonSpec(**row) for row in _rows(toml, "button")),
@@ -81,12 +82,10 @@ def _seed(value: object) -> int:
         raise Misuse(f"seed {error}") from None
 
 
-_CONTROLLER_TABLES = (*(f"M{n}" for n in range(1, AXES + 1)), *(f"IN{n}" for n in range(1, INPUTS + 1)))
-
-
-def _tables(toml: Text, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
+def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
     """Values of every ``[[kind]]`` that has all it needs, and the table itself."""
     found: list[tuple[dict[str, Any], Mapping[str, Any]]] = []
+    keys = all_keys()[kind]
     tables = toml.data.get(kind, [])
     if not isinstance(tables, list):
         toml.wrong((kind,), "D002", f"[{kind}] stands once", f"expected [[{kind}]], for there may be several")
@@ -94,8 +93,8 @@ def _tables(toml: Text, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dic
     names: set[str] = set()
     for number_, table in enumerate(tables):
         path = (kind, number_)
-        values = read_table(toml, path, table, KEYS[kind], also)
-        if any(key.is_required and (key.attribute or key.name) not in values for key in KEYS[kind]):
+        values = read_table(toml, path, table, keys, also)
+        if any(key.is_required and (key.attribute or key.name) not in values for key in keys):
             continue
         check_sense(toml, path, kind, table)
         if values.get("name") is not None and values["name"] in names:
@@ -105,46 +104,16 @@ def _tables(toml: Text, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dic
     return found
 
 
-def _rows(toml: Text, kind: str) -> list[dict[str, Any]]:
+def _rows(toml: TomlText, kind: str) -> list[dict[str, Any]]:
     return [row for row, _ in _tables(toml, kind)]
 
 
-def _mic488(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> Mic488Spec:
-    path = row["path"]
-    axes = {n: _config(toml, (*path, f"M{n}"), table, AXIS_KEYS) for n in range(1, AXES + 1) if f"M{n}" in table}
-    inputs = {n: _config(toml, (*path, f"IN{n}"), table, INPUT_KEYS) for n in range(1, INPUTS + 1) if f"IN{n}" in table}
-    return Mic488Spec(**row, axes=axes, inputs=inputs)
+def _line(row: dict[str, Any]) -> LineSpec:
+    found = {key.name: row.pop(key.name) for key in LINK_KEYS}
+    return LineSpec(**row, links={name: value for name, value in found.items() if value is not None})
 
 
-def _config(toml: Text, path: Path, table: Mapping[str, Any], rows: tuple[ConfigKey, ...]) -> dict[str, Any]:
-    """A table such as ``[mic488.M1]``: keys are attributes of the configuration, choices are numbers or their words."""
-    keys = tuple(Key(row.attribute, _configured(row), row.hint, None) for row in rows)
-    values = read_table(toml, path, table[str(path[-1])], keys)
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def _configured(row: ConfigKey) -> Callable[[Any], Any]:
-    words = {text.upper(): number for number, text in row.choices.items() if text}
-    if row.attribute in ("in_kl", "in_kr"):
-        words = {f"IN{number}": number - 1 for number in range(1, INPUTS + 1)} | {"NONE": NO_INPUT}
-        permitted = f"IN1 to IN{INPUTS} or 'none', or the number of the vendor's file, 0 for IN1 to {NO_INPUT} for none"
-    else:
-        permitted = ", ".join(words)
-
-    def read(value: Any) -> Any:
-        number = value
-        if isinstance(value, str):
-            if value.upper() not in words:
-                raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is no number")
-            number = words[value.upper()]
-        if isinstance(number, bool) or not isinstance(number, int | float) or not row.permits(number):
-            raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is not permitted")
-        return int(number) if row.whole and number == int(number) else number
-
-    return read
-
-
-def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec:
+def _axis(toml: TomlText, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec:
     path = row["path"]
     switches: list[SwitchSpec] = []
     given = table.get("switch", [])
@@ -174,7 +143,7 @@ def _axis(toml: Text, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec
     return AxisSpec(**row, switches=tuple(switches), encoder=encoder, motor=motor)
 
 
-def _events(toml: Text) -> list[ScriptSpec]:
+def _events(toml: TomlText) -> list[ScriptSpec]:
     found: list[ScriptSpec] = []
     for row, table in _tables(toml, "event"):
         path = row["path"]
@@ -186,7 +155,7 @@ def _events(toml: Text) -> list[ScriptSpec]:
     return found
 
 
-def _scripts(toml: Text) -> list[ScriptSpec]:
+def _scripts(toml: TomlText) -> list[ScriptSpec]:
     found: list[ScriptSpec] = []
     for row in _rows(toml, "script"):
         steps = read_steps(toml, (*row["path"], STEPS.name), row.pop(STEPS.name))
@@ -194,7 +163,7 @@ def _scripts(toml: Text) -> list[ScriptSpec]:
     return found
 
 
-def _faults(toml: Text) -> list[Fault | None]:
+def _faults(toml: TomlText) -> list[Fault | None]:
     """One for each table; None for one that is wrong."""
     found: list[Fault | None] = []
     tables = toml.data.get("fault", [])
@@ -213,14 +182,3 @@ def _faults(toml: Text) -> list[Fault | None]:
             toml.wrong(("fault", n, key[1] if key else ""), "D003", str(error))
             found.append(None)
     return found
-
-
-def config_of(spec: Mic488Spec, base: ControllerConfig) -> ControllerConfig:
-    """The configuration of a controller: its file's, and what the description changes."""
-    from dataclasses import replace
-
-    axes = tuple(replace(axis, **spec.axes.get(n, {})) for n, axis in enumerate(base.axes, start=1))
-    inputs = tuple(replace(one, **spec.inputs.get(n, {})) for n, one in enumerate(base.inputs, start=1))
-    keeps = base.trigger_keeps if spec.trigger_keeps is None else int(spec.trigger_keeps)
-    config = replace(base, axes=axes, inputs=inputs, trigger_keeps=keeps)
-    return replace(config, program=replace(config.program, activate=1)) if spec.start else config

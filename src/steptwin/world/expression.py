@@ -6,7 +6,8 @@
     comparison  = operand [ ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) operand ]
     operand     = number | signal
 
-A signal alone is true where it is not 0. Names of signals are for `Signals` to know.
+A signal alone is true where it is not 0. Names of signals are for `Signals` to know: ``table.M1.position``, ``table.hr:10020``,
+``table.USER_REGISTER[12]:real``.
 """
 
 from __future__ import annotations
@@ -19,16 +20,14 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-
-FARTHEST_NS: Nanos = 1 << 55
-"""What lies more than a year ahead is never."""
+from steptwin.points import FARTHEST_NS
 
 MOST_NESTED = 64
-"""Nobody writes deeper conditions, and reading them is recursive."""
+"""Deepest nesting that is read: reading is recursive."""
 
 _COMPARE: dict[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][\w&-]*(?:\.[\w&-]+)*)|(?P<sign>[=!<>]=|[<>()-])|(?P<wrong>\S))"
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][\w&-]*(?:\.[\w&-]+(?:\[\d+\])?(?::\w+)*)*)|(?P<sign>[=!<>]=|[<>()-])|(?P<wrong>\S))"
 )
 
 
@@ -56,20 +55,20 @@ Signals: TypeAlias = Callable[[str], Signal]
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class NumberLiteral:
     value: float
 
 
 @dataclass(frozen=True, slots=True)
-class Name:
+class SignalName:
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
-    left: Number | Name
+class SignalComparison:
+    left: NumberLiteral | SignalName
     sign: str
-    right: Number | Name
+    right: NumberLiteral | SignalName
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +86,7 @@ class Either:
     parts: tuple[Node, ...]
 
 
-Node: TypeAlias = Comparison | Not | Both | Either
+Node: TypeAlias = SignalComparison | Not | Both | Either
 
 
 def parse(text: str) -> Node:
@@ -97,8 +96,8 @@ def parse(text: str) -> Node:
 
 def names(node: Node) -> Iterator[str]:
     """The signals of a condition."""
-    if isinstance(node, Comparison):
-        yield from (side.text for side in (node.left, node.right) if isinstance(side, Name))
+    if isinstance(node, SignalComparison):
+        yield from (side.text for side in (node.left, node.right) if isinstance(side, SignalName))
     elif isinstance(node, Not):
         yield from names(node.inner)
     else:
@@ -158,10 +157,10 @@ class _Parser:
         if self._peek() in _COMPARE:
             sign = self._peek()
             self._at += 1
-            return Comparison(left, sign, self._operand())
-        if isinstance(left, Number):
+            return SignalComparison(left, sign, self._operand())
+        if isinstance(left, NumberLiteral):
             raise self._wrong(f"one of {' '.join(_COMPARE)}")
-        return Comparison(left, "!=", Number(0.0))
+        return SignalComparison(left, "!=", NumberLiteral(0.0))
 
     def _nested(self) -> Node:
         if self._accept("not"):
@@ -172,16 +171,16 @@ class _Parser:
             raise self._wrong("')'")
         return node
 
-    def _operand(self) -> Number | Name:
+    def _operand(self) -> NumberLiteral | SignalName:
         minus = self._accept("-")
         if self._at < len(self._tokens):
             kind, text, _ = self._tokens[self._at]
             if kind == "number":
                 self._at += 1
-                return Number(-float(text) if minus else float(text))
+                return NumberLiteral(-float(text) if minus else float(text))
             if kind == "name" and not minus and text.lower() not in ("and", "or", "not"):
                 self._at += 1
-                return Name(text)
+                return SignalName(text)
         raise self._wrong("a number" if minus else "a signal or a number")
 
 
@@ -194,7 +193,7 @@ class _Crossing(NamedTuple):
     until: Nanos
 
 
-class Condition:
+class SignalCondition:
     """A condition with its signals."""
 
     __slots__ = ("_comparisons", "_crossings", "_node", "_signals", "text")
@@ -219,7 +218,7 @@ class Condition:
         return self._holds(self._node, now)
 
     def _holds(self, node: Node, now: Nanos) -> bool:
-        if isinstance(node, Comparison):
+        if isinstance(node, SignalComparison):
             return _COMPARE[node.sign](self._value(node.left, now), self._value(node.right, now))
         if isinstance(node, Not):
             return not self._holds(node.inner, now)
@@ -227,18 +226,20 @@ class Condition:
             return all(self._holds(part, now) for part in node.parts)
         return any(self._holds(part, now) for part in node.parts)
 
-    def _value(self, side: Number | Name, now: Nanos) -> float:
-        return side.value if isinstance(side, Number) else self._signals[side.text].value(now)
+    def _value(self, side: NumberLiteral | SignalName, now: Nanos) -> float:
+        return side.value if isinstance(side, NumberLiteral) else self._signals[side.text].value(now)
 
-    def _moving(self, node: Node) -> Iterator[tuple[Signal, Number | Name]]:
+    def _moving(self, node: Node) -> Iterator[tuple[Signal, NumberLiteral | SignalName]]:
         """Comparisons that may change between events: the signal, and what it is compared with."""
         if isinstance(node, Not):
             yield from self._moving(node.inner)
-        elif not isinstance(node, Comparison):
+        elif not isinstance(node, SignalComparison):
             for part in node.parts:
                 yield from self._moving(part)
         else:
-            moving = [side for side in (node.left, node.right) if isinstance(side, Name) and self._signals[side.text].continuous]
+            moving = [
+                side for side in (node.left, node.right) if isinstance(side, SignalName) and self._signals[side.text].continuous
+            ]
             if len(moving) > 1:
                 raise Misuse(f"condition {self.text!r}: {moving[0].text} and {moving[1].text} both move: compare with a number")
             if moving:

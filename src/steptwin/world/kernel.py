@@ -11,17 +11,17 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import Drive, Edge, MotionController, Nanos
+from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain
-from steptwin.world.trace import Record, Recorder
+from steptwin.world.trace import Recorder, TraceRecord
 
 MAX_ROUNDS_PER_INSTANT = 1000
 """Signals propagate in zero time; more rounds than this at one moment are a loop of wires."""
 
 
-class Part(Protocol):
+class KernelPart(Protocol):
     """What stands between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
 
     def deadline(self) -> Nanos | None:
@@ -92,11 +92,13 @@ class Kernel:
     def __init__(self, now: Nanos = 0, record: Recorder | None = None) -> None:
         self.now = now
         self.machines: dict[str, MotionController] = {}
-        self.parts: list[Part] = []
-        self.observers: list[Callable[[str, Edge], None]] = []
+        self.parts: list[KernelPart] = []
+        self.observers: list[Callable[[str, PinEdge], None]] = []
         """Called with machine name and edge, in order, for every output edge."""
         self.stale = False
         """Something changed since signals last settled."""
+        self.is_attentive = False
+        """Whether a condition is on what a request may change without an event: then every request is one."""
         self.on_change: Callable[[Kernel], None] | None = None
         """Called with the kernel whenever something has happened in it, or something has changed from outside."""
         self._record = record
@@ -123,14 +125,14 @@ class Kernel:
         self.mark()
 
     def replace(self, name: str, machine: MotionController) -> None:
-        """Let another machine stand where ``name`` stands: one around it, with the same pins and axes."""
+        """Replace the machine ``name`` by another one: one around it, with the same pins and axes."""
         if name not in self.machines:
             raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
         self.machines[name] = machine
         machine.changed = self.mark
         self.mark()
 
-    def add_part(self, part: Part) -> None:
+    def add_part(self, part: KernelPart) -> None:
         """Add something between machines; it looks at them when signals settle next."""
         self.parts.append(part)
         self.mark()
@@ -190,7 +192,7 @@ class Kernel:
         after = machine.pins()[pin]
         if is_first or after != before:
             self.take_as_recorded(target, self.now, after)
-            self._record(Record(self.now, target.machine, "edge", pin, after))
+            self._record(TraceRecord(self.now, target.machine, "edge", pin, after))
 
     def take_as_recorded(self, target: PinName, now: Nanos, level: float) -> None:
         """Mark an edge of an input as recorded, in case its machine reports it too."""
@@ -203,10 +205,10 @@ class Kernel:
         else:
             self.drive(wire.target, level)
 
-    def tell(self, machine: str, kind: str, subject: str, value: object) -> None:
+    def report(self, machine: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
         """Something worth recording happens to a machine now."""
         if self._record is not None:
-            self._record(Record(self.now, machine, kind, subject, value))
+            self._record(TraceRecord(self.now, machine, kind, subject, value, facts))
 
     # ------------------------------------------------------------------ time
 
@@ -241,7 +243,7 @@ class Kernel:
             for edge in machine.take_edges():
                 self._edge(name, edge)
             if self._record is not None:
-                plans.tell(self._record, due)
+                plans.report(self._record, due)
             due = machine.deadline()
         self._due = due
         self.stale = False
@@ -269,7 +271,7 @@ class Kernel:
             raise Runaway(f"signals did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at {self.now} ns: a loop of wires")
         if self._record is not None:
             for plans in self._plans:
-                plans.tell(self._record, self.now)
+                plans.report(self._record, self.now)
         soonest = min(self._flights).arrival if self._flights else None
         for one in (*self.machines.values(), *self.parts):
             due = one.deadline()
@@ -279,10 +281,10 @@ class Kernel:
         if self.on_change is not None:
             self.on_change(self)
 
-    def _edge(self, name: str, edge: Edge) -> None:
+    def _edge(self, name: str, edge: PinEdge) -> None:
         pin = PinName(name, edge.pin)
         if self._record is not None and self._given.get(pin) != (edge.time, edge.value):
-            self._record(Record(edge.time, name, "edge", edge.pin, edge.value))
+            self._record(TraceRecord(edge.time, name, "edge", edge.pin, edge.value))
             if pin in self._given:
                 self._given[pin] = edge.time, edge.value
         for observer in self.observers:
@@ -338,20 +340,20 @@ class _Plans:
         self._profiles: list[Profile | None] = [None] * len(self._drives)
         self._origins = [0] * len(self._drives)
 
-    def tell(self, record: Recorder, now: Nanos) -> None:
+    def report(self, record: Recorder, now: Nanos) -> None:
         """Record new plans, and changes of coordinates. An axis at rest where its plan ended has no new plan."""
         for i, number, drive in self._drives:
             origin = drive.offset_p
             if origin != self._origins[i]:
                 self._origins[i] = origin
-                record(Record(now, self._name, "coordinate", number, origin))
+                record(TraceRecord(now, self._name, "coordinate", number, origin))
             if self._revisions[i] == drive.revision:
                 continue
             plan = drive.plan
             before, profile = self._profiles[i], profile_of(plan)
             self._revisions[i], self._profiles[i] = drive.revision, profile
             if before is None or not _only_rests(before, profile):
-                record(Record(now, self._name, "plan", number, plan))
+                record(TraceRecord(now, self._name, "plan", number, plan))
 
     def take_as_told(self) -> None:
         for i, _, drive in self._drives:
@@ -360,7 +362,7 @@ class _Plans:
 
 
 def _only_rests(before: Profile, after: Profile) -> bool:
-    """Whether ``after`` only says that the axis stands where ``before`` has ended."""
+    """Whether ``after`` is only the rest at the position where ``before`` has ended."""
     if after.segments or before.end is None or before.end > after.start:
         return False
     return before.base + before.counts[-1] == after.base

@@ -10,28 +10,17 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486
-from steptwin.m1486.line import SerialChain
 from steptwin.machine import Nanos, Port, TalkingPort
-from steptwin.mic488.device import Mic488, pause_observer
-from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.state import Plain, Stateful
-from steptwin.wire.gateway import Gateway, ScriptPort, TcpGatewayPort
-from steptwin.wire.line import SerialLine
-from steptwin.wire.rtu import BURSTY_GAP_NS, UART_GAP_NS
-from steptwin.wire.slave import Device, Direction, RtuSlavePort, SlavePort, TcpSlavePort
-from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
+from steptwin.wire.slave import Device, FrameDirection, FrameObserver, SlavePort
 from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
-from steptwin.world.faults import Line as FaultLine
+from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
-from steptwin.world.trace import Record, Recorder
+from steptwin.world.trace import Recorder, TraceRecord
 
 SCRIPTS = "script"
 """The place of the world's own scripts on every line."""
-SILENT_CHARACTERS = 4
-"""Between an answer and the next request of a master: Modbus RTU asks for 3.5."""
-
 
 MOST_RECEIVED = 1 << 16
 """More pieces than these are not kept for a program that does not fetch them: the oldest go."""
@@ -40,7 +29,7 @@ MOST_RECEIVED = 1 << 16
 class FrameFollower(Protocol):
     """Takes what goes over a line."""
 
-    def frame(self, now: Nanos, place: str, direction: Direction, data: bytes) -> None:
+    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
         """A frame, or characters; ``place`` is ``"chips"`` for what M1486 chips send."""
         ...
 
@@ -49,19 +38,31 @@ class FrameFollower(Protocol):
         ...
 
 
-class Place(Stateful):
+class LineWords(FrameFollower, Protocol):
+    """Puts what goes over a line into words."""
+
+    def recorded(self, record: TraceRecord) -> None:
+        """A record of a controller on the line was made."""
+        ...
+
+
+class LineEndPoint(Stateful):
     """Where one program is connected. ``received`` is what has come and was not fetched, with its moments."""
 
-    __slots__ = ("inner", "kind", "on_output", "port", "received", "rubbish", "talks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"inner", "kind", "on_output", "port", "rubbish", "talks"})
+    __slots__ = ("at_once", "framed", "inner", "kind", "on_output", "port", "received", "rubbish", "talks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"at_once", "framed", "inner", "kind", "on_output", "port", "rubbish", "talks"})
 
-    def __init__(self, kind: str, port: FaultyPort, inner: Any, *, talks: bool) -> None:
+    def __init__(self, kind: str, port: FaultyPort, inner: Any, framed: SlavePort | None, *, talks: bool) -> None:
         self.kind = kind
         self.port = port
         self.inner = inner
         """The port behind the faults of the line."""
+        self.framed = framed
+        """What reports Modbus frames in it."""
         self.rubbish = 0
         """Bytes that belonged to no frame, as far as that was reported."""
+        self.at_once = False
+        """Whether the port has sent all answers when it has taken a request, and nothing later."""
         self.talks = talks
         """Whether the port may send without having been asked."""
         self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
@@ -84,15 +85,17 @@ class Line(Stateful):
     kinds: ClassVar[tuple[str, ...]]
     """Kinds of places; the first is that of scripts."""
     fault_kinds: ClassVar[Mapping[str, FaultLine]]
+    is_shared: ClassVar[bool] = False
+    """Whether every program on it receives all that is sent, requested or not."""
 
     def __init__(self, kernel: Kernel, name: str, record: Recorder | None, faults: Faults) -> None:
         self._kernel = kernel
         self._record = record
         self._faults = faults
         self.name = name
-        self.places: dict[str, Place] = {}
+        self.places: dict[str, LineEndPoint] = {}
         self._followers: list[FrameFollower] = []
-        self._busy: dict[str, Place] = {}
+        self._busy: dict[str, LineEndPoint] = {}
         """Places at which something may come without being asked for, or is due later."""
 
     # ------------------------------------------------------------------ what kinds of lines have of their own
@@ -100,6 +103,22 @@ class Line(Stateful):
     def _port(self, place: str, kind: str) -> Port:
         """A port for one more program. Its state is copied by `_port_state`."""
         raise NotImplementedError
+
+    def _answers_at_once(self, kind: str) -> bool:
+        """Whether ports of a kind have sent all answers when they have taken a request."""
+        return False
+
+    def _framed(self, port: Any) -> SlavePort | None:
+        """What reports Modbus frames in a port of `_port`."""
+        return None
+
+    @property
+    def master(self) -> Master:
+        """Sends the Modbus requests of scripts. `Misuse` for a line without one."""
+        raise Misuse(f"line {self.name!r} carries no Modbus: requests need a line of kind modbus")
+
+    def serve_by(self, served: Callable[[Mapping[int, Device]], Mapping[int, Device]]) -> None:
+        """Have Modbus requests from outside executed by what a function makes of the controllers, by unit."""
 
     @property
     def units(self) -> tuple[int, ...]:
@@ -117,7 +136,7 @@ class Line(Stateful):
 
     # ------------------------------------------------------------------ places
 
-    def connect(self, place: str, kind: str | None = None) -> Place:
+    def connect(self, place: str, kind: str | None = None) -> LineEndPoint:
         """A place for a program; the same one again for the same name. `Misuse` for a kind the line does not have."""
         found = self.places.get(place)
         if found is not None:
@@ -126,6 +145,7 @@ class Line(Stateful):
         if kind not in self.kinds:
             raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
         port = self._port(place, kind)
+        framed = self._framed(port)
         if isinstance(port, TalkingPort):
             faulty: FaultyPort = FaultyTalkingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
@@ -138,12 +158,13 @@ class Line(Stateful):
                 place,
                 self._faults,
                 self.fault_kinds[kind],
-                framed=_framed(port),
+                framed=framed,
                 units=self.units,
                 line_name=self.name,
             )
             is_busy = False
-        found = self.places[place] = Place(kind, faulty, port, talks=is_busy)
+        found = self.places[place] = LineEndPoint(kind, faulty, port, framed, talks=is_busy)
+        found.at_once = self._answers_at_once(kind)
         if is_busy:
             self._busy[place] = found
         return found
@@ -155,34 +176,50 @@ class Line(Stateful):
         if found is not None:
             found.port.close()
 
-    def _count_rubbish(self, name: str, place: Place, now: Nanos) -> None:
+    def _count_rubbish(self, name: str, place: LineEndPoint, now: Nanos) -> None:
         """Report bytes that belonged to no frame."""
-        rubbish = getattr(place.inner, "rubbish", 0)
+        if place.framed is None:
+            return
+        rubbish = place.framed.rubbish
         if rubbish > place.rubbish:
             for follower in self._followers:
                 follower.rubbish(now, name, rubbish - place.rubbish)
         place.rubbish = rubbish
 
-    def exchange(self, place: str, found: Place, data: bytes, now: Nanos) -> bytes:
+    def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
         """Give bytes of the program at ``place``, which is connected as ``found``; the kernel is at ``now``. Returns what is
-        answered at once; what is answered later is in `Place.received` then."""
+        answered at once; what is answered later is in `LineEndPoint.received` then."""
         answer = found.port.exchange(data, now)
         if place in self._busy or found.port.deadline() is not None:
             self._busy[place] = found
+            self._kernel.mark()
+        elif self._kernel.is_attentive:
             self._kernel.mark()
         if self._followers:
             self._count_rubbish(place, found, now)
         return answer
 
+    def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
+        """Whether bytes of a program are a read that changes nothing. It need not be recorded: a replay misses nothing."""
+        return False
+
+    def exchange_unrecorded(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        """As `exchange`; followers see the frames, the trace does not."""
+        record, self._record = self._record, None
+        try:
+            return self.exchange(place, found, data, now)
+        finally:
+            self._record = record
+
     def receive(self, place: str, data: bytes, now: Nanos) -> None:
-        """Bytes of the program at ``place``, with all answers in `Place.received`; the kernel is at ``now``."""
+        """Bytes of the program at ``place``, with all answers in `LineEndPoint.received`; the kernel is at ``now``."""
         found = self.connect(place)
         answer = self.exchange(place, found, data, now)
         if answer:
             self._came(place, found, [(now, answer)])
         self._kernel.mark()
 
-    def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
+    def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)
         if found.on_output is not None:
             found.on_output()
@@ -207,15 +244,29 @@ class Line(Stateful):
         """Record no frames from now on."""
         self._record = None
 
-    def _tell(self, now: Nanos, place: str, direction: Direction, data: bytes) -> None:
+    def _report(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
         if self._record is not None:
-            self._record(Record(now, self.name, "frame", f"{place}/{direction.value}", data))
+            self._record(TraceRecord(now, self.name, "frame", f"{place}/{direction.value}", data))
         for follower in self._followers:
             follower.frame(now, place, direction, data)
 
     def follow_frames(self, follower: FrameFollower) -> None:
-        """Call ``follower`` with every frame; what a port carries that is there already is not followed, but for the scripts'."""
+        """Call ``follower`` with every frame from now on."""
         self._followers.append(follower)
+        self._watch_ports()
+
+    def unfollow_frames(self, follower: FrameFollower) -> None:
+        """Call it no more."""
+        self._followers.remove(follower)
+        self._watch_ports()
+
+    def _watch_ports(self) -> None:
+        for name, place in self.places.items():
+            place.port.watch(self._observer(name))
+
+    def _observer(self, place: str) -> FrameObserver | None:
+        """What a port at ``place`` is to call with its frames; None where nothing wants them, or the line has no frames."""
+        return None
 
     @property
     def _is_followed(self) -> bool:
@@ -243,159 +294,8 @@ class Line(Stateful):
             self._set_port_state(place, port_state)
         self._busy = dict(self.places)
 
-    def _port_state(self, place: Place) -> Plain:
+    def _port_state(self, place: LineEndPoint) -> Plain:
         return place.inner.copy_state()
 
-    def _set_port_state(self, place: Place, state: Plain) -> None:
+    def _set_port_state(self, place: LineEndPoint, state: Plain) -> None:
         place.inner.set_state(state)
-
-
-class ModbusLine(Line):
-    """Controllers with different units on one line. With ``timing`` requests take the time of a wire and of the controllers."""
-
-    __slots__ = ("_baud", "_gap", "_seeing", "_timed", "devices", "master", "served")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_baud", "_gap", "_seeing", "devices", "served"}) | Line.FIXED
-
-    kinds = ("rtu", "serial", "tcp")
-    """``serial``: a real serial port, on which characters take their time whatever the line timing is."""
-    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"rtu": FaultLine.RTU, "serial": FaultLine.RTU, "tcp": FaultLine.TCP}
-
-    def __init__(
-        self,
-        kernel: Kernel,
-        name: str,
-        record: Recorder | None,
-        faults: Faults,
-        *,
-        devices: Mapping[int, Mic488],
-        timing: LineTiming | None,
-        baud: int = 38400,
-        gap: Nanos | None = None,
-    ) -> None:
-        super().__init__(kernel, name, record, faults)
-        self.devices = devices
-        self.served: Mapping[int, Device] = devices
-        """What executes the requests of programs outside without line timing; ports that are made from now on use it."""
-        self._baud = baud
-        self._gap = gap
-        # WBC-15: a vision system belongs to one controller; without its registers in a program it costs nothing.
-        device = next(iter(devices.values()))
-        sees = len(devices) == 1 and any(map(uses_vision, device.program.programs.values()))
-        self._seeing = device if sees else None
-        self._timed: tuple[TimedUnits, Gateway] | None = None
-        if timing is not None:
-            units = TimedUnits(devices, timing)
-            self._timed = units, Gateway(units)
-        self.master = Master(self._ask, 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
-        """Sends the requests of scripts."""
-
-    def _ask(self, frame: bytes, now: Nanos) -> None:
-        self.receive(SCRIPTS, frame, now)
-
-    def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
-        if place == SCRIPTS:
-            self.master.answered(b"".join(data for _, data in pieces), pieces[-1][0])
-        else:
-            super()._came(place, found, pieces)
-
-    def look(self, now: Nanos) -> None:
-        super().look(now)
-        self.master.look(now)
-
-    def deadline(self) -> Nanos | None:
-        own, masters = super().deadline(), self.master.deadline()
-        return own if masters is None else masters if own is None else min(own, masters)
-
-    @property
-    def units(self) -> tuple[int, ...]:
-        return tuple(self.devices)
-
-    def _port(self, place: str, kind: str) -> Port:
-        def tell(now: Nanos, direction: Direction, data: bytes) -> None:
-            self._tell(now, place, direction, data)
-
-        observe = tell if self._is_followed else None
-        if self._timed is None and kind == "tcp":
-            return TcpSlavePort(self.served, on_frame=observe)
-        if self._timed is not None and kind == "tcp":
-            return TcpGatewayPort(self._timed[1], on_frame=observe)
-        if self._timed is not None and place == SCRIPTS:
-            return ScriptPort(self._timed[1], on_frame=observe)
-        usual = UART_GAP_NS if kind == "serial" else BURSTY_GAP_NS
-        gap = usual if self._gap is None else self._gap
-        on_pause = pause_observer(self.devices)
-        port: RtuSlavePort | TimedRtuSlavePort
-        if self._timed is not None:
-            port = TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=observe, on_pause=on_pause)
-        else:
-            devices = self.devices if place == SCRIPTS else self.served
-            wire = SerialLine(self._baud) if kind == "serial" else None
-            port = RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=observe, on_pause=on_pause)
-        return port if self._seeing is None or place == SCRIPTS else Com1Port(self._seeing, port)
-
-    @property
-    def baud(self) -> int:
-        return self._baud
-
-    @property
-    def is_timed(self) -> bool:
-        return self._timed is not None
-
-
-class ChipLine(Line):
-    """M1486 chips on one serial line. All hear everybody, and everybody hears all chips."""
-
-    __slots__ = ("chain",)
-    FIXED: ClassVar[frozenset[str]] = Line.FIXED
-
-    kinds = ("raw",)
-    fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}
-
-    def __init__(self, kernel: Kernel, name: str, record: Recorder | None, faults: Faults, chips: list[M1486]) -> None:
-        super().__init__(kernel, name, record, faults)
-        self.chain = SerialChain(chips)
-        self.connect(SCRIPTS)
-
-    @property
-    def units(self) -> tuple[int, ...]:
-        return ()
-
-    @property
-    def baud(self) -> int:
-        return next(iter(self.chain.chips.values())).uart.baud
-
-    @property
-    def is_timed(self) -> bool:
-        return next(iter(self.chain.chips.values())).is_timed
-
-    def _port(self, place: str, kind: str) -> Port:
-        return self.chain.port()
-
-    def exchange(self, place: str, found: Place, data: bytes, now: Nanos) -> bytes:
-        self._tell(now, place, Direction.IN, data)
-        return super().exchange(place, found, data, now)
-
-    def _came(self, place: str, found: Place, pieces: list[tuple[Nanos, bytes]]) -> None:
-        if place == SCRIPTS:  # output is recorded here; scripts do not read it
-            for moment, data in pieces:
-                self._tell(moment, "chips", Direction.OUT, data)
-        else:
-            super()._came(place, found, pieces)
-
-    def _port_state(self, place: Place) -> Plain:
-        return self.chain.copy_state(), tuple(place.inner.pending)
-
-    def _set_port_state(self, place: Place, state: Plain) -> None:
-        chain, pending = state
-        self.chain.set_state(chain)
-        place.inner.pending = list(pending)
-
-
-def timing_of(baud: int, *, strict: bool) -> LineTiming:
-    return LineTiming(SerialLine(baud), strict=strict)
-
-
-def _framed(port: Port) -> SlavePort | None:
-    """What reports frames in a port of a line."""
-    inner = port.modbus if isinstance(port, Com1Port) else port
-    return inner if isinstance(inner, SlavePort) else None

@@ -9,11 +9,10 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Drive, Nanos
-from steptwin.mic488.device import Mic488
 from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain, Stateful
 from steptwin.world.course import Build, Carried, Course, Standing
@@ -22,7 +21,7 @@ from steptwin.world.kernel import Kernel
 _OUTDATED = -1
 """No drive has this revision."""
 FOLLOW_NS: Nanos = 10 * MILLISECOND
-"""A controller that follows an encoder looks at it this often while it turns, so it is told so."""
+"""A controller that follows an encoder looks at it this often while it turns, so it is notified."""
 
 
 class Shaft(NamedTuple):
@@ -37,15 +36,31 @@ class Shaft(NamedTuple):
         return ((standing.load if self.on_load else standing.rotor) - build.zero) * build.sign
 
 
+class EncoderReader(Protocol):
+    """A controller that reads encoders. Axes count from 1."""
+
+    def gear_encoder(self, axis: int, counts: int, pulses: int, now: Nanos, /) -> None:
+        """The encoder gives ``counts`` per ``pulses`` of what turns it."""
+        ...
+
+    def follow_shaft(self, axis: int, shaft: Shaft, now: Nanos, /) -> None:
+        """The encoder turns with ``shaft`` from now on."""
+        ...
+
+    def turn_encoder(self, axis: int, counts: int, now: Nanos, /) -> None:
+        """The encoder turns by ``counts`` at once."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class EncoderBuild:
     """An encoder that the controller ``device``, called ``machine`` in the kernel, reads for its axis ``axis`` (from 1).
 
-    ``counts`` (negative: backwards) per ``pulses`` of the drive that turns it; None: as the controller is told.
+    ``counts`` (negative: backwards) per ``pulses`` of the drive that turns it; None: as the controller is configured.
     """
 
     machine: str
-    device: Mic488
+    device: EncoderReader
     axis: int
     on_load: bool = False
     counts: int | None = None
@@ -65,12 +80,12 @@ class Mechanism(Stateful):
         "_kernel",
         "_lost",
         "_name",
+        "_reported",
+        "_reported_course",
         "_revision",
-        "_said",
         "_simple",
         "_stall_due",
         "_stalled",
-        "_told",
         "build",
         "machine",
         "number",
@@ -85,19 +100,19 @@ class Mechanism(Stateful):
         self.build = build
         self._encoders: list[EncoderBuild] = []
         self._coupled = False
-        """Whether encoders have been told that they are not simply turned by the drive."""
+        """Whether encoders have been notified that the drive does not turn them directly."""
         self._due: Nanos | None = None
-        """When controllers that follow are told next that their encoder turns."""
+        """When controllers that follow are next notified that their encoder turns."""
         self._stalled = False
         self._stall_due: Nanos | None = None
         """When the motor loses the field next, or is caught."""
         self._lost = 0
         self._blocked = False
         self._changes = 0
-        self._said: tuple[Carried, ...] = (Carried(kernel.now, True, 0),)
-        """Where the load is, as it was told last."""
-        self._told: Course | None = None
-        """The course of which it was told."""
+        self._reported: tuple[Carried, ...] = (Carried(kernel.now, True, 0),)
+        """Where the load is, as reported last."""
+        self._reported_course: Course | None = None
+        """The course that was reported."""
         self._simple = build.ideal
         """Nothing has come between pulses and load yet, and nothing can."""
         drive = self._drive
@@ -148,32 +163,33 @@ class Mechanism(Stateful):
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
                 self._watch_motor(now)
-            self._say(now)
+            self._report_load(now)
 
-    def _say(self, now: Nanos) -> None:
-        """Tell where the load is, unless that follows from what has been told: a load that goes with its drive says nothing."""
+    def _report_load(self, now: Nanos) -> None:
+        """Report where the load is, unless that follows from earlier reports: a load that goes with its drive needs none."""
         course = self._course
-        if course is self._told:
+        if course is self._reported_course:
             return
-        self._told = course
+        self._reported_course = course
         carried = _from(course.carried(), now)
-        if carried != _from(self._said, now):
-            self._said = carried
-            self._kernel.tell(self.machine, "load", str(self.number), carried)
+        if carried != _from(self._reported, now):
+            self._reported = carried
+            self._kernel.report(self.machine, "load", str(self.number), carried)
 
     def deadline(self) -> Nanos | None:
-        """Courses are laid out ahead: only who follows or watches the axis is to be told."""
+        """Courses are computed ahead: only followers of the axis need to be notified."""
         if self._due is None or self._stall_due is None:
             return self._stall_due if self._due is None else self._due
         return min(self._due, self._stall_due)
 
     def _watch_motor(self, now: Nanos) -> None:
-        """Tell where the motor has lost the field, and where it has found it."""
+        """Report where the motor has lost the field, and where it has regained it."""
         stalled = self._course.at(now).stalled
         if stalled is not self._stalled:
             self._stalled = stalled
             text = f"{self._name} loses the field" if stalled else f"{self._name} is caught, {self.lost(now)} pulses behind"
-            self._kernel.tell(self.machine, "event", "stall", text)
+            facts = ("axis", self.number), ("stalled", stalled), ("lost", 0 if stalled else self.lost(now))
+            self._kernel.report(self.machine, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
 
     def _renew(self, drive: Drive, now: Nanos, standing: Standing | None = None) -> None:
@@ -267,10 +283,10 @@ class Mechanism(Stateful):
         self._revision = self._drive.revision if is_current else _OUTDATED
 
 
-def _from(said: tuple[Carried, ...], now: Nanos) -> tuple[Carried, ...]:
-    """What is said of ``now`` and later."""
-    past = max(bisect_right(said, now, key=attrgetter("begin")) - 1, 0)
-    return (said[past]._replace(begin=now), *said[past + 1 :])
+def _from(reported: tuple[Carried, ...], now: Nanos) -> tuple[Carried, ...]:
+    """What was reported for ``now`` and later."""
+    past = max(bisect_right(reported, now, key=attrgetter("begin")) - 1, 0)
+    return (reported[past]._replace(begin=now), *reported[past + 1 :])
 
 
 class RotorMark:

@@ -31,7 +31,7 @@ _SLACK = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Motor:
+class StepperMotor:
     """``curve``: (speed in pulses/s, pull-out torque) from speed 0 on, straight between; above the last speed there is none."""
 
     curve: tuple[tuple[float, float], ...]

@@ -1,4 +1,4 @@
-"""Names in a description: what conditions, scripts and people at the shell call by the same kind of name must differ."""
+"""Names in a description: what conditions, scripts and commands address by the same kind of name must differ."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ RESERVED = {
 
 
 def check_names(spec: WorldSpec) -> None:
-    """Tell names of lines, machines, axes and buttons that hide each other. Case does not tell them apart, at the shell."""
+    """Report names of lines, machines, axes and buttons that hide each other. The command line ignores case."""
     text = spec.text
     taken: dict[str, str] = {}
-    for one in (*spec.lines, *spec.mic488, *spec.m1486, *spec.axes, *spec.buttons):
+    for one in (*spec.lines, *spec.controllers, *spec.axes, *spec.buttons):
         path = (*one.path, "name")
         kind = one.path[0]
         key = one.name.lower()

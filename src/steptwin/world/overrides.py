@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.wbc.nearmiss import NearMiss
+from steptwin.nearmiss import NearMiss
 
 Overrides: TypeAlias = Mapping[str, Any]
 """By key with its tables, joined by points. Of several tables of a kind one is chosen by its name, or by its number from 0."""
@@ -34,7 +34,5 @@ def _inside(holder: Any, wanted: str, key: str) -> Any:
         known = {str(number): table for number, table in enumerate(holder)}
         known |= {table["name"]: table for table in holder if isinstance(table, dict) and isinstance(table.get("name"), str)}
     if wanted not in known:
-        near = NearMiss().of(wanted, known)
-        hint = "" if near is None else f"; did you mean {near!r}?"
-        raise Misuse(f"override {key!r}: there is no {wanted!r}{hint}")
+        raise Misuse(f"override {key!r}: there is no {wanted!r}{NearMiss().hint(wanted, known)}")
     return known[wanted]

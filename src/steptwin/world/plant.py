@@ -1,6 +1,6 @@
-"""A world that runs: its kernels, each as far as somebody looked, and the scripts that act on them.
+"""A world that runs: its kernels, each advanced on demand, and the scripts that act on them.
 
-Machines that share nothing are in kernels of their own. A kernel is brought to the present when somebody looks at it or does
+Machines that share nothing are in kernels of their own. A kernel is advanced to the present when something reads it or does
 something to it; conditions keep the kernels they speak of up to date, event by event. So the order in which kernels are
 advanced never matters.
 """
@@ -15,17 +15,16 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.m1486.chip import M1486
-from steptwin.machine import Nanos
-from steptwin.mic488.device import Mic488
-from steptwin.wbc.nearmiss import NearMiss
+from steptwin.machine import MotionController, Nanos
+from steptwin.nearmiss import NearMiss
 from steptwin.world import script as do
 from steptwin.world.actions import Outside, act
-from steptwin.world.build import Files, Fitted, Plan, build
+from steptwin.world.build import Files, Fitted, Keep, WorldParts, build
 from steptwin.world.contacts import Button
-from steptwin.world.expression import Condition
+from steptwin.world.expression import SignalCondition
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
+from steptwin.world.kind import AnyKind, Encoders, NamedRegisters, Values, Vision, lacks
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
 from steptwin.world.overrides import Overrides
@@ -36,8 +35,7 @@ from steptwin.world.running import Script
 from steptwin.world.scripts import MOST_STEPS_PER_INSTANT, Scripts, ScriptsState
 from steptwin.world.signals import Idle, SignalOf, find_signal
 from steptwin.world.spec import ScriptSpec, WorldSpec
-from steptwin.world.trace import Mark, Record, Trace
-from steptwin.world.writes import Values, encode_write
+from steptwin.world.trace import Mark, Trace, TraceRecord
 
 WORLD = "world"
 """What happens to no machine happens to the world."""
@@ -77,15 +75,23 @@ class PlantSnapshot:
 class Plant:
     """A world without files and clocks."""
 
-    def __init__(self, spec: WorldSpec, files: Files, *, keep_trace: bool = True, keep_inputs: bool = True) -> None:
-        names = [*(m.name for m in (*spec.mic488, *spec.m1486)), *(line.name for line in spec.lines), WORLD]
+    def __init__(
+        self,
+        spec: WorldSpec,
+        files: Files,
+        *,
+        keep_trace: bool = True,
+        keep_inputs: bool = True,
+        keep_memory: Keep | None = None,
+    ) -> None:
+        names = [*(controller.name for controller in spec.controllers), *(line.name for line in spec.lines), WORLD]
         self.spec = spec
         self.files = files
         self.trace = Trace(names, keep=keep_trace)
-        self.plan: Plan = build(spec, files, self.trace.add)
+        self.plan: WorldParts = build(spec, files, self.trace.add, keep_memory)
         self.now: Nanos = 0
         self.stopped: str | None = None
-        """Why the run ended, where a script says so."""
+        """Why the run ended, where a script gave a reason."""
         self.failures = Reports()
         """Expectations that did not hold."""
         self.overdue = Reports()
@@ -94,11 +100,11 @@ class Plant:
         """Whether everything from outside is kept, as a session needs it; a world that runs for weeks has no room for that."""
         self.inputs: list[Given] = []
         """Everything from outside so far, where it is kept."""
-        self._is_settled = False
+        self.is_settled = False
         """Whether the scripts of the description have done what they had to do since the last of that."""
         self._encoded: dict[object, tuple[bytes, ...]] = {}
         self._signals: dict[str, SignalOf | Idle] = {}
-        self._conditions: dict[str, Condition] = {}
+        self._conditions: dict[str, SignalCondition] = {}
         self._scripts = Scripts(self)
         self._later: dict[str, Script] = {}
         """What is done later, and may be called off, by name."""
@@ -112,7 +118,7 @@ class Plant:
     # ------------------------------------------------------------------ what is in it
 
     @property
-    def machines(self) -> Mapping[str, Mic488 | M1486]:
+    def machines(self) -> Mapping[str, MotionController]:
         return self.plan.machines
 
     @property
@@ -142,20 +148,25 @@ class Plant:
 
     @staticmethod
     def unknown(what: str, name: str, known: Iterable[str]) -> Unknown:
-        near = NearMiss().of(name, known)
-        hint = "" if near is None else f" (did you mean {near!r}?)"
+        hint = NearMiss().hint(name, known)
         return Unknown(name, f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
 
-    def condition(self, text: str) -> Condition:
+    def condition(self, text: str) -> SignalCondition:
         """Raises `Misuse` for what is no condition, and for unknown signals."""
         found = self._conditions.get(text)
         if found is None:
             if len(self._conditions) >= MOST_REMEMBERED:
                 self._conditions.clear()
-            found = self._conditions[text] = Condition(text, self._signal)
+            found = self._conditions[text] = SignalCondition(text, self._watched)
         return found
 
-    def _signal(self, name: str) -> SignalOf | Idle:
+    def _watched(self, name: str) -> SignalOf | Idle:
+        found = self.signal(name)
+        found.watch(name)
+        return found
+
+    def signal(self, name: str) -> SignalOf | Idle:
+        """The signal called ``name``. Raises `Misuse` with what there is."""
         found = self._signals.get(name)
         if found is None:
             if len(self._signals) >= MOST_REMEMBERED:
@@ -163,11 +174,11 @@ class Plant:
             found = self._signals[name] = find_signal(self.plan, name)
         return found
 
-    def read(self, signal: str) -> float:
-        """The present value of a signal."""
-        found = self._signal(signal)
+    def read(self, name: str) -> float:
+        """The present value of a signal. Raises `Misuse` for one that can only be written."""
+        found = self.signal(name)
         found.bring(self.now)
-        return found.value(self.now)
+        return float(found.value(self.now))
 
     # ------------------------------------------------------------------ scripts
 
@@ -187,11 +198,11 @@ class Plant:
         return self._scripts.start(name, make, is_outside=is_outside)
 
     def expect(self, text: str) -> None:
-        """Tell it where a condition does not hold."""
+        """Report a condition that does not hold."""
         if not self.holds(self.condition(text)):
             self._report(self.failures, "expectation", text)
 
-    def holds(self, condition: Condition) -> bool:
+    def holds(self, condition: SignalCondition) -> bool:
         """Whether a condition is true now."""
         condition.bring(self.now)
         return condition.holds(self.now)
@@ -201,7 +212,7 @@ class Plant:
         self._report(self.overdue, "overdue", text)
 
     def _report(self, reports: Reports, code: str, text: str) -> None:
-        record = Record(self.now, WORLD, "event", code, text)
+        record = TraceRecord(self.now, WORLD, "event", code, text)
         reports.add(record)
         self.trace.add(record)
 
@@ -216,26 +227,52 @@ class Plant:
     def note(self, what: Outside) -> None:
         """Keep what was done from outside at the present moment, where inputs are kept."""
         if self.keeps_inputs:
-            self.inputs.append(Given(self.now, what, self._is_settled))
-        self._is_settled = False
+            self.inputs.append(Given(self.now, what, self.is_settled))
+        self.is_settled = False
 
     def perform(self, what: Outside) -> None:
         """Do something at the present moment. Raises `Misuse` for what is not there."""
         act(self, what)
 
-    def machine(self, name: str) -> Mic488 | M1486:
+    def machine(self, name: str) -> MotionController:
         """Raises `Misuse` with the machines there are."""
         machine = self.machines.get(name)
         if machine is None:
             raise self.unknown("machine", name, self.machines)
         return machine
 
-    def controller(self, name: str, what: str) -> Mic488:
-        """A MIC488. Raises `Misuse` for other machines, which do not have ``what``."""
-        machine = self.machine(name)
-        if not isinstance(machine, Mic488):
-            raise Misuse(f"{name!r} is an M1486, which has no {what}")
-        return machine
+    def kind(self, name: str) -> AnyKind:
+        """The kind of a machine. Raises `Misuse` with the machines there are."""
+        self.machine(name)
+        return self.plan.kind_of[name]
+
+    def input_pin(self, name: str, pin: str, level: float) -> str:
+        """The input of a machine that ``pin`` means. Raises `Misuse` with those there are, and for a level it does not take."""
+        kind = self.kind(name)
+        found = kind.input_pin(pin, level)
+        kind.refuse_taken(self.machine(name), found)
+        return found
+
+    def registers(self, name: str) -> NamedRegisters[Any]:
+        """Raises `Misuse` for a machine without."""
+        kind = self.kind(name)
+        if kind.registers is None:
+            raise lacks(name, kind, "registers")
+        return kind.registers
+
+    def encoders(self, name: str) -> Encoders[Any]:
+        """Raises `Misuse` for a machine without."""
+        kind = self.kind(name)
+        if kind.encoders is None:
+            raise lacks(name, kind, "encoder")
+        return kind.encoders
+
+    def vision(self, name: str) -> Vision[Any, Any]:
+        """Raises `Misuse` for a machine without."""
+        kind = self.kind(name)
+        if kind.vision is None:
+            raise lacks(name, kind, "vision registers")
+        return kind.vision
 
     @staticmethod
     def by_machine(step: do.Write) -> Iterator[tuple[str, Values]]:
@@ -243,14 +280,15 @@ class Plant:
         for name, group in groupby(step.values, key=itemgetter(0)):
             yield name, tuple((register, value) for _, register, value in group)
 
-    def requests(self, device: Mic488, values: Values) -> tuple[bytes, ...]:
-        """The PDUs that write ``values``. Raises `Misuse` for what a register does not take."""
-        key = (device.firmware.name, device.data_type, values)
+    def requests(self, name: str, values: Values) -> tuple[bytes, ...]:
+        """The PDUs that write ``values`` to a machine. Raises `Misuse` for what a register does not take."""
+        registers, machine = self.registers(name), self.machine(name)
+        key = (self.kind(name).name, registers.dialect(machine), values)
         found = self._encoded.get(key)
         if found is None:
             if len(self._encoded) >= MOST_REMEMBERED:
                 self._encoded.clear()
-            found = self._encoded[key] = encode_write(device, values)
+            found = self._encoded[key] = registers.requests(machine, values)
         return found
 
     def button(self, name: str) -> tuple[Button, Kernel]:
@@ -281,7 +319,7 @@ class Plant:
     def advance(self, now: Nanos) -> None:
         """Bring the scripts, and the kernels they need, to ``now``, or to the end of the moment at which a script stops the run.
 
-        What ends at a moment has seen all of it, so that how long it ran tells what happened.
+        What ends at a moment has seen all of it, so that its length determines what happened.
         """
         if now < self.now:
             raise TimeReversal(self.now, now)
@@ -298,16 +336,11 @@ class Plant:
             if own is not None and own <= self.now:
                 self._scripts.run_own()
             else:
-                self._is_settled = True
+                self.is_settled = True
                 self._scripts.run_guests()
-        self._is_settled = True
+        self.is_settled = True
         if self.stopped is None:
             self.now = now
-
-    def pass_time(self, now: Nanos) -> None:
-        """As `advance`, for a caller who knows that nothing is due by ``now``."""
-        self.now = now
-        self._is_settled = True
 
     def watch_kernels(self, watch: Callable[[Kernel], None]) -> None:
         """Call ``watch`` from now on with every kernel in which something has happened, as `Kernel.on_change`."""
@@ -326,7 +359,7 @@ class Plant:
         for kernel in self.kernels:
             kernel.advance(self.now)
 
-    def run(self, end: Nanos, until: str | None = None) -> str | None:
+    def run_to(self, end: Nanos, until: str | None = None) -> str | None:
         """Run to the moment ``end``, or until a condition is true; gives why it ended before ``end``, else None."""
         self.go_on()
         watch = None
@@ -367,7 +400,7 @@ class Plant:
             self.plan.faults.copy_state(),
             self._scripts.state(),
             tuple(self.inputs),
-            self._is_settled,
+            self.is_settled,
             self.failures.state(),
             self.overdue.state(),
             self.trace.mark(),
@@ -390,7 +423,7 @@ class Plant:
         self.rigging.put_back(snapshot.faults, snapshot.faults_state)
         for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
             kernel.restore(state)
-        self.inputs, self._is_settled = list(snapshot.inputs), snapshot.is_settled
+        self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled
         self.failures, self.overdue = Reports(snapshot.failures), Reports(snapshot.overdue)
         self._conditions.clear()
         self._scripts.restore(snapshot.scripts)

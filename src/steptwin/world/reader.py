@@ -1,4 +1,4 @@
-"""Reads tables of TOML against rows that say what is permitted. All problems are told at once, each with file, line and key."""
+"""Reads tables of TOML against rows that define what is permitted. All errors are reported, with file, line and key."""
 
 from __future__ import annotations
 
@@ -10,44 +10,54 @@ from itertools import pairwise
 from math import isnan
 from typing import Any
 
-from steptwin.diagnostics import Diagnostic, Severity, Source, Span, in_order, render
-from steptwin.errors import Misuse
-from steptwin.wbc.nearmiss import NearMiss
-from steptwin.world.durations import duration
+from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
+from steptwin.durations import duration
+from steptwin.errors import Misuse, SourceErrors
+from steptwin.nearmiss import NearMiss
+from steptwin.world.addresses import parse_address
 from steptwin.world.names import Unknown
 from steptwin.world.tomlplaces import Path, TooMuch, find_places
 
 _MISSING: Any = object()
-NAMED = ("line", "mic488", "m1486", "axis", "button")
-"""Tables with names that others refer to."""
+NAMED = ("line", "axis", "button")
+"""Tables with names that others refer to, besides those of controllers."""
 MOST_FINDINGS = 100
-"""After so many nobody reads on."""
+"""Most errors that are reported."""
 _LONGEST_MESSAGE = 400
 MOST = 1e300
 """Numbers beyond it would overflow in products."""
 _WHOLE = range(-(1 << 63), 1 << 63)
 
 
-class WorldError(Misuse):
+FILE_ERRORS = "D010"
+"""A file that the description names has errors."""
+
+
+class WorldError(SourceErrors):
     """A description of a world with errors; the text shows them all."""
 
-    def __init__(self, source: Source, findings: Sequence[Diagnostic]) -> None:
+    def __init__(self, source: SourceText, findings: Sequence[Diagnostic], in_files: Sequence[str] = ()) -> None:
+        """``in_files`` are the errors in files that the description names, rendered; they stand for its own `FILE_ERRORS`."""
         self.source = source
         self.findings = in_order(findings)
-        super().__init__(render(source, self.findings))
+        own = [finding for finding in self.findings if finding.code != FILE_ERRORS]
+        super().__init__("\n".join([*in_files, *([render(source, own)] if own else [])]))
 
 
-class Text:
+class TomlText:
     """A TOML text that knows where its keys are, and collects what is wrong with them."""
 
-    def __init__(self, name: str, text: str) -> None:
-        """Raises `WorldError` for a text that is no TOML."""
-        self.source = Source(name, text)
+    def __init__(self, name: str, text: str, controllers: Sequence[str] = ()) -> None:
+        """``controllers`` are the tables that describe one. Raises `WorldError` for a text that is no TOML."""
+        self.source = SourceText(name, text)
+        self.controllers = tuple(controllers)
         self.findings: list[Diagnostic] = []
+        self._in_files: list[str] = []
+        """Errors in files that the description names, rendered."""
         self._near = NearMiss()
         self._spans: dict[Path, Span] = {}
         self._wrong: set[Path] = set()
-        """What is wrong, as it was told; tables of these are not looked at further."""
+        """Errors in the order of their reports; tables of these are not looked at further."""
         self._left_out: set[str] = set()
         try:
             self._spans = find_places(text)
@@ -81,27 +91,43 @@ class Text:
             self.wrong(path, "D001", "a whole number of more than 64 bits")
             raise self.error()
 
-    def wrong_at(self, span: Span, code: str, message: str, hint: str | None = None) -> None:
+    def wrong_at(self, span: Span, code: str, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
         """Raises `WorldError` when there is more wrong than anybody reads."""
         if len(message) > _LONGEST_MESSAGE and "\n" not in message:
             message = f"{message[: _LONGEST_MESSAGE - 61]}…{message[-60:]}"
-        self.findings.append(Diagnostic(code, Severity.ERROR, span, message, hint))
+        self.findings.append(Diagnostic(code, Severity.ERROR, span, message, hint, fix))
         if len(self.findings) >= MOST_FINDINGS:
             raise self.error()
 
-    def wrong(self, path: Path, code: str, message: str, hint: str | None = None) -> None:
+    def wrong(self, path: Path, code: str, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
         """Something is wrong with the value at ``path``, or with what holds it."""
         self._wrong.add(path)
         if (*path, 0) in self._spans and path not in self._spans:
             path = *path, 0
         while path and path not in self._spans:
             path = path[:-1]
-        self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint)
+        self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint, fix)
+
+    def wrong_file(self, path: Path, error: SourceErrors) -> None:
+        """A file that the table at ``path`` names has errors, which have places of their own."""
+        if str(error) not in self._in_files:
+            self._in_files.append(str(error))
+        self.wrong(path, FILE_ERRORS, f"a file has errors: {str(error).splitlines()[0]}")
 
     def wrong_reference(self, path: Path, error: Misuse, place: str = "") -> None:
-        """What is at ``path`` does not fit the rest. Not told where it only follows from something else that is wrong."""
+        """What is at ``path`` does not fit the rest. Not reported where it only follows from something else that
+        is wrong; then what the table would have been is not there either."""
         if not (isinstance(error, Unknown) and self.may_be_broken(error.name)):
             self.wrong(path, "D009", f"{place}{error}")
+        elif len(path) > 1 and (name := self._name_of(path[0], path[1])) is not None:
+            self.leave_out(name)
+
+    def _name_of(self, kind: str | int, number: str | int) -> str | None:
+        """The name in a table that may be several times."""
+        tables = self.data.get(str(kind))
+        table = tables[number] if isinstance(tables, list) and isinstance(number, int) else None
+        found = table.get("name") if isinstance(table, dict) else None
+        return found if isinstance(found, str) else None
 
     def is_wrong(self, path: Path) -> bool:
         """Whether something is wrong with the value at ``path`` or in it."""
@@ -120,10 +146,8 @@ class Text:
         if name in self._left_out:
             return True
         for kind, number in {(wrong[0], wrong[1]) for wrong in self._wrong if len(wrong) > 1}:
-            tables = self.data.get(str(kind))
-            table = tables[number] if isinstance(tables, list) and isinstance(number, int) else None
-            found = table.get("name") if isinstance(table, dict) else None
-            if found == name or (kind in NAMED and not isinstance(found, str)):
+            found = self._name_of(kind, number)
+            if found == name or (kind in (*NAMED, *self.controllers) and found is None):
                 return True
         return False
 
@@ -133,12 +157,29 @@ class Text:
             path = path[:-1]
         return self.source.position(self._spans[path].start)[0] if path else 1
 
+    def meant(self, word: str, known: Iterable[str]) -> str | None:
+        """The known word that was probably meant."""
+        return self._near.of(word, known)
+
     def near(self, word: str, known: Iterable[str]) -> str:
-        found = self._near.of(word, known)
-        return "" if found is None else f"; did you mean {found!r}?"
+        return self._near.hint(word, known)
+
+    def key_replacement(self, path: Path, name: str, known: Iterable[str]) -> Fix | None:
+        """The fix that puts the key that was probably meant in the place of the one at ``path``."""
+        span, meant = self._spans.get(path), self.meant(name, known)
+        if span is None or meant is None:
+            return None
+        place = self.source.text.find(name, span.start, span.end)
+        return None if place < 0 else Fix(Span(place, place + len(name)), meant)
+
+    def replacement(self, path: Path, old: str, new: str | None) -> Fix | None:
+        """The fix that puts a word in the place of the last such in what is at ``path``: its key or its text."""
+        span = self._spans.get(path)
+        place = -1 if span is None else self.source.text.rfind(old, span.start, span.end)
+        return None if place < 0 or new is None else Fix(Span(place, place + len(old)), new)
 
     def error(self) -> WorldError:
-        return WorldError(self.source, self.findings)
+        return WorldError(self.source, self.findings, self._in_files)
 
     def check(self) -> None:
         """`WorldError` if anything was wrong."""
@@ -165,8 +206,13 @@ class Key:
         return self.default is _MISSING
 
 
-def read_table(text: Text, path: Path, value: object, keys: Sequence[Key], also: Iterable[str] = ()) -> dict[str, Any]:
-    """The values of a table by attribute; what is wrong is told to ``text``. Keys in ``also`` are read elsewhere."""
+def optional(read: Callable[[Any], Any], name: str, meaning: str, default: Any = None, attribute: str = "") -> Key:
+    """A key that may be left out."""
+    return Key(name, read, meaning, default, attribute)
+
+
+def read_table(text: TomlText, path: Path, value: object, keys: Sequence[Key], also: Iterable[str] = ()) -> dict[str, Any]:
+    """The values of a table by attribute; errors are added to ``text``. Keys in ``also`` are read elsewhere."""
     values: dict[str, Any] = {key.attribute or key.name: key.default for key in keys if not key.is_required}
     what = _what(path)
     if not isinstance(value, Mapping):
@@ -180,10 +226,13 @@ def read_table(text: Text, path: Path, value: object, keys: Sequence[Key], also:
             try:
                 values[key.attribute or key.name] = key.read(given)
             except Misuse as error:
-                text.wrong((*path, name), "D003", f"{what}: {name}: {error}", key.meaning)
+                meant = key.read.near(given) if isinstance(key.read, Word) else None
+                fix = text.replacement((*path, name), str(given), meant)
+                text.wrong((*path, name), "D003", f"{what}: {name}: {error}", key.meaning, fix)
         elif name not in also:
             near = text.near(name, permitted)
-            text.wrong((*path, name), "D004", f"{what} has no {name!r}{near}", f"permitted: {_listed(known, also)}")
+            fix = text.key_replacement((*path, name), name, permitted)
+            text.wrong((*path, name), "D004", f"{what} has no {name!r}{near}", f"permitted: {_listed(known, also)}", fix)
     for key in keys:
         if key.is_required and key.name not in value:
             text.wrong(path, "D005", f"{what}: {key.name} is missing", key.meaning)
@@ -194,7 +243,7 @@ _MANY = 5
 
 
 def _listed(known: Iterable[str], also: Iterable[str]) -> str:
-    """Keys for people; of the many numbered tables of a controller the first and last."""
+    """Keys for messages; of the many numbered tables of a controller the first and last."""
     others = list(also)
     names = {name.rstrip("0123456789") for name in others}
     if len(others) > _MANY:
@@ -214,6 +263,12 @@ def _what(path: Path) -> str:
 def text_value(value: Any) -> str:
     if not isinstance(value, str) or not value.strip():
         raise Misuse(f"{value!r}: expected a text{' that is not empty' if isinstance(value, str) else ''}")
+    return value
+
+
+def address_value(value: Any) -> str:
+    """HOST:PORT as it is written; whether it may be reached by others is decided where it is opened."""
+    parse_address(text_value(value), listen_any=True)
     return value
 
 
@@ -258,14 +313,25 @@ def whole(least: int, most: int) -> Callable[[Any], int]:
     return read
 
 
-def word(*words: str) -> Callable[[Any], str]:
-    def read(value: Any) -> str:
-        if value not in words:
-            near = NearMiss().of(value, words) if isinstance(value, str) else None
-            raise Misuse(f"{value!r}: permitted are {', '.join(words)}{'' if near is None else f'; did you mean {near!r}?'}")
+@dataclass(frozen=True, slots=True)
+class Word:
+    """One of a few words."""
+
+    words: tuple[str, ...]
+
+    def __call__(self, value: Any) -> str:
+        if value not in self.words:
+            hint = NearMiss().hint(value, self.words) if isinstance(value, str) else ""
+            raise Misuse(f"{value!r}{hint}: permitted are {', '.join(self.words)}")
         return value
 
-    return read
+    def near(self, value: object) -> str | None:
+        """The word that was probably meant."""
+        return NearMiss().of(value, self.words) if isinstance(value, str) else None
+
+
+def word(*words: str) -> Word:
+    return Word(words)
 
 
 def time_value(value: Any) -> int:
@@ -277,20 +343,6 @@ def positive_time(value: Any) -> int:
     if found == 0:
         raise Misuse(f"{value!r}: must be more than 0")
     return found
-
-
-def banks_value(value: Any) -> tuple[tuple[int, str], ...]:
-    """Files by bank: a text is for bank 0, a list for 0, 1 …, a table names the banks."""
-    if isinstance(value, str):
-        return ((0, text_value(value)),)
-    if isinstance(value, list):
-        return tuple((bank, text_value(name)) for bank, name in enumerate(value))
-    if not isinstance(value, Mapping):
-        raise Misuse(f"{value!r}: expected a file, a list of files, or files by bank such as {{ 3 = 'file' }}")
-    for bank in value:
-        if not (bank.isascii() and bank.isdecimal() and len(bank) < 4) or (len(bank) > 1 and bank[0] == "0"):
-            raise Misuse(f"{bank!r} is no bank: expected a number from 0 on")
-    return tuple(sorted((int(bank), text_value(name)) for bank, name in value.items()))
 
 
 def pair(value: Any) -> tuple[float, float]:

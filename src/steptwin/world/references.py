@@ -7,11 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, get_args
 
 from steptwin.errors import Misuse
-from steptwin.m1486.pins import settable_pin
-from steptwin.mic488.device import Mic488, check_pin, check_turn
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Leave, Outside, See, master_of
+from steptwin.world.actions import Bytes, Leave, Outside, See
 from steptwin.world.faults import Fault
 from steptwin.world.script import STEPS
 from steptwin.world.spec import ScriptSpec
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
-    """Tell the description's text every step that cannot be taken."""
+    """Report every step that cannot be taken, in the description's text."""
     text = plant.spec.text
     set_somewhere = [step.fault for script in scripts for step in _all(script.steps) if isinstance(step, do.SetFault)]
     for script in scripts:
@@ -35,7 +33,7 @@ def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
 
 
 def check_faults(plant: Plant, faults: Sequence[Fault | None]) -> None:
-    """Set the faults of the description; tell its text those that cannot happen."""
+    """Set the faults of the description; report those that cannot happen."""
     for n, fault in enumerate(faults):
         if fault is not None and not _is_on_something_broken(plant, fault):
             try:
@@ -48,7 +46,7 @@ def _is_on_something_broken(plant: Plant, fault: Fault) -> bool:
     """Whether a fault is, or may be, on a machine or line with something wrong in its own table."""
     text = plant.spec.text
     named = [str(name) for key in ("machine", "line") if (name := fault.get(key)) is not None]
-    return any(map(text.may_be_broken, named)) if named else text.is_any_wrong("mic488", "m1486", "line", "axis")
+    return any(map(text.may_be_broken, named)) if named else text.is_any_wrong(*text.controllers, "line", "axis")
 
 
 def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
@@ -106,10 +104,7 @@ def _condition(plant: Plant, step: do.Until | do.Expect) -> None:
 
 def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, level in step.levels:
-        if isinstance(plant.machine(name), Mic488):
-            check_pin(pin, level)
-        else:
-            settable_pin(pin, level)
+        plant.input_pin(name, pin, level)
 
 
 def _button(plant: Plant, step: do.Press | do.Release) -> None:
@@ -118,11 +113,11 @@ def _button(plant: Plant, step: do.Press | do.Release) -> None:
 
 def _write(plant: Plant, step: do.Write) -> None:
     for name, values in plant.by_machine(step):
-        plant.requests(plant.controller(name, "registers"), values)
+        plant.requests(name, values)
 
 
 def _request(plant: Plant, step: do.Request) -> None:
-    master_of(plant.line_called(step.line))
+    _ = plant.line_called(step.line).master
 
 
 def _send(plant: Plant, step: do.Send) -> None:
@@ -134,12 +129,19 @@ def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
 
 
 def _turn(plant: Plant, step: do.Turn) -> None:
-    plant.controller(step.machine, "encoder")
-    check_turn(step.axis, step.counts)
+    plant.encoders(step.machine).check_turn(step.axis, step.counts)
+
+
+def _couple(plant: Plant, step: do.Couple) -> None:
+    plant.encoders(step.machine).check_turn(step.axis, 0)
+    drive = step.machine, f"M{step.axis}"
+    for axis in plant.axes.values():
+        if axis.spec.drive == drive:
+            raise Misuse(f"{'.'.join(drive)}: the description of axis {axis.spec.name!r} says what turns its encoder")
 
 
 def _see(plant: Plant, step: See) -> None:
-    plant.controller(step.machine, "vision registers")
+    plant.vision(step.machine)
 
 
 def _fault(plant: Plant, step: do.SetFault) -> None:
@@ -169,6 +171,7 @@ _CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.Send: _send,
         do.PowerCycle: _power_cycle,
         do.Turn: _turn,
+        do.Couple: _couple,
         See: _see,
         do.SetFault: _fault,
         do.ClearFault: _clear_fault,

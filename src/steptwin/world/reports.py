@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from steptwin.world.trace import Record
+from steptwin.world.trace import TraceRecord
 
 MOST_KEPT = 1000
 """A script may fail once a second for months: further records are only counted. The trace has all of them."""
 
 
 class ReportsState(NamedTuple):
-    first: tuple[Record, ...]
+    first: tuple[TraceRecord, ...]
     count: int
 
 
@@ -23,7 +23,7 @@ class Reports:
         self._first = [] if state is None else list(state.first)
         self._count = 0 if state is None else state.count
 
-    def add(self, record: Record) -> None:
+    def add(self, record: TraceRecord) -> None:
         self._count += 1
         if len(self._first) < MOST_KEPT:
             self._first.append(record)
@@ -32,11 +32,11 @@ class Reports:
         """How many there were."""
         return self._count
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[TraceRecord]:
         """The first of them."""
         return iter(self._first)
 
-    def __getitem__(self, index: int) -> Record:
+    def __getitem__(self, index: int) -> TraceRecord:
         return self._first[index]
 
     @property

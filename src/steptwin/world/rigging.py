@@ -6,20 +6,18 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from steptwin.machine import Nanos
-from steptwin.mic488.device import Mic488
-from steptwin.world.build import Plan
-from steptwin.world.faults import Active, Fault, M1486Body, Mic488Body, Wire, check_place, rig
+from steptwin.world.build import WorldParts
+from steptwin.world.faults import Active, Fault, RequestRoute, check_place, rig
 from steptwin.world.faults.table import Layer, OfRequest
+from steptwin.world.kind import Service
+from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
-
-LINELESS_UNIT = 1
-"""Under which faults know a controller without a line."""
 
 
 class Rigging:
     """Sets the faults of a world that was built from a description."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: WorldParts) -> None:
         self._plan = plan
 
     def check(self, fault: Fault) -> None:
@@ -53,40 +51,28 @@ class Rigging:
         if name in plan.faults.machines:
             return
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.axes.values() if axis.spec.drive[0] == name}
-        body: Mic488Body | M1486Body
-        if isinstance(machine, Mic488):
-            line, unit = plan.line_of.get(name, (None, LINELESS_UNIT))
-            body = Mic488Body(machine, unit, "" if line is None else line.name)
-            for number, mechanism in mechanisms.items():
-                body.shafts[number - 1] = mechanism
-        else:
-            body = M1486Body(machine, mechanisms.values())
+        on = plan.line_of.get(name)
+        service = Service() if on is None else Service(on[1], on[0].name)
+        body = plan.kind_of[name].body(machine, service, mechanisms)
         rig(plan.kernel_of[name], name, plan.faults, body)
 
 
-def _wires(plan: Plan) -> Iterator[Wire]:
+def _wires(plan: WorldParts) -> Iterator[RequestRoute]:
     """What requests come along: links of lines to the outside, described or there now; their scripts; without a line nothing."""
     for spec in plan.spec.lines:
         line = plan.lines.get(spec.name)
         if line is None:
             continue  # something is wrong with it
-        serial, network = line.fault_kinds[line.kinds[0]], line.fault_kinds[line.kinds[-1]]
-        name = f"line {spec.name!r} carries"
+        kind, name = line_kinds()[spec.kind], f"line {spec.name!r} carries"
+        links = {kind.links[key].place: kind.links[key].place_kind for key in spec.links}
         outside = [
-            Wire(name, kind, link, line.units, on=spec.name)
-            for link, kind, is_open in (
-                ("pty", serial, spec.pty),
-                ("serial", serial, spec.serial),
-                ("rtu", serial, spec.rtu_tcp or (spec.rfc2217 if spec.kind == "modbus" else None)),
-                ("tcp", network, spec.tcp or (spec.rfc2217 if spec.kind == "m1486" else None)),
-            )
-            if is_open is not None
+            RequestRoute(name, line.fault_kinds[place_kind], link, line.units, on=spec.name) for link, place_kind in links.items()
         ]
         for place, there in line.places.items():
             if place != SCRIPTS and not any(wire.is_called(place) for wire in outside):
-                outside.append(Wire(name, line.fault_kinds[there.kind], place, line.units, on=spec.name))
+                outside.append(RequestRoute(name, line.fault_kinds[there.kind], place, line.units, on=spec.name))
         yield from outside
-        yield Wire(name, serial, SCRIPTS, line.units, is_usual=not outside, on=spec.name)
-    for name, machine in plan.machines.items():
-        if isinstance(machine, Mic488) and name not in plan.line_of:
-            yield Wire(f"{name!r} is on no line", None, units=(LINELESS_UNIT,))
+        yield RequestRoute(name, line.fault_kinds[line.kinds[0]], SCRIPTS, line.units, is_usual=not outside, on=spec.name)
+    for name, kind in plan.kind_of.items():
+        if kind.registers is not None and name not in plan.line_of:
+            yield RequestRoute(f"{name!r} is on no line", None, units=(Service().unit,))

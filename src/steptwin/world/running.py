@@ -19,7 +19,7 @@ class Asked(NamedTuple):
     last: int
 
 
-class Waiting(NamedTuple):
+class ScriptWait(NamedTuple):
     """What a script waits for: a moment, or something that comes before it."""
 
     until: Nanos | None
@@ -36,7 +36,7 @@ class Waiting(NamedTuple):
         return self.condition is None and not self.asked
 
 
-class Sent:
+class SentValues:
     """All values sent to a generator so far, stored compactly: scripts may run for months."""
 
     __slots__ = ("_bytes", "_kinds", "_lengths", "_numbers")
@@ -80,14 +80,14 @@ class Sent:
             else:
                 yield self._PLAIN[kind]
 
-    def copy(self) -> Sent:
-        other = Sent()
+    def copy(self) -> SentValues:
+        other = SentValues()
         other._kinds, other._bytes = self._kinds.copy(), self._bytes.copy()
         other._numbers, other._lengths = self._numbers[:], self._lengths[:]
         return other
 
 
-Place: TypeAlias = "tuple[tuple[int, int], ...] | Sent"
+Place: TypeAlias = "tuple[tuple[int, int], ...] | SentValues"
 """Where a script is: its place in a `Walk`, or what its generator was sent."""
 
 
@@ -99,7 +99,7 @@ class ScriptState(NamedTuple):
     make: Callable[[], do.Steps | do.Walk]
     is_outside: bool
     place: Place
-    waiting: Waiting | None
+    waiting: ScriptWait | None
 
 
 class Script:
@@ -113,9 +113,9 @@ class Script:
         self.make = make
         self.is_outside = is_outside
         """Whether it is no part of the description: what it does comes from outside."""
-        self._sent = Sent()
+        self._sent = SentValues()
         self._steps = make()
-        self.waiting: Waiting | None = None
+        self.waiting: ScriptWait | None = None
         self.entry = 0
         """Its present entry in an agenda."""
         self.kernels: tuple[Any, ...] = ()
@@ -139,7 +139,7 @@ class Script:
         """It takes no further step."""
         self.ended = True
         self._steps.close()
-        self._sent = Sent()
+        self._sent = SentValues()
 
     def state(self) -> ScriptState:
         steps = self._steps
@@ -150,7 +150,7 @@ class Script:
     def at(cls, state: ScriptState) -> Script:
         """A script in a state: a walk at its place, or a fresh generator that was sent the same again."""
         script = cls(state.number, state.name, state.make, is_outside=state.is_outside)
-        if isinstance(state.place, Sent):
+        if isinstance(state.place, SentValues):
             script._sent = state.place.copy()
             for value in state.place.values():
                 script._next(value)

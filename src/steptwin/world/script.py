@@ -1,5 +1,5 @@
 """What operators do: steps, one after another. A script is a generator of steps, which are plain values. Their times are whole
-nanoseconds: ``Wait(SECOND // 2)``, or ``Wait(duration("500 ms"))`` with `steptwin.world.durations`.
+nanoseconds: ``Wait(SECOND // 2)``, or ``Wait(duration("500 ms"))`` with `steptwin.durations`.
 
 A generator is sent what a step gives: for `Read` a number, for `Request` the answer (bytes), for `Until` whether the condition
 came true in time. It touches nothing by itself, so that it can be restored by sending it the same again. Steps that are known
@@ -20,7 +20,7 @@ from steptwin.world.faults import parse as parse_fault
 from steptwin.world.reader import (
     Key,
     Path,
-    Text,
+    TomlText,
     name_value,
     number,
     pin_name,
@@ -29,6 +29,9 @@ from steptwin.world.reader import (
     time_value,
     whole,
 )
+
+COUPLINGS = ("drive", "free", "blocked")
+"""What can turn the encoder shaft of an axis."""
 
 
 def _check_ns(value: object) -> None:
@@ -134,6 +137,19 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
+class Couple:
+    """What turns the encoder shaft of an axis of a MIC488 without mechanics: the drive, nothing, or a blocked drive."""
+
+    machine: str
+    axis: int
+    coupling: str
+
+    def __post_init__(self) -> None:
+        if self.coupling not in COUPLINGS:
+            raise Misuse(f"{self.coupling!r}: an encoder shaft is turned by {', '.join(COUPLINGS)}")
+
+
+@dataclass(frozen=True, slots=True)
 class SetFault:
     fault: Fault
 
@@ -145,7 +161,7 @@ class ClearFault:
 
 @dataclass(frozen=True, slots=True)
 class Expect:
-    """Tell it where a condition does not hold; the run is not a good one then."""
+    """Report a condition that does not hold; the run has failed then."""
 
     condition: str
 
@@ -196,6 +212,7 @@ Step: TypeAlias = (
     | Request
     | PowerCycle
     | Turn
+    | Couple
     | SetFault
     | ClearFault
     | Expect
@@ -342,22 +359,26 @@ def _turn(axis: tuple[str, int], counts: int) -> Turn:
     return Turn(*axis, counts)
 
 
+def _couple(axis: tuple[str, int], coupling: str) -> Couple:
+    return Couple(*axis, coupling)
+
+
 @dataclass(frozen=True, slots=True)
-class Action:
-    """A kind of step: its first key says which; ``make`` takes the values of all keys in their order."""
+class StepKind:
+    """A kind of step: its first key selects it; ``make`` takes the values of all keys in their order."""
 
     main: Key
     others: tuple[Key, ...]
     make: Callable[..., Step]
 
 
-def _action(main: Key, make: Callable[..., Step], *others: Key) -> tuple[str, Action]:
-    return main.name, Action(main, others, make)
+def _action(main: Key, make: Callable[..., Step], *others: Key) -> tuple[str, StepKind]:
+    return main.name, StepKind(main, others, make)
 
 
 _WITHIN = Key("within", time_value, "for at most this time", None)
 
-ACTIONS: Mapping[str, Action] = dict(
+ACTIONS: Mapping[str, StepKind] = dict(
     (
         _action(Key("wait", time_value, "a time such as '1 s'"), Wait),
         _action(Key("at", time_value, "a moment such as '10 s'"), At),
@@ -380,6 +401,11 @@ ACTIONS: Mapping[str, Action] = dict(
             Key("turn", _turned, "MACHINE.M1 to M4"),
             _turn,
             Key("counts", whole(-(2**31), 2**31 - 1), "encoder counts"),
+        ),
+        _action(
+            Key("couple", _turned, "MACHINE.M1 to M4 without mechanics"),
+            _couple,
+            Key("to", text_value, "what turns the encoder shaft: drive, free or blocked"),
         ),
         _action(Key("fault", _fault, "{ kind = ... } as in [[fault]]"), SetFault),
         _action(Key("clear_fault", text_value, "the name of a fault"), ClearFault),
@@ -405,8 +431,8 @@ _UNREAD = Note("")
 """In the place of a step that is wrong, so that those after it keep theirs; such a script never runs."""
 
 
-def read_steps(text: Text, path: Path, value: object) -> tuple[Step, ...]:
-    """Steps from a list of tables; what is wrong is told to ``text``."""
+def read_steps(text: TomlText, path: Path, value: object) -> tuple[Step, ...]:
+    """Steps from a list of tables; errors are added to ``text``."""
     if not isinstance(value, list):
         text.wrong(path, "D002", f"{path[-1]} is {value!r}", "expected a list of steps, such as [{ wait = '1 s' }]")
         return ()
@@ -417,7 +443,7 @@ def read_steps(text: Text, path: Path, value: object) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def _step(text: Text, path: Path, n: int, table: object) -> Step | None:
+def _step(text: TomlText, path: Path, n: int, table: object) -> Step | None:
     if not isinstance(table, Mapping):
         text.wrong(path, "D002", f"step {n} is {table!r}", "expected a table, such as { wait = '1 s' }")
         return None

@@ -10,11 +10,11 @@ from steptwin.errors import Runaway
 from steptwin.machine import Nanos
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import FOR_SCRIPTS, Outside, master_of
+from steptwin.world.actions import FOR_SCRIPTS, Outside
 from steptwin.world.agenda import Agenda, Watchers
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
-from steptwin.world.running import Asked, Script, ScriptState, Waiting
+from steptwin.world.running import Asked, Script, ScriptState, ScriptWait
 
 if TYPE_CHECKING:
     from steptwin.world.plant import Plant
@@ -23,7 +23,7 @@ MOST_STEPS_PER_INSTANT = 10_000
 """More steps of scripts at one moment are a runaway."""
 
 
-Taken: TypeAlias = tuple[Waiting | None, Any]
+Taken: TypeAlias = tuple[ScriptWait | None, Any]
 """What a step waits for, or else what it gives."""
 
 
@@ -57,7 +57,7 @@ class Scripts:
     def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool) -> Script:
         script = self._scripts[self._begun] = Script(self._begun, name, make, is_outside=is_outside)
         self._begun += 1
-        self._wait(script, Waiting(self._plant.now))
+        self._wait(script, ScriptWait(self._plant.now))
         return script
 
     def end(self, script: Script) -> None:
@@ -89,7 +89,7 @@ class Scripts:
             for script in changed:
                 self._plan(script)
 
-    def _wait(self, script: Script, waiting: Waiting) -> None:
+    def _wait(self, script: Script, waiting: ScriptWait) -> None:
         script.waiting = waiting
         if waiting.is_timed and waiting.until is not None:
             self._watchers.set(script, ())
@@ -114,11 +114,11 @@ class Scripts:
         self._watchers.set(script, kernels)
         self._agenda_of(script).watch(script, min((due for due in dues if due is not None), default=None))
 
-    def _are_answered(self, waiting: Waiting) -> bool:
+    def _are_answered(self, waiting: ScriptWait) -> bool:
         return all(self._master(asked.line).finished >= asked.last for asked in waiting.asked)
 
     def _master(self, line: str) -> Master:
-        return master_of(self._plant.line_called(line))
+        return self._plant.line_called(line).master
 
     # ------------------------------------------------------------------ what they do
 
@@ -175,14 +175,14 @@ class Scripts:
         else:
             self._watchers.again(script)
 
-    def _answer(self, waiting: Waiting) -> bytes | None:
+    def _answer(self, waiting: ScriptWait) -> bytes | None:
         """The PDU of the answer to a `Request`; None for a `Write`."""
         if not waiting.is_request:
             return None
         (asked,) = waiting.asked
         return self._master(asked.line).answers.pop(asked.last)[1:-2]
 
-    def _report_overdue(self, script: Script, waiting: Waiting, *, has_come: bool) -> None:
+    def _report_overdue(self, script: Script, waiting: ScriptWait, *, has_come: bool) -> None:
         """Steps of a description go on whether or not what they wait for comes; code from outside is sent that, and decides."""
         if script.is_outside or waiting.is_request:
             return
@@ -218,20 +218,20 @@ class Scripts:
         return None, None
 
     def _pause(self, step: do.Wait, script: Script) -> Taken:
-        return (Waiting(self._plant.now + step.duration) if step.duration > 0 else None), None
+        return (ScriptWait(self._plant.now + step.duration) if step.duration > 0 else None), None
 
     def _wait_for_moment(self, step: do.At, script: Script) -> Taken:
-        return (Waiting(step.time) if step.time > self._plant.now else None), None
+        return (ScriptWait(step.time) if step.time > self._plant.now else None), None
 
     def _wait_for_condition(self, step: do.Until, script: Script) -> Taken:
         plant = self._plant
         plant.condition(step.condition)  # raises `Misuse` here
-        return Waiting(None if step.within is None else plant.now + step.within, step.condition), None
+        return ScriptWait(None if step.within is None else plant.now + step.within, step.condition), None
 
     def _stop(self, step: do.Stop, script: Script) -> Taken:
         plant = self._plant
         plant.stopped = step.reason if plant.stopped is None else plant.stopped
-        return Waiting(plant.now + 1), None
+        return ScriptWait(plant.now + 1), None
 
     def _read(self, step: do.Read, script: Script) -> Taken:
         return None, self._plant.read(step.signal)
@@ -245,7 +245,7 @@ class Scripts:
         number = master.asked + 1
         master.wanted |= {number}
         self._do(script, step)
-        return Waiting(None, asked=(Asked(step.line, number, number),), is_request=True), None
+        return ScriptWait(None, asked=(Asked(step.line, number, number),), is_request=True), None
 
     def _write(self, step: do.Write, script: Script) -> Taken:
         """Write as a master does: wait for the answers before the next step."""
@@ -254,7 +254,7 @@ class Scripts:
         before = {name: self._master(name).asked for name in lines}
         self._do(script, step)
         asked = tuple(Asked(name, before[name] + 1, self._master(name).asked) for name in lines)
-        waiting = Waiting(None, asked=tuple(one for one in asked if self._master(one.line).finished < one.last))
+        waiting = ScriptWait(None, asked=tuple(one for one in asked if self._master(one.line).finished < one.last))
         return (waiting if waiting.asked else None), None
 
     def _do(self, script: Script, what: Outside) -> None:

@@ -1,24 +1,32 @@
-"""Signals: what conditions may speak of and scripts may read, by name."""
+"""Signals: what conditions may speak of, and scripts and programs outside may read, by name. Points of controllers are those of
+their data sheets."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486
-from steptwin.machine import SECOND, Nanos
-from steptwin.mic488.axis import Axis
-from steptwin.mic488.device import Mic488
-from steptwin.mic488.program import ProgramState
-from steptwin.motion import Profile
+from steptwin.machine import SECOND, MotionController, Nanos
 from steptwin.motion.divisions import profile_of
-from steptwin.wbc.nearmiss import NearMiss
-from steptwin.world.build import Fitted, Plan
+from steptwin.nearmiss import NearMiss
+from steptwin.points import turns_of
 from steptwin.world.kernel import Kernel
-from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
+
+if TYPE_CHECKING:
+    from steptwin.world.build import Fitted, WorldParts
+    from steptwin.world.kind import AnyKind
+    from steptwin.world.lines import Line
+
+T = TypeVar("T")
+
+MECHANICS = ("position", "lost", "stalled")
+"""What there is of the mechanics of an axis."""
+MOST_NAMED = 8
+"""Points in a message."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +34,19 @@ class SignalOf:
     """A signal, and the kernels that have to be at the moment asked for."""
 
     kernels: tuple[Kernel, ...]
-    read: Callable[[Nanos], float]
+    read: Callable[[Nanos], float] | None
+    """None where it can only be written."""
     turning: Callable[[Nanos], Iterable[Nanos]] | None = None
     versions: Callable[[], object] | None = None
+    unit: str = ""
+    is_kept: bool = False
+    """Whether it may change by a request that is no event of its kernel."""
+    check: Callable[[], None] = lambda: None
+    """Raises `Misuse` where no condition can be on it: it changes between events at moments that are not known."""
+
+    @property
+    def is_readable(self) -> bool:
+        return self.read is not None
 
     @property
     def continuous(self) -> bool:
@@ -42,7 +60,19 @@ class SignalOf:
         return self.kernels
 
     def value(self, now: Nanos) -> float:
+        """After `bring`. Raises `Misuse` for what can only be written."""
+        if self.read is None:
+            raise Misuse("it can only be written")
         return self.read(now)
+
+    def watch(self, name: str) -> None:
+        """A condition is on it from now on. Raises `Misuse` where it cannot be."""
+        if self.read is None:
+            raise Misuse(f"{name} can only be written")
+        self.check()
+        if self.is_kept:
+            for kernel in self.kernels:
+                kernel.is_attentive = True
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         yield from () if self.turning is None else self.turning(now)
@@ -55,11 +85,13 @@ class Idle:
     """Whether all machines are idle, and nothing is on its way on a line. While one of them is busy the others do not matter."""
 
     continuous = False
+    is_readable = True
+    unit = ""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: WorldParts) -> None:
         self._kernels = tuple(plan.kernels)
         self._things: list[tuple[Kernel, Callable[[Nanos], bool]]] = [
-            *((plan.kernel_of[name], partial(is_idle, machine)) for name, machine in plan.machines.items()),
+            *((plan.kernel_of[name], partial(plan.kind_of[name].is_idle, machine)) for name, machine in plan.machines.items()),
             *((plan.kernel_of[name], partial(_is_quiet, line)) for name, line in plan.lines.items()),
         ]
         self._busy: int | None = None
@@ -76,6 +108,9 @@ class Idle:
         self._busy = None
         return self._kernels
 
+    def watch(self, name: str) -> None:
+        """A condition may be on it."""
+
     def value(self, now: Nanos) -> float:
         """After `bring`."""
         return float(self._busy is None)
@@ -87,10 +122,10 @@ class Idle:
         return None
 
 
-def find_signal(plan: Plan, name: str) -> SignalOf | Idle:
+def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     """The signal called ``name``. `Misuse` with what there is."""
     if name == "time":
-        return SignalOf((), lambda now: now / SECOND, lambda now: (), lambda: name)
+        return SignalOf((), lambda now: now / SECOND, lambda now: (), lambda: name, unit="s")
     if name == "idle":
         return Idle(plan)
     owner, _, rest = name.partition(".")
@@ -102,17 +137,23 @@ def find_signal(plan: Plan, name: str) -> SignalOf | Idle:
     machine = plan.machines.get(owner)
     if machine is None:
         known = [*plan.machines, *plan.axes, *plan.buttons, "time", "idle"]
-        near = NearMiss().of(owner, known)
-        hint = f" (did you mean {near!r}?)" if near else ""
+        hint = NearMiss().hint(owner, known)
         raise Unknown(owner, f"no signal {name!r}: nothing is called {owner!r}{hint}; there are {', '.join(known)}")
-    kernel = plan.kernel_of[owner]
-    pins = machine.pins()
-    if rest.upper() in pins:
-        pin = rest.upper()
-        return SignalOf((kernel,), lambda now: float(machine.pins()[pin]))
-    if isinstance(machine, Mic488):
-        return _of_mic488(machine, kernel, rest, name)
-    return _of_m1486(machine, kernel, rest, name)
+    return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner], rest, name)
+
+
+def _of_machine(kind: AnyKind, machine: MotionController, kernel: Kernel, rest: str, name: str) -> SignalOf:
+    """A pin, or else a point of the data sheet."""
+    pin = rest.upper()
+    if pin in machine.pins():
+        found = next(found for found in kind.datasheet(machine).pins if found.name == pin)
+        return SignalOf(
+            (kernel,), lambda now: machine.pins()[pin], unit=found.unit, check=partial(kind.refuse_taken, machine, pin)
+        )
+    point = kind.point(machine, rest)
+    if point is None:
+        raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")
+    return SignalOf((kernel,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept)
 
 
 def _is_quiet(line: Line, now: Nanos) -> bool:
@@ -120,77 +161,22 @@ def _is_quiet(line: Line, now: Nanos) -> bool:
     return line.deadline() is None
 
 
-def is_idle(machine: Mic488 | M1486, now: Nanos) -> bool:
-    """Whether all axes stand and no program runs."""
-    if isinstance(machine, M1486):
-        return machine.is_idle()
-    running = machine.program.state is ProgramState.RUNNING
-    return not running and not any(axis.profile.moving(now) for axis in machine.axes)
-
-
-def _chosen(known: Mapping[str, SignalOf], rest: str, name: str, others: str = "") -> SignalOf:
+def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
     found = known.get(rest.lower())
     if found is None:
-        near = NearMiss().of(rest, known)
-        hint = f" (did you mean {near!r}?)" if near else ""
-        raise Misuse(f"no signal {name!r}{hint}; there are {', '.join(known)}{others}")
+        raise _unknown(list(known), rest, name)
     return found
 
 
-def _turns_of(profile: Callable[[], Profile]) -> Callable[[Nanos], Iterator[Nanos]]:
-    def turns(now: Nanos) -> Iterator[Nanos]:
-        present = profile()
-        for end in present.ends:
-            if end != float("inf") and present.start + int(end) > now:
-                yield present.start + int(end)
-
-    return turns
-
-
-def _of_mic488(device: Mic488, kernel: Kernel, rest: str, name: str) -> SignalOf:
-    number, _, quantity = rest.partition(".")
-    if quantity and number.upper() in {f"M{axis.number}" for axis in device.axes}:
-        axis = device.axes[int(number[1:]) - 1]
-        return _chosen(_mic488_axis(axis, kernel), quantity, name)
-    known = {
-        "status": SignalOf((kernel,), lambda now: float(device.status())),
-        "program": SignalOf((kernel,), lambda now: float(device.program.state)),
-    }
-    return _chosen(known, rest, name, ", M1.position and so on, and pins")
-
-
-def _mic488_axis(axis: Axis, kernel: Kernel) -> dict[str, SignalOf]:
-    turning = _turns_of(lambda: axis.profile)
-
-    def version() -> object:
-        return axis.revision, axis.offset_p
-
-    return {
-        "status": SignalOf((kernel,), lambda now: float(axis.status)),
-        "enabled": SignalOf((kernel,), lambda now: float(axis.enabled)),
-        "moving": SignalOf((kernel,), lambda now: float(axis.profile.moving(now)), turning, version),
-        "position": SignalOf((kernel,), lambda now: axis.coordinate_p(now) / axis.gear, turning, version),
-        "velocity": SignalOf((kernel,), lambda now: axis.profile.velocity(now) / axis.gear, turning, version),
-        "encoder": SignalOf((kernel,), lambda now: float(axis.encoder_counts(now)), turning),
-    }
-
-
-def _of_m1486(chip: M1486, kernel: Kernel, rest: str, name: str) -> SignalOf:
-    def velocity(now: Nanos) -> float:
-        return chip.drive.profile.velocity(now)
-
-    def version() -> object:
-        return chip.drive.revision
-
-    turning = _turns_of(lambda: chip.drive.profile)
-    known = {
-        "position": SignalOf((kernel,), lambda now: float(chip.drive.true_u(now)), turning, version),
-        "velocity": SignalOf((kernel,), velocity, turning, version),
-        "counter": SignalOf((kernel,), lambda now: float(chip.drive.counter_u(now)), turning),
-        "moving": SignalOf((kernel,), lambda now: float(chip.drive.is_busy)),
-        "variable": SignalOf((kernel,), lambda now: float(chip.unit.variable)),
-    }
-    return _chosen(known, rest, name, ", and pins")
+def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Misuse:
+    """Names of the same axis, where it is of one."""
+    axis, dot, _ = rest.rpartition(".")
+    of_axis = [path for path in known if dot and path.upper().startswith(f"{axis.upper()}.")]
+    shown = of_axis or known[:MOST_NAMED]
+    more = "" if of_axis or len(known) <= MOST_NAMED else f" and more, {len(known)} in all"
+    return Misuse(
+        f"no signal {name!r}{NearMiss().hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}"
+    )
 
 
 def _of_axis(axis: Fitted, rest: str, name: str) -> SignalOf:
@@ -198,12 +184,12 @@ def _of_axis(axis: Fitted, rest: str, name: str) -> SignalOf:
 
     def turning(now: Nanos) -> Iterator[Nanos]:
         course = mechanism.course(now)
-        ends = set(_turns_of(lambda: profile_of(course.plan))(now)) | {piece.begin for piece in course.pieces}
+        ends = set(turns_of(lambda: profile_of(course.plan))(now)) | {piece.begin for piece in course.pieces}
         yield from sorted(moment for moment in ends if moment > now)
 
     kernel = (axis.kernel,)
     known = {
-        "position": SignalOf(kernel, lambda now: axis.units(mechanism.place(now)), turning, mechanism.version),
+        "position": SignalOf(kernel, lambda now: axis.units(mechanism.place(now)), turning, mechanism.version, axis.scale.unit),
         "lost": SignalOf(kernel, lambda now: float(mechanism.lost(now)), turning, mechanism.version),
         "stalled": SignalOf(kernel, lambda now: float(mechanism.at(now).stalled), turning, mechanism.version),
     }

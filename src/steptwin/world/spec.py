@@ -1,16 +1,19 @@
-"""What a description of a world says, as values."""
+"""The description of a world as values."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING
 
 from steptwin.machine import Nanos
 from steptwin.world.faults import Fault
 from steptwin.world.overrides import Overrides
-from steptwin.world.reader import Path, Text
+from steptwin.world.reader import Path, TomlText
 from steptwin.world.script import Step
+
+if TYPE_CHECKING:
+    from steptwin.world.kind import AnyKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,60 +22,24 @@ class LineSpec:
     kind: str
     baud: int | None
     timing: str
-    tcp: str | None
-    rtu_tcp: str | None
-    rfc2217: str | None
     gap: Nanos | None
-    pty: str | None
-    serial: str | None
+    links: Mapping[str, str]
+    """What opens it for programs outside, by key."""
     path: Path = ()
 
     @property
     def is_open(self) -> bool:
         """Whether programs outside can talk on it."""
-        return any((self.tcp, self.rtu_tcp, self.rfc2217, self.pty, self.serial))
-
-
-Banks: TypeAlias = tuple[tuple[int, str], ...]
-"""Numbers of banks and the files that are for them."""
+        return bool(self.links)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mic488Spec:
+class ControllerSpec:
+    """What the table of any controller has; each kind has more."""
+
+    kind: AnyKind
     name: str
     line: str | None
-    unit: int | None
-    firmware: str
-    config: str | None
-    program: str | None
-    programs: Banks
-    positions: Banks
-    start: bool
-    statement_time: Nanos | None
-    lenient: bool
-    vision: str | None
-    trigger_keeps: bool | None
-    axes: Mapping[int, Mapping[str, Any]]
-    """Changed attributes of `AxisConfig`, by axis from 1."""
-    inputs: Mapping[int, Mapping[str, Any]]
-    path: Path = ()
-
-    @property
-    def all_programs(self) -> Banks:
-        """``programs``, and ``program`` in bank 0."""
-        return self.programs if self.program is None else ((0, self.program), *self.programs)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class M1486Spec:
-    name: str
-    line: str | None
-    variant: str
-    address: int
-    interface: str
-    baud: int | None
-    statement_time: Nanos | None
-    program: str | None
     path: Path = ()
 
 
@@ -202,30 +169,32 @@ class WorldSpec:
 
     name: str
     seed: int
+    state: str | None
+    """Directory of the non-volatile memories."""
+    trace: str | None
+    """How much is kept of what happens in real time: a file, ``ring N``, ``off``."""
     lines: tuple[LineSpec, ...]
-    mic488: tuple[Mic488Spec, ...]
-    m1486: tuple[M1486Spec, ...]
+    controllers: tuple[ControllerSpec, ...]
     axes: tuple[AxisSpec, ...]
     wires: tuple[WireSpec, ...]
     buttons: tuple[ButtonSpec, ...]
     sources: tuple[SourceSpec, ...]
     scripts: tuple[ScriptSpec, ...]
     faults: tuple[Fault | None, ...]
-    """None for one that is wrong, as ``text`` says."""
-    text: Text
+    """None for one with errors, which ``text`` has."""
+    text: TomlText
     overrides: Overrides
     """Values that replace those of the text."""
 
+    def vision_addresses(self) -> Iterator[tuple[str, str]]:
+        """Controllers that take records of a vision system, and where."""
+        for spec in self.controllers:
+            address = None if spec.kind.vision is None else spec.kind.vision.address(spec)
+            if address is not None:
+                yield spec.name, address
+
     def files(self) -> Iterator[tuple[str, Path]]:
         """Names of the files the description refers to, and the keys that do."""
-        for spec in self.mic488:
-            for key in ("config", "program"):
-                name = getattr(spec, key)
-                if name is not None:
-                    yield name, (*spec.path, key)
-            for key in ("programs", "positions"):
-                for _, name in getattr(spec, key):
-                    yield name, (*spec.path, key)
-        for chip in self.m1486:
-            if chip.program is not None:
-                yield chip.program, (*chip.path, "program")
+        for spec in self.controllers:
+            for name, key in spec.kind.files(spec):
+                yield name, (*spec.path, key)

@@ -1,7 +1,7 @@
 """Where the tables, keys and values of a TOML text are.
 
 `tomllib` reads TOML and reports what is wrong with it, but keeps no places; no maintained library for Python does. This finds
-them by the same grammar without evaluating it: strings, comments and brackets are told apart, all else is left to `tomllib`. In a
+them by the same grammar without evaluating it: strings, comments and brackets; all else is left to `tomllib`. In a
 text that is no TOML it stops where it does not understand more.
 """
 
@@ -37,7 +37,7 @@ _SCALAR = re.compile(r"[^\s,\]}#]+(?: [0-9][^\s,\]}#]*)?")
 
 
 class TooMuch(Misuse):
-    """A text that nobody writes by hand; ``span`` is where."""
+    """A text that is not supported; ``span`` is where."""
 
     def __init__(self, span: Span, message: str) -> None:
         self.span = span

@@ -1,7 +1,7 @@
 """What happened in a world, exactly and compactly: profiles instead of pulses, edges instead of samples.
 
 Each machine's records come in the order in which they happened to it; machines that share no wire are advanced apart from each
-other, so the records of several machines are merged by (time, order of the machines, sequence) when somebody reads them.
+other, so the records of several machines are merged by (time, order of the machines, sequence) when they are read.
 
 Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
 a pulse for every unit of position; ``load`` where the load of an axis is until the next such record: tuples (moment, whether it
@@ -24,7 +24,7 @@ from operator import itemgetter
 from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
+from steptwin.machine import Fact, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.paths import ArcSegment
@@ -33,7 +33,7 @@ KINDS = ("plan", "load", "coordinate", "edge", "frame", "statement", "event", "i
 DIGEST_BYTES = 16
 
 
-class Record(NamedTuple):
+class TraceRecord(NamedTuple):
     """Something that happened."""
 
     time: Nanos
@@ -41,9 +41,11 @@ class Record(NamedTuple):
     kind: str
     subject: str
     value: object
+    facts: tuple[Fact, ...] = ()
+    """The content of the event's text as fields, for programs. It is no part of the digest, which has the text."""
 
 
-Recorder: TypeAlias = Callable[[Record], None]
+Recorder: TypeAlias = Callable[[TraceRecord], None]
 """Takes each record as it happens: a `Trace`'s `add`, or anything else that wants to know."""
 
 
@@ -59,13 +61,13 @@ class Trace:
         """Whether there is a digest."""
         self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
         self.watchers: list[Recorder] = []
-        """Told of every record as it is taken."""
+        """Called with every record as it is taken."""
 
     @property
     def machines(self) -> list[str]:
         return list(self._streams)
 
-    def add(self, record: Record) -> None:
+    def add(self, record: TraceRecord) -> None:
         """Take what happened to a machine after everything taken of it before. `Misuse` where its time goes back.
 
         ``value`` is immutable; one of a kind that `encode` does not know makes `digest` raise.
@@ -88,43 +90,43 @@ class Trace:
         """How many records were taken, kept or not."""
         return sum(stream.count for stream in self._streams.values())
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[TraceRecord]:
         """All kept records by (time, machine, sequence)."""
         return merge(*(stream.records for stream in self._streams.values()), key=itemgetter(0))
 
-    def of(self, *kinds: str, machine: str | None = None) -> Iterator[Record]:
+    def of(self, *kinds: str, machine: str | None = None) -> Iterator[TraceRecord]:
         """The records of these kinds, of one machine where it is named, in order. `Misuse` for an unknown kind."""
         for kind in kinds:
             if kind not in KINDS:
                 raise Misuse(f"no kind of record {kind!r}: kinds are {', '.join(KINDS)}")
         if machine is None:
-            chosen: Iterator[Record] = iter(self)
+            chosen: Iterator[TraceRecord] = iter(self)
         else:
             chosen = iter(self._streams[machine].records if machine in self._streams else ())
         return (record for record in chosen if record.kind in kinds)
 
-    def plans(self, machine: str | None = None) -> Iterator[Record]:
+    def plans(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("plan", machine=machine)
 
-    def loads(self, machine: str | None = None) -> Iterator[Record]:
+    def loads(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("load", machine=machine)
 
-    def edges(self, machine: str | None = None) -> Iterator[Record]:
+    def edges(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("edge", machine=machine)
 
-    def frames(self, machine: str | None = None) -> Iterator[Record]:
+    def frames(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("frame", machine=machine)
 
-    def statements(self, machine: str | None = None) -> Iterator[Record]:
+    def statements(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("statement", machine=machine)
 
-    def events(self, machine: str | None = None) -> Iterator[Record]:
+    def events(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("event", machine=machine)
 
-    def inputs(self, machine: str | None = None) -> Iterator[Record]:
+    def inputs(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("input", machine=machine)
 
-    def faults(self, machine: str | None = None) -> Iterator[Record]:
+    def faults(self, machine: str | None = None) -> Iterator[TraceRecord]:
         return self.of("fault", machine=machine)
 
     def stop(self) -> None:
@@ -132,6 +134,12 @@ class Trace:
         self.is_kept = self.is_recorded = False
         for stream in self._streams.values():
             stream.records.clear()
+
+    def let_go(self) -> None:
+        """Keep the digest alone, of what was kept so far too."""
+        self.is_kept = False
+        for stream in self._streams.values():
+            stream.let_go()
 
     def mark(self) -> Mark:
         """The past, for `rewind`."""
@@ -166,7 +174,7 @@ class StreamMark(NamedTuple):
     latest: Nanos
     hash: blake2b
     hashed: int
-    records: tuple[Record, ...]
+    records: tuple[TraceRecord, ...]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: a hash in progress cannot be saved, but made again from records that were kept."""
@@ -175,7 +183,7 @@ class StreamMark(NamedTuple):
         return _mark_of, (self.latest, self.records)
 
 
-def _mark_of(latest: Nanos, records: tuple[Record, ...]) -> StreamMark:
+def _mark_of(latest: Nanos, records: tuple[TraceRecord, ...]) -> StreamMark:
     return StreamMark(len(records), latest, blake2b(digest_size=DIGEST_BYTES), 0, records)
 
 
@@ -191,18 +199,23 @@ class _Stream:
     __slots__ = ("_hashed", "count", "hash", "latest", "records")
 
     def __init__(self) -> None:
-        self.records: list[Record] = []
+        self.records: list[TraceRecord] = []
         self.count = 0
         self.latest: Nanos = 0
         self.hash = blake2b(digest_size=DIGEST_BYTES)
         self._hashed = 0
 
     def digest(self) -> bytes:
-        """Kept records are hashed when somebody asks: taking them has to be cheap."""
+        """Kept records are hashed on demand: taking them has to be cheap."""
         for record in islice(self.records, self._hashed, None):
             self.hash.update(encode(record))
         self._hashed = len(self.records)
         return self.hash.digest()
+
+    def let_go(self) -> None:
+        self.digest()
+        self.records.clear()
+        self._hashed = 0
 
     def mark(self) -> StreamMark:
         return StreamMark(self.count, self.latest, self.hash.copy(), self._hashed, tuple(self.records))
@@ -221,9 +234,9 @@ _SEGMENT = struct.Struct("<6db")
 _ARC = struct.Struct("<6dqb")
 
 
-def encode(record: Record) -> bytes:
+def encode(record: TraceRecord) -> bytes:
     """The same bytes for the same record everywhere: floats by their IEEE bytes, integers exactly."""
-    time, _, kind, subject, value = record
+    time, _, kind, subject, value, _ = record
     body = _names(kind, subject) + (_profile(value) if type(value) is Profile else _value(value))
     return _HEAD.pack(time, len(body)) + body
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import pytest
 from chip_rig import ChipWire, chip_driver, chip_line
 
-from steptwin.drivers import Untold
+from steptwin.drivers import Unconfirmed
 from steptwin.drivers.m1486 import (
     M1486,
     Busy,
@@ -21,6 +22,7 @@ from steptwin.drivers.m1486 import (
     Restarted,
 )
 from steptwin.drivers.m1486.sync import download_to
+from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.machine import SECOND
@@ -48,6 +50,19 @@ def typed(wire: ChipWire) -> str:
         (lambda c: c.set_function(41, False), "function 41 is what this driver lives by: it stays ON"),
         (lambda c: c.command("f16000001"), "F16000001 is out of range"),
         (lambda c: c.command("r"), "'r' is no command to type alone"),
+        (lambda c: c.command("zz"), "'zz' is no command: 'z' begins a second command (Zero) on this line"),
+        (lambda c: c.command(""), "'' is no command"),
+        (lambda c: c.configure(velocity=15.5), "velocity = 15.5: M1486B takes 16 to 20 000 step/s"),
+        (lambda c: c.set_position(math.inf), "inf step is no position"),
+        (lambda c: c.move_by(math.nan), "nan step is no distance"),
+        (lambda c: c.inputs(1, 10), "10 lines from B1 on = 20: M1486B takes"),
+        (lambda c: c.inputs(20, 3), "3 lines from B20 on = 203: M1486B takes"),
+        (lambda c: c.set_flag(87, True), "no user flag 87: they are 80 to 86"),
+        (lambda c: c.set_function(64, True), "no function 64: they are 40 to 63"),
+        (lambda c: c.set_function(57, True), "function 57 is what this driver lives by: it stays OFF"),
+        (lambda c: c.seek(0, 3), "direction 0: permitted are 1 and -1"),
+        (lambda c: c.uploaded(0), "0 bytes: at least 1"),
+        (lambda c: c.uploaded(1), "no program of the chip was started here"),
         (lambda c: c.run_block(["f64", "\\"]), "has no place in a block"),
         (lambda c: c.run_block(["f64"] * 64), "the block is larger than the command memory of M1486B, 2032 bits"),
         (lambda c: c.download("v99999\nq"), "program is not sent:"),
@@ -98,7 +113,7 @@ def test_the_position_is_not_known_while_it_moves_nor_after_a_stop() -> None:
         chip.position()
     chip.stop()
     assert chip.wait(check=False).reason is ChipReason.STOPPED
-    with pytest.raises(PositionUnknown, match="shows where it was sent, not where it was stopped"):
+    with pytest.raises(PositionUnknown, match="shows its target, not where it was stopped"):
         chip.position()
     with pytest.raises(PositionUnknown):
         chip.move_to(10.0)
@@ -140,7 +155,7 @@ def test_limit_ends_a_move_early() -> None:
     chip.configure(**{**KNOWN, "microstep": 1})
     chip.move_by(5000.0)
     wire.at(1.0, lambda: wire.chip.set_pin("LIMIT", 0, wire.now))
-    with pytest.raises(ChipMoveFailed, match=r"ended before its time \(LIMIT, or Kill by somebody\)"):
+    with pytest.raises(ChipMoveFailed, match=r"ended early \(LIMIT, or Kill from another program\)"):
         chip.wait()
     with pytest.raises(PositionUnknown):
         chip.position()
@@ -161,7 +176,7 @@ def test_a_chip_held_by_kill_is_recovered() -> None:
     chip.run(1)
     chip.stop()
     wire.sleep(1.0)
-    with pytest.raises(Busy, match="is held by Kill, for its function 51 is OFF: recover it"):
+    with pytest.raises(Busy, match="is held by Kill because its function 51 is OFF: recover it"):
         chip.position()
     chip.recover()
     assert chip.position() == wire.true() / 64
@@ -204,7 +219,7 @@ def test_a_block_that_a_command_of_it_ends_is_not_done(kind: str, commands: list
     wire = ChipWire(kind)
     chip = chip_driver(wire)
     begin = wire.now
-    with pytest.raises(ChipMoveFailed, match=r"cut short .*\(a command was wrong data when it came to be done") as failed:
+    with pytest.raises(ChipMoveFailed, match=r"cut short .*\(a command was wrong data when it was executed") as failed:
         chip.run_block(commands)
     assert failed.value.end.reason is ChipReason.CUT
     assert wire.true() == moved
@@ -309,7 +324,7 @@ def test_a_file_for_an_eeprom_is_paced_and_kept() -> None:
     wire.happened.clear()
     wire.sleep(3.0)
     assert "moves" in wire.codes()
-    with pytest.raises(Misuse, match="keeps what stands in"):
+    with pytest.raises(Misuse, match="writes what is in"):
         chip.run_block(["f64"])
 
 
@@ -358,9 +373,9 @@ def test_example_6_of_the_manual_needs_both_its_chips() -> None:
     download_to(chips, text)
     assert [chip.wait().reason for chip in chips] == [ChipReason.DONE] * 2
     assert (wire.true(0), wire.true(7)) == (64 + 128 + 192, 640)
-    with pytest.raises(Misuse, match="there is no chip 7, which it names"):
+    with pytest.raises(Misuse, match="it names chip 7, which is not on this line"):
         download_to(chips[:1], text)
-    with pytest.raises(Misuse, match="no X before F64 says which chip it is for"):
+    with pytest.raises(Misuse, match="no X before F64 selects its chip"):
         download_to(chips, "f64\nr\nx0\nr\n")
     download_to(chips, "f64\nr\nx0\nr\n", first=chips[1])
     assert [chip.wait().reason for chip in chips] == [ChipReason.DONE] * 2
@@ -455,7 +470,7 @@ def test_a_cut_line_is_told() -> None:
     chip = chip_driver(wire, 7)
     chip.run(1)
     wire.severed = True
-    with pytest.raises(Untold, match="chip 7 could not be stopped: it cannot be told, and goes on with what it was told before"):
+    with pytest.raises(Unconfirmed, match="chip 7 could not be stopped: it cannot be reached and continues its last command"):
         chip.stop()
     assert chip.wait(1.0, check=False).reason in (ChipReason.COMMUNICATION, ChipReason.STOPPED)
     wire.severed = False
@@ -485,7 +500,7 @@ def test_a_chip_that_cannot_be_told_to_stop_is_told_with_the_first_cause() -> No
     wire = ChipWire("B", (7,))
     chip = chip_driver(wire, 7)
     wire.severed = True
-    with pytest.raises(Untold) as caught:
+    with pytest.raises(Unconfirmed) as caught:
         chip.stop()
     assert "(memory: no answer to 'chip 7: k' within 0.5 s" in str(caught.value)
     assert "does not echo" not in str(caught.value)
@@ -523,3 +538,65 @@ def test_an_end_says_how_long_it_was_waited_for() -> None:
     end = chip.wait()
     assert end.after_s == pytest.approx((wire.now - begin) / SECOND, abs=0.05)
     assert 0.1 < end.after_s < 10.0
+
+
+def test_how_far_a_download_is_is_told_after_each_command() -> None:
+    """Plain commands, then a file, and what stands behind it."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    told: list[tuple[int, int]] = []
+    chip.download("T6\nC6\n[\nF64\nR\n]\n", progress=lambda done, total: told.append((done, total)))
+    assert told == [(n, 6) for n in (1, 2, 3, 4, 5, 6, 6)]
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"steps_per_unit": 0.0}, "steps_per_unit = 0: must be above 0"),
+        ({"steps_per_unit": -1.0}, "steps_per_unit = -1: must be above 0"),
+        ({"steps_per_unit": math.inf}, "steps_per_unit = inf: must be above 0"),
+        ({"steps_per_unit": math.nan}, "steps_per_unit = nan: must be above 0"),
+        ({"timeout_s": 0.0}, "a time-out of 0 s is outside 0 to 60 s"),
+        ({"timeout_s": 60.5}, "a time-out of 60.5 s is outside 0 to 60 s"),
+        ({"address": 16}, "address 16: permitted are 0 to 15"),
+        ({"address": -1}, "address -1: permitted are 0 to 15"),
+        ({"origin_u": -1}, "origin_u = -1: permitted are 0 to 16000000 minimum microsteps"),
+        ({"origin_u": 16_000_001}, "origin_u = 16000001: permitted are 0 to 16000000 minimum microsteps"),
+    ],
+)
+def test_what_is_no_chip(options: dict[str, float], text: str) -> None:
+    with pytest.raises(Misuse) as caught:
+        M1486(chip_line(ChipWire("B")), **options)  # type: ignore[arg-type]
+    assert str(caught.value) == text
+
+
+@pytest.mark.parametrize("options", [{"timeout_s": 60.0}, {"address": 0}, {"address": 15}, {"origin_u": 16_000_000}])
+def test_what_is_just_a_chip(options: dict[str, float]) -> None:
+    assert M1486(chip_line(ChipWire("B")), **options).unit == "step"  # type: ignore[arg-type]
+
+
+def test_how_long_a_move_takes_is_known_when_all_settings_are() -> None:
+    """A B type at 12 MHz; with M16 V cannot be more than 750 full steps/s (Q4), with Q1 it can."""
+    settings = ChipSettings(start_stop=200, acceleration=5000, velocity=1000, profile=25000, qualification=1)
+    chip = chip_driver(ChipWire("B"))
+    # 96 full steps up to 1000/s in 0.16 s, as many down, 808 between.
+    assert settings.travel_s(1000 * 64, chip.variant) == pytest.approx(0.16 + 0.16 + 0.808)
+    for name in ("start_stop", "acceleration", "velocity", "profile", "qualification"):
+        assert settings.with_(**{name: None}).travel_s(64_000, chip.variant) is None
+
+
+def test_the_face_for_threads_passes_all_its_arguments_on() -> None:
+    said: list[str] = []
+    chip = M1486(
+        "/dev/none", 7, baud=9600, variant="C", steps_per_unit=40.0, unit="mm", origin_u=640, timeout_s=0.75, log=said.append
+    )
+    driver = chip._driver
+    assert (chip.address, chip.unit, chip.place) == (7, "mm", "/dev/none")
+    assert (driver.scale_u, driver.origin_u, driver._unit.timeout_ns) == (2560.0, 640, 750_000_000)
+    assert driver._variant is not None
+    assert driver._variant.name == "C"
+    talk = driver._unit.talk
+    assert talk.wire_ns(1) == pytest.approx(10 * SECOND / 9600, abs=1)
+    talk.start(ChipRequest(None, "t6"), 0, urgent=False)
+    assert len(said) == 1
+    assert said[0].endswith("t6")

@@ -22,6 +22,7 @@ from steptwin.drivers.m1486.identify import (
 )
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486.functions import REPORT, RETURN
+from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import SECOND
 from steptwin.wire import pdu, rtu
 
@@ -71,7 +72,7 @@ def test_a_chip_whose_buffer_is_full_is_busy() -> None:
     assert "wrong-data" not in wire.codes()
 
 
-FRAMES = b"".join(rtu.encode_frame(unit, pdu.encode_request(pdu.Read(2, 5000, 8))) for unit in range(1, 248))
+FRAMES = b"".join(rtu.encode_frame(unit, pdu.encode_request(pdu.ReadRequest(2, 5000, 8))) for unit in range(1, 248))
 
 
 def test_a_program_survives_the_search_and_the_modbus_frames_after_it() -> None:
@@ -135,3 +136,8 @@ def test_the_type_by_letter_and_rate() -> None:
 )
 def test_the_answer_in_what_was_heard(said: str, heard: bytes, answer: bytes) -> None:
     assert answer_in(said, heard) == answer
+
+
+def test_all_rates_that_pins_choose_are_tried_the_usual_ones_first() -> None:
+    assert CHIP_BAUDS[:2] == (4800, 9600)
+    assert sorted(CHIP_BAUDS) == sorted({one.baud(br1, br0) for one in VARIANTS for br1 in (0, 1) for br0 in (0, 1)})

@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from steptwin.drivers.exchange import LineLost
-from steptwin.drivers.m1486.failures import DoubtfulMove, Garbled, NoEcho, NoRoom, Restarted, untold
-from steptwin.drivers.m1486.motion import ChipMotion, ChipMoveEnd, ChipReason, Told
-from steptwin.drivers.m1486.watching import early_ns, end_ns
+from steptwin.drivers.m1486.failures import DoubtfulMove, Garbled, NoEcho, NoRoom, Restarted, unconfirmed
+from steptwin.drivers.m1486.motion import ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
+from steptwin.drivers.m1486.unit import ChipNotes
+from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, end_ns
 from steptwin.machine import SECOND
 
 AT = 50 * SECOND
@@ -15,7 +16,7 @@ AT = 50 * SECOND
 
 @pytest.mark.parametrize("duration_s", [0.5, 10.0])
 def test_a_motion_is_over_after_1_2_times_its_duration_and_a_second(duration_s: float) -> None:
-    motion = Told(ChipMotion.MOVE, AT, 0, duration_s=duration_s)
+    motion = ChipMotionCommand(ChipMotion.MOVE, AT, 0, duration_s=duration_s)
     over = AT + round((1.2 * duration_s + 1.0) * SECOND)
     assert not motion.is_over(over)
     assert motion.is_over(over + 1)
@@ -24,7 +25,7 @@ def test_a_motion_is_over_after_1_2_times_its_duration_and_a_second(duration_s: 
 
 
 def test_a_motion_without_known_duration_is_never_over_for_certain() -> None:
-    motion = Told(ChipMotion.ENDLESS, AT, 0)
+    motion = ChipMotionCommand(ChipMotion.ENDLESS, AT, 0)
     assert not motion.is_over(AT + 10**9 * SECOND)
     assert end_ns(motion) == AT
     assert (motion.target_u, motion.spoilt, motion.is_marked, motion.is_unfinished, motion.over_at) == (
@@ -38,7 +39,7 @@ def test_a_motion_without_known_duration_is_never_over_for_certain() -> None:
 
 def test_an_end_in_words() -> None:
     end = ChipMoveEnd(15, ChipReason.EARLY, 2.5, "mm", 1.0, "why")
-    assert str(end) == "chip F: ended before its time (LIMIT, or Kill by somebody) at 2.5 mm (why)"
+    assert str(end) == "chip F: ended early (LIMIT, or Kill from another program) at 2.5 mm (why)"
     assert str(ChipMoveEnd(None, ChipReason.TARGET, None, "mm", 1.0)) == "the chip: target reached"
     assert {reason for reason in ChipReason if ChipMoveEnd(1, reason, 0.0, "step", 0.0).ok} == {
         ChipReason.TARGET,
@@ -63,21 +64,55 @@ def test_failures_in_words() -> None:
     )
     assert str(garbled[False]).endswith(": nothing instead of 'f64'; it was not carried out")
     assert str(NoEcho("bus", "chip 7", lost)) == (
-        "bus: chip 7 does not echo: it is off, has another address or baud rate, or still does what it was told before (gone)"
+        "bus: chip 7 does not echo: it is off, has another address or baud rate, or is still busy with an earlier command (gone)"
     )
     assert str(Restarted("bus", "chip 7")) == (
-        "bus: chip 7 was switched off or reset meanwhile: its settings are those of power-up, and where it stands is not known; "
-        "nothing was carried out"
+        "bus: chip 7 was switched off or reset meanwhile: its settings are those of power-up, its position is unknown; "
+        "nothing was executed"
     )
     assert str(DoubtfulMove("chip 7", "a move", lost)) == (
         "it is not known whether chip 7 has begun a move: the command was sent once and is not repeated (gone); "
         "stop it, or wait for it and look at its position"
     )
-    assert str(untold("chip 7", lost)) == (
-        "chip 7 could not be stopped: it cannot be told, and goes on with what it was told before (gone)"
+    assert str(unconfirmed("chip 7", lost)) == (
+        "chip 7 could not be stopped: it cannot be reached and continues its last command (gone)"
     )
     assert (NoEcho("", "", None).uncertain, Restarted("", "").uncertain, DoubtfulMove("", "", lost).uncertain) == (
         False,
         False,
         True,
     )
+
+
+class Waited:
+    """What a mover asks of its unit: one with an EEPROM that takes 0.5 s for a question."""
+
+    def __init__(self, stops: int = 0) -> None:
+        self.notes = ChipNotes()
+        self.notes.stops = stops
+        self.write_ns = SECOND // 2
+
+
+def test_when_the_end_of_a_motion_is_expected() -> None:
+    """From 98 % of its time less 50 ms on, until 300 ms after it; an E type writes the question down before it answers."""
+    motion = ChipMotionCommand(ChipMotion.MOVE, AT, 0, duration_s=10.0)
+    mover = _Mover(Waited(), motion)  # type: ignore[arg-type]
+    first, last = AT + SECOND // 2 + 9_750_000_000, AT + SECOND // 2 + 10_300_000_000
+    assert [mover.is_near(at) for at in (first - 1, first, last - 1, last)] == [False, True, True, False]
+    assert [mover.is_late(at) for at in (last - 1, last)] == [False, True]
+    assert _Mover(Waited(stops=1), motion).is_near(AT), "it was stopped: any time may be its end"  # type: ignore[arg-type]
+
+
+def test_a_motion_is_watched_until_300_ms_after_its_time() -> None:
+    notes = ChipNotes()
+    assert not _is_watched(notes, AT)
+    notes.motion = ChipMotionCommand(ChipMotion.MOVE, AT, 0, duration_s=10.0)
+    end = AT + 10_300_000_000
+    assert [_is_watched(notes, at) for at in (AT, end - 1, end)] == [True, True, False]
+    notes.stops = 1
+    assert not _is_watched(notes, AT)
+    notes.stops = 0
+    notes.motion.over_at = AT
+    assert not _is_watched(notes, AT)
+    notes.motion = ChipMotionCommand(ChipMotion.ENDLESS, AT, 0)
+    assert not _is_watched(notes, AT)

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from steptwin.drivers.exchange import More
+from steptwin.drivers.exchange import SendNext
 from steptwin.drivers.m1486.failures import Garbled, NoRoom
-from steptwin.drivers.m1486.talk import NOISE_NS, QUIET_NS, WHO, CharacterTalk, Say, Sort, chip_name
+from steptwin.drivers.m1486.talk import NOISE_NS, QUIET_NS, WHO, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 
 CHARACTER_NS = 10 * SECOND // 4800
 """Ten bits."""
@@ -26,22 +26,22 @@ class Line:
     """A line whose far end is the test: ``say`` gives what is typed, ``hear`` what the exchange makes of what comes back."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[int, Direction, bytes]] = []
+        self.heard: list[tuple[int, FrameDirection, bytes]] = []
         self.talk = CharacterTalk(SerialLine(4800), "bus", on_bytes=lambda now, way, data: self.heard.append((now, way, data)))
         self.now = 0
 
     def say(self, address: int | None, text: str, *, urgent: bool = False, **options: Any) -> bytes:
-        self.request = Say(address, text, **options)
+        self.request = ChipRequest(address, text, **options)
         self.now += SECOND
         return self.talk.start(self.request, self.now, urgent=urgent)
 
-    def hear(self, data: bytes) -> bytes | More | None:
+    def hear(self, data: bytes) -> bytes | SendNext | None:
         return self.talk.receive(data, self.now)
 
     def typed(self, address: int | None, text: str, **options: Any) -> list[bytes]:
         """A whole command whose echo is right: everything that was typed."""
         said = [self.say(address, text, **options)]
-        while isinstance(answer := self.hear(said[-1]), More):
+        while isinstance(answer := self.hear(said[-1]), SendNext):
             assert answer.may_wait is False
             said.append(answer.data)
         assert answer == (None if options.get("answers") else b"")
@@ -58,11 +58,14 @@ def test_a_chip_is_selected_once_and_its_command_gets_its_cr_when_the_echo_is_ri
     assert line.typed(10, "r") == [b"r", b"\r"]
     assert line.typed(3, "r") == [b"x3", b"\r", b"r", b"\r"]
     assert line.typed(None, "r") == [b"r", b"\r"]
-    assert line.typed(7, "", sort=Sort.SELECT) == [b"x7", b"\r"]
+    assert line.typed(7, "", sort=ChipRequestKind.SELECT) == [b"x7", b"\r"]
     assert line.talk.selected == 7
     with pytest.raises(Misuse, match="chip 7: select: it is selected already"):
-        line.say(7, "", sort=Sort.SELECT)
-    assert [(direction, data) for _, direction, data in line.heard[:2]] == [(Direction.IN, b"xa"), (Direction.OUT, b"xa")]
+        line.say(7, "", sort=ChipRequestKind.SELECT)
+    assert [(direction, data) for _, direction, data in line.heard[:2]] == [
+        (FrameDirection.IN, b"xa"),
+        (FrameDirection.OUT, b"xa"),
+    ]
     assert line.heard[0][0] == SECOND
 
 
@@ -74,16 +77,16 @@ def test_it_is_committed_with_the_cr_of_its_own_line() -> None:
         line.hear(echo)
         changes.append(line.request.changes)
     assert changes == [False, False, False, True, True]
-    assert not Say(1, "u20", acts=False).changes
+    assert not ChipRequest(1, "u20", acts=False).changes
     assert (str(line.request), line.request.device) == ("chip A: f64", 10)
-    assert (chip_name(None), chip_name(15), str(Say(None, " \r"))) == ("the chip", "chip F", "the chip: select")
+    assert (chip_name(None), chip_name(15), str(ChipRequest(None, " \r"))) == ("the chip", "chip F", "the chip: select")
 
 
 @pytest.mark.parametrize("pieces", [(b"f640",), (b"f", b"640"), (b"f6", b"40"), (b"f", b"6", b"4", b"0")])
 def test_an_echo_may_come_in_pieces(pieces: tuple[bytes, ...]) -> None:
     line = Line()
     line.say(None, "f640")
-    assert [line.hear(piece) for piece in pieces] == [None] * (len(pieces) - 1) + [More(b"\r", may_wait=False)]
+    assert [line.hear(piece) for piece in pieces] == [None] * (len(pieces) - 1) + [SendNext(b"\r", may_wait=False)]
 
 
 def test_an_answer_is_what_comes_behind_the_echo_of_cr() -> None:
@@ -97,15 +100,15 @@ def test_an_answer_is_what_comes_behind_the_echo_of_cr() -> None:
 
 def test_kill_is_said_at_once_and_twice_to_a_chip_that_is_not_known_to_echo() -> None:
     line = Line()
-    assert line.say(7, "k", sort=Sort.KILL, urgent=True) == b"x7\rk\rx7\rk\r"
+    assert line.say(7, "k", sort=ChipRequestKind.KILL, urgent=True) == b"x7\rk\rx7\rk\r"
     assert line.request.changes
     line.talk.echoing.add(7)
-    assert line.say(7, "k", sort=Sort.KILL) == b"x7\rk\r"
+    assert line.say(7, "k", sort=ChipRequestKind.KILL) == b"x7\rk\r"
     assert line.hear(b"x7\rk") is None
     assert line.hear(b"\r") == b""
     assert (line.talk.selected, line.talk.dirty) == (7, False)
     line.talk.dirty = True
-    assert line.say(7, "%\rk", sort=Sort.KILL) == b"%\r%\rk\r"
+    assert line.say(7, "%\rk", sort=ChipRequestKind.KILL) == b"%\r%\rk\r"
     assert line.hear(b"%\r%\rk\r") == b""
     assert not line.talk.dirty
 
@@ -114,7 +117,7 @@ def test_what_is_said_blind_selects_nobody_and_waits_for_nothing() -> None:
     line = Line()
     line.typed(7, "r")
     line.talk.dirty = True
-    assert line.say(7, "xg\rt41\r", sort=Sort.BLIND) == b"xg\rt41\r"
+    assert line.say(7, "xg\rt41\r", sort=ChipRequestKind.BLIND) == b"xg\rt41\r"
     assert (line.talk.selected, line.talk.dirty) == (None, False)
     assert line.hear(b"anything") is None
     assert line.talk.abandon(line.now) == b""
@@ -165,10 +168,10 @@ def test_inverted_characters_tell_that_the_buffer_is_nearly_full() -> None:
     assert line.hear(inverted(ord("f"))) is None
     assert line.talk.nearly_full
     assert line.hear(b"6" + inverted(ord("6"))) is None
-    assert line.hear(b"4") == More(b"\r", may_wait=False)
+    assert line.hear(b"4") == SendNext(b"\r", may_wait=False)
     line = Line()
     line.say(None, "f")
-    assert line.hear(b"f" + inverted(ord("f"))) == More(b"\r", may_wait=False)
+    assert line.hear(b"f" + inverted(ord("f"))) == SendNext(b"\r", may_wait=False)
     assert line.talk.nearly_full
     line = Line()
     line.say(None, "f")
@@ -183,8 +186,8 @@ def test_5eh_says_that_there_was_no_room() -> None:
         line.hear(b"f\x5e")
     assert line.talk.dirty
     assert line.say(None, "f64") == b"%"
-    assert line.hear(b"\x5e") == More(b"\r", may_wait=False)
-    assert line.hear(b"\r") == More(b"f64", may_wait=False)
+    assert line.hear(b"\x5e") == SendNext(b"\r", may_wait=False)
+    assert line.hear(b"\r") == SendNext(b"f64", may_wait=False)
     assert line.talk.dirty, "the spoiler found no room: it is to be said again"
 
 
@@ -241,7 +244,7 @@ def test_who_listens_gets_the_letter_and_nothing_else() -> None:
     line.talk.uploads = bytearray()
     line.typed(7, WHO)
     line.typed(7, WHO)
-    assert line.say(7, WHO, sort=Sort.LISTEN, acts=False) == b""
+    assert line.say(7, WHO, sort=ChipRequestKind.LISTEN, acts=False) == b""
     assert line.hear(b"\x00x") is None
     assert line.hear(b"\x01B") == b"B"
     assert line.talk.uploads == b"\x00x\x01"
@@ -261,7 +264,7 @@ def test_a_stray_character_makes_the_line_dirty_unless_it_was_to_be_expected() -
     line.talk.uploads = bytearray()
     line.talk.stray(b"\x13", 0)
     assert (line.talk.dirty, line.talk.uploads) == (False, b"\x13")
-    assert line.heard == [(0, Direction.OUT, b"\x13")]
+    assert line.heard == [(0, FrameDirection.OUT, b"\x13")]
 
 
 def test_a_question_that_is_given_up_may_be_answered_yet() -> None:
@@ -282,7 +285,7 @@ def test_what_a_program_uploads_is_kept_while_letters_of_chips_are_listened_for(
     talk = CharacterTalk(SerialLine(4800), "the line")
     talk.uploads, talk.letters = bytearray(), 0
     talk.owed[7] = 1
-    talk.start(Say(7, WHO, sort=Sort.LETTER, acts=False), 0, urgent=False)
+    talk.start(ChipRequest(7, WHO, sort=ChipRequestKind.LETTER, acts=False), 0, urgent=False)
     assert talk.receive(b"\x02", 1) is None
     assert talk.receive(b"B\x03", 2) == b"B"
     assert (talk.letters, talk.uploads) == (1, b"\x02\x03")
@@ -299,7 +302,7 @@ def test_after_a_watch_each_owes_what_it_owed() -> None:
 def test_what_a_program_uploads_is_listened_for() -> None:
     line = Line()
     line.talk.uploads = bytearray()
-    line.say(7, "", sort=Sort.UPLOAD, acts=False)
+    line.say(7, "", sort=ChipRequestKind.UPLOAD, acts=False)
     assert line.hear(b"\x05\x06") == b"\x05"
     assert line.talk.uploads == b"\x05\x06"
 
@@ -307,12 +310,22 @@ def test_what_a_program_uploads_is_listened_for() -> None:
 def test_time_on_the_wire() -> None:
     """Twice the command, for its echo, and 16 characters for selection, spoiler and CRs; who listens needs none."""
     talk = Line().talk
-    assert talk.allowance_ns(Say(1, "f12800")) == talk.wire_ns(28)
-    for sort in (Sort.LISTEN, Sort.LETTER, Sort.UPLOAD):
-        assert talk.allowance_ns(Say(1, "u20", sort=sort)) == 0
+    assert talk.allowance_ns(ChipRequest(1, "f12800")) == talk.wire_ns(28)
+    for sort in (ChipRequestKind.LISTEN, ChipRequestKind.LETTER, ChipRequestKind.UPLOAD):
+        assert talk.allowance_ns(ChipRequest(1, "u20", sort=sort)) == 0
 
 
 def test_what_was_not_said_yet_changes_nothing() -> None:
-    say = Say(3, "r")
+    say = ChipRequest(3, "r")
     assert [say.changes, say.committed, say.commented, say.answers, say.acts] == [False] * 4 + [True]
-    assert say.sort is Sort.LINE
+    assert say.sort is ChipRequestKind.LINE
+
+
+@pytest.mark.parametrize("answers", [False, True])
+def test_what_comes_behind_an_exchange_belongs_to_none(answers: bool) -> None:
+    line = Line()
+    line.typed(None, "u1", answers=answers)
+    if answers:
+        assert line.hear(b"\x42") == b"\x42"
+    assert line.hear(b"\x43") is None
+    assert not line.request.commented

@@ -12,7 +12,7 @@ from steptwin.drivers import Mic488, MoveFailed, NotReady, Reason
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 
 
 def ready(**options: object) -> tuple[Wire, Mic488]:
@@ -90,7 +90,7 @@ def test_a_move_that_somebody_else_replaced_is_diverted() -> None:
     mic.axis(1).move_to(100.0)
     later(wire, 1.0, lambda: wire.twin.axes[0].move_to(3000, wire.now))
     end = mic.axis(1).wait(check=False)
-    assert str(end) == "M1: sent elsewhere by somebody at 30 mm (the target was 100 mm)"
+    assert str(end) == "M1: redirected by another command at 30 mm (the target was 100 mm)"
     assert not other.axis(1).wait(check=False).detail
 
 
@@ -133,7 +133,7 @@ def test_homing_is_waited_for() -> None:
     mic.axis(2).home(-5.0)
     assert mic.axis(2).wait().reason is Reason.TARGET
     assert mic.axis(2).position() == 0.0
-    assert wire.twin.axes[1].status is Status.REACHED
+    assert wire.twin.axes[1].status is AxisStatus.REACHED
 
 
 # ---------------------------------------------------------------------- how long is waited
@@ -261,7 +261,7 @@ def test_the_jog_coils_run_until_they_are_off() -> None:
 def test_units_and_encoder() -> None:
     wire, mic = ready()
     assert mic.axis(1).unit == "mm"
-    assert repr(mic.axis(1)) == "<Axis M1 of unit 1 on memory>"
+    assert repr(mic.axis(1)) == "<Mic488Axis M1 of unit 1 on memory>"
     wire.twin.turn_encoder(1, 40, wire.now)
     assert mic.axis(1).encoder() == 40
     assert driver(Wire(config=ControllerConfig()), config=None).axis(1).unit == "u"
@@ -290,3 +290,14 @@ def test_a_jog_coil_has_two_directions(direction: int) -> None:
     mic.axis(1).jog_bit(-1, on=False)
     wire.rest()
     assert not wire.moving()
+
+
+def test_a_ramp_that_no_axis_has_is_refused_before_it_is_sent() -> None:
+    wire, mic = ready()
+    wire.sent.clear()
+    for velocity in (641.0, 1e30, float("nan")):
+        with pytest.raises(Misuse, match=r"^M1: (velocity .* mm/s is outside|nan mm/s is no velocity)"):
+            mic.axis(1).set_ramp(velocity=velocity)
+    assert wire.sent == []
+    mic.axis(1).set_ramp(velocity=640.0)
+    assert mic.get("M1_VMAX") == {"M1_VMAX": 640.0}

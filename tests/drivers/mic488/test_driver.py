@@ -8,13 +8,26 @@ from typing import Any
 import pytest
 from host_rig import Fault, Wire, driver, spindles, thread_line
 
-from steptwin.drivers import Mic488, NoAnswer, NotReady, ProgramState, Reason, Refused, Untold, load_config
+from steptwin.drivers import (
+    Mic488,
+    ModbusLine,
+    ModbusRefusal,
+    NoAnswer,
+    NotReady,
+    ProgramState,
+    Reason,
+    Unconfirmed,
+    load_config,
+)
+from steptwin.drivers.mic488.lines import ThreadModbusLine
 from steptwin.drivers.modbus import Query
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.registermap import DataType
-from steptwin.wire.pdu import Bits, Read, WriteCoil, WriteRegister
+from steptwin.mic488.registers import register_map
+from steptwin.wire import pdu, rtu
+from steptwin.wire.pdu import BitsResponse, ReadRequest, WriteCoilRequest, WriteRegisterRequest
 
 CFG = """[Axis0]
 Unit=3
@@ -109,7 +122,7 @@ def test_gear_and_units_come_from_the_vendors_file(tmp_path: Path) -> None:
     assert load_config(path).axes[1].gear == 2.5
     mic = driver(Wire(), config=str(path))
     assert [mic.axis(n).unit for n in (1, 2, 3)] == ["mm", "degree", "imp"]
-    with pytest.raises(Misuse, match=r"cannot read .*none.cfg: No such file"):
+    with pytest.raises(Misuse, match=r"cannot read .*none.cfg: no such file"):
         load_config(tmp_path / "none.cfg")
     path.write_text("[Axis0]\nGear=much\n")
     with pytest.raises(Misuse, match="Gear"):
@@ -156,13 +169,15 @@ def test_a_trigger_mode_that_cannot_be_left_is_told() -> None:
     wire = Wire()
     mic = driver(wire)
     mic.enable()
-    back = Query(1, WriteRegister(10004, 0)).rtu_frame
+    back = Query(1, WriteRegisterRequest(10004, 0)).rtu_frame
 
     def cut(frame: bytes) -> None:
         wire.severed = wire.severed or frame == back
 
     wire.before_each = cut
-    with pytest.raises(Untold, match=r"^M1 M3 began to move, but AXIS_CTR_MODE may still be TRIGGER.* \(memory: no answer to"):
+    with pytest.raises(
+        Unconfirmed, match=r"^M1 M3 began to move, but AXIS_CTR_MODE may still be TRIGGER.* \(memory: no answer to"
+    ):
         mic.move_together({1: 100.0, 3: 120.0})
     wire.severed, wire.before_each = False, None
     assert (wire.twin.trigger_mode, wire.moving(1), wire.moving(3)) == (1, True, True)
@@ -228,9 +243,11 @@ def test_raw_access() -> None:
     mic = driver(wire)
     wire.twin.user[5] = 77
     assert mic.registers(5, 2) == (77, 0)
-    assert mic.request(WriteCoil(6001, True)) == WriteCoil(6001, True)
-    assert mic.request(Read(1, 6000, 3)) == Bits(1, b"\2")
-    with pytest.raises(Refused, match=r"unit 1: read .*was refused: it does not have this register.*exception 02") as caught:
+    assert mic.request(WriteCoilRequest(6001, True)) == WriteCoilRequest(6001, True)
+    assert mic.request(ReadRequest(1, 6000, 3)) == BitsResponse(1, b"\2")
+    with pytest.raises(
+        ModbusRefusal, match=r"unit 1: read .*was refused: it does not have this register.*exception 02"
+    ) as caught:
         mic.registers(9000, 2)
     assert caught.value.code == 2
 
@@ -294,7 +311,7 @@ def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> 
     assert unit.notes.stops[1:] == [count + 1 for count in stops[1:]], "motions asked for before are not begun after it"
     assert twin.program.state == ProgramState.STOPPED
     wire.severed = True
-    with pytest.raises(Untold, match="the program could not be stopped: the controller cannot be told"):
+    with pytest.raises(Unconfirmed, match="the program could not be stopped: the controller cannot be reached"):
         mic.program.stop()
 
 
@@ -308,3 +325,59 @@ def test_what_moves_is_sent_within_5_s_or_twice_the_time_of_its_tries(timeout_s:
     stopped, other = unit.permission(1, 3), unit.permission(2)
     unit.notes.stops[3] += 1
     assert (stopped.is_stopped(), other.is_stopped()) == (True, False)
+
+
+def test_the_face_for_threads_passes_all_its_arguments_on() -> None:
+    said: list[str] = []
+    config = spindles()
+    mic = Mic488("/dev/none", 7, baud=9600, firmware="1.40", config=config, timeout_s=0.75, observe=True, log=said.append)
+    driver = mic._driver
+    assert (mic.unit, mic.place, mic.firmware, mic.config) == (7, "/dev/none", "1.40", config)
+    assert (driver._unit.timeout_ns, driver._observe) == (750_000_000, True)
+    assert isinstance(driver.line, ThreadModbusLine)
+    discipline = driver.line._engine.discipline
+    # 8 characters of 11 bits there and 7 back: gap and time on the wire are those of the baud rate.
+    assert discipline.allowance_ns(Query(7, pdu.ReadRequest(3, 0, 1))) == pytest.approx(15 * 10 * SECOND / 9600, rel=0.11)
+    discipline.start(Query(7, pdu.ReadRequest(3, 10000, 1)), 0, urgent=False)
+    assert len(said) == 1
+    assert said[0].endswith("unit 7: read DATA_TYPE")
+
+
+def test_what_frames_tell_of_data_type_drivers_of_the_line_know() -> None:
+    mic = Mic488("tcp://127.0.0.1:5020", log=lambda _: None)
+    assert mic._driver.line.notes["frames"] is not None
+    assert "frames" not in Mic488("tcp://127.0.0.1:5020")._driver.line.notes
+
+
+@pytest.mark.parametrize("frames_per_second", [0.0, -1.0])
+def test_a_pace_is_above_0(frames_per_second: float) -> None:
+    with pytest.raises(Misuse, match="frames per second: must be above 0"):
+        ModbusLine("tcp://127.0.0.1:5020", frames_per_second=frames_per_second)
+
+
+def test_a_data_type_that_no_mic488_has_is_told() -> None:
+    wire = Wire()
+    wire.severed = True
+
+    def reply(frame: bytes) -> None:
+        count = int.from_bytes(frame[4:6], "big")
+        wire.inject(rtu.encode_frame(1, bytes((3, 2 * count, 0, 7, *bytes(2 * count - 2)))), after=wire.latency)
+
+    wire.before_each = reply
+    with pytest.raises(NotReady, match="memory: unit 1 reads DATA_TYPE = 7, which is no value of a MIC488"):
+        driver(wire)
+
+
+def test_a_jog_that_is_released_too_late_does_not_stop_what_another_master_moves() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable(1)
+    jog = mic.axis(1).jog(5.0)
+    jog.__enter__()
+    wire.sleep(5.0)
+    target = register_map("1.70").of("POS_ABS", 1).address
+    wire.twin.execute(pdu.encode_request(pdu.WriteRegistersRequest(target, (0, 0x41A0))), wire.now)
+    jog.release()
+    assert str(jog.end).startswith("M1: not held (5.")
+    wire.rest()
+    assert wire.position() == 2000

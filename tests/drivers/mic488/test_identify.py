@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
-from host_rig import Wire, thread_line
+from host_rig import Fault, Wire, thread_line
 
 from steptwin.drivers import Mic488, NoAnswer, NoMic488
 from steptwin.drivers.blocking import finish
@@ -59,6 +60,18 @@ def test_silent_where_another_refuses_is_found_too() -> None:
     mic = Mic488(thread_line(wire))
     mic.open()
     assert mic.firmware == "1.23"
+
+
+@pytest.mark.parametrize(
+    "faults", [(Fault("to twin", 5, "cut"), Fault("to twin", 13, "cut")), (Fault("to twin", 5, "much too late"),)]
+)
+def test_an_answer_that_is_lost_makes_no_older_controller(faults: tuple[Fault, ...]) -> None:
+    """User registers lie where 1.23 has its axes: both tries at the addresses of 1.70 fail, all else is answered."""
+    wire = Wire()
+    wire.put(*(replace(fault) for fault in faults))
+    mic = opened(wire)
+    assert mic.firmware == "1.70"
+    assert mic.axis(1).position() == 0.0
 
 
 def test_somebody_else_is_named() -> None:

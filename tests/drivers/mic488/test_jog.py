@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from host_rig import Fault, Wire, async_driver, driver, run_virtual, task_line
 
-from steptwin.drivers import Mic488, NotReady, Reason, Untold
+from steptwin.drivers import Mic488, NotReady, Reason, TooLate, Unconfirmed
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.registers import register_map
@@ -97,11 +97,11 @@ def test_a_cut_line_is_told_as_what_it_is() -> None:
     assert jog.hold()
     held = wire.position()
     wire.severed = True
-    with pytest.raises(Untold) as caught:  # noqa: PT012
+    with pytest.raises(Unconfirmed) as caught:  # noqa: PT012
         while jog.hold():
             pass
     text = str(caught.value)
-    assert text.startswith("M1 cannot be held any more: the controller cannot be told (memory: no answer to")
+    assert text.startswith("M1 cannot be held any more: the controller cannot be reached (memory: no answer to")
     assert f"It stops by itself, at most {REACH:g} mm after it was held last, 0." in text
     assert jog.end is not None
     assert jog.end.reason is Reason.COMMUNICATION
@@ -118,7 +118,7 @@ def test_a_line_cut_before_the_release_is_told_too() -> None:
             jog.hold()
             wire.severed = True
 
-    with pytest.raises(Untold, match=r"M1 cannot be told to stop: the controller cannot be told .* It stops by itself, at most"):
+    with pytest.raises(Unconfirmed, match=r"M1 cannot be stopped: the controller cannot be reached .* It stops by itself"):
         cut()
     wire.rest()
     assert not wire.moving()
@@ -189,7 +189,7 @@ def test_a_stop_between_two_tasks() -> None:
 
 def test_somebody_else_is_noticed() -> None:
     wire, mic = ready()
-    with pytest.raises(NotReady, match="M1 is not jogged any more"), mic.axis(1).jog(5.0) as jog:  # noqa: PT012
+    with pytest.raises(NotReady, match="M1 is no longer jogged"), mic.axis(1).jog(5.0) as jog:  # noqa: PT012
         jog.hold()
         mic.set("AXIS_CTR_MODE", 1)
         jog.hold()
@@ -229,16 +229,16 @@ def by_another_master(wire: Wire, request: pdu.Request) -> None:
 
 def jog_moves(wire: Wire) -> int:
     """How many times a jog told the axis to move on."""
-    head = pdu.encode_request(pdu.WriteRegisters(MAP.of("POS_REL", 1).address, (0, 0)))[:3]
+    head = pdu.encode_request(pdu.WriteRegistersRequest(MAP.of("POS_REL", 1).address, (0, 0)))[:3]
     return sum(frame[1:].startswith(head) for _, frame in wire.sent)
 
 
 STOPS: dict[str, tuple[pdu.Request, Reason]] = {
-    "M1_STOP": (pdu.WriteCoil(MAP.of("STOP", 1).address, True), Reason.STOPPED),
-    "M_STOP": (pdu.WriteRegister(MAP.of("M_STOP").address, 1), Reason.STOPPED),
-    "M1_EN": (pdu.WriteCoil(MAP.of("EN", 1).address, False), Reason.DISABLED),
-    "M1_VEL_ABS, still braking": (pdu.WriteRegisters(MAP.of("VEL_ABS", 1).address, (0, 0)), Reason.DIVERTED),
-    "M1_HOME": (pdu.WriteRegisters(MAP.of("HOME", 1).address, (0, 0x40A0)), Reason.DIVERTED),
+    "M1_STOP": (pdu.WriteCoilRequest(MAP.of("STOP", 1).address, True), Reason.STOPPED),
+    "M_STOP": (pdu.WriteRegisterRequest(MAP.of("M_STOP").address, 1), Reason.STOPPED),
+    "M1_EN": (pdu.WriteCoilRequest(MAP.of("EN", 1).address, False), Reason.DISABLED),
+    "M1_VEL_ABS, still braking": (pdu.WriteRegistersRequest(MAP.of("VEL_ABS", 1).address, (0, 0)), Reason.DIVERTED),
+    "M1_HOME": (pdu.WriteRegistersRequest(MAP.of("HOME", 1).address, (0, 0x40A0)), Reason.DIVERTED),
 }
 
 
@@ -278,3 +278,26 @@ def test_a_program_that_is_suspended_while_it_reads_the_status_does_not_move_the
     wire.rest(10.0)
     assert (wire.moving(), wire.position()) == (False, stood)
     assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}
+
+
+@pytest.mark.parametrize(
+    ("hold_s", "away_s", "begins"), [(0.4, 0.9, True), (0.4, 1.1, False), (1.0, 1.5, True), (1.0, 1.7, False)]
+)
+def test_a_jog_begins_within_its_hold_time_and_two_time_outs_or_not_at_all(hold_s: float, away_s: float, begins: bool) -> None:
+    """Whoever is suspended while it is prepared does not find the axis moving afterwards."""
+    wire, mic = ready()
+
+    def away(_: bytes) -> None:
+        wire.before_each = None
+        wire.sleep(away_s)
+
+    wire.before_each = away
+    jog = mic.axis(1).jog(5.0, hold_s=hold_s)
+    if begins:
+        jog.__enter__()
+        assert wire.moving()
+    else:
+        with pytest.raises(TooLate):
+            jog.__enter__()
+        wire.rest()
+        assert wire.position() == 0

@@ -9,7 +9,8 @@ from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.machine import MILLISECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.wire import mbap
-from steptwin.wire.slave import Direction
+from steptwin.wire.rtu import BURSTY_GAP_NS
+from steptwin.wire.slave import FrameDirection
 
 READ, ANSWER = bytes.fromhex("01 03 27 24 00 02 8E B4"), bytes.fromhex("01 03 04 00 00 41 48 CA 55")
 WRITE = bytes.fromhex("01 05 17 71 00 00 98 65")
@@ -23,7 +24,7 @@ def listener() -> tuple[RtuListener, list[Heard]]:
 
 
 def meanings(heard: list[Heard]) -> list[str]:
-    return [f"{'?' if h.direction is None else '→' if h.direction is Direction.IN else '←'} {h.meaning}" for h in heard]
+    return [f"{'?' if h.direction is None else '→' if h.direction is FrameDirection.IN else '←'} {h.meaning}" for h in heard]
 
 
 @pytest.mark.parametrize("size", [1, 3, 100])
@@ -51,6 +52,7 @@ def test_rubbish_is_counted() -> None:
 def test_the_beginning_of_a_frame_that_never_ends_is_told_with_the_next() -> None:
     ear, heard = listener()
     ear.heard(READ[:5], 0)
+    assert ear.deadline() == BURSTY_GAP_NS
     while (due := ear.deadline()) is not None:
         ear.expire(due)
     ear.heard(READ, 500 * MILLISECOND)
@@ -63,10 +65,10 @@ def test_both_directions_of_modbus_tcp() -> None:
     words.sinks.append(heard.append)
     ear = TcpListener(words)
     for byte in mbap.encode_frame(7, 1, READ[1:-2]):
-        ear.heard(bytes((byte,)), 1, Direction.IN)
-    ear.heard(mbap.encode_frame(7, 1, ANSWER[1:-2]), 2, Direction.OUT)
-    ear.heard(b"GET / HTTP/1.0\r\n\r\n", 3, Direction.IN)
-    ear.heard(mbap.encode_frame(8, 1, READ[1:-2]), 4, Direction.IN)
+        ear.heard(bytes((byte,)), 1, FrameDirection.IN)
+    ear.heard(mbap.encode_frame(7, 1, ANSWER[1:-2]), 2, FrameDirection.OUT)
+    ear.heard(b"GET / HTTP/1.0\r\n\r\n", 3, FrameDirection.IN)
+    ear.heard(mbap.encode_frame(8, 1, READ[1:-2]), 4, FrameDirection.IN)
     assert meanings(heard) == [
         "→ unit 1: read M1_POS_ACT",
         "← unit 1: read M1_POS_ACT = 12.5 u",
@@ -79,9 +81,9 @@ def test_what_is_too_short_for_a_frame_is_none() -> None:
     """A unit, a function and a checksum, or an MBAP header and a function; what the function makes of it is its own affair."""
     for is_tcp, raw in ((False, bytes.fromhex("01 03 40 21")), (True, bytes.fromhex("0001 0000 0002 01 03"))):
         words = FrameWords(tcp=is_tcp)
-        shorter, whole = words.frame(5, Direction.IN, raw[:-1]), words.frame(5, Direction.IN, raw)
+        shorter, whole = words.frame(5, FrameDirection.IN, raw[:-1]), words.frame(5, FrameDirection.IN, raw)
         assert (shorter.time, shorter.direction, shorter.unit, shorter.meaning) == (5, None, None, "no frame")
-        assert (whole.time, whole.direction, whole.unit) == (5, Direction.IN, 1)
+        assert (whole.time, whole.direction, whole.unit) == (5, FrameDirection.IN, 1)
         assert whole.meaning.startswith("unit 1: ")
 
 
@@ -96,6 +98,15 @@ def test_a_read_of_data_type_tells_how_values_travel(first: int, count: int, is_
     request = bytes((3, *begin.to_bytes(2, "big"), 0, count))
     registers = [1 if begin + n == address else 0 for n in range(count)]
     answer = bytes((3, 2 * count)) + b"".join(value.to_bytes(2, "big") for value in registers)
-    words.observe(0, Direction.IN, mbap.encode_frame(1, 1, request))
-    words.observe(1, Direction.OUT, mbap.encode_frame(1, 1, answer))
+    words.observe(0, FrameDirection.IN, mbap.encode_frame(1, 1, request))
+    words.observe(1, FrameDirection.OUT, mbap.encode_frame(1, 1, answer))
+    assert (words._wordings[1].data_type is DataType.DINT) is is_learnt
+
+
+@pytest.mark.parametrize(("address", "is_learnt"), [(10000, True), (10001, False), (9999, False)])
+def test_a_write_of_data_type_tells_how_values_travel(address: int, is_learnt: bool) -> None:
+    words = FrameWords(tcp=True)
+    request = bytes((6, *address.to_bytes(2, "big"), 0, 1))
+    words.observe(0, FrameDirection.IN, mbap.encode_frame(1, 1, request))
+    words.observe(1, FrameDirection.OUT, mbap.encode_frame(1, 1, request))
     assert (words._wordings[1].data_type is DataType.DINT) is is_learnt

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.drivers.mic488.motion import MOVING, Kind, Motion, MoveEnd, Reason, reason_of, status_text, travel_s
-from steptwin.mic488.status import Status
+from steptwin.drivers.mic488.motion import MOVING, MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text, travel_s
+from steptwin.mic488.status import AxisStatus
 
 
 def trapezoid(distance: float, velocity: float, acc: float, dec: float, vmax: float) -> float:
@@ -29,9 +29,7 @@ def trapezoid(distance: float, velocity: float, acc: float, dec: float, vmax: fl
     dec=st.floats(1.0, 1e4),
     vmax=st.floats(0.1, 1e3),
 )
-def test_a_move_lasts_as_its_trapezoid(  # noqa: PLR0917
-    distance: float, sign: int, part: float, acc: float, dec: float, vmax: float
-) -> None:
+def test_a_move_lasts_as_its_trapezoid(distance: float, sign: int, part: float, acc: float, dec: float, vmax: float) -> None:
     velocity = part * min(vmax, sqrt(2 * dec * distance))
     found = travel_s(sign * distance, sign * velocity, acc, dec, vmax)
     assert found == pytest.approx(trapezoid(distance, velocity, acc, dec, vmax), rel=1e-3, abs=1e-4)
@@ -52,33 +50,33 @@ def test_no_way_takes_no_time_and_what_cannot_be_planned_has_none() -> None:
 @pytest.mark.parametrize(
     ("status", "motion", "reason"),
     [
-        (Status.OFF, None, Reason.DISABLED),
-        (Status.ON, None, Reason.REST),
-        (Status.ON, (Kind.VELOCITY, 0.0), Reason.REST),
-        (Status.ON, (Kind.VELOCITY, 0.5), Reason.STOPPED),
-        (Status.ON, (Kind.POSITION, 0.0), Reason.STOPPED),
-        (Status.ON, (Kind.DISTANCE, 1.0), Reason.STOPPED),
-        (Status.REACHED, (Kind.VELOCITY, 0.0), Reason.TARGET),
-        (Status.REACHED, None, Reason.TARGET),
-        (Status.ERROR, None, Reason.POSITION_ERROR),
-        (Status.LIMIT_L, None, Reason.LIMIT_L),
-        (Status.LIMIT_R, (Kind.POSITION, 1.0), Reason.LIMIT_R),
+        (AxisStatus.OFF, None, Reason.DISABLED),
+        (AxisStatus.ON, None, Reason.REST),
+        (AxisStatus.ON, (MotionKind.VELOCITY, 0.0), Reason.REST),
+        (AxisStatus.ON, (MotionKind.VELOCITY, 0.5), Reason.STOPPED),
+        (AxisStatus.ON, (MotionKind.POSITION, 0.0), Reason.STOPPED),
+        (AxisStatus.ON, (MotionKind.DISTANCE, 1.0), Reason.STOPPED),
+        (AxisStatus.REACHED, (MotionKind.VELOCITY, 0.0), Reason.TARGET),
+        (AxisStatus.REACHED, None, Reason.TARGET),
+        (AxisStatus.ERROR, None, Reason.POSITION_ERROR),
+        (AxisStatus.LIMIT_L, None, Reason.LIMIT_L),
+        (AxisStatus.LIMIT_R, (MotionKind.POSITION, 1.0), Reason.LIMIT_R),
         (77, None, Reason.STOPPED),
     ],
 )
-def test_why_an_axis_stands(status: int, motion: tuple[Kind, float] | None, reason: Reason) -> None:
-    told = None if motion is None else Motion(*motion, at=0, before=1)
+def test_why_an_axis_stands(status: int, motion: tuple[MotionKind, float] | None, reason: Reason) -> None:
+    told = None if motion is None else MotionCommand(*motion, at=0, before=1)
     assert reason_of(status, told) is reason
 
 
 def test_an_end_in_words() -> None:
     assert str(MoveEnd(2, Reason.TARGET, 12.5, "mm", 1.0)) == "M2: target reached at 12.5 mm"
     assert str(MoveEnd(1, Reason.OVERDUE, None, "u", 1.0, "velocity mode")) == "M1: still moving (velocity mode)"
-    assert str(MoveEnd(1, Reason.DIVERTED, 0.0, "u", 1.0, "x")) == "M1: sent elsewhere by somebody at 0 u (x)"
+    assert str(MoveEnd(1, Reason.DIVERTED, 0.0, "u", 1.0, "x")) == "M1: redirected by another command at 0 u (x)"
     assert {reason for reason in Reason if MoveEnd(1, reason, None, "u", 0.0).ok} == {
         Reason.TARGET,
         Reason.REST,
         Reason.RELEASED,
     }
-    assert frozenset({Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION}) == MOVING
+    assert frozenset({AxisStatus.VELOCITY, AxisStatus.POSITION, AxisStatus.HOMING, AxisStatus.CORRECTION}) == MOVING
     assert status_text(99) == "unknown status 99"

@@ -7,7 +7,7 @@ import json
 import pytest
 from host_rig import Wire, driver
 
-from steptwin.drivers import Mic488, NotReady, Snapshot
+from steptwin.drivers import Mic488, Mic488Snapshot, NotReady
 from steptwin.errors import Misuse
 
 
@@ -73,11 +73,11 @@ def test_snapshots_are_text() -> None:
     mic = driver(Wire())
     changed(mic)
     kept = mic.take_snapshot()
-    assert Snapshot.from_json(kept.to_json()) == kept
+    assert Mic488Snapshot.from_json(kept.to_json()) == kept
     assert kept.user[100:] == (1, 2, 3)
     for text in ("", "[]", "{}", '{"format": "something"}'):
         with pytest.raises(Misuse, match=r"no snapshot|the format is"):
-            Snapshot.from_json(text)
+            Mic488Snapshot.from_json(text)
     with pytest.raises(Misuse, match=r"the snapshot is of firmware 1.70, this controller has 1.23"):
         driver(Wire(firmware="1.23")).restore_snapshot(kept)
 
@@ -110,5 +110,5 @@ def test_a_value_that_is_not_taken_is_found_before_anything_is_written(
         data["values"][what] = value
     wire.sent.clear()
     with pytest.raises(Misuse, match=text):
-        mic.restore_snapshot(Snapshot.from_json(json.dumps(data)), dry_run=dry_run)
+        mic.restore_snapshot(Mic488Snapshot.from_json(json.dumps(data)), dry_run=dry_run)
     assert {frame[1] for _, frame in wire.sent} <= {1, 2, 3}

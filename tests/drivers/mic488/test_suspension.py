@@ -19,7 +19,7 @@ from steptwin.wire import pdu
 
 RACE_P = 2
 """Pulses that an axis makes which was started too late and is stopped at once."""
-RAMP_DOWN = pdu.WriteRegisters(register_map("1.70").of("VEL_ABS", 1).address, (0, 0))
+RAMP_DOWN = pdu.WriteRegistersRequest(register_map("1.70").of("VEL_ABS", 1).address, (0, 0))
 """A velocity of 0, which a jog ends with."""
 _M_STOP = register_map("1.70").of("M_STOP").address
 _PROGRAM_CTRL = register_map("1.70").of("PROGRAM_CTRL").address
@@ -50,7 +50,7 @@ OPERATIONS: dict[str, Callable[[AsyncMic488], Awaitable[Any]]] = {
     "move and wait": _move_and_wait,
     "set a distance": lambda mic: mic.set("M1_POS_REL", 20.0),
     "set a position": lambda mic: mic.set("M1_POS_ABS", 20.0),
-    "raw": lambda mic: mic.request(pdu.WriteRegisters(10032, (0, 0x41A0))),
+    "raw": lambda mic: mic.request(pdu.WriteRegistersRequest(10032, (0, 0x41A0))),
     "program": lambda mic: mic.program.start(),
 }
 
@@ -65,7 +65,7 @@ def _motions_since(wire: Wire, back: int) -> list[str]:
         request = pdu.decode_request(frame[1:-2])
         if moves(registers, request) and request != RAMP_DOWN:
             found.append("motion")
-        elif isinstance(request, pdu.WriteRegister) and request.address in (_M_STOP, _PROGRAM_CTRL):
+        elif isinstance(request, pdu.WriteRegisterRequest) and request.address in (_M_STOP, _PROGRAM_CTRL):
             found.append("stop")
     return found
 

@@ -10,14 +10,14 @@ import pytest
 
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.line import LONGEST_WAIT_S
-from steptwin.drivers.mic488.motion import Kind, Motion, MoveEnd, Reason
+from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd, Reason
 from steptwin.drivers.mic488.unit import Control
-from steptwin.drivers.mic488.waiting import Watch, dynamics, wait_for
+from steptwin.drivers.mic488.waiting import AxisWait, dynamics, wait_for
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.registermap import DataType
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 
 BEGIN = 100 * SECOND
 
@@ -71,96 +71,96 @@ class Unit:
         return Control(self.moment, DataType.REAL, 0, False, 0, axes)  # type: ignore[arg-type]
 
 
-def judged(unit: Any, watch: Watch, status: int, at: int | None = None) -> MoveEnd | None:
+def judged(unit: Any, watch: AxisWait, status: int, at: int | None = None) -> MoveEnd | None:
     moment = unit.moment if at is None else at
     return finish(watch.judge(Control(moment, DataType.REAL, 0, False, 0, (0, status, 0, 0))))
 
 
-def limit_s(unit: Any, motion: Motion | None, status: int, timeout_s: float | None = None) -> float:
+def limit_s(unit: Any, motion: MotionCommand | None, status: int, timeout_s: float | None = None) -> float:
     """After how many seconds in that status a wait is given up, to the millisecond."""
-    watch = Watch(unit, 2, motion, timeout_s)
+    watch = AxisWait(unit, 2, motion, timeout_s)
     while judged(unit, watch, status) is None:
         unit.moment += MILLISECOND
         assert unit.moment < BEGIN + 1000 * SECOND, "it waits for ever"
     return (unit.moment - BEGIN) / SECOND
 
 
-def told(kind: Kind, value: float, before: int = 1) -> Motion:
-    return Motion(kind, value, BEGIN, before)
+def told(kind: MotionKind, value: float, before: int = 1) -> MotionCommand:
+    return MotionCommand(kind, value, BEGIN, before)
 
 
 @pytest.mark.parametrize(
     ("motion", "status", "seconds"),
     [
         # From 3 to 30, from -4: 0.8 s and 1.6 back; then 28.6, of which 6.25 and 10 are ramps of 1.25 s and 2 s.
-        (told(Kind.POSITION, 30.0), Status.POSITION, 1.2 * (0.8 + 1.25 + 2.0 + (28.6 - 16.25) / 10) + 1.0),
-        (told(Kind.DISTANCE, 27.0), Status.POSITION, 1.2 * (0.8 + 1.25 + 2.0 + (28.6 - 16.25) / 10) + 1.0),
-        (told(Kind.VELOCITY, 0.0), Status.VELOCITY, 1.2 * 4.0 / 8.0 + 1.0),
-        (told(Kind.VELOCITY, 5.0), Status.POSITION, 60.0),
-        (told(Kind.HOMING, 5.0), Status.HOMING, 60.0),
-        (None, Status.POSITION, 60.0),
-        (None, Status.HOMING, 60.0),
-        (None, Status.CORRECTION, 5.0),
+        (told(MotionKind.POSITION, 30.0), AxisStatus.POSITION, 1.2 * (0.8 + 1.25 + 2.0 + (28.6 - 16.25) / 10) + 1.0),
+        (told(MotionKind.DISTANCE, 27.0), AxisStatus.POSITION, 1.2 * (0.8 + 1.25 + 2.0 + (28.6 - 16.25) / 10) + 1.0),
+        (told(MotionKind.VELOCITY, 0.0), AxisStatus.VELOCITY, 1.2 * 4.0 / 8.0 + 1.0),
+        (told(MotionKind.VELOCITY, 5.0), AxisStatus.POSITION, 60.0),
+        (told(MotionKind.HOMING, 5.0), AxisStatus.HOMING, 60.0),
+        (None, AxisStatus.POSITION, 60.0),
+        (None, AxisStatus.HOMING, 60.0),
+        (None, AxisStatus.CORRECTION, 5.0),
     ],
 )
 def test_a_wait_without_time_is_given_up_after_1_2_times_the_computed_one_and_a_second(
-    motion: Motion | None, status: int, seconds: float
+    motion: MotionCommand | None, status: int, seconds: float
 ) -> None:
     assert limit_s(Unit(), motion, status) == pytest.approx(seconds, abs=0.002)
 
 
 @pytest.mark.parametrize("timeout_s", [0.0, 0.5, 7.25])
 def test_a_time_that_was_given_counts_from_the_beginning_of_the_wait_whatever_the_motion(timeout_s: float) -> None:
-    for status in (Status.POSITION, Status.VELOCITY, Status.HOMING, Status.CORRECTION):
-        assert limit_s(Unit(), told(Kind.POSITION, 30.0), status, timeout_s) == pytest.approx(timeout_s, abs=0.001)
+    for status in (AxisStatus.POSITION, AxisStatus.VELOCITY, AxisStatus.HOMING, AxisStatus.CORRECTION):
+        assert limit_s(Unit(), told(MotionKind.POSITION, 30.0), status, timeout_s) == pytest.approx(timeout_s, abs=0.001)
 
 
 def test_a_correction_has_time_of_its_own_after_the_motion() -> None:
     """5 s, or what the controller is configured to try for, and a second."""
     unit = Unit()
-    watch = Watch(unit, 2, told(Kind.POSITION, 30.0), None)  # type: ignore[arg-type]
-    assert judged(unit, watch, Status.POSITION) is None
+    watch = AxisWait(unit, 2, told(MotionKind.POSITION, 30.0), None)  # type: ignore[arg-type]
+    assert judged(unit, watch, AxisStatus.POSITION) is None
     unit.moment += 6 * SECOND
-    assert judged(unit, watch, Status.CORRECTION) is None
+    assert judged(unit, watch, AxisStatus.CORRECTION) is None
     unit.moment += 5 * SECOND - 1
-    assert judged(unit, watch, Status.CORRECTION) is None
+    assert judged(unit, watch, AxisStatus.CORRECTION) is None
     unit.moment += 1
-    end = judged(unit, watch, Status.CORRECTION)
+    end = judged(unit, watch, AxisStatus.CORRECTION)
     assert end is not None
     assert (end.reason, end.detail.endswith("for 11.0 s")) == (Reason.OVERDUE, True)
     for err, settle, seconds in ((2000, 500, 5.0), (7000, 500, 8.5)):
         axis = AxisConfig(err_time_ms=err, enc_settle_ms=settle)
         config = ControllerConfig(axes=(AxisConfig(), axis, AxisConfig(), AxisConfig()))
-        assert limit_s(Unit(config=config), None, Status.CORRECTION) == pytest.approx(seconds, abs=0.002)
+        assert limit_s(Unit(config=config), None, AxisStatus.CORRECTION) == pytest.approx(seconds, abs=0.002)
 
 
 def test_only_a_status_read_after_the_limit_tells_that_it_is_exceeded() -> None:
     unit = Unit()
-    watch = Watch(unit, 2, None, 1.0)  # type: ignore[arg-type]
+    watch = AxisWait(unit, 2, None, 1.0)  # type: ignore[arg-type]
     unit.moment += 5 * SECOND
-    assert judged(unit, watch, Status.POSITION, BEGIN + SECOND - 1) is None
-    end = judged(unit, watch, Status.POSITION, BEGIN + SECOND)
+    assert judged(unit, watch, AxisStatus.POSITION, BEGIN + SECOND - 1) is None
+    end = judged(unit, watch, AxisStatus.POSITION, BEGIN + SECOND)
     assert end is not None
     assert (end.axis, end.position_u, end.unit, end.after_s) == (2, 3.0, "mm", 5.0)
 
 
 def test_velocity_mode_needs_a_time() -> None:
-    for motion in (None, told(Kind.VELOCITY, 1.0), told(Kind.POSITION, 0.0)):
+    for motion in (None, told(MotionKind.VELOCITY, 1.0), told(MotionKind.POSITION, 0.0)):
         with pytest.raises(Misuse, match="M2 runs in velocity mode and does not end by itself: give the time to wait, timeout_s"):
-            limit_s(Unit(), motion, Status.VELOCITY)
+            limit_s(Unit(), motion, AxisStatus.VELOCITY)
 
 
 def test_a_status_just_after_the_command_may_still_be_the_one_of_before() -> None:
     unit = Unit()
-    watch = Watch(unit, 2, told(Kind.POSITION, 3.0, before=Status.REACHED), None)  # type: ignore[arg-type]
+    watch = AxisWait(unit, 2, told(MotionKind.POSITION, 3.0, before=AxisStatus.REACHED), None)  # type: ignore[arg-type]
     assert watch.after == BEGIN
-    assert judged(unit, watch, Status.REACHED, BEGIN + 100 * MILLISECOND - 1) is None
-    for status, at in ((Status.ON, BEGIN), (Status.REACHED, BEGIN + 100 * MILLISECOND)):
+    assert judged(unit, watch, AxisStatus.REACHED, BEGIN + 100 * MILLISECOND - 1) is None
+    for status, at in ((AxisStatus.ON, BEGIN), (AxisStatus.REACHED, BEGIN + 100 * MILLISECOND)):
         end = judged(unit, watch, status, at)
         assert end is not None
-    assert Watch(unit, 1, None, None).after == BEGIN  # type: ignore[arg-type]
-    late = Motion(Kind.POSITION, 3.0, BEGIN - SECOND, Status.REACHED)
-    assert Watch(unit, 1, late, None).after == BEGIN - SECOND  # type: ignore[arg-type]
+    assert AxisWait(unit, 1, None, None).after == BEGIN  # type: ignore[arg-type]
+    late = MotionCommand(MotionKind.POSITION, 3.0, BEGIN - SECOND, AxisStatus.REACHED)
+    assert AxisWait(unit, 1, late, None).after == BEGIN - SECOND  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -176,11 +176,11 @@ def test_a_status_just_after_the_command_may_still_be_the_one_of_before() -> Non
 )
 def test_a_target_is_reached_to_half_a_pulse(target: float, gear: float | None, reason: Reason) -> None:
     unit = Unit(gear=gear)
-    end = judged(unit, Watch(unit, 2, told(Kind.POSITION, target), None), Status.REACHED)  # type: ignore[arg-type]
+    end = judged(unit, AxisWait(unit, 2, told(MotionKind.POSITION, target), None), AxisStatus.REACHED)  # type: ignore[arg-type]
     assert end is not None
     assert end.reason is reason
     assert end.detail == ("" if reason is Reason.TARGET else f"the target was {target:g} mm")
-    distance = judged(unit, Watch(unit, 2, told(Kind.DISTANCE, target), None), Status.REACHED)  # type: ignore[arg-type]
+    distance = judged(unit, AxisWait(unit, 2, told(MotionKind.DISTANCE, target), None), AxisStatus.REACHED)  # type: ignore[arg-type]
     assert distance is not None
     assert distance.reason is Reason.TARGET
 
@@ -189,17 +189,17 @@ def test_large_targets_are_known_to_24_bits() -> None:
     for target, reason in ((2.0**24 + 4.0, Reason.TARGET), (2.0**24 + 5.1, Reason.DIVERTED)):
         unit = Unit(gear=1.0)
         unit.values["POS_ACT"] = 2.0**24
-        end = judged(unit, Watch(unit, 2, told(Kind.POSITION, target), None), Status.REACHED)  # type: ignore[arg-type]
+        end = judged(unit, AxisWait(unit, 2, told(MotionKind.POSITION, target), None), AxisStatus.REACHED)  # type: ignore[arg-type]
         assert end is not None
         assert end.reason is reason
 
 
 def test_a_stop_by_somebody_says_which_status_there_is() -> None:
     unit = Unit()
-    end = judged(unit, Watch(unit, 2, told(Kind.POSITION, 5.0, before=4), None), Status.ON)  # type: ignore[arg-type]
+    end = judged(unit, AxisWait(unit, 2, told(MotionKind.POSITION, 5.0, before=4), None), AxisStatus.ON)  # type: ignore[arg-type]
     assert end is not None
     assert (end.reason, bool(end.detail)) == (Reason.STOPPED, True)
-    limit = judged(unit, Watch(unit, 2, None, None), Status.LIMIT_L)  # type: ignore[arg-type]
+    limit = judged(unit, AxisWait(unit, 2, None, None), AxisStatus.LIMIT_L)  # type: ignore[arg-type]
     assert limit is not None
     assert (limit.reason, limit.detail) == (Reason.LIMIT_L, "")
 
@@ -207,20 +207,20 @@ def test_a_stop_by_somebody_says_which_status_there_is() -> None:
 @pytest.mark.parametrize("timeout_s", [-0.1, float("nan"), LONGEST_WAIT_S * 1.01])
 def test_times_that_nobody_waits(timeout_s: float) -> None:
     with pytest.raises(Misuse, match=r"a time to wait of .* s is outside 0 to 1000000 s"):
-        Watch(Unit(), 1, None, timeout_s)  # type: ignore[arg-type]
+        AxisWait(Unit(), 1, None, timeout_s)  # type: ignore[arg-type]
 
 
 def test_the_dynamics_in_their_order() -> None:
     assert finish(dynamics(Unit(), 3)) == (3.0, -4.0, 8.0, 5.0, 10.0)  # type: ignore[arg-type]
 
 
-def watches(unit: Any, *motions: Motion | None) -> dict[int, Watch]:
-    return {axis: Watch(unit, axis, motion, 10.0) for axis, motion in enumerate(motions, start=1)}
+def watches(unit: Any, *motions: MotionCommand | None) -> dict[int, AxisWait]:
+    return {axis: AxisWait(unit, axis, motion, 10.0) for axis, motion in enumerate(motions, start=1)}
 
 
 def test_all_are_waited_for_every_50_ms_with_statuses_of_30_ms_at_most() -> None:
     unit = Unit([(2, 2, 0, 0), (4, 2, 0, 0), (4, 4, 0, 0)])
-    early = Motion(Kind.DISTANCE, 1.0, BEGIN - SECOND, 1)
+    early = MotionCommand(MotionKind.DISTANCE, 1.0, BEGIN - SECOND, 1)
     ends = finish(wait_for(unit, watches(unit, early, None), check=True))  # type: ignore[arg-type]
     assert {axis: end.reason for axis, end in ends.items()} == {1: Reason.TARGET, 2: Reason.TARGET}
     assert unit.slept == [0.05, 0.05]

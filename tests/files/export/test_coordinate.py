@@ -62,7 +62,7 @@ def ran() -> tuple[World, list[tuple[float, float]]]:
 
 
 def exported(world: World, path: Path) -> Path:
-    write_trace(world.trace, path, views=axis_views(world.machines, world.axes), period=PERIOD, until=499 * PERIOD)
+    write_trace(world.trace, path, views=axis_views(world), period=PERIOD, until=499 * PERIOD)
     return path
 
 

@@ -29,9 +29,7 @@ def recorded() -> list[str]:
     world = World.load(EXAMPLES / "feeder.toml")
     world.run(for_=3)
     with tempfile.TemporaryDirectory() as folder:
-        (path,) = write_trace(
-            world.trace, Path(folder) / "t.jsonl", views=axis_views(world.machines, world.axes), ended=world.now
-        )
+        (path,) = write_trace(world.trace, Path(folder) / "t.jsonl", views=axis_views(world), ended=world.now)
         return path.read_text().splitlines()
 
 
@@ -89,7 +87,7 @@ def test_a_record_of_other_values_whose_digest_is_right(
         (b" " * (5 << 20), ":1: a line of more than"),
         (b"[]\n", ":1: not the first line of a trace"),
         (b"null\n", ":1: not the first line of a trace"),
-        (b'{"steptwin_trace": 2}\n', ":1: a trace of format 2: this version reads format 1"),
+        (b'{"steptwin_trace": 1}\n', ":1: a trace of format 1: this version reads format 2"),
     ],
 )
 def test_what_is_no_trace(content: bytes, message: str, tmp_path: Path) -> None:

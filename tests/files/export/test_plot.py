@@ -14,7 +14,7 @@ from steptwin.files.export.polyline import curve
 from steptwin.files.export.recording import sort_out
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position, plan_velocity
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 
 def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
@@ -28,7 +28,7 @@ def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
 def test_long_names_are_not_cut_off(tmp_path: Path) -> None:
     trace = Trace()
     for name in ("a-machine-with-a-long-name", "b"):
-        trace.add(Record(0, name, "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
+        trace.add(TraceRecord(0, name, "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
     write_trace(trace, tmp_path / "run.svg")
     begins = re.findall(r"translate\(([-\d.]+) [-\d.]+\)\">a-machine-with", (tmp_path / "run.svg").read_text())
     assert len(begins) == 2
@@ -53,7 +53,7 @@ def test_a_png_is_as_wide_as_a_page(m1486: Run, tmp_path: Path) -> None:
 def test_more_than_can_be_read_is_said_to_be_left_out(tmp_path: Path) -> None:
     trace = Trace()
     for n in range(18):
-        trace.add(Record(0, f"m{n}", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
+        trace.add(TraceRecord(0, f"m{n}", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
     write_trace(trace, tmp_path / "run.svg")
     assert "not shown: 2 axes, 0 lanes" in (tmp_path / "run.svg").read_text()
 
@@ -66,7 +66,7 @@ def test_nothing_at_all_is_a_picture_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("seconds", "unit"), [(10, "time (s)"), (3600, "time (h:min:s)")])
 def test_long_runs_have_clock_times(seconds: int, unit: str, tmp_path: Path) -> None:
     trace = Trace()
-    trace.add(Record(SECOND, "a", "edge", "OUT1", 1.0))
+    trace.add(TraceRecord(SECOND, "a", "edge", "OUT1", 1.0))
     write_trace(trace, tmp_path / "run.svg", until=seconds * SECOND)
     assert f">{unit}<" in (tmp_path / "run.svg").read_text()
 
@@ -77,10 +77,10 @@ def times_of(picture: Path) -> set[str]:
 
 def test_a_picture_ends_shortly_after_the_last_change_unless_asked_for_more(tmp_path: Path) -> None:
     trace = Trace()
-    trace.add(Record(SECOND, "a", "edge", "OUT1", 1.0))
-    trace.add(Record(7 * SECOND, "a", "edge", "OUT1", 0.0))
+    trace.add(TraceRecord(SECOND, "a", "edge", "OUT1", 1.0))
+    trace.add(TraceRecord(7 * SECOND, "a", "edge", "OUT1", 0.0))
     for second in range(60):
-        trace.add(Record(second * SECOND, "b", "edge", "AIN1", float(second % 2)))
+        trace.add(TraceRecord(second * SECOND, "b", "edge", "AIN1", float(second % 2)))
     write_trace(trace, tmp_path / "short.svg", ended=60 * SECOND)
     write_trace(trace, tmp_path / "long.svg", ended=60 * SECOND, until=60 * SECOND)
     assert times_of(tmp_path / "short.svg") & {"7", "8", "60"} == {"7"}
@@ -89,7 +89,7 @@ def test_a_picture_ends_shortly_after_the_last_change_unless_asked_for_more(tmp_
 
 def test_a_motion_without_end_is_shown_to_the_end(tmp_path: Path) -> None:
     trace = Trace()
-    trace.add(Record(0, "a", "plan", "1", plan_velocity(MotionState(0, 0, 0.0, 0.0), 100.0, 100.0, 100.0)))
+    trace.add(TraceRecord(0, "a", "plan", "1", plan_velocity(MotionState(0, 0, 0.0, 0.0), 100.0, 100.0, 100.0)))
     write_trace(trace, tmp_path / "run.svg", ended=60 * SECOND)
     assert "60" in times_of(tmp_path / "run.svg")
 
@@ -111,7 +111,7 @@ def test_the_title_is_the_name_of_what_ran(mic488: Run, tmp_path: Path) -> None:
 def test_curves_of_few_points_are_close_to_the_motion(target: int, acc: float, dec: float, speed: float, begin: Nanos) -> None:
     profile = plan_position(MotionState(0, 0, 0.0, 0.0), target, acc, dec, speed)
     trace = Trace()
-    trace.add(Record(0, "a", "plan", "1", profile))
+    trace.add(TraceRecord(0, "a", "plan", "1", profile))
     assert profile.end is not None
     until = max(profile.end, begin) + SECOND
     points = curve(sort_out(trace, {}, begin, until).axes[0], begin, until)

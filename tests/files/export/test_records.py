@@ -13,7 +13,7 @@ from steptwin.files.export.records import _from_json, _to_json
 from steptwin.motion import MotionState, plan_position, plan_velocity
 from steptwin.motion.divisions import Microstepping, step_train
 from steptwin.motion.paths import ArcProfile, Circular, circle
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 REST = MotionState(0, 0, 0.0, 0.0)
 
@@ -40,7 +40,7 @@ def test_every_kind_of_value_comes_back(tmp_path: Path) -> None:
     ]  # fmt: skip
     trace = Trace(["first", "ł"])
     for time, value in enumerate(values):
-        trace.add(Record(time, "ł", "event", "x", value))
+        trace.add(TraceRecord(time, "ł", "event", "x", value))
     write_trace(trace, tmp_path, formats=["jsonl"])
     saved = read_trace(tmp_path)
     assert saved.trace.digest() == trace.digest()
@@ -66,7 +66,7 @@ def test_arcs_come_back() -> None:
         (lambda lines: [], "is empty: a trace begins with a line about itself"),
         (lambda lines: ["{}\n"], "x.jsonl:1: not the first line of a trace"),
         (lambda lines: ["nonsense\n"], "x.jsonl:1: not the first line of a trace"),
-        (lambda lines: [lines[0].replace('"steptwin_trace":1', '"steptwin_trace":9')], "format 9: this version reads format 1"),
+        (lambda lines: [lines[0].replace('"steptwin_trace":2', '"steptwin_trace":9')], "format 9: this version reads format 2"),
         (lambda lines: [*lines[:2], lines[2][:-9] + "\n"], "x.jsonl:3: not a record of a trace"),
         (lambda lines: [lines[0], lines[1].replace('"edge"', '"wedge"')], "x.jsonl:2: no kind of record 'wedge'"),
         (lambda lines: lines[:-1], "the records are not those that were written"),
@@ -75,8 +75,8 @@ def test_arcs_come_back() -> None:
 )
 def test_what_is_no_trace_is_refused(change: Callable[[list[str]], list[str]], message: str, tmp_path: Path) -> None:
     trace = Trace()
-    trace.add(Record(1, "a", "edge", "OUT1", 1.0))
-    trace.add(Record(2, "a", "edge", "OUT1", 0.0))
+    trace.add(TraceRecord(1, "a", "edge", "OUT1", 1.0))
+    trace.add(TraceRecord(2, "a", "edge", "OUT1", 0.0))
     path = tmp_path / "x.jsonl"
     write_trace(trace, path)
     path.write_text("".join(change(path.read_text().splitlines(keepends=True))))
@@ -85,7 +85,7 @@ def test_what_is_no_trace_is_refused(change: Callable[[list[str]], list[str]], m
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(Misuse, match=r"cannot read .*no\.jsonl: No such file"):
+    with pytest.raises(Misuse, match=r"cannot read .*no\.jsonl: no such file"):
         read_trace(tmp_path / "no.jsonl")
     (tmp_path / "bytes.jsonl").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(Misuse, match=r"bytes\.jsonl:1: not the first line of a trace"):

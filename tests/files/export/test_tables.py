@@ -10,7 +10,7 @@ from trace_rig import Run
 
 from steptwin.files.export import tables, write_trace
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 PERIOD = 7 * MILLISECOND
 
@@ -71,7 +71,7 @@ def test_parts_of_a_table_make_up_the_whole(mic488: Run, monkeypatch: pytest.Mon
 
 def test_a_moment_is_a_table_of_one_row(tmp_path: Path) -> None:
     trace = Trace()
-    trace.add(Record(5, "a", "edge", "AIN1", 2.5))
+    trace.add(TraceRecord(5, "a", "edge", "AIN1", 2.5))
     write_trace(trace, tmp_path / "x.csv", begin=5, until=5)
     assert (tmp_path / "x.csv").read_text() == "time_s,a.AIN1\n5e-09,2.5\n"
     assert math.isclose(5e-09, 5 / SECOND)

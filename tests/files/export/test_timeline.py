@@ -23,7 +23,7 @@ from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import StepTrain, profile_of
 from steptwin.motion.paths import Circular, circle
 from steptwin.motion.pulses import step_times
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 WORLDS = Path(__file__).parents[3] / "examples" / "worlds"
 
@@ -97,7 +97,7 @@ def test_arcs_are_followed_closely() -> None:
     course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
     profile = course.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
     trace = Trace()
-    trace.add(Record(0, "a", "plan", "1", profile))
+    trace.add(TraceRecord(0, "a", "plan", "1", profile))
     (axis,) = data_of(page_of(trace))["axes"]
     pieces = Pieces(axis["pieces"])
     assert profile.end is not None
@@ -113,7 +113,7 @@ def test_a_page_of_many_machines_stays_small() -> None:
         for move in range(moves):
             for axis in "1234":
                 plan = plan_position(MotionState(move * SECOND, 0, 0.0, 0.0), 100 * move, 5000.0, 5000.0, 1000.0)
-                trace.add(Record(move * SECOND, f"m{n}", "plan", axis, plan))
+                trace.add(TraceRecord(move * SECOND, f"m{n}", "plan", axis, plan))
     page = page_of(trace)
     data = data_of(page)
     assert (len(data["machines"]), len(data["axes"])) == (100, 400)
@@ -132,7 +132,7 @@ def test_the_page_needs_nothing_from_outside(mic488: Run) -> None:
 def test_texts_cannot_break_out_of_the_page() -> None:
     trace = Trace(["</title><b>"])
     evil = "</script><script>alert(1)</script><!-- /*data*/ \u2028"
-    trace.add(Record(1, "</title><b>", "event", "x", evil))
+    trace.add(TraceRecord(1, "</title><b>", "event", "x", evil))
     page = page_of(trace, until=SECOND)
     assert page.count("</script>") == 2
     assert "<b>" not in page
@@ -144,8 +144,8 @@ def test_every_record_that_is_no_track_is_a_mark(mic488: Run) -> None:
     assert len(marks) == len(list(mic488.trace.of("frame", "event", "input", "statement", "fault")))
     assert [text for _, _, kind, _, text in marks if kind == "event"][-1] == "M3 stopped by KR"
     trace = Trace()
-    trace.add(Record(1, "a", "statement", "main", 12))
-    trace.add(Record(2, "a", "frame", "tcp-1/in", bytes(100)))
+    trace.add(TraceRecord(1, "a", "statement", "main", 12))
+    trace.add(TraceRecord(2, "a", "frame", "tcp-1/in", bytes(100)))
     statement, frame = data_of(page_of(trace))["marks"]
     assert statement == [1, "a", "statement", "main", "line 12"]
     assert frame[4].endswith("00 … 100 bytes")
@@ -169,7 +169,7 @@ def test_lanes_in_a_browser(tmp_path: Path) -> None:
     world = World.load(WORLDS / "feeder.toml")
     world.run(for_=8)
     page = tmp_path / "t.html"
-    write_trace(world.trace, page, views=axis_views(world.machines, world.axes))
+    write_trace(world.trace, page, views=axis_views(world))
     lanes = re.findall(r'class="name"[^>]*>([^<]*)<', shown(page))
     assert lanes[:3] == ["table", "M1 position, x true", "M1 since power-on"]
     assert lanes[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]

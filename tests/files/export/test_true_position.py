@@ -71,7 +71,7 @@ class Ran:
 
     @property
     def views(self) -> AxisViews:
-        return axis_views(self.world.machines, self.world.axes)
+        return axis_views(self.world)
 
 
 def run(build: str) -> Ran:
@@ -165,7 +165,7 @@ def test_a_load_that_loses_steps_while_nothing_moves_is_told_too(tmp_path: Path)
     world = World.from_toml(dedent(MACHINE))
     world.at(1.0, do.SetFault(read("lost-steps machine=m pulses=640 at_s=0")))
     world.run(for_=2)
-    write_trace(world.trace, tmp_path / "x.csv", views=axis_views(world.machines, world.axes), ended=world.now, period=SECOND)
+    write_trace(world.trace, tmp_path / "x.csv", views=axis_views(world), ended=world.now, period=SECOND)
     with (tmp_path / "x.csv").open(newline="") as file:
         positions = [float(row["m.x_true_position_mm"]) for row in csv.DictReader(file)]
     assert positions == [20.0, 19.0, 19.0]

@@ -23,7 +23,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.waveforms import PERIOD, currents
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 Changes = dict[str, list[tuple[Nanos, object]]]
 """By name of the variable; the first is its value at the beginning."""
@@ -198,7 +198,7 @@ def test_a_window_of_time_shows_what_the_whole_dump_does(name: str, request: pyt
 
 def test_pulses_closer_than_their_width_are_kept_apart() -> None:
     trace = Trace()
-    trace.add(Record(0, "a", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1e9, 1e9, 500_000.0)))
+    trace.add(TraceRecord(0, "a", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1e9, 1e9, 500_000.0)))
     levels = read(dumped(sort_out(trace, {}, until=SECOND)))["a.M1_STEP"][1:]
     assert [level for _, level in levels] == ["1", "0"] * 1000
     assert all(now > before for (before, _), (now, _) in pairwise(levels))
@@ -206,8 +206,8 @@ def test_pulses_closer_than_their_width_are_kept_apart() -> None:
 
 def test_names_and_texts_that_would_break_the_file() -> None:
     trace = Trace()
-    trace.add(Record(1, "a machine.x", "edge", "IN 1", 1.0))
-    trace.add(Record(2, "a machine.x", "event", "odd", "zażółć $end\n#5 \\"))
+    trace.add(TraceRecord(1, "a machine.x", "edge", "IN 1", 1.0))
+    trace.add(TraceRecord(2, "a machine.x", "event", "odd", "zażółć $end\n#5 \\"))
     changes = read(dumped(sort_out(trace, {}, until=SECOND)))
     assert changes["a_machine_x.IN_1"] == [(0, "0"), (1, "1")]
     text = str(changes["a_machine_x.events"][1][1])
@@ -235,9 +235,9 @@ def test_text_made_of_many_changes_is_that_made_of_each(changes: list[tuple[int,
 
 def test_without_texts_there_are_no_signals_of_type_string() -> None:
     trace = Trace()
-    trace.add(Record(1, "a", "edge", "OUT1", 1.0))
-    trace.add(Record(2, "a", "event", "note", "a text"))
-    trace.add(Record(3, "a", "statement", "program", 7))
+    trace.add(TraceRecord(1, "a", "edge", "OUT1", 1.0))
+    trace.add(TraceRecord(2, "a", "event", "note", "a text"))
+    trace.add(TraceRecord(3, "a", "statement", "program", 7))
     recording = sort_out(trace, {})
     file = io.BytesIO()
     vcd.write_vcd(recording, file, silent, texts=False)

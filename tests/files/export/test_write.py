@@ -18,11 +18,11 @@ from steptwin.files.export.progress import Progress
 from steptwin.files.export.recording import sort_out
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
-from steptwin.world.trace import Record, Trace
+from steptwin.world.trace import Trace, TraceRecord
 
 TRACE = Trace(["a", "b"])
-TRACE.add(Record(5, "a", "edge", "OUT1", 1.0))
-TRACE.add(Record(9, "b", "edge", "OUT1", 1.0))
+TRACE.add(TraceRecord(5, "a", "edge", "OUT1", 1.0))
+TRACE.add(TraceRecord(9, "b", "edge", "OUT1", 1.0))
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_what_cannot_be_written_is_refused(arguments: dict[str, object], message
 
 def test_a_trace_that_was_not_kept_is_refused(tmp_path: Path) -> None:
     trace = Trace(keep=False)
-    trace.add(Record(5, "a", "edge", "OUT1", 1.0))
+    trace.add(TraceRecord(5, "a", "edge", "OUT1", 1.0))
     with pytest.raises(Misuse, match="kept nothing but its digest"):
         write_trace(trace, tmp_path)
 
@@ -91,10 +91,10 @@ def test_a_file_is_whole_or_as_it_was(tmp_path: Path, monkeypatch: pytest.Monkey
     path.write_text("old")
 
     def breaks(*_: object) -> None:
-        raise OSError(28, "No space left on device")
+        raise OSError(28, "no space left on device")
 
     monkeypatch.setattr("steptwin.files.export.tables.samples", breaks)
-    with pytest.raises(Misuse, match=r"cannot write .*x\.csv: No space left on device"):
+    with pytest.raises(Misuse, match=r"cannot write .*x\.csv: no space left on device"):
         write_trace(TRACE, path)
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["x.csv"]
@@ -124,9 +124,9 @@ def test_there_is_no_bar_where_nobody_would_see_it(capsys: pytest.CaptureFixture
 
 def test_before_its_first_change_a_pin_had_the_other_level_and_an_axis_stood() -> None:
     trace = Trace()
-    trace.add(Record(5, "a", "edge", "IN1", 0.0))
-    trace.add(Record(6, "a", "edge", "AIN1", 4.0))
-    trace.add(Record(7, "a", "plan", "1", plan_position(MotionState(7, 30, 0.0, 0.0), 50, 100.0, 100.0, 100.0)))
+    trace.add(TraceRecord(5, "a", "edge", "IN1", 0.0))
+    trace.add(TraceRecord(6, "a", "edge", "AIN1", 4.0))
+    trace.add(TraceRecord(7, "a", "plan", "1", plan_position(MotionState(7, 30, 0.0, 0.0), 50, 100.0, 100.0, 100.0)))
     recording = sort_out(trace, {})
     ain, in1 = recording.pins
     assert [in1.level(t) for t in (0, 4, 5)] == [1.0, 1.0, 0.0]
@@ -144,5 +144,5 @@ def trace_end(trace: Trace) -> Nanos | None:
 def test_pins_come_in_the_order_of_their_numbers() -> None:
     trace = Trace()
     for n in (10, 2, 1):
-        trace.add(Record(5, "a", "edge", f"IN{n}", 1.0))
+        trace.add(TraceRecord(5, "a", "edge", f"IN{n}", 1.0))
     assert [pin.pin for pin in sort_out(trace, {}).pins] == ["IN1", "IN2", "IN10"]

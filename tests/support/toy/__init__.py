@@ -1,7 +1,8 @@
 """A third controller that the source does not know: it shows that the contracts of `steptwin.machine` are enough.
 
 A `Toy` has one axis, an input STOP and an output BUSY, and is commanded by two bytes: a letter and a number. `ToyPort` is its
-line, `ToyLine` the line of a world with one toy on it, `ToyBody` what can fail.
+line, `ToyLine` the line of a world with one toy on it, `ToyBody` what can fail. `toy.kind` makes a kind of
+controller of it, for worlds.
 """
 
 from toy.faults import ToyBody

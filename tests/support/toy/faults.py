@@ -6,14 +6,14 @@ from collections.abc import Iterable
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
-from steptwin.world.faults import FaultyMachine, Kind, Occasion, Shaft
+from steptwin.world.faults import AxisLoad, FaultKind, FaultyMachine, Occasion
 
 
 class ToyBody:
-    def __init__(self, shafts: Iterable[Shaft] = ()) -> None:
+    def __init__(self, shafts: Iterable[AxisLoad] = ()) -> None:
         self.shafts = list(shafts)
 
-    def lacks(self, kind: Kind) -> str | None:
+    def lacks(self, kind: FaultKind) -> str | None:
         if kind.needs is not None or kind.occasion is Occasion.SAVE:
             return "is a toy"
         return None if self.shafts or kind.parameter("axis") is None else "has no shaft"

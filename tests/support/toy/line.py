@@ -7,10 +7,12 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
+from steptwin.wire.slave import FrameDirection
 from steptwin.world.faults import Faults
-from steptwin.world.faults import Line as FaultLine
+from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
-from steptwin.world.lines import Line
+from steptwin.world.lines import Line, LineEndPoint
+from steptwin.world.trace import Recorder
 from toy.machine import Toy
 
 
@@ -51,8 +53,11 @@ class ToyLine(Line):
     kinds = ("raw",)
     fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}
 
-    def __init__(self, kernel: Kernel, name: str, toy: Toy, faults: Faults | None = None) -> None:
-        super().__init__(kernel, name, None, Faults() if faults is None else faults)
+    baud = 9600
+    is_timed = False
+
+    def __init__(self, kernel: Kernel, name: str, toy: Toy, faults: Faults | None = None, record: Recorder | None = None) -> None:
+        super().__init__(kernel, name, record, Faults() if faults is None else faults)
         self._toy = toy
 
     @property
@@ -61,3 +66,10 @@ class ToyLine(Line):
 
     def _port(self, place: str, kind: str) -> ToyPort:
         return ToyPort(self._toy)
+
+    def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        self._report(now, place, FrameDirection.IN, data)
+        answer = super().exchange(place, found, data, now)
+        if answer:
+            self._report(now, place, FrameDirection.OUT, answer)
+        return answer

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from steptwin.errors import Misuse, TimeReversal
-from steptwin.machine import Drive, Edge, Nanos
+from steptwin.machine import Drive, Nanos, PinEdge
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop
 from steptwin.state import Plain, Stateful
 
@@ -29,7 +29,7 @@ class Bare(Stateful):
     def __init__(self) -> None:
         self.changed: Callable[[], None] = _nothing
         self.now: Nanos = 0
-        self.edges: list[Edge] = []
+        self.edges: list[PinEdge] = []
 
     @property
     def axes(self) -> Sequence[Drive]:
@@ -49,7 +49,7 @@ class Bare(Stateful):
     def pins(self) -> Mapping[str, float]:
         return {}
 
-    def take_edges(self) -> list[Edge]:
+    def take_edges(self) -> list[PinEdge]:
         edges, self.edges = self.edges, []
         return edges
 
@@ -125,7 +125,7 @@ class Toy(Bare):
     def _show(self, is_busy: bool) -> None:
         if is_busy is not self.is_busy:
             self.is_busy = is_busy
-            self.edges.append(Edge(self.now, "BUSY", float(is_busy)))
+            self.edges.append(PinEdge(self.now, "BUSY", float(is_busy)))
 
     # ------------------------------------------------------------------ commands
 

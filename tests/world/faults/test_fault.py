@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.tables import IncompleteTable
-from steptwin.world.faults import KINDS, Active, Fault, Kind, Layer, Occasion, Parameter, parse, read, schema
+from steptwin.world.faults import KINDS, Active, Fault, FaultKind, Layer, Occasion, Parameter, parse, read, schema
 from steptwin.world.faults.stream import Run, spoil
-from steptwin.world.faults.table import LARGEST_WHOLE, Form, OfByte, Tell, check, checked
+from steptwin.world.faults.table import LARGEST_WHOLE, FaultReporter, OfByte, ParameterForm, check, checked
 
 WANTED = {
     Layer.BYTES: {"flip", "drop", "insert", "gap", "split", "noise"},
@@ -31,17 +31,17 @@ def test_there_is_a_kind_for_each_thing_that_goes_wrong_at_each_layer() -> None:
 def values(parameter: Parameter) -> st.SearchStrategy[object]:
     least, most = parameter.least, parameter.most
     match parameter.form:
-        case Form.WHOLE:
+        case ParameterForm.WHOLE:
             return st.integers(
                 1 - LARGEST_WHOLE if least is None else int(least), LARGEST_WHOLE - 1 if most is None else int(most)
             )
-        case Form.NUMBER:
+        case ParameterForm.NUMBER:
             return st.floats(least, most, allow_nan=False, allow_infinity=False)
-        case Form.SPAN:
+        case ParameterForm.SPAN:
             return st.tuples(st.integers(0, 65535), st.integers(0, 65535)).map(lambda pair: (min(pair), max(pair)))
-        case Form.WORD:
+        case ParameterForm.WORD:
             return st.sampled_from(parameter.words)
-        case Form.TEXT:
+        case ParameterForm.TEXT:
             return st.text("abcXYZ019-_.", min_size=1)
 
 
@@ -126,13 +126,13 @@ def test_the_table_checks_itself() -> None:
     with pytest.raises(Misuse, match="two kinds of fault are named 'crc'"):
         checked((crc, crc))
     with pytest.raises(Misuse, match="fault crc: a parameter is given twice"):
-        checked((replace(crc, own=(Parameter("nth", Form.WHOLE, "", default=1),)),))
+        checked((replace(crc, own=(Parameter("nth", ParameterForm.WHOLE, "", default=1),)),))
     with pytest.raises(Misuse, match="fault crc, parameter x = 9: permitted are whole numbers 0 to 5"):
-        checked((replace(crc, own=(Parameter("x", Form.WHOLE, "", 0, 5, default=9),)),))
+        checked((replace(crc, own=(Parameter("x", ParameterForm.WHOLE, "", 0, 5, default=9),)),))
     with pytest.raises(Misuse, match="parameter x: a default, what holds otherwise, or required"):
-        checked((replace(crc, own=(Parameter("x", Form.WHOLE, ""),)),))
+        checked((replace(crc, own=(Parameter("x", ParameterForm.WHOLE, ""),)),))
     with pytest.raises(Misuse, match="lines belong to all faults but those of physics"):
-        checked((Kind("x", Layer.PHYSICS, Occasion.MOMENT, "", (), crc.lines),))
+        checked((FaultKind("x", Layer.PHYSICS, Occasion.MOMENT, "", (), crc.lines),))
 
 
 _CRC, _STALL = KINDS["crc"], KINDS["stall"]
@@ -159,15 +159,15 @@ _CRC, _STALL = KINDS["crc"], KINDS["stall"]
         (replace(KINDS["no-answer"], effect=KINDS["busy"].effect), "fault no-answer lacks what it does to answers"),
     ],
 )
-def test_a_kind_without_the_effect_of_its_occasion_is_refused(kind: Kind, message: str) -> None:
+def test_a_kind_without_the_effect_of_its_occasion_is_refused(kind: FaultKind, message: str) -> None:
     with pytest.raises(IncompleteTable) as caught:
         checked((kind,))
     assert str(caught.value) == message
 
 
 def test_a_new_kind_is_one_row() -> None:
-    def invert(active: Active, byte: int, run: Run, tell: Tell) -> int:
-        tell(active, "inverted")
+    def invert(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
+        report(active, "inverted")
         return byte ^ 0xFF
 
     kind = replace(KINDS["flip"], name="invert", own=(), effect=OfByte(invert))
@@ -178,7 +178,7 @@ def test_a_new_kind_is_one_row() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
-def test_faults_can_be_pickled_with_their_kind(kind: Kind) -> None:
+def test_faults_can_be_pickled_with_their_kind(kind: FaultKind) -> None:
     fault = Fault(kind, {}, "it")
     assert pickle.loads(pickle.dumps(fault)) == fault
 

@@ -9,17 +9,19 @@ import pytest
 from fault_rig import ANSWER, READ, FaultRig, rtu
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.encoding import encode
 from steptwin.m1486.syntax import parse as parse_m1486
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
-from steptwin.mic488.device import Mic488
-from steptwin.mic488.status import Status
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.status import AxisStatus
 from steptwin.world.contacts import PositionSwitch, place
-from steptwin.world.faults import Faults, M1486Body, Mic488Body, read, rig
+from steptwin.world.faults import Faults, read, rig
 from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kinds.m1486.faults import M1486Body
+from steptwin.world.kinds.mic488.faults import Mic488Body
 
 SAVE, LOAD, ZERO = (bytes((5, 0x08, n, 0xFF, 0x00)) for n in (0x35, 0x34, 0x36))
 """USER_REG_SAVE 2101, USER_REG_READ 2100, USER_REG_ZERO 2102."""
@@ -113,7 +115,7 @@ def test_position_control_makes_up_for_lost_steps(faults: tuple[str, ...], pulse
     rig.ask(real(POS_ABS, 1000.0), ms=0)
     rig.wait(30.0)
     assert counts(rig) == (pytest.approx(pulses, abs=1), pytest.approx(4000, abs=4))
-    assert rig.device.axes[0].status is Status.REACHED
+    assert rig.device.axes[0].status is AxisStatus.REACHED
 
 
 @pytest.mark.parametrize("level", [0, 1])
@@ -163,7 +165,7 @@ def test_master_error_stays_when_the_controller_is_switched_off_and_on() -> None
 
 def test_what_shows_no_master_error_says_so() -> None:
     kernel, faults = Kernel(), Faults()
-    kernel.add("old", Mic488(ControllerConfig(), "1.40"))
+    kernel.add("old", Mic488Device(ControllerConfig(), "1.40"))
     rig(kernel, "old", faults, Mic488Body(kernel.machines["old"], 1))  # type: ignore[arg-type]
     with pytest.raises(Misuse, match=r"fault master-error: 'old' has firmware 1\.40, which has no M_STATUS: 1\.70 has"):
         faults.add(read("master-error"))
@@ -275,7 +277,7 @@ def test_power_cut_leaves_what_was_not_written_as_it_was(written: int) -> None:
 
 def test_what_is_stored_outside_is_what_the_memory_has() -> None:
     kernel, held, kept = Kernel(), Faults(), list[bytes]()
-    device = Mic488(ControllerConfig())
+    device = Mic488Device(ControllerConfig())
     device.store = kept.append
     kernel.add("1", device)
     rig(kernel, "1", held, Mic488Body(device, 1))
@@ -306,8 +308,8 @@ def test_worn_bytes_keep_what_they_have() -> None:
 # ---------------------------------------------------------------------- the M1486
 
 
-def chip(*faults: str) -> tuple[M1486, Kernel]:
-    chip = M1486(variant("E1"), address=1)
+def chip(*faults: str) -> tuple[M1486Chip, Kernel]:
+    chip = M1486Chip(variant("E1"), address=1)
     kernel, held = Kernel(), Faults()
     kernel.add("1", chip)
     rig(kernel, "1", held, M1486Body(chip))
@@ -316,7 +318,7 @@ def chip(*faults: str) -> tuple[M1486, Kernel]:
     return chip, kernel
 
 
-def download(chip: M1486, kernel: Kernel, text: str, seconds: float) -> None:
+def download(chip: M1486Chip, kernel: Kernel, text: str, seconds: float) -> None:
     for line in ("[", text, "]"):
         kernel.advance(kernel.now + SECOND)
         chip.receive(f"{line}\r".encode(), kernel.now)

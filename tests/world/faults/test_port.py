@@ -7,12 +7,12 @@ from fault_rig import ANSWER, ANSWER_PDU, READ, REQUEST, FaultRig, crc, rtu, tcp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.m1486.chip import M1486
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND
-from steptwin.wire.slave import Direction, RtuSlavePort
-from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort, Line, read
+from steptwin.wire.slave import FrameDirection, RtuSlavePort
+from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort, LineProtocol, read
 from steptwin.world.trace import Trace
 
 WRITE = bytes.fromhex("06 00 64 00 07")
@@ -40,13 +40,13 @@ def test_without_faults_calls_are_those_of_the_port_itself() -> None:
 
 def test_an_observer_sees_frames_as_without_faults() -> None:
     rig = FaultRig()
-    seen: list[tuple[Direction, bytes]] = []
+    seen: list[tuple[FrameDirection, bytes]] = []
     rig.inner.on_frame = lambda now, direction, raw: seen.append((direction, raw))
     rig.add("crc nth=1")
     rig.ask()
     rig.faults.clear(rig.now)
     rig.ask()
-    assert seen == [(Direction.IN, REQUEST), (Direction.OUT, ANSWER)] * 2
+    assert seen == [(FrameDirection.IN, REQUEST), (FrameDirection.OUT, ANSWER)] * 2
 
 
 def test_what_is_on_its_way_arrives_after_the_fault_is_gone() -> None:
@@ -133,11 +133,11 @@ def test_after_any_faults_of_bytes_the_line_is_in_step_again(seed: int, kinds: l
 
 
 def characters(*faults: str) -> tuple[FaultyTalkingPort, Faults]:
-    chain = SerialChain([M1486(variant("B"))])
+    chain = SerialChain([M1486Chip(variant("B"))])
     held = Faults()
     for fault in faults:
         held.add(read(fault))
-    return FaultyTalkingPort(chain.port(), "pty", held, Line.CHARACTERS), held
+    return FaultyTalkingPort(chain.port(), "pty", held, LineProtocol.CHARACTERS), held
 
 
 def test_bytes_of_an_m1486_go_wrong_too() -> None:
@@ -170,17 +170,17 @@ def test_faults_of_frames_pass_a_line_of_characters_by() -> None:
 # ---------------------------------------------------------------------- frames
 
 
-@pytest.mark.parametrize("line", [Line.RTU, Line.TCP])
-def test_delay_keeps_the_order_of_answers(line: Line) -> None:
+@pytest.mark.parametrize("line", [LineProtocol.RTU, LineProtocol.TCP])
+def test_delay_keeps_the_order_of_answers(line: LineProtocol) -> None:
     rig = FaultRig("delay for_ms=100 nth=1", line=line)
-    answers = [tcp(n, 1, ANSWER_PDU) if line is Line.TCP else ANSWER for n in (1, 2)]
+    answers = [tcp(n, 1, ANSWER_PDU) if line is LineProtocol.TCP else ANSWER for n in (1, 2)]
     assert rig.ask() == b""
     assert rig.ask() == b""
     assert rig.arrivals() == [(100 * MILLISECOND, answer) for answer in answers]
 
 
-@pytest.mark.parametrize("line", [Line.RTU, Line.TCP])
-def test_no_answer_whose_request_was_done(line: Line) -> None:
+@pytest.mark.parametrize("line", [LineProtocol.RTU, LineProtocol.TCP])
+def test_no_answer_whose_request_was_done(line: LineProtocol) -> None:
     rig = FaultRig("no-answer nth=1", line=line)
     assert rig.ask(WRITE) == b""
     assert rig.device.user[100] == 7
@@ -188,8 +188,8 @@ def test_no_answer_whose_request_was_done(line: Line) -> None:
     assert rig.ask() != b""
 
 
-@pytest.mark.parametrize("line", [Line.RTU, Line.TCP])
-def test_no_answer_whose_request_was_lost(line: Line) -> None:
+@pytest.mark.parametrize("line", [LineProtocol.RTU, LineProtocol.TCP])
+def test_no_answer_whose_request_was_lost(line: LineProtocol) -> None:
     rig = FaultRig("no-answer lost=request nth=1", line=line)
     assert rig.ask(WRITE) == b""
     assert rig.device.user[100] == 0x1234
@@ -198,12 +198,12 @@ def test_no_answer_whose_request_was_lost(line: Line) -> None:
     assert rig.told() == ["no-answer: request lost on its way: 06 00 64 00 07"]
 
 
-@pytest.mark.parametrize("line", [Line.RTU, Line.TCP])
-def test_a_late_answer_comes_before_the_next_one(line: Line) -> None:
+@pytest.mark.parametrize("line", [LineProtocol.RTU, LineProtocol.TCP])
+def test_a_late_answer_comes_before_the_next_one(line: LineProtocol) -> None:
     rig = FaultRig("late nth=1", line=line)
     assert rig.ask() == b""
     assert rig.arrivals() == []
-    answers = [tcp(n, 1, ANSWER_PDU) for n in (1, 2)] if line is Line.TCP else [ANSWER, ANSWER]
+    answers = [tcp(n, 1, ANSWER_PDU) for n in (1, 2)] if line is LineProtocol.TCP else [ANSWER, ANSWER]
     assert rig.ask() == b"".join(answers)
 
 
@@ -212,7 +212,7 @@ def test_wrong_unit_is_a_good_frame_of_somebody_else() -> None:
     assert rig.ask() == rtu(2, ANSWER_PDU)
     assert rig.ask() == rtu(9, ANSWER_PDU)
     assert rig.ask() == ANSWER
-    assert FaultRig("wrong-unit", line=Line.TCP).ask() == tcp(1, 2, ANSWER_PDU)
+    assert FaultRig("wrong-unit", line=LineProtocol.TCP).ask() == tcp(1, 2, ANSWER_PDU)
 
 
 @given(st.integers(0, 2**64))
@@ -227,17 +227,17 @@ def test_echo_gives_the_request_back_before_its_answer() -> None:
 
 
 def test_crc_and_echo_do_not_exist_on_tcp() -> None:
-    rig = FaultRig("crc", "echo", "flip", "noise", line=Line.TCP)
+    rig = FaultRig("crc", "echo", "flip", "noise", line=LineProtocol.TCP)
     assert rig.ask() == tcp(1, 1, ANSWER_PDU)
     assert rig.told() == []
 
 
 def test_faults_of_frames_on_a_line_that_takes_its_time() -> None:
     """9600 bit/s: the answer to the second request is the one that is spoilt, though all were sent at once."""
-    rig = FaultRig("wrong-unit address=100", line=Line.TCP, is_timed=True)
+    rig = FaultRig("wrong-unit address=100", line=LineProtocol.TCP, is_timed=True)
     rig.send(tcp(1, 1, READ) + tcp(2, 1, bytes.fromhex("03 00 64 00 01")) + tcp(3, 1, bytes.fromhex("03 00 01 00 01")))
     assert [(data[1], data[6]) for _, data in rig.arrivals()] == [(1, 2), (2, 2), (3, 1)]
-    rig = FaultRig("wrong-unit function=6", line=Line.TCP, is_timed=True)
+    rig = FaultRig("wrong-unit function=6", line=LineProtocol.TCP, is_timed=True)
     rig.send(tcp(1, 1, READ) + tcp(2, 1, WRITE) + tcp(3, 1, READ))
     assert [(data[1], data[6]) for _, data in rig.arrivals()] == [(1, 1), (2, 2), (3, 1)]
     rig = FaultRig("crc nth=1", is_timed=True)
@@ -248,7 +248,7 @@ def test_faults_of_frames_on_a_line_that_takes_its_time() -> None:
 
 def test_an_answer_that_overtakes_others_leaves_them_their_faults() -> None:
     """The seventeenth request is refused at once, while sixteen wait."""
-    rig = FaultRig("wrong-unit nth=3", line=Line.TCP, is_timed=True)
+    rig = FaultRig("wrong-unit nth=3", line=LineProtocol.TCP, is_timed=True)
     refused = rig.send(b"".join(tcp(n, 1, READ) for n in range(1, 18)))
     assert refused == tcp(17, 1, b"\x83\x06")
     assert [data[6] for _, data in rig.arrivals(2.0)] == [1, 2] + [1] * 14
@@ -270,11 +270,11 @@ def test_an_answer_asked_for_before_the_fault_was_set_comes_whole() -> None:
 # ---------------------------------------------------------------------- protocol and what is meant
 
 
-@pytest.mark.parametrize("line", [Line.RTU, Line.TCP])
-def test_exception_and_busy_refuse_and_do_nothing(line: Line) -> None:
+@pytest.mark.parametrize("line", [LineProtocol.RTU, LineProtocol.TCP])
+def test_exception_and_busy_refuse_and_do_nothing(line: LineProtocol) -> None:
     rig = FaultRig("exception code=3 nth=1", "busy nth=1", line=line)
     refused = [bytes((0x86, code)) for code in (3, 6)]
-    wanted = [tcp(n, 1, pdu) if line is Line.TCP else rtu(1, pdu) for n, pdu in enumerate(refused, start=1)]
+    wanted = [tcp(n, 1, pdu) if line is LineProtocol.TCP else rtu(1, pdu) for n, pdu in enumerate(refused, start=1)]
     assert [rig.ask(WRITE), rig.ask(WRITE)] == wanted
     assert rig.device.user[100] == 0x1234
     rig.ask(WRITE)
@@ -292,7 +292,7 @@ def test_a_fault_is_of_a_unit() -> None:
 
 
 def test_mic_23_a_single_unit_on_tcp_has_its_faults_whichever_way_it_is_addressed() -> None:
-    rig = FaultRig("wrong-unit unit=1 answers_as=7", line=Line.TCP)
+    rig = FaultRig("wrong-unit unit=1 answers_as=7", line=LineProtocol.TCP)
     assert [rig.ask(unit=unit)[6] for unit in (1, 0, 255)] == [7, 7, 7]
 
 
@@ -364,7 +364,7 @@ def test_a_fault_is_of_a_link() -> None:
 def test_the_nth_is_counted_over_all_links_together() -> None:
     rig = FaultRig("crc nth=2")
     inner = RtuSlavePort(rig.devices)
-    second = FaultyPort(inner, "link-2", rig.faults, Line.RTU, framed=inner, units=(1,))
+    second = FaultyPort(inner, "link-2", rig.faults, LineProtocol.RTU, framed=inner, units=(1,))
     assert rig.ask() == ANSWER
     assert second.exchange(REQUEST, rig.now) != ANSWER
     assert rig.ask() == ANSWER

@@ -11,7 +11,7 @@ import pytest
 
 from steptwin.errors import Misuse
 from steptwin.world.faults.kinds import KINDS, rows, shared
-from steptwin.world.faults.table import LARGEST_WHOLE, Form, Kind, Layer, Parameter, check
+from steptwin.world.faults.table import LARGEST_WHOLE, FaultKind, Layer, Parameter, ParameterForm, check
 
 GOLDEN = Path(__file__).parent / "golden" / "kinds.txt"
 
@@ -21,7 +21,7 @@ def described(parameter: Parameter) -> str:
     return f"    {parameter.name}: {parameter.permitted} | {without} {parameter.default!r} | {parameter.meaning}"
 
 
-def kind_lines(kind: Kind) -> list[str]:
+def kind_lines(kind: FaultKind) -> list[str]:
     lines = ", ".join(line.value for line in kind.lines)
     head = f"{kind.name}: {kind.layer.value}, {kind.occasion.value}, on {lines or 'machines'} | {kind.meaning}"
     return [head, *map(described, kind.parameters)]
@@ -41,6 +41,18 @@ def test_kinds_by_layer() -> None:
 def test_shared_parameters_say_which_kinds_have_them() -> None:
     """Each is in all kinds of what it is said to be shared by, and the texts are without repetition."""
     found = shared()
+    assert [(parameter.name, of) for parameter, of in found][:7] == [
+        ("direction", "bytes"),
+        ("link", "bytes, frames, protocol"),
+        ("line", "bytes, frames, protocol"),
+        ("unit", "frames, protocol"),
+        ("function", "frames, protocol"),
+        ("address", "frames, protocol"),
+        ("machine", "physics"),
+    ]
+    assert {parameter.name: of for parameter, of in found}["from_s"] == (
+        "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error"
+    )
     assert len({parameter for parameter, _ in found}) == len(found)
     for parameter, of in found:
         for layer in Layer:
@@ -53,34 +65,36 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
 @pytest.mark.parametrize(
     ("form", "least", "most", "value", "found"),
     [
-        (Form.WHOLE, 1, 5, 1, 1),
-        (Form.WHOLE, 1, 5, 5, 5),
-        (Form.WHOLE, 1, 5, 0, None),
-        (Form.WHOLE, 1, 5, 6, None),
-        (Form.WHOLE, 1, 5, 1.0, None),
-        (Form.WHOLE, 1, 5, True, None),
-        (Form.WHOLE, 1, None, LARGEST_WHOLE - 1, LARGEST_WHOLE - 1),
-        (Form.WHOLE, None, None, 1 - LARGEST_WHOLE, 1 - LARGEST_WHOLE),
-        (Form.WHOLE, 1, None, LARGEST_WHOLE, None),
-        (Form.WHOLE, None, None, -LARGEST_WHOLE, None),
-        (Form.NUMBER, 0.5, 2, 0.5, 0.5),
-        (Form.NUMBER, 0.5, 2, 2, 2.0),
-        (Form.NUMBER, 0.5, 2, 0.49, None),
-        (Form.NUMBER, 0.5, 2, 2.01, None),
-        (Form.NUMBER, 0, 2, False, None),
-        (Form.NUMBER, 0, 2, float("nan"), None),
-        (Form.NUMBER, 0, 2, float("inf"), None),
-        (Form.NUMBER, 0, 2, "1", None),
-        (Form.SPAN, 0, 9, 3, (3, 3)),
-        (Form.SPAN, 0, 9, "3-9", (3, 9)),
-        (Form.SPAN, 0, 9, "3", (3, 3)),
-        (Form.SPAN, 0, 9, "0-0", (0, 0)),
-        (Form.SPAN, 0, 9, "4-3", None),
-        (Form.SPAN, 0, 9, "3-10", None),
-        (Form.SPAN, 0, 9, "x", None),
+        (ParameterForm.WHOLE, 1, 5, 1, 1),
+        (ParameterForm.WHOLE, 1, 5, 5, 5),
+        (ParameterForm.WHOLE, 1, 5, 0, None),
+        (ParameterForm.WHOLE, 1, 5, 6, None),
+        (ParameterForm.WHOLE, 1, 5, 1.0, None),
+        (ParameterForm.WHOLE, 1, 5, True, None),
+        (ParameterForm.WHOLE, 1, None, LARGEST_WHOLE - 1, LARGEST_WHOLE - 1),
+        (ParameterForm.WHOLE, None, None, 1 - LARGEST_WHOLE, 1 - LARGEST_WHOLE),
+        (ParameterForm.WHOLE, 1, None, LARGEST_WHOLE, None),
+        (ParameterForm.WHOLE, None, None, -LARGEST_WHOLE, None),
+        (ParameterForm.NUMBER, 0.5, 2, 0.5, 0.5),
+        (ParameterForm.NUMBER, 0.5, 2, 2, 2.0),
+        (ParameterForm.NUMBER, 0.5, 2, 0.49, None),
+        (ParameterForm.NUMBER, 0.5, 2, 2.01, None),
+        (ParameterForm.NUMBER, 0, 2, False, None),
+        (ParameterForm.NUMBER, 0, 2, float("nan"), None),
+        (ParameterForm.NUMBER, 0, 2, float("inf"), None),
+        (ParameterForm.NUMBER, 0, 2, "1", None),
+        (ParameterForm.SPAN, 0, 9, 3, (3, 3)),
+        (ParameterForm.SPAN, 0, 9, "3-9", (3, 9)),
+        (ParameterForm.SPAN, 0, 9, "3", (3, 3)),
+        (ParameterForm.SPAN, 0, 9, "0-0", (0, 0)),
+        (ParameterForm.SPAN, 0, 9, "4-3", None),
+        (ParameterForm.SPAN, 0, 9, "3-10", None),
+        (ParameterForm.SPAN, 0, 9, "x", None),
     ],
 )
-def test_what_a_parameter_takes(form: Form, least: float | None, most: float | None, value: object, found: object) -> None:
+def test_what_a_parameter_takes(
+    form: ParameterForm, least: float | None, most: float | None, value: object, found: object
+) -> None:
     parameter = Parameter("p", form, "Something.", least, most)
     if found is not None:
         taken = check(parameter, value, "here")

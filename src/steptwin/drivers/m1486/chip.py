@@ -8,12 +8,12 @@ from math import isfinite
 from types import TracebackType
 from typing import Self
 
-from steptwin.drivers.line import Line
+from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.failures import PositionUnknown
 from steptwin.drivers.m1486.lines import BAUD, AsyncM1486Line
 from steptwin.drivers.m1486.settings import COMMANDS, ChipSettings, checked_number
-from steptwin.drivers.m1486.talk import Say
-from steptwin.drivers.m1486.unit import Unit
+from steptwin.drivers.m1486.talk import ChipRequest
+from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.errors import Misuse
 from steptwin.m1486.functions import CARRY, FUNCTIONS, LIMITOFF, REPORT, RETURN, USER_FLAGS
 from steptwin.m1486.lines import LINES
@@ -49,7 +49,7 @@ class AsyncChip:
 
     def __init__(
         self,
-        where: str | Line[Say, bytes],
+        where: str | DriverLine[ChipRequest, bytes],
         address: int | None = None,
         *,
         baud: int = BAUD,
@@ -70,14 +70,14 @@ class AsyncChip:
             raise Misuse(f"origin_u = {origin_u}: permitted are 0 to {LARGEST} minimum microsteps")
         self._variant = None if variant is None else variant_named(variant)
         self._own = isinstance(where, str)
-        self.line: Line[Say, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
-        self._unit = Unit(self.line, address, timeout_ns=round(timeout_s * SECOND))
+        self.line: DriverLine[ChipRequest, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
+        self._unit = ChipUnit(self.line, address, timeout_ns=round(timeout_s * SECOND))
         self.unit = unit
         self.scale_u = FULL_STEP * steps_per_unit
         """Minimum microsteps in a unit."""
         self.origin_u = origin_u
 
-    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Say, bytes]:
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[ChipRequest, bytes]:
         return AsyncM1486Line(address, baud=baud, log=log)
 
     def __repr__(self) -> str:
@@ -145,8 +145,8 @@ class AsyncChip:
     def _check_position(self) -> None:
         if not self._unit.notes.is_position_valid:
             raise PositionUnknown(
-                f"{self.line.place}: the counter of {self._unit.name} shows where it was sent, not where it was stopped: "
-                "seek a line whose place is known, and say where that is (set_position)"
+                f"{self.line.place}: the counter of {self._unit.name} shows its target, not where it was stopped: "
+                "seek a line at a known position and set that position (set_position)"
             )
 
     def _shown(self, counter_u: int) -> float:
@@ -177,6 +177,12 @@ class AsyncChip:
         """The internal variable, 24 bits."""
         async with self._unit.turn():
             return await self._unit.read_number(4)
+
+    async def byte(self, number: int) -> int:
+        """What ``U`` with that number sends, 1 to 20. Raises `Busy` while the chip does something."""
+        async with self._unit.turn():
+            (byte,) = await self._unit.read(number)
+        return byte
 
     async def flags(self) -> dict[int, bool]:
         """Flags 80 to 87."""

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from steptwin.diagnostics import Severity, Source, render
+from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.drivers.exchange import SentLate
 from steptwin.drivers.m1486.failures import Busy, DoubtfulMove, FileGivenUp
-from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, Told
+from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand
 from steptwin.drivers.m1486.settings import ChipSettings, after_reset
 from steptwin.drivers.m1486.talk import WHO
-from steptwin.drivers.m1486.unit import Unit
+from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.m1486.syntax import Command, Condition, Program
+from steptwin.m1486.syntax import Command, JumpCondition, ProgramText
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
 
@@ -30,7 +30,7 @@ _MOVES = frozenset("r)(jk'[ie")
 """What moves, or leads to commands typed before."""
 
 
-def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> Program:
+def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> ProgramText:
     """Raises `Misuse` with the errors in it."""
     from steptwin.m1486.check import check
 
@@ -38,11 +38,11 @@ def checked_program(text: str, variant: Variant, interface: Interface, name: str
     if not checked.is_sound:
         errors = [d for d in checked.diagnostics if d.severity is Severity.ERROR]
         more = f"\nand {len(errors) - MOST_TOLD} more errors" if len(errors) > MOST_TOLD else ""
-        raise Misuse(f"{name} is not sent:\n{render(Source(name, text), errors[:MOST_TOLD])}{more}")
+        raise Misuse(f"{name} is not sent:\n{render(SourceText(name, text), errors[:MOST_TOLD])}{more}")
     return checked.program
 
 
-def parts(program: Program) -> list[tuple[int | None, list[Command]]]:
+def parts(program: ProgramText) -> list[tuple[int | None, list[Command]]]:
     """The commands in order, cut where ``X`` chooses another chip; None before the first X."""
     found: list[tuple[int | None, list[Command]]] = [(None, [])]
     for command in program.commands:
@@ -72,7 +72,7 @@ def probes(commands: Sequence[Command]) -> list[bool]:
             begin = loops.pop()
         elif command.key in ("J", "'", "I"):
             condition = command.argument
-            label = condition.label if isinstance(condition, Condition) else command.number
+            label = condition.label if isinstance(condition, JumpCondition) else command.number
             begin = min(labels.values(), default=index) if label is None else labels.get(label, index)
         for inside in range(begin + 1, index + 1):
             allowed[inside] = False
@@ -80,7 +80,7 @@ def probes(commands: Sequence[Command]) -> list[bool]:
 
 
 async def send_program(
-    units: Mapping[int | None, Unit],
+    units: Mapping[int | None, ChipUnit],
     text: str,
     *,
     progress: Progress | None = None,
@@ -99,8 +99,8 @@ async def send_program(
     for address, commands in found:
         if address not in units:
             if address is None:
-                raise Misuse(f"{name} is not sent: no X before {commands[0]} says which chip it is for")
-            raise Misuse(f"{name} is not sent: there is no chip {address:X}, which it names")
+                raise Misuse(f"{name} is not sent: no X before {commands[0]} selects its chip")
+            raise Misuse(f"{name} is not sent: it names chip {address:X}, which is not on this line")
     total = sum(len(commands) for _, commands in found)
     done = 0
     uploaded = b""
@@ -118,7 +118,7 @@ async def send_program(
 class _Typist:
     """Types commands into one chip."""
 
-    def __init__(self, unit: Unit, tell: Callable[[int], object]) -> None:
+    def __init__(self, unit: ChipUnit, tell: Callable[[int], object]) -> None:
         self._unit = unit
         self._tell = tell
         self._permission = unit.permission()
@@ -197,7 +197,7 @@ class _Typist:
         self._typed = 0
 
 
-async def type_file(unit: Unit, lines: Sequence[str], permission: Permission, tell: Callable[[int], object]) -> None:
+async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission, tell: Callable[[int], object]) -> None:
     """Type a file from ``[`` to ``]``, which makes it run.
 
     When something goes wrong before, nothing of it runs: the chip is reset, which is how the manual has a file given up (chapter
@@ -229,7 +229,7 @@ async def type_file(unit: Unit, lines: Sequence[str], permission: Permission, te
 
 
 async def begin(
-    unit: Unit,
+    unit: ChipUnit,
     text: str,
     kind: ChipMotion,
     permission: Permission,
@@ -246,7 +246,7 @@ async def begin(
             notes.settings = ChipSettings()
             unit.talk.uploads = notes.uploads = bytearray()
         # What an E type is told it does when it has written it.
-        notes.motion = Told(
+        notes.motion = ChipMotionCommand(
             kind, unit.line.now() + unit.write_ns, notes.stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0)
         )
 
@@ -264,7 +264,7 @@ async def begin(
     told(target_u, duration_s)
 
 
-async def reset(unit: Unit) -> None:
+async def reset(unit: ChipUnit) -> None:
     """``\\``, and the time an E type takes for it."""
     await unit.say("\\", stored=False)
     notes = unit.notes

@@ -9,7 +9,7 @@ from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.chip import LARGEST, AsyncChip
 from steptwin.drivers.m1486.download import Progress, begin, reset, send_program, type_file
 from steptwin.drivers.m1486.failures import Busy, ChipMoveFailed
-from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMoveEnd, Told
+from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd
 from steptwin.drivers.m1486.settings import COMMANDS, checked_number
 from steptwin.drivers.m1486.unit import SLICE_NS
 from steptwin.drivers.m1486.waiting import wait_for
@@ -70,7 +70,7 @@ class AsyncM1486(AsyncChip):
     async def _move(self, specification: str, distance_u: int, target_u: int, permission: Permission) -> None:
         if distance_u == 0:
             notes = self._unit.notes
-            notes.motion = Told(ChipMotion.MOVE, self.line.now(), notes.stops, target_u, 0.0)
+            notes.motion = ChipMotionCommand(ChipMotion.MOVE, self.line.now(), notes.stops, target_u, 0.0)
             return
         await self._unit.say(specification)
         duration = self.settings.travel_s(distance_u, self.variant)
@@ -114,7 +114,7 @@ class AsyncM1486(AsyncChip):
     async def stop(self) -> None:
         """K: brake with the ramp. Goes before everything that waits for the line; moves that wait are not begun any more.
 
-        A program goes on after it unless function 51 is OFF: `stop_program` ends it. Raises `steptwin.drivers.Untold`.
+        A program goes on after it unless function 51 is OFF: `stop_program` ends it. Raises `steptwin.drivers.Unconfirmed`.
         """
         notes = self._unit.notes
         motion = notes.motion
@@ -147,9 +147,7 @@ class AsyncM1486(AsyncChip):
             notes.is_killed = False
             notes.motion = None
             if await unit.asks_who(round(timeout_s * SECOND)) is None:
-                raise Busy(
-                    f"{self.line.place}: {unit.name} goes on nevertheless: function 44 is ON, LIMIT is low, or it brakes yet"
-                )
+                raise Busy(f"{self.line.place}: {unit.name} continues: function 44 is ON, LIMIT is low, or it is still braking")
 
     async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> ChipMoveEnd:
         """Wait until the chip has done what it was told, and say why a motion ended.
@@ -173,14 +171,19 @@ class AsyncM1486(AsyncChip):
         Raises `Misuse` for what the chip would drop.
         """
         unit = self._unit
-        typed = unit.checked(text)
-        if typed[0] not in _TYPED:
-            raise Misuse(f"{text!r} is no command to type alone: motions, files and questions have methods of their own")
+        typed = self.check_command(text)
         permission = unit.permission()
         async with unit.turn(permission):
             await unit.rest()
             self._learn(typed)
             await unit.act(typed, permission, once=typed[0] in "d+-*/")
+
+    def check_command(self, text: str) -> str:
+        """A command as `command` types it. Raises `Misuse` for what it does not type."""
+        typed = self._unit.checked(text)
+        if typed[0] not in _TYPED:
+            raise Misuse(f"{text!r} is no command to type alone: motions, files and questions have methods of their own")
+        return typed
 
     def _learn(self, typed: str) -> None:
         """Settings typed by hand are known again when they are configured."""
@@ -202,7 +205,7 @@ class AsyncM1486(AsyncChip):
         check_wait(timeout_s)
         unit = self._unit
         if unit.variant.store is Store.EEPROM:
-            raise Misuse(f"{unit.variant.title} keeps what stands in [ ] in its EEPROM: use download")
+            raise Misuse(f"{unit.variant.title} writes what is in [ ] into its EEPROM: use download")
         typed = [unit.checked(command) for command in commands]
         for command in typed:
             if command[0] in "[]\\kxu" or command == "c75":
@@ -233,7 +236,7 @@ class AsyncM1486(AsyncChip):
             raise Misuse(f"{self.line.place}: no program of {unit.name} was started here: download or start_program")
         if any(notes.motion is not None and notes.motion.kind is ChipMotion.BLOCK for notes in unit.others()):
             raise Misuse(
-                f"{self.line.place}: another chip runs a program too, and bytes do not say whose they are: wait for its end"
+                f"{self.line.place}: another chip runs a program too, so that bytes are not attributable: wait for its end"
             )
         limit = self.line.now() + round(timeout_s * SECOND)
         while len(kept) < count:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from steptwin.drivers.mic488.failures import Untold
+from steptwin.drivers.mic488.failures import Unconfirmed
 from steptwin.errors import LineFailure, Refusal
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ class NoEcho(LineFailure):
 
     def __init__(self, place: str, chip: str, cause: LineFailure | None) -> None:
         super().__init__(
-            f"{place}: {chip} does not echo: it is off, has another address or baud rate, or still does what it was told before "
-            f"({cause})"
+            f"{place}: {chip} does not echo: it is off, has another address or baud rate, or is still busy with an earlier "
+            f"command ({cause})"
         )
 
 
@@ -73,8 +73,8 @@ class Restarted(LineFailure):
 
     def __init__(self, place: str, chip: str) -> None:
         super().__init__(
-            f"{place}: {chip} was switched off or reset meanwhile: its settings are those of power-up, and where it stands is "
-            "not known; nothing was carried out"
+            f"{place}: {chip} was switched off or reset meanwhile: its settings are those of power-up, its position is unknown; "
+            "nothing was executed"
         )
 
 
@@ -96,8 +96,8 @@ class FileGivenUp(LineFailure):
     uncertain = False
 
 
-def untold(chip: str, cause: LineFailure) -> Untold:
-    return Untold(f"{chip} could not be stopped: it cannot be told, and goes on with what it was told before ({cause})")
+def unconfirmed(chip: str, cause: LineFailure) -> Unconfirmed:
+    return Unconfirmed(f"{chip} could not be stopped: it cannot be reached and continues its last command ({cause})")
 
 
 def _shown(data: bytes) -> str:

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from steptwin.drivers.exchange import Exchanger, Job, NoAnswer
-from steptwin.drivers.line import Line
+from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.lines import line_endpoint
 from steptwin.drivers.m1486.talk import LETTERS, WHO
 from steptwin.drivers.place import Endpoint
@@ -134,7 +134,7 @@ def type_of(letter: int, baud: int | None) -> str:
 
 
 async def scan_chips(
-    line: Line[Question, bytes],
+    line: DriverLine[Question, bytes],
     *,
     baud: int | None = None,
     timeout_ns: Nanos = SCAN_NS,
@@ -167,18 +167,18 @@ async def scan_chips(
     return sorted(found.values())
 
 
-async def let_all_listen(line: Line[Question, bytes]) -> None:
+async def let_all_listen(line: DriverLine[Question, bytes]) -> None:
     """End what others have said on the line, to which chips were deaf, and have them listen again."""
     await _say(line, "\rxg\r", 0)
 
 
-async def end_line(line: Line[Question, bytes]) -> None:
+async def end_line(line: DriverLine[Question, bytes]) -> None:
     """End what others have said on the line: chips that took it for characters drop it. Nobody is selected by it."""
     await _say(line, "\r", 0)
 
 
 async def _asked(
-    line: Line[Question, bytes], before: str, address: int, baud: int | None, patience_ns: Nanos
+    line: DriverLine[Question, bytes], before: str, address: int, baud: int | None, patience_ns: Nanos
 ) -> FoundChip | None:
     text = f"{before}x{address:x}\r{WHO}\r"
     answer = answer_in(text, await _say(line, text, patience_ns, has_one_answer=True))
@@ -189,7 +189,7 @@ async def _asked(
     return FoundChip(address, None) if answer and full.issuperset(answer) else None
 
 
-async def _say(line: Line[Question, bytes], text: str, patience_ns: Nanos, *, has_one_answer: bool = False) -> bytes:
+async def _say(line: DriverLine[Question, bytes], text: str, patience_ns: Nanos, *, has_one_answer: bool = False) -> bytes:
     """What is heard meanwhile."""
     try:
         return await line.exchange(Job(Question(text, has_one_answer), patience_ns))

@@ -7,14 +7,14 @@ from types import TracebackType
 from typing import Self
 
 from steptwin.drivers.exchange import Exchanger
-from steptwin.drivers.m1486.talk import CharacterTalk, Say
-from steptwin.drivers.place import Endpoint, parse_place
+from steptwin.drivers.m1486.talk import CharacterTalk, ChipRequest
+from steptwin.drivers.place import Endpoint, parse_line_address
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 
 BAUD = 4800
 """What BR1 and BR0 give when they are left open."""
@@ -22,12 +22,14 @@ TALK = "m1486 talk"
 """Where a line's notes have its `CharacterTalk`."""
 
 
-def talking(endpoint: Endpoint, baud: int, log: Callable[[str], object] | None) -> tuple[Exchanger[Say, bytes], CharacterTalk]:
+def talking(
+    endpoint: Endpoint, baud: int, log: Callable[[str], object] | None
+) -> tuple[Exchanger[ChipRequest, bytes], CharacterTalk]:
     """The exchanges of a line of chips."""
 
-    def heard(now: Nanos, direction: Direction, data: bytes) -> None:
+    def heard(now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if log is not None:
-            log(f"{now / SECOND:12.6f} s  {'→' if direction is Direction.IN else '←'} {data.hex(' '):<24}  {in_words(data)}")
+            log(f"{now / SECOND:12.6f} s  {'→' if direction is FrameDirection.IN else '←'} {data.hex(' '):<24}  {in_words(data)}")
 
     talk = CharacterTalk(SerialLine(baud), str(endpoint), on_bytes=heard if log is not None else None)
     return Exchanger(talk, str(endpoint)), talk
@@ -39,13 +41,13 @@ def in_words(data: bytes) -> str:
 
 
 def line_endpoint(address: str, baud: int) -> Endpoint:
-    place = parse_place(address, baud)
+    place = parse_line_address(address, baud)
     if address.startswith("tcp://") and address.rpartition(":")[2].strip("/").isdecimal() is False:
         raise Misuse(f"{address!r} names no port: expected tcp://HOST:PORT, such as tcp://127.0.0.1:5022")
     return place.endpoint
 
 
-class AsyncM1486Line(TaskLine[Say, bytes]):
+class AsyncM1486Line(TaskLine[ChipRequest, bytes]):
     """A line of chips for tasks, at an address (``/dev/ttyUSB0``, ``tcp://host:5022`` raw, ``rfc2217://host:port``)."""
 
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
@@ -62,7 +64,7 @@ class AsyncM1486Line(TaskLine[Say, bytes]):
         await self.close()
 
 
-class ThreadM1486Line(ThreadLine[Say, bytes]):
+class ThreadM1486Line(ThreadLine[ChipRequest, bytes]):
     """The same for threads; `steptwin.drivers.m1486.sync.M1486Line` is its face."""
 
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:

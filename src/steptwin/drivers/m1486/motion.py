@@ -26,16 +26,16 @@ class ChipReason(enum.Enum):
     REST = "at rest"
     DONE = "commands done"
     STOPPED = "stopped"
-    EARLY = "ended before its time (LIMIT, or Kill by somebody)"
-    DIVERTED = "not where it was sent"
+    EARLY = "ended early (LIMIT, or Kill from another program)"
+    DIVERTED = "stopped elsewhere than its target"
     CUT = "cut short"
-    LIMIT = "stopped without being told (LIMIT, or Kill by somebody)"
+    LIMIT = "stopped without a command (LIMIT, or Kill from another program)"
     OVERDUE = "not done yet"
     COMMUNICATION = "communication lost"
 
 
 class ChipMotion(enum.Enum):
-    """What a chip was told."""
+    """Kinds of motion commands."""
 
     MOVE = "a move"
     ENDLESS = "a run without end"
@@ -44,8 +44,8 @@ class ChipMotion(enum.Enum):
 
 
 @dataclass(slots=True, eq=False)
-class Told:
-    """A motion a chip was told. ``target_u``: the counter after it, where that is known (minimum microsteps)."""
+class ChipMotionCommand:
+    """A motion command that a chip was sent. ``target_u``: the counter after it, if known (minimum microsteps)."""
 
     kind: ChipMotion
     at: Nanos

@@ -27,8 +27,6 @@ COMMANDS = {
     "waveform": "n",
 }
 """The command of each setting."""
-OFF_PROFILE = 25_000
-"""P above V: no parabolic part. What it is after power-up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +78,8 @@ def checked_number(letter: str, number: float, variant: Variant, what: str) -> i
     """``number`` if the command takes it. Raises `Misuse` with the permitted range."""
     key = letter.upper()
     if number != int(number) or find(key, int(number), variant) is None:
-        permitted = ", ".join(range_text(spec, variant, named=len(rows(key)) > 1) for spec in rows(key))
-        raise Misuse(f"{what} = {number:g}: {variant.title} takes {permitted}")
+        (spec,) = rows(key)
+        raise Misuse(f"{what} = {number:g}: {variant.title} takes {range_text(spec, variant, named=False)}")
     return int(number)
 
 

@@ -10,14 +10,16 @@ from types import TracebackType
 from typing import Self
 
 from steptwin.drivers.blocking import Blocking, blocking, finish
-from steptwin.drivers.line import Line
+from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.chip import TIMEOUT_S
 from steptwin.drivers.m1486.download import Progress
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.driver import download_to as async_download_to
 from steptwin.drivers.m1486.lines import BAUD, ThreadM1486Line
 from steptwin.drivers.m1486.settings import ChipSettings
-from steptwin.drivers.m1486.talk import Say
+from steptwin.drivers.m1486.subject import M1486Part
+from steptwin.drivers.m1486.talk import ChipRequest
+from steptwin.drivers.subject import PERIOD_S, AsyncDeviceSubject, DeviceSubject
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486.variants import Variant
 
@@ -51,7 +53,7 @@ class M1486Line(Blocking):
 
 
 class _ThreadM1486(AsyncM1486):
-    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Say, bytes]:
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[ChipRequest, bytes]:
         return ThreadM1486Line(address, baud=baud, log=log)
 
 
@@ -62,7 +64,7 @@ class M1486(Blocking):
 
     def __init__(
         self,
-        where: str | M1486Line | ThreadLine[Say, bytes],
+        where: str | M1486Line | ThreadLine[ChipRequest, bytes],
         address: int | None = None,
         *,
         baud: int = BAUD,
@@ -111,6 +113,11 @@ class M1486(Blocking):
     def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
         """Type a program into the chip; see `AsyncM1486.download`."""
         return finish(self._driver.download(text, progress=progress, name=name))
+
+    def subject(self, name: str = "m1486", *, period_s: float = PERIOD_S) -> DeviceSubject:
+        """The device, once it was opened, with the commands, points and events of a twin. It is polled for events while there are
+        followers, at most once in ``period_s``."""
+        return DeviceSubject(AsyncDeviceSubject(name, M1486Part(self._driver), period_s))
 
     open = blocking(AsyncM1486.open)
     open_line = blocking(AsyncM1486.open_line)

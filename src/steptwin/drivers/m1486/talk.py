@@ -13,14 +13,14 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Mapping
 
-from steptwin.drivers.exchange import More
+from steptwin.drivers.exchange import SendNext
 from steptwin.drivers.m1486.failures import Garbled, NoRoom
 from steptwin.errors import Misuse
 from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 
 SPOILER = b"%"
 """No command has this character: a line that gets it is dropped as wrong data (M-11)."""
@@ -36,22 +36,22 @@ ALL = None
 _END = bytes((CR,))
 
 
-class Sort(enum.Enum):
+class ChipRequestKind(enum.Enum):
     """How a request is said."""
 
     LINE = "typed, verified, then CR"
     SELECT = "only the selection of the chip"
     KILL = "at once, with its CR; the echo is looked at afterwards"
-    LISTEN = "nothing is said: an answer is owed"
-    LETTER = "nothing is said: letters are owed by several chips"
-    UPLOAD = "nothing is said: a program uploads"
-    BLIND = "said to chips that do not echo yet; nobody waits for an answer"
+    LISTEN = "nothing is sent: an answer is pending"
+    LETTER = "nothing is sent: several chips are to send their type letters"
+    UPLOAD = "nothing is sent: a program uploads"
+    BLIND = "sent to chips that do not echo yet; no answer is expected"
 
 
-_SILENT = (Sort.LISTEN, Sort.LETTER, Sort.UPLOAD)
+_SILENT = (ChipRequestKind.LISTEN, ChipRequestKind.LETTER, ChipRequestKind.UPLOAD)
 
 
-class Say:
+class ChipRequest:
     """Something said to the chip with ``address`` (None: the only one on the line).
 
     ``answers``: one byte comes back. ``acts``: it matters whether the chip did it, and how often. ``committed``: CR was sent.
@@ -60,7 +60,13 @@ class Say:
     __slots__ = ("acts", "address", "answers", "commented", "committed", "sort", "text")
 
     def __init__(
-        self, address: int | None, text: str, *, sort: Sort = Sort.LINE, answers: bool = False, acts: bool = True
+        self,
+        address: int | None,
+        text: str,
+        *,
+        sort: ChipRequestKind = ChipRequestKind.LINE,
+        answers: bool = False,
+        acts: bool = True,
     ) -> None:
         self.address = address
         self.text = text
@@ -84,7 +90,7 @@ class Say:
         return f"{chip_name(self.address)}: {self.text.strip() or 'select'}"
 
 
-Heard = Callable[[Nanos, Direction, bytes], object]
+Heard = Callable[[Nanos, FrameDirection, bytes], object]
 """Told of what is sent and heard."""
 
 
@@ -119,7 +125,7 @@ class CharacterTalk:
         self.nearly_full = False
         """Whether the last command met one of the last three places of the input buffer."""
         self._is_stuck = False  # the spoiler found no room: it is to be said again
-        self._request: Say | None = None
+        self._request: ChipRequest | None = None
         self._lines: list[bytes] = []  # still to be said, the one being said first
         self._sent = b""
         self._heard = b""
@@ -127,7 +133,7 @@ class CharacterTalk:
 
     wary = True
 
-    def allowance_ns(self, request: Say) -> Nanos:
+    def allowance_ns(self, request: ChipRequest) -> Nanos:
         if request.sort in _SILENT:
             return 0
         return self._serial.duration(2 * len(request.text) + 16)
@@ -164,9 +170,8 @@ class CharacterTalk:
 
     # ------------------------------------------------------------------ saying
 
-    def start(self, request: Say, now: Nanos, *, urgent: bool) -> bytes:
+    def start(self, request: ChipRequest, now: Nanos, *, urgent: bool) -> bytes:
         self._request = request
-        self._heard = b""
         self._lines = []
         self.nearly_full = self._is_stuck = False
         request.committed = request.commented = False
@@ -174,16 +179,16 @@ class CharacterTalk:
         spoiler = [SPOILER] if self.dirty else []
         text = request.text.encode("ascii")
         match request.sort:
-            case Sort.LISTEN | Sort.LETTER | Sort.UPLOAD:
+            case ChipRequestKind.LISTEN | ChipRequestKind.LETTER | ChipRequestKind.UPLOAD:
                 request.committed = True
                 return self._put(b"", now)
-            case Sort.BLIND:
+            case ChipRequestKind.BLIND:
                 # Its first line spoils what may stand before it, and is said twice.
                 request.committed = True
                 self.selected = ALL
                 self.dirty = False
                 return self._put(text, now)
-            case Sort.KILL:
+            case ChipRequestKind.KILL:
                 request.committed = True
                 said = b"".join(line + _END for line in (*selection, *text.splitlines()))
                 if self.dirty:
@@ -191,9 +196,9 @@ class CharacterTalk:
                 elif not self.knows(request.address):
                     said *= 2  # the first line may meet the rest of another one
                 return self._put(said, now)
-            case Sort.SELECT:
+            case ChipRequestKind.SELECT:
                 self._lines = [*spoiler, *selection]
-            case Sort.LINE:
+            case ChipRequestKind.LINE:
                 self._lines = [*spoiler, *selection, text]
         if not self._lines:
             raise Misuse(f"{request}: it is selected already")
@@ -203,16 +208,16 @@ class CharacterTalk:
         self._sent = data
         self._heard = b""
         if data and self._on_bytes is not None:
-            self._on_bytes(now, Direction.IN, data)
+            self._on_bytes(now, FrameDirection.IN, data)
         return data
 
     # ------------------------------------------------------------------ hearing
 
-    def receive(self, data: bytes, now: Nanos) -> bytes | More | None:
+    def receive(self, data: bytes, now: Nanos) -> bytes | SendNext | None:
         if self._on_bytes is not None:
-            self._on_bytes(now, Direction.OUT, data)
+            self._on_bytes(now, FrameDirection.OUT, data)
         request = self._request
-        if request is None or request.sort is Sort.BLIND:
+        if request is None or request.sort is ChipRequestKind.BLIND:
             return None
         for place, byte in enumerate(data):
             outcome = self._take(request, byte, data[place + 1 :], now)
@@ -220,13 +225,13 @@ class CharacterTalk:
                 return outcome
         return None
 
-    def _take(self, request: Say, byte: int, rest: bytes, now: Nanos) -> bytes | More | None:
-        if request.sort is Sort.LISTEN:
+    def _take(self, request: ChipRequest, byte: int, rest: bytes, now: Nanos) -> bytes | SendNext | None:
+        if request.sort is ChipRequestKind.LISTEN:
             return self._take_owed(request, byte)
-        if request.sort is Sort.LETTER:
+        if request.sort is ChipRequestKind.LETTER:
             came = [self._uploaded(one) and one in LETTERS for one in (byte, *rest)]
             return self._done(bytes((byte,))) if any(came) else None
-        if request.sort is Sort.UPLOAD:
+        if request.sort is ChipRequestKind.UPLOAD:
             for one in (byte, *rest):
                 self._uploaded(one)
             return self._done(bytes((byte,)))
@@ -235,7 +240,7 @@ class CharacterTalk:
         # All has come back, and an answer is waited for.
         return self._done(bytes((byte,)))
 
-    def _take_owed(self, request: Say, byte: int) -> bytes | None:
+    def _take_owed(self, request: ChipRequest, byte: int) -> bytes | None:
         if byte not in LETTERS:
             self._uploaded(byte)
             return None
@@ -243,7 +248,7 @@ class CharacterTalk:
         self.settle(request.address)
         return self._done(bytes((byte,)))
 
-    def _echo(self, request: Say, byte: int, rest: bytes, now: Nanos) -> bytes | More | None:
+    def _echo(self, request: ChipRequest, byte: int, rest: bytes, now: Nanos) -> bytes | SendNext | None:
         expected = self._sent[len(self._heard)]
         if byte == expected:
             self._heard += bytes((byte,))
@@ -254,7 +259,7 @@ class CharacterTalk:
             self.nearly_full = True
             return None
         if byte == NO_ROOM:
-            if expected == SPOILER[0] or (request.sort is Sort.KILL and self._heard.endswith(SPOILER)):
+            if expected == SPOILER[0] or (request.sort is ChipRequestKind.KILL and self._heard.endswith(SPOILER)):
                 self._is_stuck = True
                 return self._echo(request, expected, rest, now)
             self._give_up(now)
@@ -264,8 +269,8 @@ class CharacterTalk:
             return None
         raise self._garbled(request, self._heard + bytes((byte,)) + rest, now)
 
-    def _garbled(self, request: Say, heard: bytes, now: Nanos) -> Garbled:
-        typed = request.sort is Sort.LINE and len(self._lines) == 1 and self._sent == self._lines[0]
+    def _garbled(self, request: ChipRequest, heard: bytes, now: Nanos) -> Garbled:
+        typed = request.sort is ChipRequestKind.LINE and len(self._lines) == 1 and self._sent == self._lines[0]
         request.commented = typed and b";" in heard
         sent = self._sent
         self._give_up(now)
@@ -286,8 +291,8 @@ class CharacterTalk:
             return False
         return True
 
-    def _came_back(self, request: Say, rest: bytes, now: Nanos) -> bytes | More | None:
-        if request.sort is Sort.KILL:
+    def _came_back(self, request: ChipRequest, rest: bytes, now: Nanos) -> bytes | SendNext | None:
+        if request.sort is ChipRequestKind.KILL:
             self.dirty = self._is_stuck
             self.selected = request.address
             return self._done(b"")
@@ -295,19 +300,19 @@ class CharacterTalk:
             if not all(byte == ~self._heard[-1] & 0xFF or self._uploaded(byte) for byte in rest):
                 raise self._garbled(request, self._heard + rest, now)
             self.nearly_full |= bool(rest)
-            request.committed |= len(self._lines) == 1 and request.sort is Sort.LINE
-            return More(self._put(_END, now), may_wait=False)
+            request.committed |= len(self._lines) == 1 and request.sort is ChipRequestKind.LINE
+            return SendNext(self._put(_END, now), may_wait=False)
         return self._line_taken(request, rest, now)
 
-    def _line_taken(self, request: Say, rest: bytes, now: Nanos) -> bytes | More | None:
+    def _line_taken(self, request: ChipRequest, rest: bytes, now: Nanos) -> bytes | SendNext | None:
         line = self._lines.pop(0)
         if line == SPOILER:
             self.dirty = self._is_stuck
             self.spoilt[request.address] = self.spoilt.get(request.address, 0) + 1
-        elif request.sort is Sort.SELECT or self._lines:
+        elif request.sort is ChipRequestKind.SELECT or self._lines:
             self.selected = request.address
         if self._lines:
-            return More(self._put(self._lines[0], now), may_wait=False)
+            return SendNext(self._put(self._lines[0], now), may_wait=False)
         if request.text == WHO and not request.answers:
             # Its answer may be long in coming: others may have to go first meanwhile.
             self.owed[request.address] = self.owes(request.address) + 1
@@ -341,7 +346,7 @@ class CharacterTalk:
 
     def _give_up(self, now: Nanos) -> None:
         request = self._request
-        if request is not None and request.sort is not Sort.BLIND:
+        if request is not None and request.sort is not ChipRequestKind.BLIND:
             self.dirty = True
             if request.text == WHO and request.committed:
                 self.surplus += 1
@@ -358,7 +363,7 @@ class CharacterTalk:
         if request is None:
             return b""
         awaits_answer = request.committed and request.answers and not self._sent and not self._lines
-        if request.sort in _SILENT or request.sort is Sort.BLIND or awaits_answer:
+        if request.sort in _SILENT or request.sort is ChipRequestKind.BLIND or awaits_answer:
             self._done(b"")
             return b""
         self._give_up(now)
@@ -366,7 +371,7 @@ class CharacterTalk:
 
     def stray(self, data: bytes, now: Nanos) -> None:
         if self._on_bytes is not None and data:
-            self._on_bytes(now, Direction.OUT, data)
+            self._on_bytes(now, FrameDirection.OUT, data)
         for byte in data:
             if not self._uploaded(byte) and byte not in (EMPTY, THREE_FREE):
                 self.dirty = True  # the echo of something that now stands in front of the next command

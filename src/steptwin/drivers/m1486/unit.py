@@ -1,7 +1,7 @@
 """One chip on a line: commands, answers, what drivers of the same chip must agree on.
 
-Everything but a stop is done in turns (`Unit.turn`): while a chip owes an answer nobody else is talked to, because bytes do not
-say whose they are. A stop goes in between.
+All exchanges but stops take turns (`ChipUnit.turn`): while a chip has an answer pending, no other chip is addressed: a byte
+does not identify its sender. A stop interrupts a turn.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from contextlib import AbstractAsyncContextManager, suppress
 
 from steptwin.drivers.exchange import Job, NoAnswer, Overtaken, SentLate, TooLate
-from steptwin.drivers.line import Line
-from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, WrongType, untold
+from steptwin.drivers.line import DriverLine
+from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, WrongType, unconfirmed
 from steptwin.drivers.m1486.lines import TALK
-from steptwin.drivers.m1486.motion import Told
+from steptwin.drivers.m1486.motion import ChipMotionCommand
 from steptwin.drivers.m1486.settings import ChipSettings
-from steptwin.drivers.m1486.talk import SPOILER, WHO, CharacterTalk, Say, Sort, chip_name
+from steptwin.drivers.m1486.talk import SPOILER, WHO, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.functions import FUNCTIONS, RECOVER, REPORT, RETURN, TABLE
@@ -30,7 +30,7 @@ STOP_TRIES = 5
 PAUSES_NS: tuple[Nanos, ...] = (40 * MILLISECOND, 1300 * MILLISECOND)
 """Time for ``t41`` to be done; the other is for chips that write commands into an EEPROM."""
 WAKE_COMMANDS = 5
-"""What `Unit.wake` has typed when all goes well, and a question."""
+"""What `ChipUnit.wake` has typed when all goes well, and a question."""
 EVERYBODY = "xg\rxg\r"
 """All chips listen from now on. The first may meet the rest of something else."""
 PATIENCE_NS: Nanos = 10 * SECOND
@@ -44,7 +44,7 @@ READINGS = 4
 """How often something is read until it reads the same twice."""
 
 
-class Notes:
+class ChipNotes:
     """What all drivers of one chip on one line share."""
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class Notes:
         self.functions: int | None = None
         """Functions 40 to 63, the lowest number in the lowest bit."""
         self.settings = ChipSettings()
-        self.motion: Told | None = None
+        self.motion: ChipMotionCommand | None = None
         self.is_position_valid = True
         self.was_awake = False
         """Whether it echoed before: if it does not any more, it was switched off."""
@@ -85,10 +85,10 @@ class Notes:
             self.functions = self.functions | bit if on else self.functions & ~bit
 
 
-class Unit:
+class ChipUnit:
     """The chip with ``address`` on ``line``; None: the only one, which needs no selection."""
 
-    def __init__(self, line: Line[Say, bytes], address: int | None, *, timeout_ns: Nanos) -> None:
+    def __init__(self, line: DriverLine[ChipRequest, bytes], address: int | None, *, timeout_ns: Nanos) -> None:
         self.line = line
         self.address = address
         self.timeout_ns = timeout_ns
@@ -97,7 +97,7 @@ class Unit:
         if (None in known) is not (address is None) and known:
             raise Misuse(f"{line.place}: a chip without address has to be the only one on its line")
         known.add(address)
-        self.notes: Notes = line.notes.setdefault(("m1486", address), Notes())
+        self.notes: ChipNotes = line.notes.setdefault(("m1486", address), ChipNotes())
 
     @property
     def name(self) -> str:
@@ -137,20 +137,20 @@ class Unit:
 
     async def _exchange(
         self,
-        say: Say,
+        say: ChipRequest,
         *,
         timeout_ns: Nanos | None = None,
         urgent: bool = False,
         permission: Permission | None = None,
     ) -> bytes:
-        job: Job[Say, bytes] = Job(
+        job: Job[ChipRequest, bytes] = Job(
             say, self.timeout_ns if timeout_ns is None else timeout_ns, urgent=urgent, permission=permission
         )
         return await self.line.exchange(job)
 
     async def _blind(self, text: str, pause_ns: Nanos, *, urgent: bool = False) -> None:
         with suppress(NoAnswer):
-            await self._exchange(Say(self.address, text, sort=Sort.BLIND), timeout_ns=pause_ns, urgent=urgent)
+            await self._exchange(ChipRequest(self.address, text, sort=ChipRequestKind.BLIND), timeout_ns=pause_ns, urgent=urgent)
 
     async def wake(self) -> None:
         """Have the chip echo what it hears, and select it. Raises `NoEcho`."""
@@ -162,9 +162,9 @@ class Unit:
                     # Everybody is to echo, so that the selection is verified by whoever hears it.
                     await self._blind(f"{rest}{EVERYBODY}t{RETURN}\r", pause)
                     rest = ""
-                    await self._exchange(Say(self.address, "", sort=Sort.SELECT, acts=False))
+                    await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT, acts=False))
                 await self._blind_echo(rest, pause)
-                await self._exchange(Say(self.address, f"t{RETURN}", acts=False))
+                await self._exchange(ChipRequest(self.address, f"t{RETURN}", acts=False))
             except (NoAnswer, Garbled) as error:
                 failure = error
                 # What was not echoed lacks only its CR. To spoil it would end a program that runs (M-11).
@@ -212,7 +212,7 @@ class Unit:
             await self._blind(EVERYBODY, PAUSES_NS[0])
         for _ in range(TRIES):
             try:
-                await self._exchange(Say(self.address, f"t{RETURN}", acts=False))
+                await self._exchange(ChipRequest(self.address, f"t{RETURN}", acts=False))
             except Garbled:
                 continue
             except NoAnswer:
@@ -247,7 +247,7 @@ class Unit:
         failure: LineFailure | None = None
         for _ in range(TRIES):
             await self._ready()
-            say = Say(self.address, text, answers=answers, acts=once or acts)
+            say = ChipRequest(self.address, text, answers=answers, acts=once or acts)
             try:
                 answer = await self._exchange(say, permission=permission, timeout_ns=self._patience(answers))
             except (Garbled, NoAnswer) as error:
@@ -299,7 +299,7 @@ class Unit:
         """A command as it is typed. Raises `Misuse` for one the chip would drop."""
         line, found = parse_line(text)
         command = line.command
-        if command is None or found:
+        if command is None:
             raise Misuse(f"{text!r} is no command{f': {found[0].message}' if found else ''}")
         why = out_of_range(command, self.variant)
         if why is not None:
@@ -331,7 +331,7 @@ class Unit:
         """A chip that was asked twice answers twice: the second letter must not be taken for what it is asked next."""
         talk = self.talk
         if talk.surplus:
-            listening = Say(self.address, WHO, sort=Sort.LISTEN, acts=False)
+            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN, acts=False)
             with suppress(NoAnswer):
                 while talk.surplus:
                     await self._exchange(listening, timeout_ns=self._patience(True))
@@ -347,7 +347,7 @@ class Unit:
         talk = self.talk
         limit = self.line.now() + patience_ns
         while self.address not in talk.came:
-            listening = Say(self.address, WHO, sort=Sort.LISTEN, acts=False)
+            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN, acts=False)
             try:
                 return (await self._exchange(listening, timeout_ns=SLICE_NS))[0]
             except NoAnswer:
@@ -360,14 +360,14 @@ class Unit:
     async def hear_letter(self, patience_ns: Nanos) -> None:
         """Listen for a letter that any chip owes (`CharacterTalk.letters`)."""
         with suppress(NoAnswer):
-            await self._exchange(Say(self.address, WHO, sort=Sort.LETTER, acts=False), timeout_ns=patience_ns)
+            await self._exchange(ChipRequest(self.address, WHO, sort=ChipRequestKind.LETTER, acts=False), timeout_ns=patience_ns)
 
     async def hear_upload(self, patience_ns: Nanos) -> None:
         """Listen for what a program uploads."""
         with suppress(NoAnswer):
-            await self._exchange(Say(self.address, "", sort=Sort.UPLOAD, acts=False), timeout_ns=patience_ns)
+            await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.UPLOAD, acts=False), timeout_ns=patience_ns)
 
-    def others(self) -> list[Notes]:
+    def others(self) -> list[ChipNotes]:
         """What is known of the other chips on the line."""
         return [self.line.notes[("m1486", address)] for address in self.line.notes["m1486 chips"] if address != self.address]
 
@@ -385,7 +385,7 @@ class Unit:
 
     def why_busy(self) -> str:
         if self.notes.is_killed and self.notes.function(RECOVER) is False:
-            return "is held by Kill, for its function 51 is OFF: recover it, which lets a program go on"
+            return "is held by Kill because its function 51 is OFF: recover it; a program of it then continues"
         if self.notes.motion is not None:
             return f"is not done with {self.notes.motion.kind.value}: wait for its end or stop it"
         return "does not answer yet: it moves or waits, its program runs, or LIMIT holds it"
@@ -404,7 +404,7 @@ class Unit:
             if found == before:
                 return found
             before = found
-        raise LineFailure(f"{self.place}: {self.name}: what U{' U'.join(map(str, numbers))} says is another thing each time")
+        raise LineFailure(f"{self.place}: {self.name}: what U{' U'.join(map(str, numbers))} sends differs at every reading")
 
     async def read_number(self, first: int, *, rests: bool = False) -> int:
         """24 bits from ``first`` on."""
@@ -419,7 +419,7 @@ class Unit:
             await self.say(f"c{REPORT}")  # function 57 reports an empty input buffer before each answer
             code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
         if letter not in _NAMES:
-            raise WrongType(f"{self.place}: {self.name} says that its type is {letter:02X}H, which no M1486 does")
+            raise WrongType(f"{self.place}: {self.name} reports the type letter {letter:02X}H, which no M1486 has")
         if self.notes.variant is None:
             self.notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
         self.notes.interface = next((interface for interface in INTERFACES if interface.code == code), None)
@@ -431,10 +431,10 @@ class Unit:
         """Have the chip drop what was typed without its CR: the next CR on the line, whoever sends it, would carry it out."""
         if self.talk.dirty:
             with suppress(NoAnswer, Garbled):
-                await self._exchange(Say(self.address, "", sort=Sort.SELECT, acts=False))
+                await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT, acts=False))
 
     async def kill(self, *, program: bool = False) -> None:
-        """K, before everything that waits for the line; ``program``: and wrong data before it. Raises `Untold`."""
+        """K, before everything that waits for the line; ``program``: and wrong data before it. Raises `Unconfirmed`."""
         notes = self.notes
         notes.stops += 1
         notes.is_killed = True
@@ -444,7 +444,7 @@ class Unit:
             if attempt and not self.talk.knows(self.address):
                 break  # it was worth a try: function 41 may be ON since before
             try:
-                await self._exchange(Say(self.address, text, sort=Sort.KILL), urgent=True)
+                await self._exchange(ChipRequest(self.address, text, sort=ChipRequestKind.KILL), urgent=True)
             except (Garbled, NoAnswer) as error:
                 failure = error
                 continue
@@ -455,6 +455,6 @@ class Unit:
         try:
             await self.wake()
             notes.forget()
-            await self._exchange(Say(self.address, text, sort=Sort.KILL), urgent=True)
+            await self._exchange(ChipRequest(self.address, text, sort=ChipRequestKind.KILL), urgent=True)
         except (NoEcho, Garbled, NoAnswer) as error:
-            raise untold(self.name, failure or error) from error
+            raise unconfirmed(self.name, failure or error) from error

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from steptwin.drivers.line import check_wait
-from steptwin.drivers.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMoveEnd, ChipReason, Told
+from steptwin.drivers.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.talk import WHO
-from steptwin.drivers.m1486.unit import SLICE_NS, Unit
+from steptwin.drivers.m1486.unit import SLICE_NS, ChipUnit
 from steptwin.drivers.m1486.watching import early_ns, watch
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import SECOND, Nanos
@@ -17,7 +17,7 @@ ASK_AGAIN_NS: Nanos = SECOND
 
 
 async def wait_for(
-    unit: Unit, timeout_s: float | None, unit_name: str, shown: Callable[[int], float], *, check: bool
+    unit: ChipUnit, timeout_s: float | None, unit_name: str, shown: Callable[[int], float], *, check: bool
 ) -> ChipMoveEnd:
     """See `steptwin.drivers.m1486.driver.AsyncM1486.wait`. ``shown`` turns the counter into a position.
 
@@ -63,7 +63,7 @@ async def wait_for(
     return ended(reason, shown(counter) if notes.is_position_valid else None, detail)
 
 
-async def _end_of_block(unit: Unit, limit: Nanos) -> None:
+async def _end_of_block(unit: ChipUnit, limit: Nanos) -> None:
     """Until a block has sent its mark, or the chip answers without, or ``limit``.
 
     What the chip was asked goes with a block that it drops because of wrong data (M-11). So it is asked again, but not as often
@@ -83,7 +83,7 @@ async def _end_of_block(unit: Unit, limit: Nanos) -> None:
         await unit.ask()  # those before may be gone
 
 
-def _time_out_s(unit: Unit, motion: Told | None) -> float:
+def _time_out_s(unit: ChipUnit, motion: ChipMotionCommand | None) -> float:
     if motion is None or motion.stops != unit.notes.stops:
         return UNKNOWN_S
     if motion.kind is ChipMotion.ENDLESS:
@@ -94,7 +94,7 @@ def _time_out_s(unit: Unit, motion: Told | None) -> float:
 _ENDS = {ChipMotion.ENDLESS: ChipReason.LIMIT, ChipMotion.SEEK: ChipReason.SOUGHT}
 
 
-def _reason(unit: Unit, motion: Told | None, counter: int, over_at: Nanos) -> tuple[ChipReason, str]:
+def _reason(unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over_at: Nanos) -> tuple[ChipReason, str]:
     """Why it ended, and more of it. ``over_at``: when it was seen to have ended."""
     if motion is None:
         return ChipReason.REST, ""
@@ -104,7 +104,7 @@ def _reason(unit: Unit, motion: Told | None, counter: int, over_at: Nanos) -> tu
         if unit.talk.spoilt.get(unit.address, 0) != motion.spoilt:
             return ChipReason.CUT, "by trouble on the line"
         if motion.is_unfinished:
-            return ChipReason.CUT, "a command was wrong data when it came to be done, or the end was not heard"
+            return ChipReason.CUT, "a command was wrong data when it was executed, or its end was not received"
         return ChipReason.DONE, ""
     if motion.kind in _ENDS:
         return _ENDS[motion.kind], ""

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486.lines import TALK, talking
-from steptwin.drivers.m1486.talk import Say
-from steptwin.drivers.m1486.unit import Unit
+from steptwin.drivers.m1486.talk import ChipRequest
+from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.place import Channel
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
@@ -24,10 +24,10 @@ def wake(channel: Channel, place: str, address: int | None, baud: int, log: Call
     """
     endpoint = _Opened(channel, place)
     exchanger, talk = talking(endpoint, baud, log)
-    line: ThreadLine[Say, bytes] = ThreadLine(endpoint, exchanger)
+    line: ThreadLine[ChipRequest, bytes] = ThreadLine(endpoint, exchanger)
     line.notes[TALK] = talk
     finish(line.open())
-    finish(Unit(line, address, timeout_ns=TIMEOUT_NS).wake())
+    finish(ChipUnit(line, address, timeout_ns=TIMEOUT_NS).wake())
 
 
 class _Opened:

@@ -9,9 +9,9 @@ time is somebody's who was stopped early: the chips are asked again one by one, 
 from __future__ import annotations
 
 from steptwin.drivers.m1486.failures import Restarted
-from steptwin.drivers.m1486.motion import EARLY, EARLY_S, Told
+from steptwin.drivers.m1486.motion import EARLY, EARLY_S, ChipMotionCommand
 from steptwin.drivers.m1486.talk import WHO
-from steptwin.drivers.m1486.unit import SLICE_NS, Notes, Unit
+from steptwin.drivers.m1486.unit import SLICE_NS, ChipNotes, ChipUnit
 from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 
@@ -25,17 +25,17 @@ GRACE_NS: Nanos = 300 * MILLISECOND
 """A move that goes on for so long after its time is overdue; it is not watched any more."""
 
 
-def early_ns(motion: Told) -> Nanos:
+def early_ns(motion: ChipMotionCommand) -> Nanos:
     """A move that is over before did not go all its way."""
     duration_s = motion.duration_s or 0.0
     return motion.at + round((EARLY * duration_s - EARLY_S) * SECOND)
 
 
-def end_ns(motion: Told) -> Nanos:
+def end_ns(motion: ChipMotionCommand) -> Nanos:
     return motion.at + round((motion.duration_s or 0.0) * SECOND)
 
 
-def _is_watched(notes: Notes, now: Nanos) -> bool:
+def _is_watched(notes: ChipNotes, now: Nanos) -> bool:
     """Whether the chip makes a move whose end is known in advance and has not been seen."""
     motion = notes.motion
     return (
@@ -47,8 +47,8 @@ def _is_watched(notes: Notes, now: Nanos) -> bool:
     )
 
 
-async def watch(unit: Unit, motion: Told, limit: Nanos) -> None:
-    """Until the end of ``motion`` was seen (`Told.over_at`), or ``limit``, or there is nothing to be watched for any more."""
+async def watch(unit: ChipUnit, motion: ChipMotionCommand, limit: Nanos) -> None:
+    """Until the end of ``motion`` was seen (`ChipMotionCommand.over_at`), until ``limit``, or until nothing is left to watch."""
     line = unit.line
     while _is_watched(unit.notes, now := line.now()) and unit.notes.motion is motion and now < limit:
         due = min(_Watch(unit).begins().values(), default=now)
@@ -63,7 +63,7 @@ async def watch(unit: Unit, motion: Told, limit: Nanos) -> None:
 class _Mover:
     """A chip whose end is near."""
 
-    def __init__(self, unit: Unit, motion: Told) -> None:
+    def __init__(self, unit: ChipUnit, motion: ChipMotionCommand) -> None:
         self.unit = unit
         self.motion = motion
         self.owed = 0
@@ -90,7 +90,7 @@ class _Mover:
 class _Watch:
     """One watch, with the line to itself."""
 
-    def __init__(self, own: Unit) -> None:
+    def __init__(self, own: ChipUnit) -> None:
         self._own = own
         self._movers: dict[int | None, _Mover] = {}
         self._given_up: set[int | None] = set()
@@ -104,9 +104,9 @@ class _Watch:
         """When each chip is to be asked, who was not yet."""
         line = self._own.line
         now = line.now()
-        moving: dict[int | None, Told] = {}
+        moving: dict[int | None, ChipMotionCommand] = {}
         for address in line.notes["m1486 chips"]:
-            notes: Notes = line.notes[("m1486", address)]
+            notes: ChipNotes = line.notes[("m1486", address)]
             if notes.motion is not None and _is_watched(notes, now):
                 moving[address] = notes.motion
         lead = len(moving) * (ASK_NS + self._own.talk.wire_ns(20))
@@ -136,7 +136,7 @@ class _Watch:
 
     async def _begin(self, address: int | None) -> None:
         own = self._own
-        unit = own if address == own.address else Unit(own.line, address, timeout_ns=own.timeout_ns)
+        unit = own if address == own.address else ChipUnit(own.line, address, timeout_ns=own.timeout_ns)
         motion = unit.notes.motion
         if motion is None:
             return

@@ -4,28 +4,33 @@ from __future__ import annotations
 
 from math import isfinite
 
-from steptwin.drivers.mic488.failures import untold
-from steptwin.drivers.mic488.jog import HOLD_S, AsyncJog
-from steptwin.drivers.mic488.motion import Kind, Motion, MoveEnd
+from steptwin.drivers.mic488.failures import unconfirmed
+from steptwin.drivers.mic488.jog import HOLD_S, AsyncMic488Jog
+from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd
 from steptwin.drivers.mic488.unit import URGENT_TRIES, Control, Unit, check_axis
-from steptwin.drivers.mic488.waiting import Watch, wait_for
+from steptwin.drivers.mic488.waiting import AxisWait, wait_for
 from steptwin.errors import LineFailure, Misuse
-from steptwin.mic488.axis import MAX_SPEED_P
+from steptwin.mic488.axis_motion import MAX_SPEED_P
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 
-_KEYS = {Kind.POSITION: "POS_ABS", Kind.DISTANCE: "POS_REL", Kind.VELOCITY: "VEL_ABS", Kind.HOMING: "HOME"}
+_KEYS = {
+    MotionKind.POSITION: "POS_ABS",
+    MotionKind.DISTANCE: "POS_REL",
+    MotionKind.VELOCITY: "VEL_ABS",
+    MotionKind.HOMING: "HOME",
+}
 
 
-class AsyncAxis:
+class AsyncMic488Axis:
     """Axis ``number`` (from 1). Positions, velocities and accelerations are in its configured unit: u, u/s, u/s²."""
 
     def __init__(self, unit: Unit, number: int) -> None:
         self._unit = unit
         self.number = check_axis(number)
-        self._motion: Motion | None = None
+        self._motion: MotionCommand | None = None
 
     def __repr__(self) -> str:
-        return f"<AsyncAxis M{self.number} of unit {self._unit.number} on {self._unit.place}>"
+        return f"<AsyncMic488Axis M{self.number} of unit {self._unit.number} on {self._unit.place}>"
 
     @property
     def unit(self) -> str:
@@ -35,7 +40,7 @@ class AsyncAxis:
     # ------------------------------------------------------------------ what it does
 
     async def status(self) -> int:
-        """Mx_STATUS, see `steptwin.mic488.status.Status`."""
+        """Mx_STATUS, see `steptwin.mic488.status.AxisStatus`."""
         return (await self._unit.control()).axes[self.number - 1]
 
     async def position(self) -> float:
@@ -77,7 +82,7 @@ class AsyncAxis:
         for key, value in (("ACC", acc), ("DEC", dec), ("VMAX", velocity)):
             if value is not None:
                 if key == "VMAX":
-                    self.check(Kind.VELOCITY, value)
+                    self.check(MotionKind.VELOCITY, value)
                 await self._store(key, value)
 
     async def set_limits(self, *, left: float | None = None, right: float | None = None) -> None:
@@ -97,30 +102,30 @@ class AsyncAxis:
 
         Raises `Misuse` for a position no register holds, `NotReady` when the drive is off.
         """
-        self.check(Kind.POSITION, position_u)
-        await self._begin(Kind.POSITION, position_u)
+        self.check(MotionKind.POSITION, position_u)
+        await self._begin(MotionKind.POSITION, position_u)
 
     async def move_by(self, distance_u: float) -> None:
         """Begin to move by a distance from where the axis is at that moment.
 
         It is sent once only: if its answer is lost, nobody knows whether the axis moves, and the `NoAnswer` says so.
         """
-        self.check(Kind.DISTANCE, distance_u)
-        await self._begin(Kind.DISTANCE, distance_u)
+        self.check(MotionKind.DISTANCE, distance_u)
+        await self._begin(MotionKind.DISTANCE, distance_u)
 
     async def move_velocity(self, velocity_u: float) -> None:
         """Run at a velocity until told otherwise; 0 ramps down."""
-        self.check(Kind.VELOCITY, velocity_u)
-        await self._begin(Kind.VELOCITY, velocity_u)
+        self.check(MotionKind.VELOCITY, velocity_u)
+        await self._begin(MotionKind.VELOCITY, velocity_u)
 
     async def home(self, velocity_u: float) -> None:
         """Begin homing at this velocity: negative towards the switch KL, positive towards KR. Sent once only, as `move_by`."""
-        self.check(Kind.HOMING, velocity_u)
+        self.check(MotionKind.HOMING, velocity_u)
         if velocity_u == 0.0:
             raise Misuse(f"homing of M{self.number} at 0 {self.unit}/s: the sign of the velocity chooses the switch")
-        await self._begin(Kind.HOMING, velocity_u)
+        await self._begin(MotionKind.HOMING, velocity_u)
 
-    async def _begin(self, kind: Kind, value_u: float) -> None:
+    async def _begin(self, kind: MotionKind, value_u: float) -> None:
         unit = self._unit
         permission = unit.permission(self.number)
         async with unit.lock(), unit.stopping_if_late(self.number):
@@ -129,10 +134,10 @@ class AsyncAxis:
             await unit.set_axis(_KEYS[kind], self.number, value_u, control.data_type, permission=permission)
             self.told(kind, value_u, control)
 
-    def told(self, kind: Kind, value_u: float, control: Control | None) -> None:
+    def told(self, kind: MotionKind, value_u: float, control: Control | None) -> None:
         """The axis has been given a motion; ``control`` is from before."""
         before = -1 if control is None else control.axes[self.number - 1]
-        self._motion = Motion(kind, value_u, self._unit.line.now(), before)
+        self._motion = MotionCommand(kind, value_u, self._unit.line.now(), before)
 
     async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> MoveEnd:
         """Wait until the axis has come to rest, and say why it has.
@@ -141,16 +146,16 @@ class AsyncAxis:
         `MoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
         reported as the end. A motion in velocity mode needs ``timeout_s``.
         """
-        watch = Watch(self._unit, self.number, self._motion, timeout_s)
+        watch = AxisWait(self._unit, self.number, self._motion, timeout_s)
         return (await wait_for(self._unit, {self.number: watch}, check=check))[self.number]
 
-    def watch(self, timeout_s: float | None) -> Watch:
-        return Watch(self._unit, self.number, self._motion, timeout_s)
+    def watch(self, timeout_s: float | None) -> AxisWait:
+        return AxisWait(self._unit, self.number, self._motion, timeout_s)
 
     async def stop(self) -> None:
         """Stop at once, without ramp. Goes before everything that waits for the line.
 
-        Motions of this axis that wait for the line are not begun any more. Raises `Untold` when the controller cannot be told.
+        Motions of this axis that wait for the line are not begun any more. Raises `Unconfirmed`.
         """
         await self._halt("STOP", on=True, what="stopped")
 
@@ -160,7 +165,7 @@ class AsyncAxis:
         try:
             await unit.write(unit.item(key, self.number), on, urgent=True, most=URGENT_TRIES)
         except LineFailure as failure:
-            raise untold(f"M{self.number}", what, failure) from failure
+            raise unconfirmed(f"M{self.number}", what, failure) from failure
         self.forget()
 
     def forget(self) -> None:
@@ -169,15 +174,15 @@ class AsyncAxis:
 
     # ------------------------------------------------------------------ jogging
 
-    def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> AsyncJog:
-        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncJog`.
+    def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> AsyncMic488Jog:
+        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncMic488Jog`.
 
         ``hold_s``: how long the axis runs on without being held before it brakes by itself, from 0.2 to 2 s.
         """
-        self.check(Kind.VELOCITY, velocity_u)
+        self.check(MotionKind.VELOCITY, velocity_u)
         if velocity_u == 0.0:
             raise Misuse(f"a jog of M{self.number} at 0 {self.unit}/s does not move")
-        return AsyncJog(self._unit, self.number, velocity_u, hold_s, self.told)
+        return AsyncMic488Jog(self._unit, self.number, velocity_u, hold_s, self.told)
 
     async def jog_bit(self, direction: int, on: bool) -> None:
         """Write the coil JOG_PLUS (direction +1) or JOG_MINUS (−1): the axis runs at JOG_SPEED **until the coil is written OFF**.
@@ -199,10 +204,10 @@ class AsyncAxis:
 
     # ------------------------------------------------------------------ ranges
 
-    def check(self, kind: Kind, value_u: float) -> None:
+    def check(self, kind: MotionKind, value_u: float) -> None:
         """`Misuse` for a position no register holds or a velocity no output gives, as far as GEAR is known."""
         gear = self._unit.gear(self.number)
-        is_velocity = kind in (Kind.VELOCITY, Kind.HOMING)
+        is_velocity = kind in (MotionKind.VELOCITY, MotionKind.HOMING)
         unit = f"{self.unit}/s" if is_velocity else self.unit
         if not isfinite(value_u):
             raise Misuse(f"M{self.number}: {value_u} {unit} is no {kind.value}")

@@ -9,13 +9,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from steptwin.drivers.line import Line
+from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488 import identify, snapshot
-from steptwin.drivers.mic488.axis import AsyncAxis
+from steptwin.drivers.mic488.axis import AsyncMic488Axis
 from steptwin.drivers.mic488.group import trigger
 from steptwin.drivers.mic488.lines import AsyncModbusLine
-from steptwin.drivers.mic488.motion import Kind, MoveEnd
-from steptwin.drivers.mic488.program import AsyncProgram
+from steptwin.drivers.mic488.motion import MotionKind, MoveEnd
+from steptwin.drivers.mic488.program import AsyncMic488Program
 from steptwin.drivers.mic488.unit import Unit, axis_mask, check_axis
 from steptwin.drivers.mic488.user import AsyncUserRegisters
 from steptwin.drivers.mic488.waiting import wait_for
@@ -25,7 +25,7 @@ from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig, read_config
 from steptwin.mic488.inifile import IniFile
-from steptwin.mic488.registermap import DataType, Effect
+from steptwin.mic488.registermap import DataType, WriteEffect
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, OUTPUTS, register_map
 from steptwin.mic488.values import Value, named
 from steptwin.wire import pdu
@@ -70,7 +70,7 @@ class AsyncMic488:
 
     def __init__(
         self,
-        where: str | Line[Query, bytes],
+        where: str | DriverLine[Query, bytes],
         unit: int = 1,
         *,
         baud: int = 38400,
@@ -83,7 +83,7 @@ class AsyncMic488:
         if not 0.0 < timeout_s <= 60.0:
             raise Misuse(f"a time-out of {timeout_s:g} s is outside 0 to 60 s")
         self._own = isinstance(where, str)
-        self.line: Line[Query, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
+        self.line: DriverLine[Query, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
         check_unit(unit, tcp=bool(self.line.notes.get("tcp")))
         self._firmware = firmware
         self._observe = observe
@@ -91,11 +91,11 @@ class AsyncMic488:
             config = load_config(config, firmware or DEFAULT_FIRMWARE)
         registers = register_map(firmware or DEFAULT_FIRMWARE)
         self._unit = Unit(self.line, unit, registers, config, timeout_ns=round(timeout_s * SECOND), tries=TRIES)
-        self._axes = {number: AsyncAxis(self._unit, number) for number in ALL_AXES}
-        self.program = AsyncProgram(self._unit)
+        self._axes = {number: AsyncMic488Axis(self._unit, number) for number in ALL_AXES}
+        self.program = AsyncMic488Program(self._unit)
         self.user = AsyncUserRegisters(self._unit)
 
-    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Query, bytes]:
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[Query, bytes]:
         return AsyncModbusLine(address, baud=baud, log=log)
 
     def __repr__(self) -> str:
@@ -113,7 +113,7 @@ class AsyncMic488:
     def config(self) -> ControllerConfig | None:
         return self._unit.config
 
-    def axis(self, number: int) -> AsyncAxis:
+    def axis(self, number: int) -> AsyncMic488Axis:
         """Axis 1 to 4."""
         return self._axes[check_axis(number)]
 
@@ -227,23 +227,23 @@ class AsyncMic488:
 
     async def move_together(self, positions: Mapping[int, float]) -> None:
         """Begin to move axes to positions (u) in the same instant: ``{1: 10.0, 2: 15.0}``."""
-        await trigger(self._unit, self._axes, Kind.POSITION, positions)
+        await trigger(self._unit, self._axes, MotionKind.POSITION, positions)
 
     async def move_together_by(self, distances: Mapping[int, float]) -> None:
         """Begin to move axes by distances (u) in the same instant."""
-        await trigger(self._unit, self._axes, Kind.DISTANCE, distances)
+        await trigger(self._unit, self._axes, MotionKind.DISTANCE, distances)
 
     async def run_together(self, velocities: Mapping[int, float]) -> None:
         """Begin to run axes at velocities (u/s) in the same instant."""
-        await trigger(self._unit, self._axes, Kind.VELOCITY, velocities)
+        await trigger(self._unit, self._axes, MotionKind.VELOCITY, velocities)
 
     async def wait(self, *axes: int, timeout_s: float | None = None, check: bool = True) -> dict[int, MoveEnd]:
-        """Wait until axes (without any: all) have come to rest; see `AsyncAxis.wait`. One that fails ends the waiting."""
+        """Wait until axes (without any: all) have come to rest; see `AsyncMic488Axis.wait`. One that fails ends the waiting."""
         chosen = [check_axis(axis) for axis in axes or ALL_AXES]
         return await wait_for(self._unit, {axis: self._axes[axis].watch(timeout_s) for axis in chosen}, check=check)
 
     async def set_jog_speed(self, velocity: float) -> None:
-        """JOG_SPEED in u/s, which holds for all axes and the coils of `AsyncAxis.jog_bit`."""
+        """JOG_SPEED in u/s, which holds for all axes and the coils of `AsyncMic488Axis.jog_bit`."""
         await self._unit.write(self._unit.item("JOG_SPEED"), velocity)
 
     # ------------------------------------------------------------------ registers by name and raw
@@ -268,7 +268,7 @@ class AsyncMic488:
         unit = self._unit
         item = named(unit.registers, name)
         axis = item.register.axis
-        moved = () if item.register.effect not in (Effect.MOVE, Effect.ADD) else ALL_AXES if axis is None else (axis,)
+        moved = () if item.register.effect not in (WriteEffect.MOVE, WriteEffect.ADD) else ALL_AXES if axis is None else (axis,)
         permission = unit.permission(*moved) if moved else None
         data_type = (await unit.control()).data_type
         async with unit.stopping_if_late(*moved):
@@ -284,13 +284,13 @@ class AsyncMic488:
 
     # ------------------------------------------------------------------ snapshots
 
-    async def take_snapshot(self) -> snapshot.Snapshot:
+    async def take_snapshot(self) -> snapshot.Mic488Snapshot:
         """Everything the registers let one read and write."""
         return await snapshot.take(self._unit)
 
     async def restore_snapshot(
-        self, kept: snapshot.Snapshot, *, counters: bool = False, outputs: bool = False, dry_run: bool = False
-    ) -> list[snapshot.Change]:
+        self, kept: snapshot.Mic488Snapshot, *, counters: bool = False, outputs: bool = False, dry_run: bool = False
+    ) -> list[snapshot.SnapshotChange]:
         """Write what differs from a snapshot, and tell what that was; with ``dry_run`` only tell.
 
         ``counters``: positions and encoder counters too; ``outputs``: OUT1 to OUT8 too.

@@ -18,7 +18,7 @@ _WHY = {
 }
 
 
-class Refused(Refusal):
+class ModbusRefusal(Refusal):
     """The controller answered with a Modbus exception; ``code`` is its number."""
 
     def __init__(self, place: str, request: object, exception: ModbusException) -> None:
@@ -34,23 +34,21 @@ class NotReady(Refusal):
 
 
 class NoMic488(Refusal):
-    """Somebody answers, but not as a MIC488 does."""
+    """The device that answers is no MIC488."""
 
 
 class MoveFailed(Refusal):
-    """A motion did not end as it was meant to; ``end`` tells how."""
+    """A motion did not end as intended; ``end`` has the reason."""
 
     def __init__(self, end: MoveEnd) -> None:
         self.end = end
         super().__init__(str(end))
 
 
-class Untold(LineFailure):
-    """The controller could not be told to stop, not to go on, or to leave a mode. What it does then is part of the text."""
+class Unconfirmed(LineFailure):
+    """A stop, or a change of mode that ends a motion, was not confirmed by the controller. The text says what it does then."""
 
 
-def untold(who: str, what: str, failure: LineFailure) -> Untold:
+def unconfirmed(who: str, what: str, failure: LineFailure) -> Unconfirmed:
     """``who`` could not be ``what`` (stopped). A controller out of reach is not one at rest."""
-    return Untold(
-        f"{who} could not be {what}: the controller cannot be told, and goes on with what it was told before ({failure})"
-    )
+    return Unconfirmed(f"{who} could not be {what}: the controller cannot be reached and continues its last command ({failure})")

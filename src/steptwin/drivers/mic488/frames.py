@@ -10,20 +10,20 @@ from steptwin.mic488.describe import Wording
 from steptwin.mic488.registermap import DataType, RegisterMap
 from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu as modbus
-from steptwin.wire.slave import Direction
+from steptwin.wire.slave import FrameDirection
 
 
 class Heard(NamedTuple):
     """One frame: towards the device or back, or bytes that are no frame (direction None)."""
 
     time: Nanos
-    direction: Direction | None
+    direction: FrameDirection | None
     unit: int | None
     raw: bytes
     meaning: str
 
     def __str__(self) -> str:
-        arrow = "?" if self.direction is None else "→" if self.direction is Direction.IN else "←"
+        arrow = "?" if self.direction is None else "→" if self.direction is FrameDirection.IN else "←"
         raw = f"{self.raw.hex(' ')}  " if self.raw else ""
         return f"{self.time / SECOND:12.6f} s  {arrow} {raw}{self.meaning}"
 
@@ -45,7 +45,7 @@ class FrameWords:
         """Use what is known of a unit."""
         self._wordings[unit] = wording
 
-    def observe(self, now: Nanos, direction: Direction, raw: bytes) -> None:
+    def observe(self, now: Nanos, direction: FrameDirection, raw: bytes) -> None:
         """A frame as a master sent or heard it: a `steptwin.wire.slave.FrameObserver`."""
         self._tell(self.frame(now, direction, raw))
 
@@ -60,7 +60,7 @@ class FrameWords:
         for sink in self.sinks:
             sink(heard)
 
-    def frame(self, now: Nanos, direction: Direction, raw: bytes) -> Heard:
+    def frame(self, now: Nanos, direction: FrameDirection, raw: bytes) -> Heard:
         least = 8 if self._tcp else 4
         if len(raw) < least:
             return Heard(now, None, None, raw, "no frame")
@@ -68,7 +68,7 @@ class FrameWords:
         wording = self._wordings.get(unit)
         if wording is None:
             wording = self._wordings[unit] = Wording(self._registers)
-        if direction is Direction.IN:
+        if direction is FrameDirection.IN:
             self._asked[unit] = pdu
             text = wording.request(pdu)
         else:
@@ -86,11 +86,13 @@ class FrameWords:
         except (modbus.ModbusException, modbus.BadResponse):
             return
         match request, response:
-            case modbus.Read(function, first, count), modbus.Registers(words) if function == modbus.READ_HOLDING_REGISTERS:
+            case modbus.ReadRequest(function, first, count), modbus.RegistersResponse(words) if (
+                function == modbus.READ_HOLDING_REGISTERS
+            ):
                 if not first <= address < first + count:
                     return
                 value = words[address - first]
-            case modbus.WriteRegister(where, value), _ if where == address:
+            case modbus.WriteRegisterRequest(where, value), _ if where == address:
                 pass
             case _:
                 return

@@ -5,24 +5,24 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 
-from steptwin.drivers.mic488.axis import AsyncAxis
-from steptwin.drivers.mic488.failures import Untold
-from steptwin.drivers.mic488.motion import Kind
+from steptwin.drivers.mic488.axis import AsyncMic488Axis
+from steptwin.drivers.mic488.failures import Unconfirmed
+from steptwin.drivers.mic488.motion import MotionKind
 from steptwin.drivers.mic488.unit import Unit, axis_mask, check_axis
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 
 _REGISTERS = {
-    Kind.POSITION: ("POS_ABS", "AXIS_POS_ABS_TRIG"),
-    Kind.DISTANCE: ("POS_REL", "AXIS_POS_REL_TRIG"),
-    Kind.VELOCITY: ("VEL_ABS", "AXIS_VEL_ABS_TRIG"),
+    MotionKind.POSITION: ("POS_ABS", "AXIS_POS_ABS_TRIG"),
+    MotionKind.DISTANCE: ("POS_REL", "AXIS_POS_REL_TRIG"),
+    MotionKind.VELOCITY: ("VEL_ABS", "AXIS_VEL_ABS_TRIG"),
 }
 DIRECT, TRIGGER = 0, 1
 
 
-async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values: Mapping[int, float]) -> None:
+async def trigger(unit: Unit, axes: Mapping[int, AsyncMic488Axis], kind: MotionKind, values: Mapping[int, float]) -> None:
     """Store a value for each axis and start them with one write. The trigger itself is sent once only.
 
-    Raises `Untold` when the axes have begun to move, but the controller cannot be told that motions need no trigger any more.
+    Raises `Unconfirmed` when the axes have begun to move, but AXIS_CTR_MODE could not be set back to DIRECT.
     """
     if not values:
         raise Misuse("no axis is given to be moved")
@@ -49,7 +49,7 @@ async def trigger(unit: Unit, axes: Mapping[int, AsyncAxis], kind: Kind, values:
         try:
             await unit.write(mode, DIRECT)
         except LineFailure as failure:
-            raise Untold(
+            raise Unconfirmed(
                 f"{' '.join(f'M{axis}' for axis in chosen)} began to move, but AXIS_CTR_MODE may still be TRIGGER, in which the "
                 f"controller makes no motion without a trigger: it could not be set back to DIRECT ({failure})"
             ) from failure

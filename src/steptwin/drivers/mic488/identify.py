@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from steptwin.drivers.exchange import Job, LineLost
-from steptwin.drivers.line import Line
-from steptwin.drivers.mic488.failures import NoMic488, Refused
+from steptwin.drivers.line import DriverLine
+from steptwin.drivers.mic488.failures import ModbusRefusal, NoMic488
 from steptwin.drivers.modbus import Query, words
 from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, Nanos
@@ -20,9 +20,9 @@ SCAN_NS: Nanos = 100 * MILLISECOND
 PROBE_TRIES = 2
 
 _GATEWAY_CODES = (0x0A, pdu.GATEWAY_TARGET_FAILED)
-_PROBED = ("1.70", "1.23")
-"""One firmware for each address map, in the order in which they are tried. 1.23 comes last: what lies at its addresses, the
-others have as user registers, which anybody can read. 1.40 has the addresses of 1.70, and no read tells them apart."""
+_NEW, _OLD = "1.70", "1.23"
+"""One firmware for each address map. What lies at the addresses of 1.23, the others have as user registers, which anybody can
+read. 1.40 has the addresses of 1.70, and no read tells them apart."""
 
 
 class Found(NamedTuple):
@@ -32,33 +32,41 @@ class Found(NamedTuple):
     firmware: str | None
 
 
-async def firmware_of(line: Line[Query, bytes], unit: int, timeout_ns: Nanos) -> str:
+async def firmware_of(line: DriverLine[Query, bytes], unit: int, timeout_ns: Nanos) -> str:
     """The firmware whose addresses a controller has: ``1.70`` (which may be 1.40) or ``1.23``.
 
     A real controller may be silent where another refuses, so no answer is as good as a refusal as long as one address map is
-    answered. Raises `NoMic488` when neither is, the `LineFailure` when nothing is answered at all, `Refused` when a
-    gateway says that nobody does.
+    answered; but an answer may also have been lost. Raises `NoMic488` when neither is answered, the `LineFailure` when nothing is
+    answered at all, `ModbusRefusal` when a gateway says that nobody does.
     """
     refusal: Refusal | None = None
     failure: LineFailure | None = None
-    for name in _PROBED:
+
+    async def answers(name: str) -> bool:
+        nonlocal refusal, failure
         registers = register_map(name)
         first, last = registers.of("DATA_TYPE"), registers.of("STATUS", AXES)
-        request = pdu.Read(pdu.READ_HOLDING_REGISTERS, first.address, last.last - first.address + 1)
-        query = Query(unit, request, lambda _, name=name: f"read the control registers of firmware {name}")
+        request = pdu.ReadRequest(pdu.READ_HOLDING_REGISTERS, first.address, last.last - first.address + 1)
+        query = Query(unit, request, lambda _: f"read the control registers of firmware {name}")
         try:
             answer = await line.exchange(Job(query, timeout_ns, most=PROBE_TRIES))
         except pdu.ModbusException as exception:
-            refusal = Refused(line.place, query, exception)
+            refusal = ModbusRefusal(line.place, query, exception)
             if exception.code in _GATEWAY_CODES:
                 raise refusal from None
+            return False
         except LineLost:
             raise
         except LineFailure as error:
             failure = error
-        else:
-            if _plausible(registers, first.address, words(answer)):
-                return name
+            return False
+        return _plausible(registers, first.address, words(answer))
+
+    if await answers(_NEW):
+        return _NEW
+    may_be_new = failure is not None
+    if await answers(_OLD):
+        return _NEW if may_be_new and await answers(_NEW) else _OLD
     if refusal is None and failure is not None:
         raise failure
     raise NoMic488(
@@ -78,7 +86,7 @@ def _plausible(registers: RegisterMap, start: int, content: tuple[int, ...]) -> 
 
 
 async def scan(
-    line: Line[Query, bytes],
+    line: DriverLine[Query, bytes],
     units: Iterable[int],
     *,
     timeout_ns: Nanos = SCAN_NS,
@@ -86,7 +94,7 @@ async def scan(
 ) -> list[Found]:
     """The units that answer on a line. ``progress`` is told every unit before it is asked. Raises `LineLost`."""
     found = []
-    inputs = pdu.Read(pdu.READ_DISCRETE_INPUTS, 5000, 8)  # every firmware has them, and it is the manual's own example
+    inputs = pdu.ReadRequest(pdu.READ_DISCRETE_INPUTS, 5000, 8)  # every firmware has them, and it is the manual's own example
     for unit in units:
         if progress is not None:
             progress(unit)

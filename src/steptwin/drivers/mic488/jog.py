@@ -18,14 +18,14 @@ from types import TracebackType
 from typing import Self
 
 from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
-from steptwin.drivers.mic488.failures import NotReady, Untold
-from steptwin.drivers.mic488.motion import Kind, Motion, MoveEnd, Reason, reason_of, status_text
+from steptwin.drivers.mic488.failures import NotReady, Unconfirmed
+from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text
 from steptwin.drivers.mic488.unit import Control, Unit
 from steptwin.drivers.mic488.waiting import dynamics
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.machine import SECOND, Nanos
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 
 HOLD_S = 0.4
 """How long an axis runs on after it was held last, before it brakes."""
@@ -36,7 +36,7 @@ RENEWALS = 4
 """How often it is held in that time."""
 
 
-class AsyncJog:
+class AsyncMic488Jog:
     """A jog of one axis: ``async with axis.jog(5.0) as jog: while pressed(): await jog.hold()``.
 
     `hold` returns after a quarter of the hold time: call it again at once for as long as the axis is to run. It says False when
@@ -52,7 +52,7 @@ class AsyncJog:
         axis: int,
         velocity_u: float,
         hold_s: float,
-        told: Callable[[Kind, float, Control | None], None],
+        told: Callable[[MotionKind, float, Control | None], None],
     ) -> None:
         least, most = HOLD_RANGE_S
         if not least <= hold_s <= most:
@@ -82,7 +82,7 @@ class AsyncJog:
         begin = unit.permission(axis, patience_ns=self._begin_ns)
         async with unit.lock():
             control = await unit.ready(axis)
-            self._told(Kind.DISTANCE, self._velocity_u, control)
+            self._told(MotionKind.DISTANCE, self._velocity_u, control)
             _, _, _, dec, vmax = await dynamics(unit, axis)
             speed = abs(self._velocity_u)
             if speed > vmax * (1.0 + SINGLE):
@@ -111,7 +111,7 @@ class AsyncJog:
         return self
 
     async def hold(self) -> bool:
-        """Let the axis run on; False when it has stopped. Raises `Untold` when the controller cannot be told in time."""
+        """Let the axis run on; False when it has stopped. Raises `Unconfirmed` when the controller cannot be told in time."""
         unit, permission = self._unit, self._permission
         if permission is None or self._held_ns is None:
             raise Misuse("a jog is held inside its with block")
@@ -143,7 +143,9 @@ class AsyncJog:
     async def _look(self) -> Control:
         control = await self._unit.control(timeout_ns=self._exchange_ns())
         if control.triggered:
-            raise NotReady(f"{self._unit.place}: somebody has set AXIS_CTR_MODE to TRIGGER: M{self._axis} is not jogged any more")
+            raise NotReady(
+                f"{self._unit.place}: AXIS_CTR_MODE was set to TRIGGER by another program: M{self._axis} is no longer jogged"
+            )
         return control
 
     def _exchange_ns(self) -> Nanos:
@@ -163,14 +165,14 @@ class AsyncJog:
 
     def _judge(self, status: int) -> None:
         """Find the end of the jog in the status of the axis."""
-        if status == Status.POSITION:
+        if status == AxisStatus.POSITION:
             return
-        if status in (Status.VELOCITY, Status.HOMING):
+        if status in (AxisStatus.VELOCITY, AxisStatus.HOMING):
             self._stopped(Reason.DIVERTED, status_text(status))
             return
-        motion = Motion(Kind.DISTANCE, self._reach_u, self._held_ns or 0, Status.ON)
+        motion = MotionCommand(MotionKind.DISTANCE, self._reach_u, self._held_ns or 0, AxisStatus.ON)
         reason = reason_of(status, motion)
-        if reason is Reason.TARGET or status == Status.CORRECTION:
+        if reason is Reason.TARGET or status == AxisStatus.CORRECTION:
             reason = Reason.NOT_HELD
         self._stopped(reason, status_text(status) if reason is Reason.STOPPED else "")
 
@@ -187,7 +189,7 @@ class AsyncJog:
                 raise
 
     async def release(self) -> None:
-        """Ramp down, and put VMAX back. Raises `Untold` when the controller cannot be told."""
+        """Ramp down, and put VMAX back. Raises `Unconfirmed` when the controller cannot be told."""
         unit = self._unit
         if self.end is None and self._held_ns is not None:
             try:
@@ -198,10 +200,10 @@ class AsyncJog:
             except (TooLate, SentLate):
                 self._not_held()
             except LineFailure as failure:
-                raise self._untold("cannot be told to stop", failure) from failure
+                raise self._untold("cannot be stopped", failure) from failure
             else:
                 self._stopped(Reason.RELEASED, "")
-                self._told(Kind.VELOCITY, 0.0, None)
+                self._told(MotionKind.VELOCITY, 0.0, None)
         await self._put_back()
 
     def _not_held(self) -> None:
@@ -213,12 +215,12 @@ class AsyncJog:
         if vmax is not None and vmax != abs(self._velocity_u):
             await self._unit.set_axis("VMAX", self._axis, vmax, self._unit.wording.data_type)
 
-    def _untold(self, what: str, failure: LineFailure) -> Untold:
+    def _untold(self, what: str, failure: LineFailure) -> Unconfirmed:
         unit = self._unit
         name = unit.unit_name(self._axis)
         since = (unit.line.now() - (self._held_ns or unit.line.now())) / SECOND
         self._stopped(Reason.COMMUNICATION, str(failure))
-        return Untold(
-            f"M{self._axis} {what}: the controller cannot be told ({failure}). "
+        return Unconfirmed(
+            f"M{self._axis} {what}: the controller cannot be reached ({failure}). "
             f"It stops by itself, at most {self._reach_u:g} {name} after it was held last, {since:.2f} s ago"
         )

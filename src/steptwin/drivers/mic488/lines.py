@@ -9,7 +9,7 @@ from typing import Self
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.modbus import Query, RtuMaster, TcpMaster
-from steptwin.drivers.place import Place, parse_place
+from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
@@ -20,7 +20,7 @@ FRAMES_PER_SECOND = 100.0
 
 
 def modbus_exchanger(
-    place: Place, frames_per_second: float | None, log: Callable[[str], object] | None
+    place: LineAddress, frames_per_second: float | None, log: Callable[[str], object] | None
 ) -> tuple[Exchanger[Query, bytes], dict[str, object]]:
     """The exchanges of a Modbus line, and what its drivers find in its notes. ``frames_per_second`` to each device; None: any."""
     if frames_per_second is not None and frames_per_second <= 0.0:
@@ -49,7 +49,7 @@ class AsyncModbusLine(TaskLine[Query, bytes]):
         frames_per_second: float | None = FRAMES_PER_SECOND,
         log: Callable[[str], object] | None = None,
     ) -> None:
-        place = parse_place(address, baud)
+        place = parse_line_address(address, baud)
         exchanger, notes = modbus_exchanger(place, frames_per_second, log)
         super().__init__(place.endpoint, exchanger)
         self.notes.update(notes)
@@ -73,7 +73,7 @@ class ThreadModbusLine(ThreadLine[Query, bytes]):
         frames_per_second: float | None = FRAMES_PER_SECOND,
         log: Callable[[str], object] | None = None,
     ) -> None:
-        place = parse_place(address, baud)
+        place = parse_line_address(address, baud)
         exchanger, notes = modbus_exchanger(place, frames_per_second, log)
         super().__init__(place.endpoint, exchanger)
         self.notes.update(notes)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.machine import Nanos
 from steptwin.wire import mbap
-from steptwin.wire.rtu import BURSTY_GAP_NS, Role, RtuFrame, RtuFramer
-from steptwin.wire.slave import Direction
+from steptwin.wire.rtu import BURSTY_GAP_NS, FrameRole, RtuFrame, RtuFramer
+from steptwin.wire.slave import FrameDirection
 
 
 class RtuListener:
@@ -32,10 +32,10 @@ class RtuListener:
 
     def _take(self, frames: list[RtuFrame], now: Nanos) -> None:
         for frame in frames:
-            if frame.role is Role.UNKNOWN:
+            if frame.role is FrameRole.UNKNOWN:
                 self._words.rubbish(now, frame.raw)
             else:
-                self._words.observe(now, Direction.IN if frame.role is Role.REQUEST else Direction.OUT, frame.raw)
+                self._words.observe(now, FrameDirection.IN if frame.role is FrameRole.REQUEST else FrameDirection.OUT, frame.raw)
         lost = self._framer.rubbish - self._rubbish
         if lost:
             self._rubbish += lost
@@ -47,9 +47,9 @@ class TcpListener:
 
     def __init__(self, words: FrameWords) -> None:
         self._words = words
-        self._framers = {Direction.IN: mbap.TcpFramer(), Direction.OUT: mbap.TcpFramer()}
+        self._framers = {FrameDirection.IN: mbap.TcpFramer(), FrameDirection.OUT: mbap.TcpFramer()}
 
-    def heard(self, data: bytes, now: Nanos, direction: Direction) -> None:
+    def heard(self, data: bytes, now: Nanos, direction: FrameDirection) -> None:
         framer = self._framers[direction]
         for frame in framer.feed(data):
             self._words.observe(now, direction, frame.raw)

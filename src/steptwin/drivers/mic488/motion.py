@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 from steptwin.motion import MotionState, plan_position
 
-MOVING = frozenset({Status.VELOCITY, Status.POSITION, Status.HOMING, Status.CORRECTION})
+MOVING = frozenset({AxisStatus.VELOCITY, AxisStatus.POSITION, AxisStatus.HOMING, AxisStatus.CORRECTION})
 
 _SCALE = 2**20
 """Pulses a distance is taken as when its length in pulses is not known: plenty for a duration."""
@@ -27,10 +27,10 @@ class Reason(enum.Enum):
     REST = "at rest"
     LIMIT_L = "stopped at limit L"
     LIMIT_R = "stopped at limit R"
-    STOPPED = "stopped by somebody"
+    STOPPED = "stopped by a command"
     POSITION_ERROR = "position error (encoder)"
     DISABLED = "drive switched off"
-    DIVERTED = "sent elsewhere by somebody"
+    DIVERTED = "redirected by another command"
     OVERDUE = "still moving"
     RELEASED = "released"
     NOT_HELD = "not held"
@@ -38,16 +38,16 @@ class Reason(enum.Enum):
 
 
 _REASONS: dict[int, Reason] = {
-    Status.OFF: Reason.DISABLED,
-    Status.ON: Reason.STOPPED,
-    Status.REACHED: Reason.TARGET,
-    Status.ERROR: Reason.POSITION_ERROR,
-    Status.LIMIT_L: Reason.LIMIT_L,
-    Status.LIMIT_R: Reason.LIMIT_R,
+    AxisStatus.OFF: Reason.DISABLED,
+    AxisStatus.ON: Reason.STOPPED,
+    AxisStatus.REACHED: Reason.TARGET,
+    AxisStatus.ERROR: Reason.POSITION_ERROR,
+    AxisStatus.LIMIT_L: Reason.LIMIT_L,
+    AxisStatus.LIMIT_R: Reason.LIMIT_R,
 }
 
 
-class Kind(enum.Enum):
+class MotionKind(enum.Enum):
     """What an axis was told."""
 
     POSITION = "position"
@@ -57,10 +57,10 @@ class Kind(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class MotionCommand:
     """A motion command. ``value_u`` is the position, distance or velocity; ``before`` the status of the axis before it."""
 
-    kind: Kind
+    kind: MotionKind
     value_u: float
     at: Nanos
     before: int
@@ -91,9 +91,9 @@ def status_text(code: int) -> str:
     return AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
 
 
-def reason_of(status: int, motion: Motion | None) -> Reason:
+def reason_of(status: int, motion: MotionCommand | None) -> Reason:
     """Why an axis that does not move any more stands: rest is all there is to say without a motion or after a velocity of 0."""
-    if status == Status.ON and (motion is None or (motion.kind is Kind.VELOCITY and motion.value_u == 0.0)):
+    if status == AxisStatus.ON and (motion is None or (motion.kind is MotionKind.VELOCITY and motion.value_u == 0.0)):
         return Reason.REST
     return _REASONS.get(status, Reason.STOPPED)
 

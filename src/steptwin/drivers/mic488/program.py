@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import enum
-
 from steptwin.drivers.exchange import SentLate
-from steptwin.drivers.mic488.failures import untold
+from steptwin.drivers.mic488.failures import unconfirmed
 from steptwin.drivers.mic488.unit import URGENT_TRIES, Unit
 from steptwin.errors import LineFailure
 from steptwin.mic488.registers import AXES
+from steptwin.mic488.status import ProgramState
 
 
-class ProgramState(enum.IntEnum):
-    """What PROGRAM_CTRL reads (MIC-22)."""
-
-    STOPPED = 0
-    RUNNING = 1
-    PAUSED = 2
-
-
-class AsyncProgram:
+class AsyncMic488Program:
     """The program of a controller. Programs get into it with the vendor's tool; Modbus has no function for that."""
 
     def __init__(self, unit: Unit) -> None:
@@ -54,4 +45,4 @@ class AsyncProgram:
         try:
             await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.STOPPED, urgent=True, most=URGENT_TRIES)
         except LineFailure as failure:
-            raise untold("the program", "stopped", failure) from failure
+            raise unconfirmed("the program", "stopped", failure) from failure

@@ -15,8 +15,8 @@ from steptwin.drivers.mic488.failures import NotReady
 from steptwin.drivers.mic488.motion import MOVING, status_text
 from steptwin.drivers.mic488.unit import Unit
 from steptwin.errors import Misuse
-from steptwin.mic488.registermap import DataType, Effect, Register, Type
-from steptwin.mic488.values import Item, Value, View, encoded
+from steptwin.mic488.registermap import DataType, Register, Type, WriteEffect
+from steptwin.mic488.values import RegisterItem, Value, View, encoded
 
 FORMAT = "steptwin MIC488 snapshot 1"
 _COUNTERS = ("POS_ACT", "ENC_IMP", "ENC_XPOS")
@@ -24,7 +24,7 @@ _OUTPUTS = ("OUT",)
 
 
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class Mic488Snapshot:
     """Values by name, as they travelled with ``data_type``; user registers as words, without zeros at their end."""
 
     firmware: str
@@ -43,7 +43,7 @@ class Snapshot:
         return json.dumps(data, indent=2)
 
     @classmethod
-    def from_json(cls, text: str) -> Snapshot:
+    def from_json(cls, text: str) -> Mic488Snapshot:
         """Raises `Misuse` for what is no snapshot. Whether a controller takes its values is checked before they are put back."""
         try:
             data: dict[str, Any] = json.loads(text)
@@ -64,10 +64,10 @@ def _checked(name: str, value: Any, kind: Any) -> Any:
     return value
 
 
-class Change(NamedTuple):
+class SnapshotChange(NamedTuple):
     """What putting a snapshot back changes: ``old`` is None when it is not comparable (another DATA_TYPE)."""
 
-    item: Item
+    item: RegisterItem
     old: Value | None
     new: Value
 
@@ -80,22 +80,22 @@ def _text(value: Value) -> str:
 
 
 def _kept(register: Register) -> bool:
-    return bool(register.reads) and register.effect is Effect.STORE and register.type is not Type.MEMORY
+    return bool(register.reads) and register.effect is WriteEffect.STORE and register.type is not Type.MEMORY
 
 
-async def take(unit: Unit) -> Snapshot:
+async def take(unit: Unit) -> Mic488Snapshot:
     """Read everything."""
     data_type = (await unit.control()).data_type
-    items = [Item(register) for register in unit.registers if _kept(register)]
+    items = [RegisterItem(register) for register in unit.registers if _kept(register)]
     values = await unit.read(items, data_type)
     count = unit.registers.firmware.user_registers
     user = [int(word) for word in await unit.read_user(0, View.WORD, count)]
     while user and user[-1] == 0:
         user.pop()
-    return Snapshot(unit.registers.firmware.name, data_type, {item.name: values[item] for item in items}, tuple(user))
+    return Mic488Snapshot(unit.registers.firmware.name, data_type, {item.name: values[item] for item in items}, tuple(user))
 
 
-async def changes(unit: Unit, snapshot: Snapshot, *, counters: bool, outputs: bool) -> list[Change]:
+async def changes(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outputs: bool) -> list[SnapshotChange]:
     """What `put_back` would write. Raises `Misuse` for a snapshot of another firmware, or with values that are not taken."""
     if snapshot.firmware != unit.registers.firmware.name:
         raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {unit.registers.firmware.name}")
@@ -105,26 +105,26 @@ async def changes(unit: Unit, snapshot: Snapshot, *, counters: bool, outputs: bo
     present = await take(unit)
     left_out = (() if counters else _COUNTERS) + (() if outputs else _OUTPUTS)
     comparable = present.data_type is snapshot.data_type
-    found: list[Change] = []
+    found: list[SnapshotChange] = []
     for name, new in snapshot.values.items():
         register = unit.registers.named(name)
         if register.key in left_out or not _kept(register):
             continue
         old = present.values.get(name) if comparable or register.type is not Type.VALUE else None
         if old != new:
-            found.append(Change(Item(register), old, new))
+            found.append(SnapshotChange(RegisterItem(register), old, new))
     # Values mean something only with the DATA_TYPE they were read with.
     found.sort(key=lambda change: change.item.register.key != "DATA_TYPE")
     for number in range(max(len(snapshot.user), len(present.user))):
         old, new = (words[number] if number < len(words) else 0 for words in (present.user, snapshot.user))
         if old != new:
-            found.append(Change(Item(memory, number), old, new))
+            found.append(SnapshotChange(RegisterItem(memory, number), old, new))
     for change in found:  # all of them before the first is written
         encoded(change.item, change.new, snapshot.data_type)
     return found
 
 
-async def put_back(unit: Unit, snapshot: Snapshot, *, counters: bool, outputs: bool) -> list[Change]:
+async def put_back(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outputs: bool) -> list[SnapshotChange]:
     """Write what differs, and read it back. Raises `NotReady` while an axis moves, or when a value was not kept."""
     control = await unit.control()
     moving = [f"M{axis} ({status_text(code)})" for axis, code in enumerate(control.axes, start=1) if code in MOVING]
@@ -142,7 +142,7 @@ async def put_back(unit: Unit, snapshot: Snapshot, *, counters: bool, outputs: b
     return wanted
 
 
-def _runs(changed: list[Change]) -> list[tuple[int, list[Value]]]:
+def _runs(changed: list[SnapshotChange]) -> list[tuple[int, list[Value]]]:
     """Neighbouring user registers together."""
     runs: list[tuple[int, list[Value]]] = []
     for change in changed:

@@ -11,15 +11,17 @@ from types import TracebackType
 from typing import Generic, Self
 
 from steptwin.drivers.blocking import Blocking, blocking, finish
-from steptwin.drivers.line import Line
-from steptwin.drivers.mic488.axis import AsyncAxis
+from steptwin.drivers.line import DriverLine
+from steptwin.drivers.mic488.axis import AsyncMic488Axis
 from steptwin.drivers.mic488.driver import TIMEOUT_S, AsyncMic488
-from steptwin.drivers.mic488.jog import HOLD_S, AsyncJog
+from steptwin.drivers.mic488.jog import HOLD_S, AsyncMic488Jog
 from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, ThreadModbusLine
 from steptwin.drivers.mic488.motion import MoveEnd
-from steptwin.drivers.mic488.program import AsyncProgram
+from steptwin.drivers.mic488.program import AsyncMic488Program
+from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.user import AsyncUserRegisters, AsyncUserView, Number
 from steptwin.drivers.modbus import Query
+from steptwin.drivers.subject import PERIOD_S, AsyncDeviceSubject, DeviceSubject
 from steptwin.drivers.threads import ThreadLine
 from steptwin.mic488.config import ControllerConfig
 
@@ -59,10 +61,10 @@ class ModbusLine(Blocking):
         self.close()
 
 
-class Jog(Blocking):
-    """A jog of one axis: ``with axis.jog(5.0) as jog: while pressed() and jog.hold(): pass``. See `AsyncJog`."""
+class Mic488Jog(Blocking):
+    """A jog of one axis: ``with axis.jog(5.0) as jog: while pressed() and jog.hold(): pass``. See `AsyncMic488Jog`."""
 
-    _driver: AsyncJog
+    _driver: AsyncMic488Jog
 
     @property
     def end(self) -> MoveEnd | None:
@@ -74,8 +76,8 @@ class Jog(Blocking):
         """How far the axis goes at most after it was held last, in u."""
         return self._driver.reach_u
 
-    hold = blocking(AsyncJog.hold)
-    release = blocking(AsyncJog.release)
+    hold = blocking(AsyncMic488Jog.hold)
+    release = blocking(AsyncMic488Jog.release)
 
     def __enter__(self) -> Self:
         finish(self._driver.__aenter__())
@@ -85,10 +87,10 @@ class Jog(Blocking):
         finish(self._driver.__aexit__(kind, error, trace))
 
 
-class Axis(Blocking):
-    """One axis; see `AsyncAxis`."""
+class Mic488Axis(Blocking):
+    """One axis; see `AsyncMic488Axis`."""
 
-    _driver: AsyncAxis
+    _driver: AsyncMic488Axis
 
     @property
     def number(self) -> int:
@@ -99,38 +101,38 @@ class Axis(Blocking):
         """Name of the configured unit; ``u`` where no configuration was given."""
         return self._driver.unit
 
-    def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> Jog:
-        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncAxis.jog`."""
-        return Jog(self._driver.jog(velocity_u, hold_s=hold_s))
+    def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> Mic488Jog:
+        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncMic488Axis.jog`."""
+        return Mic488Jog(self._driver.jog(velocity_u, hold_s=hold_s))
 
-    status = blocking(AsyncAxis.status)
-    position = blocking(AsyncAxis.position)
-    velocity = blocking(AsyncAxis.velocity)
-    encoder = blocking(AsyncAxis.encoder)
-    enable = blocking(AsyncAxis.enable)
-    disable = blocking(AsyncAxis.disable)
-    set_position = blocking(AsyncAxis.set_position)
-    set_ramp = blocking(AsyncAxis.set_ramp)
-    set_limits = blocking(AsyncAxis.set_limits)
-    move_to = blocking(AsyncAxis.move_to)
-    move_by = blocking(AsyncAxis.move_by)
-    move_velocity = blocking(AsyncAxis.move_velocity)
-    home = blocking(AsyncAxis.home)
-    wait = blocking(AsyncAxis.wait)
-    stop = blocking(AsyncAxis.stop)
-    jog_bit = blocking(AsyncAxis.jog_bit)
+    status = blocking(AsyncMic488Axis.status)
+    position = blocking(AsyncMic488Axis.position)
+    velocity = blocking(AsyncMic488Axis.velocity)
+    encoder = blocking(AsyncMic488Axis.encoder)
+    enable = blocking(AsyncMic488Axis.enable)
+    disable = blocking(AsyncMic488Axis.disable)
+    set_position = blocking(AsyncMic488Axis.set_position)
+    set_ramp = blocking(AsyncMic488Axis.set_ramp)
+    set_limits = blocking(AsyncMic488Axis.set_limits)
+    move_to = blocking(AsyncMic488Axis.move_to)
+    move_by = blocking(AsyncMic488Axis.move_by)
+    move_velocity = blocking(AsyncMic488Axis.move_velocity)
+    home = blocking(AsyncMic488Axis.home)
+    wait = blocking(AsyncMic488Axis.wait)
+    stop = blocking(AsyncMic488Axis.stop)
+    jog_bit = blocking(AsyncMic488Axis.jog_bit)
 
 
-class Program(Blocking):
-    """The program in the controller; see `AsyncProgram`."""
+class Mic488Program(Blocking):
+    """The program in the controller; see `AsyncMic488Program`."""
 
-    _driver: AsyncProgram
+    _driver: AsyncMic488Program
 
-    state = blocking(AsyncProgram.state)
-    select = blocking(AsyncProgram.select)
-    start = blocking(AsyncProgram.start)
-    pause = blocking(AsyncProgram.pause)
-    stop = blocking(AsyncProgram.stop)
+    state = blocking(AsyncMic488Program.state)
+    select = blocking(AsyncMic488Program.select)
+    start = blocking(AsyncMic488Program.start)
+    pause = blocking(AsyncMic488Program.pause)
+    stop = blocking(AsyncMic488Program.stop)
 
 
 class UserView(Blocking, Generic[Number]):
@@ -176,7 +178,7 @@ class UserRegisters(Blocking):
 
 
 class _ThreadMic488(AsyncMic488):
-    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> Line[Query, bytes]:
+    def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[Query, bytes]:
         return ThreadModbusLine(address, baud=baud, log=log)
 
 
@@ -202,8 +204,8 @@ class Mic488(Blocking):
             place, unit, baud=baud, firmware=firmware, config=config, timeout_s=timeout_s, observe=observe, log=log
         )
         super().__init__(driver)
-        self._axes = {number: Axis(driver.axis(number)) for number in range(1, 5)}
-        self.program = Program(driver.program)
+        self._axes = {number: Mic488Axis(driver.axis(number)) for number in range(1, 5)}
+        self.program = Mic488Program(driver.program)
         self.user = UserRegisters(driver.user)
 
     @property
@@ -222,9 +224,14 @@ class Mic488(Blocking):
     def config(self) -> ControllerConfig | None:
         return self._driver.config
 
-    def axis(self, number: int) -> Axis:
+    def axis(self, number: int) -> Mic488Axis:
         """Axis 1 to 4."""
         return self._axes[self._driver.axis(number).number]
+
+    def subject(self, name: str = "mic488", *, period_s: float = PERIOD_S) -> DeviceSubject:
+        """The device, once it was opened, with the commands, points and events of a twin. It is polled for events while there are
+        followers, at most once in ``period_s``."""
+        return DeviceSubject(AsyncDeviceSubject(name, Mic488Part(self._driver), period_s))
 
     open = blocking(AsyncMic488.open)
     close = blocking(AsyncMic488.close)

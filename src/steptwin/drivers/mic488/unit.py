@@ -10,19 +10,19 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import NamedTuple
 
 from steptwin.drivers.exchange import Job, SentLate
-from steptwin.drivers.line import Line
-from steptwin.drivers.mic488.failures import NotReady, Refused, untold
+from steptwin.drivers.line import DriverLine
+from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady, unconfirmed
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.modbus import Query, bits, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.describe import Scale, Wording
+from steptwin.mic488.describe import AxisScale, Wording
 from steptwin.mic488.registermap import DataType, RegisterMap, Type
 from steptwin.mic488.registers import AXES
-from steptwin.mic488.status import Status
-from steptwin.mic488.values import Block, Item, Value, View, encoded, moves, plan, repeatable, user_item
+from steptwin.mic488.status import AxisStatus
+from steptwin.mic488.values import Block, RegisterItem, Value, View, encoded, moves, plan, repeatable, user_item
 from steptwin.wire import pdu
 
 QUERIES_KEPT = 256
@@ -47,7 +47,7 @@ class Control(NamedTuple):
     """M1_STATUS … M4_STATUS."""
 
 
-class Notes:
+class UnitNotes:
     """What all drivers of one controller on one line share."""
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class Unit:
 
     def __init__(
         self,
-        line: Line[Query, bytes],
+        line: DriverLine[Query, bytes],
         number: int,
         registers: RegisterMap,
         config: ControllerConfig | None,
@@ -77,24 +77,24 @@ class Unit:
         self.config = config
         self.timeout_ns = timeout_ns
         self.tries = tries
-        self.notes: Notes = line.notes.setdefault(("mic488", number), Notes())
+        self.notes: UnitNotes = line.notes.setdefault(("mic488", number), UnitNotes())
         self.use(registers)
 
     def use(self, registers: RegisterMap) -> None:
         """Talk to a controller of that firmware."""
         self.registers = registers
         axes = self.config.axes if self.config is not None else ()
-        self.wording = Wording(registers, [Scale(axis.unit_name, axis.gear) for axis in axes])
+        self.wording = Wording(registers, [AxisScale(axis.unit_name, axis.gear) for axis in axes])
         frames = self.line.notes.get("frames")
         if isinstance(frames, FrameWords):
             frames.know(self.number, self.wording)
         self._queries: dict[tuple[int, int, int], Query] = {}
-        self._plans: dict[tuple[Item, ...], list[Block]] = {}
+        self._plans: dict[tuple[RegisterItem, ...], list[Block]] = {}
         keys = ("DATA_TYPE", "PROGRAM_CTRL", "AXIS_CTR_MODE")
-        self._control_items = [Item(registers.of(key)) for key in keys]
+        self._control_items = [RegisterItem(registers.of(key)) for key in keys]
         self._has_status = "M_STATUS" in {row.key for row in registers.rows}
         if self._has_status:
-            self._control_items.append(Item(registers.of("M_STATUS")))
+            self._control_items.append(RegisterItem(registers.of("M_STATUS")))
         self._control_items += self.axis_items("STATUS")
         (self._control_block,) = plan(registers, self._control_items)
         self._control_query = Query(self.number, self._control_block.request, lambda _: "read the control registers")
@@ -124,7 +124,7 @@ class Unit:
         timeout_ns: Nanos | None = None,
         most: int | None = None,
     ) -> bytes:
-        """The answer PDU. Raises `Refused` or a `LineFailure`."""
+        """The answer PDU. Raises `ModbusRefusal` or a `LineFailure`."""
         if most is None:
             most = self.tries if repeatable(self.registers, request) else 1
         if permission is None and moves(self.registers, request):
@@ -138,7 +138,7 @@ class Unit:
         try:
             return await self.line.exchange(job)
         except pdu.ModbusException as exception:
-            raise Refused(self.place, query, exception) from None
+            raise ModbusRefusal(self.place, query, exception) from None
 
     async def look(self, function: int, address: int, count: int) -> bytes:
         """The answer to a read."""
@@ -147,18 +147,18 @@ class Unit:
         if query is None:
             if len(self._queries) >= QUERIES_KEPT:
                 self._queries.clear()
-            query = self._queries[key] = Query(self.number, pdu.Read(function, address, count), self.wording.request)
+            query = self._queries[key] = Query(self.number, pdu.ReadRequest(function, address, count), self.wording.request)
         return await self._exchange(query, False, None, None, self.tries)
 
     # ------------------------------------------------------------------ values
 
-    def item(self, key: str, index: int | None = None) -> Item:
-        return Item(self.registers.of(key, index))
+    def item(self, key: str, index: int | None = None) -> RegisterItem:
+        return RegisterItem(self.registers.of(key, index))
 
-    def axis_items(self, key: str) -> list[Item]:
+    def axis_items(self, key: str) -> list[RegisterItem]:
         return [self.item(key, axis) for axis in range(1, AXES + 1)]
 
-    async def read(self, items: Iterable[Item], data_type: DataType = DataType.REAL) -> dict[Item, Value]:
+    async def read(self, items: Iterable[RegisterItem], data_type: DataType = DataType.REAL) -> dict[RegisterItem, Value]:
         """The values as they travel with ``data_type``, in as few frames as there can be."""
         wanted = tuple(items)
         blocks = self._plans.get(wanted)
@@ -166,7 +166,7 @@ class Unit:
             if len(self._plans) >= QUERIES_KEPT:
                 self._plans.clear()
             blocks = self._plans[wanted] = plan(self.registers, wanted)
-        values: dict[Item, Value] = {}
+        values: dict[RegisterItem, Value] = {}
         for block in blocks:
             request = block.request
             answer = await self.look(request.function, request.address, request.count)
@@ -179,7 +179,7 @@ class Unit:
 
     async def write(
         self,
-        item: Item,
+        item: RegisterItem,
         value: Value,
         *,
         data_type: DataType = DataType.REAL,
@@ -205,14 +205,14 @@ class Unit:
         flat: list[int] = []
         for n, value in enumerate(values):
             request = encoded(first.at(number + view.size * n), value, DataType.REAL)
-            flat += request.values if isinstance(request, pdu.WriteRegisters) else [request.value]  # type: ignore[union-attr]
+            flat += request.values if isinstance(request, pdu.WriteRegistersRequest) else [request.value]  # type: ignore[union-attr]
         most = pdu.MAX_WRITTEN_REGISTERS - pdu.MAX_WRITTEN_REGISTERS % 2
         for start in range(0, len(flat), most):
-            await self.ask(pdu.WriteRegisters(first.address + start, tuple(flat[start : start + most])))
+            await self.ask(pdu.WriteRegistersRequest(first.address + start, tuple(flat[start : start + most])))
 
     # ------------------------------------------------------------------ units
 
-    def shown(self, item: Item, value: Value, data_type: DataType) -> tuple[Value, str]:
+    def shown(self, item: RegisterItem, value: Value, data_type: DataType) -> tuple[Value, str]:
         """A value that travelled with ``data_type`` in units where they can be told, and its unit."""
         register = item.register
         axis = register.axis or (register.index if register.type is Type.VALUE else None)
@@ -224,7 +224,7 @@ class Unit:
             return value / gear, register.unit(DataType.REAL, name)
         return value, register.unit(data_type, name)
 
-    def travelling(self, item: Item, value_u: float, data_type: DataType) -> float:
+    def travelling(self, item: RegisterItem, value_u: float, data_type: DataType) -> float:
         """A value in units as it travels with ``data_type``. Raises `NotReady` where that needs an unknown GEAR."""
         axis = item.register.axis
         if item.register.type is not Type.VALUE or data_type is DataType.REAL or axis is None:
@@ -264,7 +264,7 @@ class Unit:
         values = self._control_block.values(words(answer), DataType.REAL)
         found = [int(values[item]) for item in self._control_items]
         if found[0] not in (DataType.REAL, DataType.DINT):
-            raise NotReady(f"{self.place}: unit {self.number} says DATA_TYPE = {found[0]}, which no MIC488 does")
+            raise NotReady(f"{self.place}: unit {self.number} reads DATA_TYPE = {found[0]}, which is no value of a MIC488")
         status = found[3] if self._has_status else None
         control = Control(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
         self.wording.data_type = control.data_type
@@ -280,8 +280,8 @@ class Unit:
                 "trigger: set AXIS_CTR_MODE to 0"
             )
         for axis in axes:
-            if control.axes[axis - 1] == Status.OFF:  # MIC-8
-                raise NotReady(f"{self.place}: M{axis} of unit {self.number} is switched off: enable it first")
+            if control.axes[axis - 1] == AxisStatus.OFF:  # MIC-8
+                raise NotReady(f"{self.place}: M{axis} of unit {self.number} is switched off: enable it first (M{axis}_EN = 1)")
         return control
 
     def lock(self) -> AbstractAsyncContextManager[object]:
@@ -306,13 +306,13 @@ class Unit:
             raise
 
     async def stop(self, axes: Sequence[int], key: str = "M_STOP", what: str = "stopped") -> None:
-        """Stop axes in the same instant, before everything that waits for the line. Raises `Untold`."""
+        """Stop axes in the same instant, before everything that waits for the line. Raises `Unconfirmed`."""
         for axis in axes:
             self.notes.stops[axis] += 1
         try:
             await self.write(self.item(key), axis_mask(axes), urgent=True, most=URGENT_TRIES)
         except LineFailure as failure:
-            raise untold(" ".join(f"M{axis}" for axis in axes), what, failure) from failure
+            raise unconfirmed(" ".join(f"M{axis}" for axis in axes), what, failure) from failure
 
 
 def axis_mask(axes: Iterable[int]) -> int:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.mic488.failures import MoveFailed
-from steptwin.drivers.mic488.motion import MOVING, Kind, Motion, MoveEnd, Reason, reason_of, status_text, travel_s
+from steptwin.drivers.mic488.motion import MOVING, MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text, travel_s
 from steptwin.drivers.mic488.unit import Control, Unit
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.mic488.status import Status
+from steptwin.mic488.status import AxisStatus
 
 POLL_S = 0.05
 SHARED_NS: Nanos = 30 * MILLISECOND
@@ -25,10 +25,10 @@ CORRECTION_S = 5.0
 unless its configuration says otherwise."""
 
 
-class Watch:
+class AxisWait:
     """Waits for one axis. ``motion`` is what it was told last, if we told it."""
 
-    def __init__(self, unit: Unit, axis: int, motion: Motion | None, timeout_s: float | None) -> None:
+    def __init__(self, unit: Unit, axis: int, motion: MotionCommand | None, timeout_s: float | None) -> None:
         self._unit = unit
         self._axis = axis
         self._motion = motion
@@ -49,7 +49,7 @@ class Watch:
         motion = self._motion
         if status in MOVING:
             now = self._unit.line.now()
-            corrects = status == Status.CORRECTION  # which follows the motion that the time was computed of
+            corrects = status == AxisStatus.CORRECTION  # which follows the motion that the time was computed of
             if self._limit is None or (self._is_computed and corrects is not self._corrects):
                 self._limit = now + round(await self._time_out_s(status) * SECOND)
                 self._corrects = corrects
@@ -70,7 +70,7 @@ class Watch:
         raw = (await unit.read([item], data_type))[item]
         position, name = unit.shown(item, raw, data_type)
         gear = unit.gear(axis)
-        if reason is Reason.TARGET and motion is not None and motion.kind is Kind.POSITION and gear is not None:
+        if reason is Reason.TARGET and motion is not None and motion.kind is MotionKind.POSITION and gear is not None:
             # A REAL has 24 bits; half a pulse is what the target was rounded by (MIC-14).
             tolerance = 0.51 / gear + abs(motion.value_u) * 2.0**-22
             if abs(position - motion.value_u) > tolerance:
@@ -80,20 +80,20 @@ class Watch:
     async def _time_out_s(self, status: int) -> float:
         """How long the motion may take from now on."""
         unit, axis, motion = self._unit, self._axis, self._motion
-        if status == Status.CORRECTION:
+        if status == AxisStatus.CORRECTION:
             known = unit.config.axes[axis - 1] if unit.config is not None else None
             patience_s = 0.0 if known is None else (known.enc_settle_ms + known.err_time_ms) / 1000.0 + MARGIN_S
             return max(CORRECTION_S, patience_s)
-        if status == Status.HOMING:
+        if status == AxisStatus.HOMING:
             return UNKNOWN_S
         position, velocity, acc, dec, vmax = await dynamics(unit, axis)
-        if status == Status.VELOCITY:
-            if motion is not None and motion.kind is Kind.VELOCITY and motion.value_u == 0.0:
+        if status == AxisStatus.VELOCITY:
+            if motion is not None and motion.kind is MotionKind.VELOCITY and motion.value_u == 0.0:
                 return MARGIN * abs(velocity) / acc + MARGIN_S
             raise Misuse(f"M{axis} runs in velocity mode and does not end by itself: give the time to wait, timeout_s")
-        if motion is None or motion.kind not in (Kind.POSITION, Kind.DISTANCE):
+        if motion is None or motion.kind not in (MotionKind.POSITION, MotionKind.DISTANCE):
             return UNKNOWN_S
-        distance = motion.value_u - position if motion.kind is Kind.POSITION else motion.value_u
+        distance = motion.value_u - position if motion.kind is MotionKind.POSITION else motion.value_u
         duration = travel_s(distance, velocity, acc, dec, vmax)
         return UNKNOWN_S if duration is None else MARGIN * duration + MARGIN_S
 
@@ -107,7 +107,7 @@ async def dynamics(unit: Unit, axis: int) -> tuple[float, float, float, float, f
     return position, velocity, acc, dec, vmax
 
 
-async def wait_for(unit: Unit, watches: dict[int, Watch], *, check: bool) -> dict[int, MoveEnd]:
+async def wait_for(unit: Unit, watches: dict[int, AxisWait], *, check: bool) -> dict[int, MoveEnd]:
     """Until all axes have ended, or with ``check`` until one has ended otherwise than meant: then its `MoveFailed` is raised.
 
     A line that fails ends the waiting: with ``check`` as the failure, else as the end of all who still move.

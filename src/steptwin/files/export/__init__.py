@@ -1,4 +1,4 @@
-"""Traces as files: JSON lines that say everything, and what other programs show of it.
+"""Traces as files: JSON lines with everything, and formats of other programs.
 
 | format | shows | needs |
 |---|---|---|
@@ -19,16 +19,30 @@ from pathlib import Path
 from typing import NamedTuple
 
 from steptwin.errors import Misuse
-from steptwin.files.export.axes import AxisView, AxisViews, axis_views
+from steptwin.files.export.axes import axis_views, controller_views
 from steptwin.files.export.progress import Progress, Watch, bar, unwatched
 from steptwin.files.export.recording import Recording, sort_out
 from steptwin.files.export.records import SavedTrace, read_records, write_records
 from steptwin.files.textfiles import check_writable
 from steptwin.inputfiles import open_regular
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.system import reason
+from steptwin.world.lanes import AxisLane, AxisViews
 from steptwin.world.trace import Trace
 
-__all__ = ["FORMATS", "AxisView", "AxisViews", "SavedTrace", "axis_views", "bar", "check_target", "read_trace", "write_trace"]
+__all__ = [
+    "FORMATS",
+    "AxisLane",
+    "AxisViews",
+    "SavedTrace",
+    "axis_views",
+    "bar",
+    "check_target",
+    "controller_views",
+    "growing_file",
+    "read_trace",
+    "write_trace",
+]
 
 NAME = "trace"
 """What files are called in a directory."""
@@ -44,7 +58,7 @@ class _Options(NamedTuple):
     """Whether signals may be texts."""
 
 
-class Format(NamedTuple):
+class Exporter(NamedTuple):
     """``needs`` are modules; ``extra`` is what installs them."""
 
     meaning: str
@@ -97,14 +111,14 @@ def _svg(recording: Recording, path: Path, options: _Options) -> None:
     write_plot(recording if options.window else recording.to_last_change(), path, "svg", options.progress)
 
 
-FORMATS: Mapping[str, Format] = {
-    "jsonl": Format("every record, exactly", (), "", None),
-    "html": Format("a timeline for the browser", (), "", _html),
-    "png": Format("a picture", ("matplotlib",), "plots", _png),
-    "svg": Format("a picture", ("matplotlib",), "plots", _svg),
-    "vcd": Format("signals for GTKWave", ("numpy",), "numbers", _vcd),
-    "csv": Format("samples", ("numpy",), "numbers", _csv),
-    "parquet": Format("samples", ("numpy", "pyarrow"), "parquet", _parquet),
+FORMATS: Mapping[str, Exporter] = {
+    "jsonl": Exporter("every record, exactly", (), "", None),
+    "html": Exporter("a timeline for the browser", (), "", _html),
+    "png": Exporter("a picture", ("matplotlib",), "plots", _png),
+    "svg": Exporter("a picture", ("matplotlib",), "plots", _svg),
+    "vcd": Exporter("signals for GTKWave", ("numpy",), "numbers", _vcd),
+    "csv": Exporter("samples", ("numpy",), "numbers", _csv),
+    "parquet": Exporter("samples", ("numpy", "pyarrow"), "parquet", _parquet),
 }
 USUAL = ("jsonl", "html", "png")
 """What a directory gets: small however long the run was. Those whose libraries are missing are left out."""
@@ -125,7 +139,7 @@ def write_trace(
     texts: bool = True,
     watch: Watch = unwatched,
 ) -> list[Path]:
-    """Write ``trace`` to a file, whose suffix says its format, or into a directory, as ``trace.jsonl`` and so on; what was
+    """Write ``trace`` to a file, whose suffix selects its format, or into a directory, as ``trace.jsonl`` and so on; what was
     written.
 
     ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``title`` is the name of what ran, and
@@ -162,7 +176,7 @@ def write_trace(
             finally:
                 unfinished.unlink(missing_ok=True)
         except OSError as error:
-            raise Misuse(f"cannot write {path}: {error.strerror or error}") from error
+            raise Misuse(f"cannot write {path}: {reason(error)}") from error
     return [path for _, path in targets]
 
 
@@ -170,6 +184,14 @@ def check_target(where: Path | str) -> None:
     """Whether `write_trace` can write there, before much is done for it. Raises `Misuse`."""
     for _, path in _targets(Path(where), None):
         check_writable(path)
+
+
+def growing_file(where: Path) -> Path:
+    """The JSON lines that are written while a world runs, when `write_trace` is to make ``where`` of them in the end."""
+    name, path = _targets(where, None)[0]
+    if name == "jsonl":
+        return path
+    return path.with_name(f".{path.name}.jsonl")
 
 
 def _targets(where: Path, formats: Sequence[str] | None) -> list[tuple[str, Path]]:
@@ -203,7 +225,7 @@ def _check(name: str) -> None:
 def read_trace(where: Path | str) -> SavedTrace:
     """What `write_trace` wrote as JSON lines: a file, or a directory with ``trace.jsonl``.
 
-    Raises `Misuse` where it cannot be read, is not a trace, or is not as it was written (its digest tells).
+    Raises `Misuse` where it cannot be read, is not a trace, or is not as it was written (checked by its digest).
     """
     path = Path(where)
     if path.is_dir():

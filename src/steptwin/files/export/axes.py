@@ -1,110 +1,32 @@
-"""How the axes of a trace are shown: unit, and the terminals that carry their pulses or currents.
-
-A trace knows pulses only. A view is static: it is read from a machine once and then goes with the trace.
-"""
+"""The views with which the axes of a world are exported."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING
 
-from steptwin.machine import MICROSECOND, Nanos
+from steptwin.machine import MotionController
+from steptwin.world.kind import AnyKind
+from steptwin.world.lanes import AxisLane, AxisViews, Mechanics
 
 if TYPE_CHECKING:
     from steptwin.world.build import Fitted
+    from steptwin.world.plant import Plant
 
 
-class StepOutputs(NamedTuple):
-    """STEP and DIR of one axis."""
-
-    step: str = "STEP"
-    dir: str | None = "DIR"
-    """None: the machine has this pin itself, so that its edges are in the trace."""
-    active_low: bool = False
-    width_ns: Nanos = 5 * MICROSECOND
-    """How long a pulse is drawn; shorter where the next one comes within twice this time."""
-
-
-class PhaseOutputs(NamedTuple):
-    """Two phase currents, −127…127, that follow a waveform (`steptwin.motion.waveforms`)."""
-
-    phases: tuple[str, str] = ("PHASE1", "PHASE2")
-    characteristic: int = 1
-    """Until the trace says otherwise: an edge of ``characteristic_pin``."""
-    characteristic_pin: str = "N"
-
-
-class Mechanics(NamedTuple):
-    """What an axis moves, which has a name, a unit and a zero of its own.
-
-    Its true position is (pulses of the load + ``zero_p``) / ``pulses_per_unit``; negative where positive pulses go down.
-    """
-
-    name: str
-    unit: str
-    pulses_per_unit: float
-    zero_p: int = 0
-    is_ideal: bool = True
-    """Whether the load is where the pulses have it, unless a trace says otherwise."""
-
-    @property
-    def position_name(self) -> str:
-        return f"{self.name}_true_position_{self.unit}"
-
-
-class AxisView(NamedTuple):
-    """``pulses_per_unit``: units of its profiles in one ``unit``."""
-
-    name: str
-    unit: str = "imp"
-    pulses_per_unit: float = 1.0
-    outputs: StepOutputs | PhaseOutputs = StepOutputs()
-    mechanics: Mechanics | None = None
-
-    # Names of variables and columns.
-
-    @property
-    def position_name(self) -> str:
-        return f"{self.name}_position_{self.unit}"
-
-    @property
-    def counted_name(self) -> str:
-        return f"{self.name}_since_power_on_{self.unit}"
-
-    @property
-    def velocity_name(self) -> str:
-        return f"{self.name}_velocity_{self.unit}_s"
-
-
-NOTHING_FITTED: Mapping[str, Fitted] = {}
-
-AxisViews: TypeAlias = Mapping[tuple[str, str], AxisView]
-"""By machine and subject of its ``plan`` records (``"1"``…)."""
-
-
-def plain_view(axis: str) -> AxisView:
-    """The view of an axis of which nothing is known."""
-    return AxisView(f"M{axis}", outputs=StepOutputs(f"M{axis}_STEP", f"M{axis}_DIR"))
-
-
-def axis_views(machines: Mapping[str, object], axes: Mapping[str, Fitted] = NOTHING_FITTED) -> dict[tuple[str, str], AxisView]:
-    """The views of all axes of ``machines``, with the mechanics of ``axes``; both by name, as a world has them."""
-    from steptwin.files.export.m1486_axes import chip_views
-    from steptwin.m1486.chip import M1486
-    from steptwin.mic488.device import Mic488
-
-    views: dict[tuple[str, str], AxisView] = {}
-    for name, machine in machines.items():
-        if isinstance(machine, Mic488):
-            for axis in machine.axes:
-                number = str(axis.number)
-                views[name, number] = plain_view(number)._replace(unit=axis.config.unit_name, pulses_per_unit=axis.gear)
-        elif isinstance(machine, M1486):
-            views |= chip_views({name: machine})
-    for fitted in axes.values():
+def axis_views(world: Plant) -> AxisViews:
+    """The views of all axes of the controllers in a world, with the mechanics that they move."""
+    views: dict[tuple[str, str], AxisLane] = {}
+    for name, machine in world.machines.items():
+        views |= controller_views(name, world.kind(name), machine)
+    for fitted in world.axes.values():
         place = fitted.mechanism.machine, str(fitted.mechanism.number)
         views[place] = views[place]._replace(mechanics=_mechanics(fitted))
     return views
+
+
+def controller_views(name: str, kind: AnyKind, machine: MotionController) -> dict[tuple[str, str], AxisLane]:
+    """The views of the axes of one controller, for traces in which it is called ``name``."""
+    return {(name, axis): view for axis, view in kind.lanes(machine).items()}
 
 
 def _mechanics(fitted: Fitted) -> Mechanics:

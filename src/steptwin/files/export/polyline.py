@@ -29,7 +29,7 @@ class Curve(NamedTuple):
     velocities: list[float]
 
 
-class Piece(NamedTuple):
+class PolylinePiece(NamedTuple):
     """A segment, or rest (None), from ``begin`` to ``end``."""
 
     profile: Profile
@@ -67,21 +67,21 @@ def curve(track: AxisTrack, begin: Nanos, until: Nanos, resolution: Nanos = 0) -
     return points
 
 
-def pieces_of(profile: Profile, begin: Nanos, until: Nanos) -> list[Piece]:
+def pieces_of(profile: Profile, begin: Nanos, until: Nanos) -> list[PolylinePiece]:
     """What ``profile`` does from ``begin`` to ``until``, without gaps."""
-    pieces: list[Piece] = []
+    pieces: list[PolylinePiece] = []
     at = begin
     for segment, end_ns in zip(profile.segments, profile.ends, strict=True):
         end = until if end_ns == inf else min(profile.start + int(end_ns), until)
         if end > at:
-            pieces.append(Piece(profile, segment, at, end))
+            pieces.append(PolylinePiece(profile, segment, at, end))
             at = end
     if at < until:
-        pieces.append(Piece(profile, None, at, until))
+        pieces.append(PolylinePiece(profile, None, at, until))
     return pieces
 
 
-def _points(piece: Piece, *courses: tuple[float, float, float]) -> int:
+def _points(piece: PolylinePiece, *courses: tuple[float, float, float]) -> int:
     """In how many equal parts to divide; each course is the value at the beginning, at the end, and what may be missed."""
     most = 0.0
     for quarter in (1, 2, 3):

@@ -13,11 +13,11 @@ Progress: TypeAlias = Callable[[Nanos], None]
 """Called with the moment up to which an export is done."""
 
 Watch: TypeAlias = Callable[[str, Nanos, Nanos], AbstractContextManager[Progress]]
-"""Called with what is done, from when and until when; gives whom to tell while it lasts."""
+"""Called with what is done, from when and until when; gives the function to call while it lasts."""
 
 
 def silent(_: Nanos) -> None:
-    """Nobody watches."""
+    """No progress is shown."""
 
 
 @contextmanager

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 from operator import attrgetter
 
 from steptwin.errors import Misuse
-from steptwin.files.export.axes import AxisView, AxisViews, plain_view
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.world.course import Carried
-from steptwin.world.trace import Record, Trace
+from steptwin.world.lanes import AxisLane, AxisViews, plain_view
+from steptwin.world.trace import Trace, TraceRecord
 
 
 @dataclass(slots=True)
@@ -22,7 +22,7 @@ class AxisTrack:
     """The plans of an axis: each counts from its moment to that of the next. There is one at the beginning of the window."""
 
     machine: str
-    view: AxisView
+    view: AxisLane
     times: list[Nanos] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
     loads: list[Carried] = field(default_factory=list)
@@ -68,7 +68,7 @@ class AxisTrack:
         mechanics = self.view.mechanics
         if mechanics is None or (mechanics.is_ideal and not self.loads):
             return None
-        view = AxisView(f"{mechanics.name} true", mechanics.unit, mechanics.pulses_per_unit)
+        view = AxisLane(f"{mechanics.name} true", mechanics.unit, mechanics.pulses_per_unit)
         track = AxisTrack(self.machine, view)
         for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
             past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
@@ -133,7 +133,7 @@ class Recording:
     machines: list[str]
     axes: list[AxisTrack]
     pins: list[PinTrack]
-    marks: list[Record]
+    marks: list[TraceRecord]
     """Frames, statements, events, inputs and faults, in order."""
     last: Nanos
     """When something changed last, analog inputs apart: their sources never end; ``until`` where something moves on."""
@@ -145,7 +145,7 @@ class Recording:
             return self
         return replace(self, until=min(self.until, self.last + (self.last - self.begin) // 32 + MILLISECOND))
 
-    def of(self, kind: str) -> list[Record]:
+    def of(self, kind: str) -> list[TraceRecord]:
         return [record for record in self.marks if record.kind == kind]
 
 
@@ -167,10 +167,10 @@ def sort_out(
     order = {name: i for i, name in enumerate(chosen)}
     axes: dict[tuple[str, str], AxisTrack] = {}
     pins: dict[tuple[str, str], PinTrack] = {}
-    marks: list[Record] = []
+    marks: list[TraceRecord] = []
     last = changed = begin
     for record in trace:
-        time, machine, kind, subject, value = record
+        time, machine, kind, subject, value, _ = record
         if machine not in order:
             continue
         if until is not None and time > until:

@@ -1,11 +1,9 @@
 """A trace as JSON lines: all that was recorded, exactly, one record a line; and back.
 
-The first line says what the file is: a title, names of the machines, how their axes are shown, the end of the run, the digest.
-Every other line is a record: ``time_ns``, ``machine``, ``kind``, ``subject``, ``value``. The value of a plan is its profile:
-moments in nanoseconds, positions in pulses, and for each segment ``[end_s, anchor_s, c0, c1, c2, c3, direction]`` with
-position = base + c0 + c1·u + c2·u² + c3·u³, u = seconds since ``start_ns`` − anchor_s; an end or a limit that never
-comes is null. A segment of an arc is ``{"way": [its segment], "course": [centre_p, radius_p, angle_q, turn_q], …}`` with
-position = base + centre + radius · cos((angle + turn · way) · 90°). Bytes are ``{"hex": …}``.
+The first line is the head of the file: a title, names of the machines, how their axes are shown, the end of the run, the digest.
+A file that is written while a world runs has the end of the run and the digest in its last line; one that was cut has none.
+Every other line is a record: ``time_ns``, ``machine``, ``kind``, ``subject``, ``value``, and ``facts`` where its text has some.
+The value of a plan is as `steptwin.motion.plain` has it; bytes are ``{"hex": …}``.
 """
 
 from __future__ import annotations
@@ -13,21 +11,20 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator, Mapping
-from math import inf
 from typing import IO, Any, NamedTuple
 
+from steptwin.durations import LONGEST_NS as LATEST_NS
 from steptwin.errors import Misuse
-from steptwin.files.export.axes import AxisView, AxisViews, Mechanics, PhaseOutputs, StepOutputs
 from steptwin.files.export.progress import Progress
-from steptwin.files.plaintypes import fields_fit, fits, fitting, shown
 from steptwin.machine import Nanos
-from steptwin.motion import Profile, Segment
-from steptwin.motion.divisions import Division, Microstepping, StepTrain
-from steptwin.motion.paths import ArcProfile, ArcSegment, Circular
-from steptwin.world.durations import LONGEST_NS as LATEST_NS
-from steptwin.world.trace import KINDS, Record, Trace
+from steptwin.motion import Profile
+from steptwin.motion.divisions import StepTrain
+from steptwin.motion.plain import plain_plan, read_plan
+from steptwin.plaintypes import fields_fit, fits, fitting, shown
+from steptwin.world.lanes import AxisLane, AxisViews, Mechanics, PhaseOutputs, StepOutputs
+from steptwin.world.trace import KINDS, Trace, TraceRecord
 
-FORMAT = 1
+FORMAT = 2
 LONGEST_LINE = 4 << 20
 """Bytes of a line; a plan with thousands of segments has some 100 000."""
 LONGEST_NUMBER = 20
@@ -36,10 +33,10 @@ _PROGRESS_EVERY = 5000
 
 
 class SavedTrace(NamedTuple):
-    """What a file of JSON lines says."""
+    """The content of a file of JSON lines."""
 
     trace: Trace
-    views: dict[tuple[str, str], AxisView]
+    views: dict[tuple[str, str], AxisLane]
     until: Nanos
     """When the run ended."""
     digest: str
@@ -47,34 +44,53 @@ class SavedTrace(NamedTuple):
 
 
 def write_records(trace: Trace, views: AxisViews, file: IO[str], progress: Progress, *, title: str, until: Nanos) -> None:
-    axes = [{"machine": machine, "axis": axis, **_view_to_json(view)} for (machine, axis), view in views.items()]
-    head = {
-        "steptwin_trace": FORMAT,
-        "title": title,
-        "machines": trace.machines,
-        "until_ns": until,
-        "digest": trace.digest(),
-        "axes": axes,
-    }
-    file.write(_line(head))
-    for i, (time, machine, kind, subject, value) in enumerate(trace):
-        file.write(_line({"time_ns": time, "machine": machine, "kind": kind, "subject": subject, "value": _to_json(value)}))
+    file.write(_line({**_head_of(trace, views, title), "until_ns": until, "digest": trace.digest()}))
+    for i, record in enumerate(trace):
+        file.write(record_line(record))
         if i % _PROGRESS_EVERY == 0:
-            progress(time)
+            progress(record.time)
+
+
+def begin_records(trace: Trace, views: AxisViews, title: str) -> str:
+    """The first line of a file that is written while a world runs: its end is in the last one, `end_records`."""
+    return _line({**_head_of(trace, views, title), "until_ns": None, "digest": None})
+
+
+def end_records(trace: Trace, until: Nanos) -> str:
+    return _line({"until_ns": until, "digest": trace.digest()})
+
+
+def record_line(record: TraceRecord) -> str:
+    time, machine, kind, subject, value, facts = record
+    line = {"time_ns": time, "machine": machine, "kind": kind, "subject": subject, "value": _to_json(value)}
+    return _line({**line, "facts": dict(facts)} if facts else line)
+
+
+def _head_of(trace: Trace, views: AxisViews, title: str) -> dict[str, object]:
+    axes = [{"machine": machine, "axis": axis, **_view_to_json(view)} for (machine, axis), view in views.items()]
+    return {"steptwin_trace": FORMAT, "title": title, "machines": trace.machines, "axes": axes}
 
 
 def read_records(file: IO[bytes], name: str) -> SavedTrace:
     """Raises `Misuse` with ``name`` and the line where it is not what `write_records` writes."""
     saved: SavedTrace | None = None
+    is_open, latest = False, 0  # whether the end of the run is still to be said
     for number, line in enumerate(_lines(file), 1):
         try:
             if len(line) > LONGEST_LINE:
                 raise Misuse(f"a line of more than {LONGEST_LINE} bytes")
+            if is_open and not line.endswith(b"\n"):
+                break  # it was being written when its process was ended
             data = json.loads(line, parse_int=_whole)
             if saved is None:
-                saved = _head(data)
+                is_open = data.get("until_ns", 0) is None
+                saved = _head({**data, "until_ns": 0, "digest": ""} if is_open else data)
+            elif is_open and "kind" not in data:
+                saved, is_open = saved._replace(until=_until(data), digest=fitting("digest", data["digest"], str)), False
             else:
-                saved.trace.add(_record(data))
+                record = _record(data)
+                saved.trace.add(record)
+                latest = max(latest, record.time)
         except Misuse as error:
             raise Misuse(f"{name}:{number}: {error}") from error
         except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, struct.error) as error:
@@ -82,6 +98,8 @@ def read_records(file: IO[bytes], name: str) -> SavedTrace:
             raise Misuse(f"{name}:{number}: not {what} of a trace") from error
     if saved is None:
         raise Misuse(f"{name} is empty: a trace begins with a line about itself")
+    if is_open:  # the run was cut
+        return saved._replace(until=latest)
     try:
         digest = saved.trace.digest()
     except (Misuse, ArithmeticError, struct.error):
@@ -109,7 +127,7 @@ def _line(data: dict[str, Any]) -> str:
 def _head(data: dict[str, Any]) -> SavedTrace:
     if data["steptwin_trace"] != FORMAT:
         raise Misuse(f"a trace of format {shown(data['steptwin_trace'])}: this version reads format {FORMAT}")
-    views: dict[tuple[str, str], AxisView] = {}
+    views: dict[tuple[str, str], AxisLane] = {}
     for axis in data["axes"]:
         view = _view_from_json(axis)
         if not (fields_fit(view) and fields_fit(view.outputs) and view.pulses_per_unit):
@@ -118,14 +136,18 @@ def _head(data: dict[str, Any]) -> SavedTrace:
             raise TypeError("mechanics")
         views[fitting("machine", axis["machine"], str), fitting("axis", axis["axis"], str)] = view
     machines = fitting("machines", tuple(data["machines"]), tuple[str, ...])
+    title = fitting("title", data.get("title", ""), str)
+    return SavedTrace(Trace(machines), views, _until(data), fitting("digest", data["digest"], str), title)
+
+
+def _until(data: dict[str, Any]) -> Nanos:
     until = fitting("until_ns", data["until_ns"], int)
     if not 0 <= until <= LATEST_NS:
         raise Misuse(f"until_ns is {until}: permitted are 0 to {LATEST_NS}")
-    title = fitting("title", data.get("title", ""), str)
-    return SavedTrace(Trace(machines), views, until, fitting("digest", data["digest"], str), title)
+    return until
 
 
-def _record(data: dict[str, Any]) -> Record:
+def _record(data: dict[str, Any]) -> TraceRecord:
     kind = data["kind"]
     if kind not in KINDS:
         raise Misuse(f"no kind of record {shown(kind)}: kinds are {', '.join(KINDS)}")
@@ -135,7 +157,10 @@ def _record(data: dict[str, Any]) -> Record:
     time = fitting("time_ns", data["time_ns"], int)
     if not 0 <= time <= LATEST_NS:
         raise Misuse(f"time_ns is {time}: permitted are 0 to {LATEST_NS}")
-    return Record(time, fitting("machine", data["machine"], str), kind, fitting("subject", data["subject"], str), value)
+    facts = tuple((fitting("facts", name, str), fitting("facts", one, _FACT)) for name, one in data.get("facts", {}).items())
+    return TraceRecord(
+        time, fitting("machine", data["machine"], str), kind, fitting("subject", data["subject"], str), value, facts
+    )
 
 
 def _is_value(kind: str, value: object) -> bool:
@@ -145,6 +170,7 @@ def _is_value(kind: str, value: object) -> bool:
     return kind not in _VALUES or fits(value, _VALUES[kind])
 
 
+_FACT = int | float | str | bool | None
 _VALUES: Mapping[str, Any] = {"load": tuple[tuple[int, bool, int], ...], "coordinate": int, "edge": float, "frame": bytes}
 
 
@@ -152,12 +178,8 @@ _VALUES: Mapping[str, Any] = {"load": tuple[tuple[int, bool, int], ...], "coordi
 
 
 def _to_json(value: object) -> object:
-    if isinstance(value, StepTrain):
-        fine, coarse, limit = value.microstepping
-        grids = (fine, coarse, None if limit == inf else limit)
-        return {**_profile_to_json(value.profile), "microstepping": grids, "divisions": value.divisions}
-    if isinstance(value, Profile):
-        return _profile_to_json(value)
+    if isinstance(value, Profile | StepTrain):
+        return plain_plan(value)
     if isinstance(value, bytes):
         return {"hex": value.hex()}
     if isinstance(value, tuple):
@@ -170,59 +192,16 @@ def _from_json(value: Any) -> object:
         return tuple(_from_json(item) for item in value)
     if not isinstance(value, dict):
         return value
-    if "hex" in value:
-        return bytes.fromhex(value["hex"])
-    profile = _profile_from_json(value)
-    if "divisions" in value:
-        divisions = tuple(Division(*fitting("a division", tuple(one), tuple[int, int])) for one in value["divisions"])
-        fine, coarse, limit = fitting("microstepping", tuple(value["microstepping"]), tuple[int, int, float | None])
-        return StepTrain(profile, Microstepping(fine, coarse, inf if limit is None else limit), divisions)
-    return profile
+    return bytes.fromhex(value["hex"]) if "hex" in value else read_plan(value)
 
 
-def _profile_to_json(profile: Profile) -> dict[str, object]:
-    segments = [_segment_to_json(segment) for segment in profile.segments]
-    return {"start_ns": profile.start, "base": profile.base, "final": profile.final_p, "segments": segments}
-
-
-def _profile_from_json(data: dict[str, Any]) -> Profile:
-    start, base = fitting("start_ns", data["start_ns"], int), fitting("base", data["base"], int)
-    final = fitting("final", data["final"], float)
-    if any(isinstance(segment, dict) for segment in data["segments"]):
-        return ArcProfile(start, base, tuple(_arc_from_json(segment) for segment in data["segments"]), final)
-    return Profile(start, base, tuple(_segment_from_json(segment) for segment in data["segments"]), final)
-
-
-def _segment_to_json(s: Segment | ArcSegment) -> object:
-    end_s = None if s.end_s == inf else s.end_s
-    if isinstance(s, Segment):
-        return end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction
-    c = s.course
-    course = (c.centre_p, c.radius_p, c.angle_q, c.turn_q)
-    way = _segment_to_json(s.way)
-    return {"end_s": end_s, "direction": s.direction, "way": way, "course": course, "half": s.half, "end_p": s.end_p}
-
-
-def _segment_from_json(data: list[Any]) -> Segment:
-    end_s, *rest = fitting("a segment", tuple(data), tuple[float | None, float, float, float, float, float, int])
-    return Segment(inf if end_s is None else end_s, *rest)
-
-
-def _arc_from_json(data: dict[str, Any]) -> ArcSegment:
-    end_s = fitting("end_s", data["end_s"], float | None)
-    course = Circular(*fitting("course", tuple(data["course"]), tuple[float, float, float, float]))
-    direction, half = fitting("direction", data["direction"], int), fitting("half", data["half"], int)
-    way, end_p = _segment_from_json(data["way"]), fitting("end_p", data["end_p"], float)
-    return ArcSegment(inf if end_s is None else end_s, direction, way, course, half, end_p)
-
-
-def _view_to_json(view: AxisView) -> dict[str, object]:
+def _view_to_json(view: AxisLane) -> dict[str, object]:
     data = {**view._asdict(), "outputs": view.outputs._asdict()}
     del data["mechanics"]
     return data if view.mechanics is None else {**data, "mechanics": view.mechanics._asdict()}
 
 
-def _view_from_json(data: dict[str, Any]) -> AxisView:
+def _view_from_json(data: dict[str, Any]) -> AxisLane:
     outputs = dict(data["outputs"])
     made: StepOutputs | PhaseOutputs
     if "phases" in outputs:
@@ -231,4 +210,4 @@ def _view_from_json(data: dict[str, Any]) -> AxisView:
     else:
         made = StepOutputs(**outputs)
     mechanics = Mechanics(**data["mechanics"]) if "mechanics" in data else None
-    return AxisView(data["name"], data["unit"], data["pulses_per_unit"], made, mechanics)
+    return AxisLane(data["name"], data["unit"], data["pulses_per_unit"], made, mechanics)

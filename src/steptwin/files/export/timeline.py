@@ -12,13 +12,13 @@ from html import escape
 from importlib.resources import files
 from typing import IO
 
-from steptwin.files.export.polyline import Piece, pieces_of
+from steptwin.files.export.polyline import PolylinePiece, pieces_of
 from steptwin.files.export.progress import Progress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
-from steptwin.world.trace import Record
+from steptwin.world.trace import TraceRecord
 
 _SCRIPTS = ("model.js", "draw.js", "timeline.js")
 _CLOSE_P = 0.01
@@ -83,7 +83,7 @@ def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[Piece, int, int]]:
+def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylinePiece, int, int]]:
     """(piece, grid, counted position where it begins); a piece ends where the division changes."""
     profile = profile_of(plan)
     cuts: list[Nanos] = []
@@ -97,7 +97,7 @@ def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[Piece, in
             yield piece, grid, plan.count(max(piece.begin, profile.start))
 
 
-def _cubics(piece: Piece) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
+def _cubics(piece: PolylinePiece) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
     """Moments and coefficients, in seconds from there, of the polynomials that make up ``piece``."""
     segment = piece.segment
     if segment is None:
@@ -108,7 +108,7 @@ def _cubics(piece: Piece) -> Iterator[tuple[Nanos, tuple[float, float, float, fl
         yield from _along_arc(piece, piece.begin, piece.end)
 
 
-def _along_arc(piece: Piece, begin: Nanos, end: Nanos) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
+def _along_arc(piece: PolylinePiece, begin: Nanos, end: Nanos) -> Iterator[tuple[Nanos, tuple[float, float, float, float]]]:
     """Halved until the cubics are close."""
     c0, c1, c2, c3 = cubic = _between(piece, begin, end)
     middle = (begin + end) // 2
@@ -130,7 +130,7 @@ def _from(s: Segment, profile: Profile, begin: Nanos) -> tuple[float, float, flo
     )
 
 
-def _between(piece: Piece, begin: Nanos, end: Nanos) -> tuple[float, float, float, float]:
+def _between(piece: PolylinePiece, begin: Nanos, end: Nanos) -> tuple[float, float, float, float]:
     """The cubic with the positions and velocities of ``piece`` at both moments."""
     (p0, v0), (p1, v1) = piece.look(begin), piece.look(end)
     d = (end - begin) / SECOND
@@ -154,7 +154,7 @@ def _pin(pin: PinTrack, recording: Recording) -> dict[str, object]:
     }
 
 
-def _mark(record: Record, begin: Nanos) -> list[object]:
+def _mark(record: TraceRecord, begin: Nanos) -> list[object]:
     """Moment (ns), machine, kind, subject, text."""
     value = record.value
     if isinstance(value, bytes):

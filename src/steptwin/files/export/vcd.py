@@ -17,7 +17,6 @@ from typing import IO, NamedTuple, TypeAlias
 import numpy as np
 
 from steptwin import __version__
-from steptwin.files.export.axes import PhaseOutputs, StepOutputs
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import Progress
 from steptwin.files.export.recording import AxisTrack, PinTrack, Recording
@@ -27,6 +26,7 @@ from steptwin.motion import Profile
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.pulses import pulse_runs, step_times
 from steptwin.motion.waveforms import PERIOD, currents
+from steptwin.world.lanes import PhaseOutputs, StepOutputs
 
 _WINDOW_CHANGES = 1 << 20
 """About how many changes are in memory at a time."""
@@ -168,7 +168,7 @@ class _Dump:
     def _add_texts(self, recording: Recording, quiet: _Quiet) -> None:
         """One variable for each link and direction, for the lines of each program, for events, faults and inputs."""
         changes: dict[tuple[str, str, str], _Quiet] = {}
-        for time, machine, kind, subject, value in recording.marks:
+        for time, machine, kind, subject, value, _ in recording.marks:
             name = f"{kind}s" if kind in {"event", "fault", "input"} else f"{subject}_line" if kind == "statement" else subject
             text = value.hex(" ") if isinstance(value, bytes) else str(value) if kind == "statement" else f"{subject} {value}"
             changes.setdefault((machine, kind, name), []).append((time, text.encode()))

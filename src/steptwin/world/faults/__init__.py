@@ -7,33 +7,29 @@ between a link and a port, `rig` lets a machine in its kernel have faults. `step
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, parse, read, schema
 from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.m1486 import M1486Body
-from steptwin.world.faults.machine import Body, FaultyMachine, Shaft, rig
-from steptwin.world.faults.mic488 import Mic488Body
-from steptwin.world.faults.places import Wire, check_place
+from steptwin.world.faults.machine import AxisLoad, Body, FaultyMachine, rig
+from steptwin.world.faults.places import RequestRoute, check_place
 from steptwin.world.faults.port import FaultyPort, FaultyTalkingPort
-from steptwin.world.faults.table import Kind, Layer, Line, Occasion, Parameter
+from steptwin.world.faults.table import FaultKind, Layer, LineProtocol, Occasion, Parameter
 
 __all__ = [
     "EXAMPLE",
     "GRAMMAR",
     "KINDS",
     "Active",
+    "AxisLoad",
     "Body",
     "Fault",
+    "FaultKind",
     "Faults",
     "FaultyMachine",
     "FaultyPort",
     "FaultyTalkingPort",
-    "Kind",
     "Layer",
-    "Line",
-    "M1486Body",
-    "Mic488Body",
+    "LineProtocol",
     "Occasion",
     "Parameter",
-    "Shaft",
-    "Wire",
+    "RequestRoute",
     "check_place",
     "parse",
     "read",

@@ -11,7 +11,7 @@ from steptwin.state import Stateful
 from steptwin.world.chance import Chance
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.table import Layer
-from steptwin.world.trace import Record, Recorder
+from steptwin.world.trace import Recorder, TraceRecord
 
 if TYPE_CHECKING:
     from steptwin.world.faults.machine import FaultyMachine
@@ -137,7 +137,7 @@ def addresses(pdu: bytes) -> range | None:
 class Faults(Stateful):
     """The faults of a world or of a served twin. ``seed`` and the name of a fault are all that its chance comes from.
 
-    ``sinks`` are told of everything that happens, as records of kind ``fault``, and of the edges that faults make. Setting and
+    ``sinks`` are called with all that happens, as records of kind ``fault``, and of the edges that faults make. Setting and
     removing faults is for whoever builds the world or stands at the machine, not part of a snapshot: it is restored into the
     same set of faults.
     """
@@ -176,14 +176,13 @@ class Faults(Stateful):
         machine.check(fault)
         return machine
 
-    def remove(self, name: str, now: Nanos) -> Active:
+    def remove(self, name: str, now: Nanos) -> None:
         """Take a fault away; what it holds is let go. `Misuse` with the names there are."""
         active = self.called(name)
         self.active = tuple(a for a in self.active if a is not active)
         if active.fault.kind.layer is Layer.PHYSICS:
             self._machine(active.fault).end(active, now)
         self._changed()
-        return active
 
     def called(self, name: str) -> Active:
         """A fault that is set. `Misuse` with the names there are."""
@@ -236,10 +235,10 @@ class Faults(Stateful):
         for port in list(self.ports):
             port.choose()
 
-    def tell(self, active: Active, place: str, now: Nanos, text: str) -> None:
+    def report(self, active: Active, place: str, now: Nanos, text: str) -> None:
         """A fault has happened to a machine or link."""
-        self.record(Record(now, place, "fault", active.name, text))
+        self.record(TraceRecord(now, place, "fault", active.name, text))
 
-    def record(self, record: Record) -> None:
+    def record(self, record: TraceRecord) -> None:
         for sink in self.sinks:
             sink(record)

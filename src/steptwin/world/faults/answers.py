@@ -9,15 +9,15 @@ from steptwin.machine import Nanos
 from steptwin.wire.pdu import REFUSED
 from steptwin.world.faults.active import Active
 from steptwin.world.faults.kinds_frames import NEVER_SENT
-from steptwin.world.faults.table import Line, Tell
+from steptwin.world.faults.table import FaultReporter, LineProtocol
 
-_UNIT = {Line.RTU: 0, Line.TCP: 6}
+_UNIT = {LineProtocol.RTU: 0, LineProtocol.TCP: 6}
 
 
 class Exchange(NamedTuple):
     """A request and its answer as they are on the wire."""
 
-    line: Line
+    line: LineProtocol
     request: bytes
     answer: bytes
 
@@ -30,16 +30,16 @@ class Exchange(NamedTuple):
         return pdu_of(self.line, self.request)
 
 
-def pdu_of(line: Line, raw: bytes) -> bytes:
-    return raw[1:-2] if line is Line.RTU else raw[7:]
+def pdu_of(line: LineProtocol, raw: bytes) -> bytes:
+    return raw[1:-2] if line is LineProtocol.RTU else raw[7:]
 
 
-def must_not_be_sent(line: Line, raw: bytes) -> bool:
+def must_not_be_sent(line: LineProtocol, raw: bytes) -> bool:
     pdu = pdu_of(line, raw)
     return len(pdu) == 2 and pdu[0] >= REFUSED and pdu[1] == NEVER_SENT
 
 
-class Sent(NamedTuple):
+class AlteredAnswer(NamedTuple):
     """What is left of an answer: ``before`` it the request's echo, then ``answer`` after ``delay``, or kept for ``later``."""
 
     delay: Nanos
@@ -48,12 +48,12 @@ class Sent(NamedTuple):
     later: bytes
 
 
-def spoil_answer(exchange: Exchange, unit: int, actives: Sequence[Active], now: Nanos, tell: Tell) -> Sent:
+def spoil_answer(exchange: Exchange, unit: int, actives: Sequence[Active], now: Nanos, report: FaultReporter) -> AlteredAnswer:
     """Faults in the order in which they were set; ``unit`` is the one that was addressed, whatever the frame calls it."""
-    sent = Sent(0, b"", exchange.answer, b"")
+    sent = AlteredAnswer(0, b"", exchange.answer, b"")
     for active in actives:
         if active.matches(unit, exchange.pdu) and active.strikes(now):
-            sent = active.fault.kind.effect.answer(active, exchange, unit, sent, tell)
+            sent = active.fault.kind.effect.answer(active, exchange, unit, sent, report)
             if not sent.answer:
                 break
     return sent

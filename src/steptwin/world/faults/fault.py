@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.table import Form, Kind, OfRequest, Parameter, Value, check
+from steptwin.world.faults.table import FaultKind, OfRequest, Parameter, ParameterForm, Value, check
 
 GRAMMAR = "KIND [NAME=VALUE ...]"
 EXAMPLE = "crc unit=1 nth=3"
@@ -15,9 +15,9 @@ EXAMPLE = "crc unit=1 nth=3"
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """``given`` are the parameters that were given; ``name`` tells it from others of its kind, empty: not said."""
+    """``given`` are the parameters that were given; ``name`` distinguishes it from others of its kind; empty: none."""
 
-    kind: Kind
+    kind: FaultKind
     given: Mapping[str, Value]
     name: str = ""
 
@@ -49,11 +49,11 @@ class Fault:
     def __str__(self) -> str:
         """The line that `read` makes this of."""
         name = {"name": self.name} if self.name else {}
-        parts = [self.kind.name, *(f"{key}={_text(value)}" for key, value in (name | dict(self.given)).items())]
+        parts = [self.kind.name, *(f"{key}={value_text(value)}" for key, value in (name | dict(self.given)).items())]
         return " ".join(parts)
 
 
-def _text(value: Value) -> str:
+def value_text(value: Value) -> str:
     if isinstance(value, tuple):
         return str(value[0]) if value[0] == value[1] else f"{value[0]}-{value[1]}"
     return (
@@ -114,9 +114,9 @@ def read(line: str) -> Fault:
 
 def _value(parameter: Parameter, text: str) -> object:
     """A number where the text is one; everything else is for `check` to refuse."""
-    if parameter.form in (Form.WHOLE, Form.NUMBER):
+    if parameter.form in (ParameterForm.WHOLE, ParameterForm.NUMBER):
         try:
-            return int(text, 0) if parameter.form is Form.WHOLE else float(text)
+            return int(text, 0) if parameter.form is ParameterForm.WHOLE else float(text)
         except ValueError:
             return text
     return text
@@ -127,7 +127,7 @@ def schema() -> dict[str, object]:
     return {"oneOf": [_object(kind) for kind in KINDS.values()]}
 
 
-def _object(kind: Kind) -> dict[str, object]:
+def _object(kind: FaultKind) -> dict[str, object]:
     properties: dict[str, object] = {"kind": {"const": kind.name, "description": kind.meaning}, "name": {"type": "string"}}
     properties |= {parameter.name: _property(parameter) for parameter in kind.parameters}
     required = ["kind", *(parameter.name for parameter in kind.parameters if parameter.is_required)]
@@ -138,10 +138,10 @@ def _property(parameter: Parameter) -> dict[str, object]:
     shown: dict[str, object] = {"description": parameter.meaning}
     numeric = {"minimum": parameter.least, "maximum": parameter.most}
     match parameter.form:
-        case Form.WHOLE | Form.NUMBER:
-            kind = "integer" if parameter.form is Form.WHOLE else "number"
+        case ParameterForm.WHOLE | ParameterForm.NUMBER:
+            kind = "integer" if parameter.form is ParameterForm.WHOLE else "number"
             shown |= {"type": kind, **{key: bound for key, bound in numeric.items() if bound is not None}}
-        case Form.SPAN:
+        case ParameterForm.SPAN:
             shown["type"] = ["integer", "string"]
         case _:
             shown["type"] = "string"

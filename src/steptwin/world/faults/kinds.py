@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from steptwin.world.faults.kinds_bytes import BYTES
 from steptwin.world.faults.kinds_frames import FRAMES
 from steptwin.world.faults.kinds_physics import PHYSICS
-from steptwin.world.faults.table import WHEN, WHERE, Kind, Layer, Occasion, Parameter, checked
+from steptwin.world.faults.table import WHEN, WHERE, FaultKind, Layer, Occasion, Parameter, checked
 
 KINDS = checked((*BYTES, *FRAMES, *PHYSICS))
 
 
-def rows(*layers: Layer) -> Iterator[Kind]:
+def rows(*layers: Layer) -> Iterator[FaultKind]:
     """The kinds of these layers, of all without any."""
     return (kind for kind in KINDS.values() if not layers or kind.layer in layers)
 

@@ -10,12 +10,12 @@ from steptwin.world.faults.table import (
     LONGEST_MS,
     SERIAL,
     BeforeDelivery,
+    FaultKind,
+    FaultReporter,
     InPieces,
-    Kind,
     Layer,
     Occasion,
     OfByte,
-    Tell,
     number,
     whole,
 )
@@ -25,35 +25,35 @@ if TYPE_CHECKING:
     from steptwin.world.faults.stream import Run
 
 
-def _flip(active: Active, byte: int, run: Run, tell: Tell) -> int:
+def _flip(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
     bit = active.fault.whole("bit")
     turned = byte ^ 1 << (active.chance.below(8) if bit is None else bit)
-    tell(active, f"{byte:02X} becomes {turned:02X}")
+    report(active, f"{byte:02X} becomes {turned:02X}")
     return turned
 
 
-def _drop(active: Active, byte: int, run: Run, tell: Tell) -> None:
+def _drop(active: Active, byte: int, run: Run, report: FaultReporter) -> None:
     active.left = (active.fault.whole("length") or 1) - 1
-    tell(active, f"{byte:02X} is lost" + (f" and {active.left} more" if active.left else ""))
+    report(active, f"{byte:02X} is lost" + (f" and {active.left} more" if active.left else ""))
 
 
-def _insert(active: Active, byte: int, run: Run, tell: Tell) -> int:
+def _insert(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
     value = active.fault.whole("value")
     extra = active.chance.below(256) if value is None else value
-    tell(active, f"{extra:02X} comes before it")
+    report(active, f"{extra:02X} comes before it")
     run.put((extra,))
     return byte
 
 
-def _gap(active: Active, byte: int, run: Run, tell: Tell) -> int:
-    tell(active, f"{active.fault.number('for_ms'):g} ms of silence before it")
+def _gap(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
+    report(active, f"{active.fault.number('for_ms'):g} ms of silence before it")
     run.pause(active.ns("for_ms"))
     return byte
 
 
-def _split(active: Active, run: Run, count: int, tell: Tell) -> list[tuple[Nanos, bytes]]:
+def _split(active: Active, run: Run, count: int, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
     length = active.fault.whole("length") or 1
-    tell(active, f"{count} bytes in pieces of {length}")
+    report(active, f"{count} bytes in pieces of {length}")
     pause = active.ns("for_ms")
     pieces: list[tuple[Nanos, bytes]] = []
     for delay, piece in run.pieces:
@@ -62,14 +62,14 @@ def _split(active: Active, run: Run, count: int, tell: Tell) -> list[tuple[Nanos
     return pieces
 
 
-def _noise(active: Active, run: Run, tell: Tell) -> None:
+def _noise(active: Active, run: Run, report: FaultReporter) -> None:
     rubbish = active.chance.some_bytes(active.fault.whole("length") or 1)
-    tell(active, f"{len(rubbish)} bytes of noise: {rubbish.hex(' ')}")
+    report(active, f"{len(rubbish)} bytes of noise: {rubbish.hex(' ')}")
     run.put(rubbish)
 
 
 BYTES = (
-    Kind(
+    FaultKind(
         "flip",
         Layer.BYTES,
         Occasion.BYTE,
@@ -78,7 +78,7 @@ BYTES = (
         SERIAL,
         effect=OfByte(_flip),
     ),
-    Kind(
+    FaultKind(
         "drop",
         Layer.BYTES,
         Occasion.BYTE,
@@ -87,7 +87,7 @@ BYTES = (
         SERIAL,
         effect=OfByte(_drop),
     ),
-    Kind(
+    FaultKind(
         "insert",
         Layer.BYTES,
         Occasion.BYTE,
@@ -96,7 +96,7 @@ BYTES = (
         SERIAL,
         effect=OfByte(_insert),
     ),
-    Kind(
+    FaultKind(
         "gap",
         Layer.BYTES,
         Occasion.BYTE,
@@ -105,7 +105,7 @@ BYTES = (
         ALL_LINES,
         effect=OfByte(_gap),
     ),
-    Kind(
+    FaultKind(
         "split",
         Layer.BYTES,
         Occasion.DELIVERY,
@@ -117,7 +117,7 @@ BYTES = (
         ALL_LINES,
         effect=InPieces(_split),
     ),
-    Kind(
+    FaultKind(
         "noise",
         Layer.BYTES,
         Occasion.DELIVERY,

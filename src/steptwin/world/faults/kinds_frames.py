@@ -9,32 +9,32 @@ from steptwin.wire.pdu import DEVICE_BUSY
 from steptwin.world.faults.table import (
     LONGEST_MS,
     MODBUS,
-    Form,
-    Kind,
+    FaultKind,
+    FaultReporter,
     Layer,
-    Line,
+    LineProtocol,
     Occasion,
     OfAnswer,
     OfRequest,
     Parameter,
-    Tell,
+    ParameterForm,
     number,
     whole,
 )
 
 if TYPE_CHECKING:
     from steptwin.world.faults.active import Active
-    from steptwin.world.faults.answers import Exchange, Sent
+    from steptwin.world.faults.answers import AlteredAnswer, Exchange
     from steptwin.world.faults.fault import Fault
 
 NEVER_SENT = 0
 """No answer carries this exception code: a slave that must not answer gives it, and the port keeps it."""
 
-_UNITS = {Line.RTU: 248, Line.TCP: 256}
+_UNITS = {LineProtocol.RTU: 248, LineProtocol.TCP: 256}
 
 
-def _delay(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
-    tell(active, f"{active.fault.number('for_ms'):g} ms later: {sent.answer.hex(' ')}")
+def _delay(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"{active.fault.number('for_ms'):g} ms later: {sent.answer.hex(' ')}")
     return sent._replace(delay=sent.delay + active.ns("for_ms"))
 
 
@@ -46,39 +46,39 @@ def _lose_request(active: Active) -> tuple[int, str]:
     return NEVER_SENT, "request lost on its way"
 
 
-def _lose_answer(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
-    tell(active, f"lost on its way: {sent.answer.hex(' ')}")
+def _lose_answer(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"lost on its way: {sent.answer.hex(' ')}")
     return sent._replace(delay=0, answer=b"")
 
 
-def _hold_back(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
-    tell(active, f"held back: {sent.answer.hex(' ')}")
+def _hold_back(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"held back: {sent.answer.hex(' ')}")
     return sent._replace(delay=0, answer=b"", later=sent.answer)
 
 
-def _answer_as(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+def _answer_as(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     other = active.fault.whole("answers_as")
     other = (unit + 1) % _UNITS[exchange.line] if other is None else other
-    tell(active, f"answered as unit {other}: {sent.answer.hex(' ')}")
+    report(active, f"answered as unit {other}: {sent.answer.hex(' ')}")
     return sent._replace(answer=_as_unit(exchange.line, sent.answer, other))
 
 
-def _as_unit(line: Line, raw: bytes, unit: int) -> bytes:
-    if line is Line.RTU:
+def _as_unit(line: LineProtocol, raw: bytes, unit: int) -> bytes:
+    if line is LineProtocol.RTU:
         return with_crc(bytes((unit,)) + raw[1:-2])
     return raw[:6] + bytes((unit,)) + raw[7:]
 
 
-def _spoil_crc(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
+def _spoil_crc(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     raw = sent.answer
     wrong = int.from_bytes(raw[-2:], "little") ^ 1 + active.chance.below(0xFFFF)
     raw = raw[:-2] + wrong.to_bytes(2, "little")
-    tell(active, f"wrong CRC: {raw.hex(' ')}")
+    report(active, f"wrong CRC: {raw.hex(' ')}")
     return sent._replace(answer=raw)
 
 
-def _echo(active: Active, exchange: Exchange, unit: int, sent: Sent, tell: Tell) -> Sent:
-    tell(active, f"echo: {exchange.request.hex(' ')}")
+def _echo(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+    report(active, f"echo: {exchange.request.hex(' ')}")
     return sent._replace(before=exchange.request)
 
 
@@ -88,7 +88,7 @@ def _refuse(active: Active) -> tuple[int, str]:
 
 
 FRAMES = (
-    Kind(
+    FaultKind(
         "delay",
         Layer.FRAMES,
         Occasion.ANSWER,
@@ -97,16 +97,16 @@ FRAMES = (
         MODBUS,
         effect=OfAnswer(_delay),
     ),
-    Kind(
+    FaultKind(
         "no-answer",
         Layer.FRAMES,
         Occasion.REQUEST,
         "There is no answer: the request was lost on its way, or was carried out and the answer lost.",
-        (Parameter("lost", Form.WORD, "What was lost.", words=("answer", "request"), default="answer"),),
+        (Parameter("lost", ParameterForm.WORD, "What was lost.", words=("answer", "request"), default="answer"),),
         MODBUS,
         effect=OfRequest(_lose_request, _is_request_lost, _lose_answer),
     ),
-    Kind(
+    FaultKind(
         "late",
         Layer.FRAMES,
         Occasion.ANSWER,
@@ -115,7 +115,7 @@ FRAMES = (
         MODBUS,
         effect=OfAnswer(_hold_back),
     ),
-    Kind(
+    FaultKind(
         "wrong-unit",
         Layer.FRAMES,
         Occasion.ANSWER,
@@ -124,25 +124,25 @@ FRAMES = (
         MODBUS,
         effect=OfAnswer(_answer_as),
     ),
-    Kind(
+    FaultKind(
         "crc",
         Layer.FRAMES,
         Occasion.ANSWER,
         "The answer has a wrong CRC.",
         (),
-        (Line.RTU,),
+        (LineProtocol.RTU,),
         effect=OfAnswer(_spoil_crc),
     ),
-    Kind(
+    FaultKind(
         "echo",
         Layer.FRAMES,
         Occasion.ANSWER,
         "The request comes back before its answer.",
         (),
-        (Line.RTU,),
+        (LineProtocol.RTU,),
         effect=OfAnswer(_echo),
     ),
-    Kind(
+    FaultKind(
         "exception",
         Layer.PROTOCOL,
         Occasion.REQUEST,
@@ -151,7 +151,7 @@ FRAMES = (
         MODBUS,
         effect=OfRequest(_refuse),
     ),
-    Kind(
+    FaultKind(
         "busy",
         Layer.PROTOCOL,
         Occasion.REQUEST,

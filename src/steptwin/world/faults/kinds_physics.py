@@ -12,7 +12,7 @@ from steptwin.world.faults.table import (
     LONGEST_S,
     OFF,
     PIN,
-    Kind,
+    FaultKind,
     Layer,
     Need,
     Occasion,
@@ -36,24 +36,24 @@ def _axis(active: Active) -> int:
 
 def _stall(active: Active, machine: FaultyMachine, now: Nanos) -> None:
     axis = _axis(active)
-    machine.tell(active, now, f"M{axis} is blocked for {active.fault.number('for_s'):g} s")
+    machine.report(active, now, f"M{axis} is blocked for {active.fault.number('for_s'):g} s")
     machine.block(active, axis, now, now + active.ns("for_s"))
 
 
 def _lose_steps(active: Active, machine: FaultyMachine, now: Nanos) -> None:
     axis, pulses = _axis(active), int(active.fault.number("pulses"))
-    machine.tell(active, now, f"M{axis} loses {pulses} pulses")
+    machine.report(active, now, f"M{axis} loses {pulses} pulses")
     machine.body.shafts[axis - 1].lose(pulses, now)
 
 
 def _slip(active: Active, machine: FaultyMachine, now: Nanos) -> None:
     axis, counts = _axis(active), int(active.fault.number("counts"))
-    machine.tell(active, now, f"the encoder of M{axis} slips by {counts} counts")
+    machine.report(active, now, f"the encoder of M{axis} slips by {counts} counts")
     machine.body.shafts[axis - 1].slip(counts, now)
 
 
 def _drop_supply(active: Active, machine: FaultyMachine, now: Nanos) -> None:
-    machine.tell(active, now, f"no supply for {active.fault.number('for_s'):g} s")
+    machine.report(active, now, f"no supply for {active.fault.number('for_s'):g} s")
     machine.drop_supply(now, now + active.ns("for_s"))
 
 
@@ -70,7 +70,7 @@ def _bounce(active: Active, machine: FaultyMachine, pin: str, levels: tuple[floa
     bounces, within = active.fault.whole("bounces") or 1, active.ns("for_ms")
     moments = sorted(1 + active.chance.below(within) for _ in range(2 * bounces - 1))
     changes = [(now + at, pin, to) for at, to in zip((*moments, within), levels * bounces, strict=True)]
-    machine.tell(active, now, f"{pin} bounces {bounces} times in {active.fault.number('for_ms'):g} ms")
+    machine.report(active, now, f"{pin} bounces {bounces} times in {active.fault.number('for_ms'):g} ms")
     machine.bounce(changes)
 
 
@@ -84,7 +84,7 @@ def _cut_power(active: Active, machine: FaultyMachine, old: bytes, kept: bytearr
     written = active.fault.whole("written")
     written = active.chance.below(len(kept) + 1) if written is None else min(written, len(kept))
     kept[written:] = old[written:]
-    machine.tell(active, now, f"no supply after {written} of {len(kept)} bytes were saved")
+    machine.report(active, now, f"no supply after {written} of {len(kept)} bytes were saved")
     machine.cut_supply(now, now + active.ns("for_s"))
 
 
@@ -93,13 +93,13 @@ def _wear(active: Active, machine: FaultyMachine, old: bytes, kept: bytearray, n
     if active.struck > good and len(active.worn) < len(kept):
         sound = [place for place in range(len(kept)) if place not in active.worn]
         active.worn.append(sound[active.chance.below(len(sound))])
-        machine.tell(active, now, f"after {active.struck} saves byte {active.worn[-1]} is worn out")
+        machine.report(active, now, f"after {active.struck} saves byte {active.worn[-1]} is worn out")
     for place in active.worn:
         kept[place] = old[place]
 
 
 PHYSICS = (
-    Kind(
+    FaultKind(
         "stall",
         Layer.PHYSICS,
         Occasion.MOMENT,
@@ -107,7 +107,7 @@ PHYSICS = (
         (AXIS, number("for_s", "How long.", 1e-6, LONGEST_S, default=1.0)),
         effect=OfMoment(_stall),
     ),
-    Kind(
+    FaultKind(
         "lost-steps",
         Layer.PHYSICS,
         Occasion.MOMENT,
@@ -115,7 +115,7 @@ PHYSICS = (
         (AXIS, whole("pulses", "By how many pulses; negative: ahead.", -(10**9), 10**9, default=4)),
         effect=OfMoment(_lose_steps),
     ),
-    Kind(
+    FaultKind(
         "slip",
         Layer.PHYSICS,
         Occasion.MOMENT,
@@ -124,7 +124,7 @@ PHYSICS = (
         effect=OfMoment(_slip),
         needs=Need.ENCODER,
     ),
-    Kind(
+    FaultKind(
         "stuck",
         Layer.PHYSICS,
         Occasion.ALWAYS,
@@ -132,7 +132,7 @@ PHYSICS = (
         (PIN, number("value", "The level; volts on analog inputs.", 0, 10, otherwise="the one it has")),
         effect=OfWindow(_stick),
     ),
-    Kind(
+    FaultKind(
         "master-error",
         Layer.PHYSICS,
         Occasion.ALWAYS,
@@ -140,7 +140,7 @@ PHYSICS = (
         effect=OfWindow(_fail_master),
         needs=Need.MODBUS_MASTER,
     ),
-    Kind(
+    FaultKind(
         "bounce",
         Layer.PHYSICS,
         Occasion.CHANGE,
@@ -153,7 +153,7 @@ PHYSICS = (
         effect=OfChange(_bounce),
         check=_needs_switch,
     ),
-    Kind(
+    FaultKind(
         "supply-drop",
         Layer.PHYSICS,
         Occasion.MOMENT,
@@ -161,7 +161,7 @@ PHYSICS = (
         (OFF,),
         effect=OfMoment(_drop_supply),
     ),
-    Kind(
+    FaultKind(
         "power-cut",
         Layer.PHYSICS,
         Occasion.SAVE,
@@ -169,7 +169,7 @@ PHYSICS = (
         (OFF, whole("written", "Bytes written until then.", 0, None, otherwise="any number")),
         effect=OfSave(_cut_power, is_last=True),
     ),
-    Kind(
+    FaultKind(
         "wear",
         Layer.PHYSICS,
         Occasion.SAVE,

@@ -6,18 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Drive, Edge, MotionController, Nanos
+from steptwin.machine import Drive, MotionController, Nanos, PinEdge
 from steptwin.state import Plain, Stateful
 from steptwin.wire.pdu import exception_pdu
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.kinds_frames import NEVER_SENT
-from steptwin.world.faults.table import Kind, Occasion, OfChange, OfSave
+from steptwin.world.faults.table import FaultKind, Occasion, OfChange, OfSave
 from steptwin.world.kernel import Kernel, PinName
-from steptwin.world.trace import Record
+from steptwin.world.trace import TraceRecord
 
 
-class Shaft(Protocol):
+class AxisLoad(Protocol):
     """What an axis moves. All take the moment."""
 
     def block(self, blocked: bool, now: Nanos) -> None:
@@ -36,10 +36,10 @@ class Shaft(Protocol):
 class Body(Protocol):
     """What a kind of machine has that can fail, beyond its pins."""
 
-    shafts: list[Shaft]
+    shafts: list[AxisLoad]
     """By axis. Mechanics put themselves in the place of what is there."""
 
-    def lacks(self, kind: Kind) -> str | None:
+    def lacks(self, kind: FaultKind) -> str | None:
         """Why faults of a kind cannot happen to it, to follow its name in a message; None: they can."""
         ...
 
@@ -127,7 +127,7 @@ class FaultyMachine(Stateful):
     def _pass_on(self) -> None:
         self.changed()
 
-    def take_edges(self) -> list[Edge]:
+    def take_edges(self) -> list[PinEdge]:
         return self.inner.take_edges()
 
     def pins(self) -> Mapping[str, float]:
@@ -221,8 +221,8 @@ class FaultyMachine(Stateful):
     def _mine(self) -> list[Active]:
         return self._faults.of(self.name)
 
-    def tell(self, active: Active, now: Nanos, text: str) -> None:
-        self._faults.tell(active, self.name, now, text)
+    def report(self, active: Active, now: Nanos, text: str) -> None:
+        self._faults.report(active, self.name, now, text)
 
     # ------------------------------------------------------------------ setting and removing
 
@@ -286,7 +286,7 @@ class FaultyMachine(Stateful):
         after = self.inner.pins()[pin]
         if after != before:
             self._on_edge(pin, now, after)
-            self._faults.record(Record(now, self.name, "edge", pin, after))
+            self._faults.record(TraceRecord(now, self.name, "edge", pin, after))
 
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         """What lies before the faults changes; an input that is held takes it when it is let go."""
@@ -322,13 +322,13 @@ class FaultyMachine(Stateful):
             self._stuck[pin] = active.name
             self._put(pin, level, now)
             active.struck += 1
-            self.tell(active, now, f"{pin} is stuck at {level:g}")
+            self.report(active, now, f"{pin} is stuck at {level:g}")
             active.due = active.end
         else:
             active.due = None
             del self._stuck[pin]
             self._put(pin, self._outer[pin], now)
-            self.tell(active, now, f"{pin} is free")
+            self.report(active, now, f"{pin} is free")
 
     def fail_master(self, active: Active, now: Nanos) -> None:
         """The first moment sets the error, the second clears it."""
@@ -336,11 +336,11 @@ class FaultyMachine(Stateful):
             self._mute.append(active.name)
             active.struck = 1
             active.due = active.end
-            self.tell(active, now, "a slave of its Modbus master does not answer")
+            self.report(active, now, "a slave of its Modbus master does not answer")
         else:
             self._mute.remove(active.name)
             active.due = None
-            self.tell(active, now, "the slave of its Modbus master answers again")
+            self.report(active, now, "the slave of its Modbus master answers again")
         self.body.show_master_error(bool(self._mute), now)
 
     # ------------------------------------------------------------------ what the body asks
@@ -353,7 +353,7 @@ class FaultyMachine(Stateful):
         for active in self._faults.refusing():
             if active.matches(unit, pdu) and active.is_on(self._faults.link, line) and active.strikes(now):
                 code, text = active.fault.kind.effect.refusal(active)
-                self.tell(active, now, f"{text}: {pdu.hex(' ')}")
+                self.report(active, now, f"{text}: {pdu.hex(' ')}")
                 return exception_pdu(function, code)
         return None
 

@@ -8,14 +8,14 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.table import Layer, Line
+from steptwin.world.faults.table import Layer, LineProtocol
 
 
-class Wire(NamedTuple):
+class RequestRoute(NamedTuple):
     """Something that requests come along. ``name`` with its verb is for people: ``"line 'bus' carries"``."""
 
     name: str
-    line: Line | None
+    line: LineProtocol | None
     """None: none at all, so that nothing but being refused can happen to a request."""
     link: str = ""
     """What a fault calls it: this, or this with a number (``tcp``: tcp-1…). Empty: not known."""
@@ -43,7 +43,7 @@ class Wire(NamedTuple):
         return f"{self.name} {self.line.value}, where {', '.join(kinds)} can happen"
 
 
-def check_place(fault: Fault, wires: Sequence[Wire]) -> None:
+def check_place(fault: Fault, wires: Sequence[RequestRoute]) -> None:
     """Raises `Misuse` for a fault of bytes, frames or protocol that none of ``wires`` can show."""
     kind, link, unit = fault.kind, fault.get("link"), fault.get("unit")
     if kind.layer is Layer.PHYSICS:

@@ -8,11 +8,11 @@ from typing import ClassVar
 
 from steptwin.machine import Nanos, Port, TalkingPort
 from steptwin.state import Plain, Stateful
-from steptwin.wire.slave import Direction, FrameObserver, SlavePort
+from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort
 from steptwin.world.faults.active import Active, Faults
 from steptwin.world.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer
 from steptwin.world.faults.stream import spoil
-from steptwin.world.faults.table import Layer, Line
+from steptwin.world.faults.table import Layer, LineProtocol
 
 _ASKED = 64
 """More requests than this never wait for their answers (`steptwin.wire.gateway.QUEUE_REQUESTS`)."""
@@ -22,7 +22,7 @@ class FaultyPort(Stateful):
     """One link of a twin, or one line of a world. Only while faults are set, or something delayed is on its way, anything is
     done here: `exchange`, `to_send` and `deadline` are the inner port's own else.
 
-    ``framed`` is the slave port that tells of frames, inside ``port``; without it bytes alone can go wrong. ``units`` are the
+    ``framed`` is the slave port that reports frames, inside ``port``; without it bytes alone can go wrong. ``units`` are the
     units it serves (MIC-23: on TCP a single one is addressed by 0 and 255 too). ``line_name`` is the line of a world it is on:
     what goes wrong is recorded there, else at the link.
     """
@@ -43,6 +43,7 @@ class FaultyPort(Stateful):
         "_units",
         "deadline",
         "exchange",
+        "is_transparent",
         "line_name",
         "link",
         "to_send",
@@ -59,6 +60,7 @@ class FaultyPort(Stateful):
             "_units",
             "deadline",
             "exchange",
+            "is_transparent",
             "line_name",
             "link",
             "to_send",
@@ -68,13 +70,15 @@ class FaultyPort(Stateful):
     exchange: Callable[[bytes, Nanos], bytes]
     to_send: Callable[[Nanos], list[tuple[Nanos, bytes]]]
     deadline: Callable[[], Nanos | None]
+    is_transparent: bool
+    """Whether calls are the inner port's own."""
 
     def __init__(
         self,
         port: Port,
         link: str,
         faults: Faults,
-        line: Line,
+        line: LineProtocol,
         *,
         framed: SlavePort | None = None,
         units: tuple[int, ...] = (),
@@ -103,7 +107,7 @@ class FaultyPort(Stateful):
         return self._inner.broken
 
     def close(self) -> None:
-        """The program is gone."""
+        """The program has closed the link."""
         self._inner.close()
 
     def set_state(self, plain: Plain) -> None:
@@ -120,6 +124,7 @@ class FaultyPort(Stateful):
             self._be_transparent()
 
     def _be_transparent(self) -> None:
+        self.is_transparent = True
         self.exchange = self._inner.exchange
         self.to_send = self._inner.to_send
         self.deadline = self._inner.deadline
@@ -129,6 +134,7 @@ class FaultyPort(Stateful):
         self._held = b""
 
     def _be_faulty(self) -> None:
+        self.is_transparent = False
         self.exchange = self._exchange
         self.to_send = self._to_send
         self.deadline = self._deadline
@@ -174,7 +180,7 @@ class FaultyPort(Stateful):
             self._take([(now, answer)] if answer else [], now)
 
     def _take(self, sent: list[tuple[Nanos, bytes]], now: Nanos) -> None:
-        """What the inner port sends: bytes as they are, or the frames it told of."""
+        """What the inner port sends: bytes as they are, or the frames it reported."""
         if self._framed is None:
             fresh = [(moment, 0, data) for moment, data in sent]
         else:
@@ -185,13 +191,21 @@ class FaultyPort(Stateful):
                 at = moment + delay + more
                 self._leaving.append((max(at, self._leaving[-1][0]) if self._leaving else at, piece))
 
-    def _observe(self, moment: Nanos, direction: Direction, raw: bytes) -> None:
-        if direction is Direction.OUT and must_not_be_sent(self._line, raw):
+    def watch(self, observer: FrameObserver | None) -> None:
+        """Have ``observer`` called with the frames of the port from now on; None: nothing is called."""
+        framed = self._framed
+        if framed is not None and framed.on_frame == self._observe:
+            self._before = observer
+        elif framed is not None:
+            framed.on_frame = observer
+
+    def _observe(self, moment: Nanos, direction: FrameDirection, raw: bytes) -> None:
+        if direction is FrameDirection.OUT and must_not_be_sent(self._line, raw):
             self._request_of(raw)
             return
         if self._before is not None:
             self._before(moment, direction, raw)
-        if direction is Direction.IN:
+        if direction is FrameDirection.IN:
             self._asked.append(raw)
             return
         request = self._request_of(raw)
@@ -218,7 +232,7 @@ class FaultyPort(Stateful):
         key = self._key(raw)
         for place, asked in enumerate(self._asked):
             if self._key(asked) == key:
-                for _ in range(place if self._line is Line.RTU else 0):
+                for _ in range(place if self._line is LineProtocol.RTU else 0):
                     self._asked.popleft()
                 self._asked.remove(asked)
                 return asked
@@ -226,11 +240,11 @@ class FaultyPort(Stateful):
 
     def _key(self, raw: bytes) -> tuple[bytes, int]:
         """What a request and its answer have in common: the unit (on TCP after the transaction) and the function."""
-        head = raw[:1] if self._line is Line.RTU else raw[:2] + raw[6:7]
+        head = raw[:1] if self._line is LineProtocol.RTU else raw[:2] + raw[6:7]
         return head, pdu_of(self._line, raw)[0] & 0x7F
 
     def _addressed(self, unit: int) -> int:
-        return self._units[0] if self._line is Line.TCP and len(self._units) == 1 and unit in (0, 255) else unit
+        return self._units[0] if self._line is LineProtocol.TCP and len(self._units) == 1 and unit in (0, 255) else unit
 
     def _bytewise(self, direction: str) -> list[Active]:
         faults = self._faults.active
@@ -244,7 +258,7 @@ class FaultyPort(Stateful):
     def _teller(self, which: str) -> Callable[[Active, str], None]:
         words = [*([self.link] if self.line_name else []), *([which] if which else [])]
         place = self.line_name or self.link
-        return lambda active, text: self._faults.tell(active, place, self._now, ", ".join([*words, text]))
+        return lambda active, text: self._faults.report(active, place, self._now, ", ".join([*words, text]))
 
 
 class FaultyTalkingPort(FaultyPort):
@@ -257,7 +271,7 @@ class FaultyTalkingPort(FaultyPort):
     FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_read", "_talking"}
 
     def __init__(
-        self, port: TalkingPort, link: str, faults: Faults, line: Line, *, line_name: str = "", is_read: bool = True
+        self, port: TalkingPort, link: str, faults: Faults, line: LineProtocol, *, line_name: str = "", is_read: bool = True
     ) -> None:
         self._is_read = is_read
         self._talking = port

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from steptwin.machine import Nanos
 from steptwin.world.faults.active import Active
-from steptwin.world.faults.table import BeforeDelivery, InPieces, OfByte, Tell
+from steptwin.world.faults.table import BeforeDelivery, FaultReporter, InPieces, OfByte
 
 
 class Run:
@@ -22,7 +22,7 @@ class Run:
         self.pieces.append((self.pieces[-1][0] + time, bytearray()))
 
 
-def spoil(data: bytes, actives: Sequence[Active], now: Nanos, tell: Tell) -> list[tuple[Nanos, bytes]]:
+def spoil(data: bytes, actives: Sequence[Active], now: Nanos, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
     """The pieces that ``data`` arrives in, each with its delay; faults of the order in which they were set."""
     run = Run()
     bytewise = []
@@ -31,27 +31,29 @@ def spoil(data: bytes, actives: Sequence[Active], now: Nanos, tell: Tell) -> lis
         if isinstance(effect, OfByte):
             bytewise.append(active)
         elif isinstance(effect, BeforeDelivery) and active.strikes(now):
-            effect.act(active, run, tell)
+            effect.act(active, run, report)
     if bytewise:
         for place, byte in enumerate(data):
-            _pass(run, byte, bytewise, now, lambda active, what, at=place: tell(active, f"byte {at + 1} of {len(data)}: {what}"))
+            _pass(
+                run, byte, bytewise, now, lambda active, what, at=place: report(active, f"byte {at + 1} of {len(data)}: {what}")
+            )
     else:
         run.put(data)
     for active in actives:
         effect = active.fault.kind.effect
         if isinstance(effect, InPieces) and active.strikes(now):
-            return effect.act(active, run, len(data), tell)
+            return effect.act(active, run, len(data), report)
     return [(delay, bytes(piece)) for delay, piece in run.pieces if piece]
 
 
-def _pass(run: Run, byte: int, actives: Sequence[Active], now: Nanos, tell: Tell) -> None:
+def _pass(run: Run, byte: int, actives: Sequence[Active], now: Nanos, report: FaultReporter) -> None:
     lost = False
     for active in actives:
         if active.left:
             active.left -= 1
             lost = True
         elif active.strikes(now):
-            arrives = active.fault.kind.effect.act(active, byte, run, tell)
+            arrives = active.fault.kind.effect.act(active, byte, run, report)
             if arrives is None:
                 lost = True
             else:

@@ -13,12 +13,12 @@ from steptwin.tables import IncompleteTable
 if TYPE_CHECKING:
     from steptwin.machine import Nanos
     from steptwin.world.faults.active import Active
-    from steptwin.world.faults.answers import Exchange, Sent
+    from steptwin.world.faults.answers import AlteredAnswer, Exchange
     from steptwin.world.faults.fault import Fault
     from steptwin.world.faults.machine import FaultyMachine
     from steptwin.world.faults.stream import Run
 
-Tell: TypeAlias = "Callable[[Active, str], None]"
+FaultReporter: TypeAlias = "Callable[[Active, str], None]"
 """A fault has happened, and what it did."""
 
 Value: TypeAlias = int | float | str | tuple[int, int]
@@ -57,7 +57,7 @@ class Need(enum.Enum):
     MODBUS_MASTER = "Modbus master of its own"
 
 
-class Line(enum.StrEnum):
+class LineProtocol(enum.StrEnum):
     """What faults but those of physics can happen on."""
 
     RTU = "Modbus RTU"
@@ -65,7 +65,7 @@ class Line(enum.StrEnum):
     CHARACTERS = "M1486"
 
 
-class Form(enum.Enum):
+class ParameterForm(enum.Enum):
     WHOLE = "whole number"
     NUMBER = "number"
     SPAN = "number or span such as 10020-10035"
@@ -75,10 +75,10 @@ class Form(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """``least`` and ``most`` bound numbers; ``words`` are the permitted ones; ``otherwise`` says what holds without a default."""
+    """``least`` and ``most`` bound numbers; ``words`` are the permitted ones; ``otherwise`` is what holds without a default."""
 
     name: str
-    form: Form
+    form: ParameterForm
     meaning: str
     least: float | None = None
     most: float | None = None
@@ -97,9 +97,15 @@ class Parameter:
             bounds += f" to {self.most:g}"
         elif bounds:
             bounds += " and more"
-        if self.form is Form.TEXT:
+        if self.form is ParameterForm.TEXT:
             return "text"
-        what = "whole numbers" if self.form is Form.WHOLE else "numbers" if self.form is Form.NUMBER else "numbers or spans N-M"
+        what = (
+            "whole numbers"
+            if self.form is ParameterForm.WHOLE
+            else "numbers"
+            if self.form is ParameterForm.NUMBER
+            else "numbers or spans N-M"
+        )
         return f"{what} {bounds}".rstrip()
 
 
@@ -107,14 +113,14 @@ class Parameter:
 class OfByte:
     """``act`` gives what arrives of a byte, None where it is lost; bytes before it are put into the run."""
 
-    act: Callable[[Active, int, Run, Tell], int | None]
+    act: Callable[[Active, int, Run, FaultReporter], int | None]
 
 
 @dataclass(frozen=True, slots=True)
 class BeforeDelivery:
     """``act`` puts bytes into the run before those of a delivery."""
 
-    act: Callable[[Active, Run, Tell], None]
+    act: Callable[[Active, Run, FaultReporter], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,14 +128,14 @@ class InPieces:
     """``act`` gives the pieces in which a run arrives, each with its delay; takes the run and the length of the delivery. Only
     one such fault happens to a delivery, the first."""
 
-    act: Callable[[Active, Run, int, Tell], list[tuple[Nanos, bytes]]]
+    act: Callable[[Active, Run, int, FaultReporter], list[tuple[Nanos, bytes]]]
 
 
 @dataclass(frozen=True, slots=True)
 class OfAnswer:
     """``answer`` gives what is sent of an answer; without bytes later faults have nothing to happen to."""
 
-    answer: Callable[[Active, Exchange, int, Sent, Tell], Sent]
+    answer: Callable[[Active, Exchange, int, AlteredAnswer, FaultReporter], AlteredAnswer]
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +145,7 @@ class OfRequest:
 
     refusal: Callable[[Active], tuple[int, str]]
     is_refused: Callable[[Fault], bool] | None = None
-    answer: Callable[[Active, Exchange, int, Sent, Tell], Sent] | None = None
+    answer: Callable[[Active, Exchange, int, AlteredAnswer, FaultReporter], AlteredAnswer] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,16 +189,16 @@ _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FaultKind:
     """A row. ``own`` are the parameters of this kind alone, ``lines`` what it can happen on. ``needs``: what a
-    machine must have beyond what parameters and occasion say. ``check`` raises `Misuse` where it cannot happen."""
+    machine must have beyond what parameters and occasion need. ``check`` raises `Misuse` where it cannot happen."""
 
     name: str
     layer: Layer
     occasion: Occasion
     meaning: str
     own: tuple[Parameter, ...] = ()
-    lines: tuple[Line, ...] = ()
+    lines: tuple[LineProtocol, ...] = ()
     effect: Any = None
     """What it does: one of the effects that fit the occasion. A kind without it is refused when the table is built."""
     needs: Need | None = None
@@ -208,11 +214,11 @@ class Kind:
 
 
 def whole(name: str, meaning: str, least: int, most: int | None, **others: object) -> Parameter:
-    return Parameter(name, Form.WHOLE, meaning, least, most, **others)  # type: ignore[arg-type]
+    return Parameter(name, ParameterForm.WHOLE, meaning, least, most, **others)  # type: ignore[arg-type]
 
 
 def number(name: str, meaning: str, least: float, most: float | None, **others: object) -> Parameter:
-    return Parameter(name, Form.NUMBER, meaning, least, most, **others)  # type: ignore[arg-type]
+    return Parameter(name, ParameterForm.NUMBER, meaning, least, most, **others)  # type: ignore[arg-type]
 
 
 LARGEST_WHOLE = 1 << 63
@@ -240,21 +246,21 @@ _MOMENTS = (
     _COUNT,
     _WINDOW[1],
 )
-_LINK = Parameter("link", Form.TEXT, "On this link alone, such as tcp-1, rtu-1, pty, serial.", otherwise="all")
-_LINE = Parameter("line", Form.TEXT, "On this line of a world alone.", otherwise="all")
-_MACHINE = Parameter("machine", Form.TEXT, "Which machine; for a served twin its unit.", otherwise="the only one")
+_LINK = Parameter("link", ParameterForm.TEXT, "On this link alone, such as tcp-1, rtu-1, pty, serial.", otherwise="all")
+_LINE = Parameter("line", ParameterForm.TEXT, "On this line of a world alone.", otherwise="all")
+_MACHINE = Parameter("machine", ParameterForm.TEXT, "Which machine; for a served twin its unit.", otherwise="the only one")
 AXIS = whole("axis", "Which axis.", 1, 16, default=1)
-PIN = Parameter("pin", Form.TEXT, "Which input.", is_required=True)
+PIN = Parameter("pin", ParameterForm.TEXT, "Which input.", is_required=True)
 _ADDRESSED = (
     whole("unit", "Requests to this unit.", 0, 255, otherwise="all"),
     whole("function", "Requests with this function code.", 1, 127, otherwise="all"),
-    Parameter("address", Form.SPAN, "Requests that touch these addresses.", 0, 65535, otherwise="all"),
+    Parameter("address", ParameterForm.SPAN, "Requests that touch these addresses.", 0, 65535, otherwise="all"),
     _LINK,
     _LINE,
 )
 WHERE: dict[Layer, tuple[Parameter, ...]] = {
     Layer.BYTES: (
-        Parameter("direction", Form.WORD, "Towards the twin, or from it.", words=("in", "out"), default="out"),
+        Parameter("direction", ParameterForm.WORD, "Towards the twin, or from it.", words=("in", "out"), default="out"),
         _LINK,
         _LINE,
     ),
@@ -268,16 +274,16 @@ WHEN: dict[Occasion, tuple[Parameter, ...]] = {
     Occasion.ALWAYS: _WINDOW,
 }
 
-SERIAL = (Line.RTU, Line.CHARACTERS)
-MODBUS = (Line.RTU, Line.TCP)
-ALL_LINES = (Line.RTU, Line.TCP, Line.CHARACTERS)
+SERIAL = (LineProtocol.RTU, LineProtocol.CHARACTERS)
+MODBUS = (LineProtocol.RTU, LineProtocol.TCP)
+ALL_LINES = (LineProtocol.RTU, LineProtocol.TCP, LineProtocol.CHARACTERS)
 OFF = number("for_s", "How long the supply is off.", 1e-6, LONGEST_S, default=1.0)
 
 
-def checked(kinds: Sequence[Kind]) -> dict[str, Kind]:
+def checked(kinds: Sequence[FaultKind]) -> dict[str, FaultKind]:
     """The table by name. `Misuse` for a name or parameter given twice, and for a default that is not permitted;
     `IncompleteTable` for a kind without the effect that its occasion needs."""
-    table: dict[str, Kind] = {}
+    table: dict[str, FaultKind] = {}
     for kind in kinds:
         if kind.name in table:
             raise Misuse(f"two kinds of fault are named {kind.name!r}")
@@ -297,7 +303,7 @@ def checked(kinds: Sequence[Kind]) -> dict[str, Kind]:
     return table
 
 
-def _check_effect(kind: Kind) -> None:
+def _check_effect(kind: FaultKind) -> None:
     layers, effects = _FITTING[kind.occasion]
     needed = " or ".join(effect.__name__ for effect in effects)
     if kind.layer not in layers:
@@ -315,13 +321,13 @@ def check(parameter: Parameter, value: object, where: str) -> Value:
     form = parameter.form
     if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:
         raise Misuse(f"{where}: a number of more than 63 bits: permitted are {parameter.permitted}")
-    if form is Form.SPAN:
+    if form is ParameterForm.SPAN:
         return _span(parameter, value, where)
-    if form is Form.NUMBER and isinstance(value, int) and not isinstance(value, bool):
+    if form is ParameterForm.NUMBER and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     right: bool
-    if form is Form.WHOLE or form is Form.NUMBER:
-        right = type(value) is (int if form is Form.WHOLE else float) and _is_within(parameter, value)  # type: ignore[arg-type]
+    if form is ParameterForm.WHOLE or form is ParameterForm.NUMBER:
+        right = type(value) is (int if form is ParameterForm.WHOLE else float) and _is_within(parameter, value)  # type: ignore[arg-type]
     else:
         right = isinstance(value, str) and value != "" and (not parameter.words or value in parameter.words)
     if not right:

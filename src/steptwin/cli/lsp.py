@@ -1,0 +1,13 @@
+"""``steptwin lsp``: the editor server.
+
+From Python: `steptwin.lsp.session`.
+"""
+
+from __future__ import annotations
+
+
+def lsp() -> None:
+    """Serve an editor on standard input and output (Language Server Protocol): programs, tables, configurations, worlds."""
+    from steptwin.lsp import serve_stdio
+
+    serve_stdio()

@@ -1,0 +1,46 @@
+"""Descriptions of small worlds that commands make of their options: printed, or saved with the files they name."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.files.textfiles import check_folder, write_bytes
+from steptwin.inputfiles import read_bytes
+from steptwin.world.description import read_world
+
+Named: TypeAlias = Callable[[Path], str]
+"""What a file is called in a description."""
+Describe: TypeAlias = Callable[[Named], str]
+
+
+def print_world(text: str, name: str) -> None:
+    """The description, and on standard error the files it needs that do not lie below this folder."""
+    sys.stdout.write(text)
+    folder = Path.cwd().resolve()
+    for file, _ in read_world(name, text).files():
+        if not (folder / file).resolve().is_relative_to(folder):
+            sys.stderr.write(f"{file} does not lie in this folder: --save-world FILE copies it, 'up --allow-outside' reads it\n")
+
+
+def save_world(describe: Describe, where: Path) -> None:
+    """The description in a file, and the files it names beside that. Raises `Misuse` where something else is there."""
+    check_folder(where)
+    name = str(where)
+    given, text = describe(str), describe(lambda path: path.name)
+    copies: dict[Path, Path] = {}
+    for (own, _), (copied, _) in zip(read_world(name, given).files(), read_world(name, text).files(), strict=True):
+        source, target = Path(own), where.parent / copied
+        content = read_bytes(source)
+        if copies.get(target, source) != source or (target.exists() and read_bytes(target) != content):
+            raise Misuse(f"--save-world {where}: {target} is another file than {source}: choose another folder")
+        copies[target] = source
+    for target, source in copies.items():
+        if not target.exists():
+            write_bytes(target, read_bytes(source))
+            sys.stdout.write(f"wrote {target}\n")
+    write_bytes(where, text.encode())
+    sys.stdout.write(f"wrote {where}\n")

@@ -1,0 +1,92 @@
+"""A program alone in a small world: run until it has ended, and what is common to `run_wbc` and `run_m1486`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from steptwin.files.export import axis_views, bar, write_trace
+from steptwin.files.timedinputs import TimedInput
+from steptwin.files.world import World
+from steptwin.machine import SECOND, Nanos
+from steptwin.wbc.real import real_text
+from steptwin.world.overrides import NO_OVERRIDES, Overrides
+from steptwin.world.small import InputChange
+
+USUAL_LIMIT_NS: Nanos = 60 * SECOND
+LIMIT_UNTIL_IDLE_NS: Nanos = 3600 * SECOND
+SLICE_NS: Nanos = SECOND
+"""The longest stretch of time between two looks at whether anything is still going on."""
+NOTE = "note"
+"""The subject of records of `InputChange`."""
+
+Print = Callable[[str], None]
+
+
+class Ending(NamedTuple):
+    """When the last thing happened, and why there is nothing more: it has ``ended``, waits for ever (``waiting``), ``limit``."""
+
+    at: Nanos
+    why: str
+
+
+class Outcome(NamedTuple):
+    """How a run ended, and how long it took on the wall."""
+
+    ending: Ending
+    wall_s: float
+
+    @property
+    def virtual_s(self) -> float:
+        return self.ending.at / SECOND
+
+    @property
+    def ratio(self) -> float:
+        return self.virtual_s / self.wall_s
+
+    def __str__(self) -> str:
+        faster = f"{self.ratio:,.0f} times faster than real time"
+        return f"{self.virtual_s:.6f} s of virtual time in {self.wall_s:.3f} s: {faster}"
+
+
+def limit_of(limit: Nanos | None, *, until_idle: bool) -> Nanos:
+    return limit if limit is not None else LIMIT_UNTIL_IDLE_NS if until_idle else USUAL_LIMIT_NS
+
+
+def changes_of(inputs: Sequence[TimedInput], controller: str) -> Iterator[InputChange]:
+    """Inputs of the only controller."""
+    for change in inputs:
+        level = f"{real_text(change.value)} V" if change.pin.startswith("AIN") else "on" if change.value else "off"
+        yield InputChange(change.time, f"{controller}.{change.pin}", change.value, f"{change.pin} {level}")
+
+
+@contextmanager
+def world_of(
+    text: str, files: Mapping[str, bytes], program: Path, *, keep_trace: bool, overrides: Overrides = NO_OVERRIDES
+) -> Generator[World]:
+    name = f"run {program}"
+    with World.from_toml(text, files, name=name, overrides=overrides, keep_trace=keep_trace, keep_inputs=False) as world:
+        yield world
+
+
+def run_on(
+    world: World, limit: Nanos, due: Callable[[], Nanos | None], has_ended: Callable[[], bool], *, until_idle: bool
+) -> str:
+    """Run until a program has ended and nothing from outside is to come, at most to ``limit``; with ``until_idle`` also where
+    nothing will happen any more. Gives why it ended, as in `Ending`; ``due`` is the moment at which something happens next."""
+    while True:
+        moment = due()
+        if not world.scripts and has_ended():
+            return "ended"
+        if world.now >= limit:
+            return "limit"
+        if moment is None and until_idle:
+            return "waiting"
+        world.run_to(limit if moment is None else min(max(moment, world.now + SLICE_NS), limit))
+
+
+def write(world: World, where: Path | None, title: str, ended: Nanos) -> None:
+    if where is not None:
+        write_trace(world.trace, where, views=axis_views(world), title=title, ended=ended, watch=bar)

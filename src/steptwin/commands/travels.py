@@ -1,0 +1,104 @@
+"""Switches KL and KR of a MIC488 that runs a program alone: where ``--travel`` says, or where homing needs them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from steptwin.errors import Misuse
+from steptwin.mic488.config import AxisConfig, ControllerConfig
+from steptwin.mic488.registers import AXES, INPUTS
+from steptwin.wbc.real import real_text
+from steptwin.world.small import AxisSwitches
+
+ASSUMED_TRAVEL_S = 0.1
+"""How far from the place at power-on a switch is assumed, for homing: what VMAX covers in this time."""
+ASSUMED_FAR_S = 10.0
+"""The same for KR where a program homes to both sides: it has to leave a way between the switches."""
+
+
+class Travel(NamedTuple):
+    """Where the switches of ``axis`` (from 1) are, in configured units seen from the place at power-on; None: no switch."""
+
+    axis: int
+    low_u: float | None
+    high_u: float | None
+
+
+class Placed(NamedTuple):
+    """Switches of a run; ``assumed`` lists those that nobody placed as text, ``pins`` is what they or the run drive."""
+
+    switches: Sequence[AxisSwitches]
+    assumed: Sequence[str]
+    pins: frozenset[str]
+
+
+def place_switches(
+    config: ControllerConfig, travels: Sequence[Travel], homed: Mapping[int, frozenset[int]], driven: Collection[str]
+) -> Placed:
+    """Switches where ``travels`` say, or for axes they do not name where ``homed`` (`homing_sides`) needs them.
+
+    None is assumed on the pins in ``driven``. Raises `Misuse` for a switch that the configuration does not have.
+    """
+    known = {travel.axis: travel for travel in travels}
+    switches: list[AxisSwitches] = []
+    assumed: list[str] = []
+    for number, axis in enumerate(config.axes, start=1):
+        travel = known.get(number)
+        if travel is None:
+            travel = _assumed(number, axis, homed.get(number, frozenset()), driven)
+            assumed += _texts(travel, axis)
+        if travel.low_u is None and travel.high_u is None:
+            continue
+        for name, pin, edge in (("KL", axis.in_kl, travel.low_u), ("KR", axis.in_kr, travel.high_u)):
+            if edge is not None and pin >= INPUTS:
+                raise Misuse(f"--travel M{number}: the configuration has no {name} for this axis")
+        low, high = (_contact(config, pin) for pin in (axis.in_kl, axis.in_kr))
+        pins = f"IN{axis.in_kl + 1}", f"IN{axis.in_kr + 1}"
+        switches.append(AxisSwitches(number, travel.low_u, travel.high_u, *pins, (low, high)))
+    pins = {pin for one in switches for pin, edge in ((one.low_pin, one.low), (one.high_pin, one.high)) if edge is not None}
+    return Placed(switches, assumed, frozenset(pins | set(driven)))
+
+
+def _contact(config: ControllerConfig, pin: int) -> str:
+    return "NC" if pin < INPUTS and config.inputs[pin].level == 1 else "NO"
+
+
+def _assumed(number: int, axis: AxisConfig, sides: frozenset[int], driven: Collection[str]) -> Travel:
+    """Where KL and KR of an axis have to be that is homed to ``sides``."""
+    has_kl, has_kr = (pin < INPUTS and f"IN{pin + 1}" not in driven for pin in (axis.in_kl, axis.in_kr))
+    if 0 in sides:
+        sides |= {-1 if has_kl else 1}
+    low_u = -axis.vel * ASSUMED_TRAVEL_S if has_kl and -1 in sides else None
+    high_u = None
+    if has_kr and 1 in sides:
+        high_u = axis.vel * (ASSUMED_FAR_S if -1 in sides else ASSUMED_TRAVEL_S)
+    return Travel(number, low_u, high_u)
+
+
+def _texts(travel: Travel, axis: AxisConfig) -> Iterator[str]:
+    for name, pin, edge_u in (("KL", axis.in_kl, travel.low_u), ("KR", axis.in_kr, travel.high_u)):
+        if edge_u is not None:
+            where = f"{real_text(edge_u)} {axis.unit_name}"
+            example = f"--travel M{travel.axis}={'LOW..' if name == 'KL' else '..HIGH'} changes it"
+            yield f"M{travel.axis}: {name} on IN{pin + 1} assumed at {where} ({example})"
+
+
+def parse_travel(text: str) -> list[Travel]:
+    """``M1=-10..250,M2=-5..`` → switches of axes. Raises `Misuse`."""
+    travels: list[Travel] = []
+    for part in filter(None, map(str.strip, text.split(","))):
+        name, _, ends = part.partition("=")
+        low, dots, high = ends.partition("..")
+        number = name.strip().upper().removeprefix("M")
+        try:
+            low_u, high_u = (float(end) if end.strip() else None for end in (low, high))
+        except ValueError:
+            dots = ""
+            low_u = high_u = None
+        if not dots or not number.isdecimal() or not 1 <= int(number) <= AXES:
+            raise Misuse(f"--travel {part}: expected Mn=LOW..HIGH, such as M1=-10..250 or M1=-10..")
+        if low_u is not None and high_u is not None and low_u >= high_u:
+            raise Misuse(f"--travel {part}: {real_text(low_u)} must be below {real_text(high_u)}")
+        travels.append(Travel(int(number), low_u, high_u))
+    return travels

@@ -1,0 +1,231 @@
+"""The static description of one controller: what there is to read, write, connect and expect, and in which units.
+
+A data sheet is made from the controller's own tables and never changes. `plain` makes JSON of it, `read_datasheet` reads that.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+
+class PointEffect(enum.Enum):
+    """What a write does."""
+
+    NONE = "none"
+    """It cannot be written."""
+    PARAMETER = "parameter"
+    """Keeps a value that later actions use."""
+    ACTS = "acts"
+    """Does something at once, or starts what may be started once; no motion."""
+    MOVES = "moves"
+    """Gives an axis a motion, or prepares one."""
+
+
+class Access(enum.Enum):
+    READ = "r"
+    WRITE = "w"
+    BOTH = "rw"
+
+
+class PinDirection(enum.Enum):
+    INPUT = "input"
+    OUTPUT = "output"
+    BOTH = "input and output"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Permitted numbers from ``low`` to ``high``; None is open. ``is_low_excluded``: above ``low`` only."""
+
+    low: float | None = None
+    high: float | None = None
+    is_low_excluded: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisDescription:
+    number: int
+    name: str
+    """``M1``."""
+    unit: str
+    """Of its positions; velocities are in it per second."""
+    pulses_per_unit: float | None
+    """None where it is not known: of a device without its configuration."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pin:
+    name: str
+    direction: PinDirection
+    is_analog: bool = False
+    unit: str = ""
+    limits: Limits = Limits(0, 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointAddress:
+    """Where a point is on a wire."""
+
+    space: str
+    """``holding register``, ``coil``, ``input``; ``command`` of a chip."""
+    place: int | str
+    """Address counted from 0, or the text of the command."""
+    words: int = 1
+    """Number of addresses that the value takes."""
+    type: str = ""
+    """How it lies there: ``BIT``, ``WORD``, ``DINT``, ``REAL``, ``REAL/DINT``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """A value that can be read or written."""
+
+    path: str
+    """As programs and conditions name it, after the name of the controller: ``M1.position``, ``M1_POS_ABS``."""
+    meaning: str
+    type: str
+    unit: str = ""
+    limits: Limits | None = None
+    """Of what may be written; None where nothing may."""
+    values: Mapping[int, str]
+    """Texts of enumerated values."""
+    access: Access
+    effect: PointEffect
+    addresses: tuple[PointAddress, ...] = ()
+    source: str
+    """Section of the manual, or id of an interpretation."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Argument:
+    name: str
+    type: str
+    unit: str = ""
+    limits: Limits | None = None
+    values: tuple[int, ...] = ()
+    """All that is permitted, where it is no range."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandDescription:
+    name: str
+    code: str
+    """What is sent: the letter of a chip, the name of a register."""
+    meaning: str
+    arguments: tuple[Argument, ...] = ()
+    effect: PointEffect
+    source: str
+
+
+class FactType(enum.Enum):
+    """Of a field of an event."""
+
+    WHOLE = "whole number"
+    NUMBER = "number"
+    TRUTH = "true or false"
+    TEXT = "text"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FactDescription:
+    """A field of an event, beside its moment and text."""
+
+    name: str
+    type: FactType
+    unit: str = ""
+    is_optional: bool = False
+    """Whether there are events of the code without it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EventDescription:
+    """Something that the controller reports."""
+
+    code: str
+    meaning: str
+    facts: tuple[FactDescription, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Datasheet:
+    kind: str
+    """The name of the kind of controller: ``mic488``."""
+    title: str
+    variant: str
+    """Firmware, or type of a chip."""
+    axes: tuple[AxisDescription, ...]
+    pins: tuple[Pin, ...]
+    points: tuple[Point, ...]
+    commands: tuple[CommandDescription, ...]
+    events: tuple[EventDescription, ...]
+
+    def point(self, path: str) -> Point:
+        """Raises `KeyError` for a point that is not there."""
+        for found in self.points:
+            if found.path.upper() == path.upper():
+                return found
+        raise KeyError(path)
+
+
+def plain(value: Any) -> Any:
+    """A data sheet, or a part of it, as JSON has values."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, enum.Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
+    """The data sheet in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `plain` does not give."""
+    lists: dict[str, Any] = {
+        "axes": tuple(AxisDescription(**axis) for axis in data["axes"]),
+        "pins": tuple(map(_read_pin, data["pins"])),
+        "points": tuple(map(_read_point, data["points"])),
+        "commands": tuple(map(_read_command, data["commands"])),
+        "events": tuple(map(_read_event, data["events"])),
+    }
+    return Datasheet(**{**data, **lists})
+
+
+def _read_pin(data: Mapping[str, Any]) -> Pin:
+    read: dict[str, Any] = {"direction": PinDirection(data["direction"]), "limits": Limits(**data["limits"])}
+    return Pin(**{**data, **read})
+
+
+def _read_point(data: Mapping[str, Any]) -> Point:
+    read: dict[str, Any] = {
+        "limits": _read_limits(data["limits"]),
+        "values": {int(number): text for number, text in data["values"].items()},
+        "access": Access(data["access"]),
+        "effect": PointEffect(data["effect"]),
+        "addresses": tuple(PointAddress(**address) for address in data["addresses"]),
+    }
+    return Point(**{**data, **read})
+
+
+def _read_command(data: Mapping[str, Any]) -> CommandDescription:
+    read: dict[str, Any] = {"arguments": tuple(map(_read_argument, data["arguments"])), "effect": PointEffect(data["effect"])}
+    return CommandDescription(**{**data, **read})
+
+
+def _read_argument(data: Mapping[str, Any]) -> Argument:
+    read: dict[str, Any] = {"limits": _read_limits(data["limits"]), "values": tuple(data["values"])}
+    return Argument(**{**data, **read})
+
+
+def _read_event(data: Mapping[str, Any]) -> EventDescription:
+    facts = tuple(
+        FactDescription(name=one["name"], type=FactType(one["type"]), unit=one["unit"], is_optional=one["is_optional"])
+        for one in data["facts"]
+    )
+    return EventDescription(code=data["code"], meaning=data["meaning"], facts=facts)
+
+
+def _read_limits(data: Mapping[str, Any] | None) -> Limits | None:
+    return None if data is None else Limits(**data)

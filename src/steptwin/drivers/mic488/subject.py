@@ -1,0 +1,183 @@
+"""A MIC488 behind its driver, as a part of a subject (`steptwin.drivers.subject`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from steptwin.datasheet import Datasheet
+from steptwin.drivers.line import DriverLine
+from steptwin.drivers.mic488.driver import ALL_AXES, AsyncMic488, Mic488Status
+from steptwin.drivers.mic488.failures import ModbusRefusal
+from steptwin.drivers.mic488.motion import status_text
+from steptwin.drivers.mic488.program import ProgramState
+from steptwin.drivers.modbus import Query
+from steptwin.drivers.subject import Action, Value
+from steptwin.errors import Misuse
+from steptwin.mic488.datasheet import datasheet_of
+from steptwin.mic488.points import item_of
+from steptwin.mic488.registermap import Space
+from steptwin.mic488.registers import CONTROLLER_STATUS_TEXTS, register_map
+from steptwin.mic488.values import named
+from steptwin.nearmiss import NearMiss
+from steptwin.subject import commands as command
+from steptwin.subject.events import EdgePayload, Payload, SamplePayload, StatusPayload
+from steptwin.wire import pdu
+from steptwin.world import script as steps
+
+MOST_NAMED = 9
+"""Points in a message."""
+
+
+class Mic488Part:
+    """Positions are in configured units where the driver has the configuration; else pulses per unit are unknown."""
+
+    line_kind = "modbus"
+
+    def __init__(self, mic: AsyncMic488) -> None:
+        self._mic = mic
+        self._registers = register_map(mic.firmware)
+        gears = [None] * len(ALL_AXES) if mic.config is None else [axis.gear for axis in mic.config.axes]
+        scales = tuple((mic.axis(n).unit, gear) for n, gear in zip(ALL_AXES, gears, strict=True))
+        self.datasheet: Datasheet = datasheet_of(mic.firmware, scales)
+        self._points = {point.path.upper(): point for point in self.datasheet.points}
+        self._pins = {pin.name: pin for pin in self.datasheet.pins}
+        self._last: Mic488Status | None = None
+
+    @property
+    def line(self) -> DriverLine[Query, bytes]:
+        return self._mic.line
+
+    @property
+    def address(self) -> int:
+        return self._mic.unit
+
+    # ------------------------------------------------------------------ points
+
+    async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
+        """Those of a data sheet that a register shows; what a pin or a short name has no register for is unknown."""
+        registers = {point: self._register(point) for point in points}
+        names = tuple(dict.fromkeys(name for name in registers.values() if name is not None))
+        shown = await self._mic.get_shown(*names) if names else {}
+        return {
+            point: (None, self._unit(point)) if name is None else (float(shown[name][0]), shown[name][1])
+            for point, name in registers.items()
+        }
+
+    def _register(self, path: str) -> str | None:
+        """The name of the register that shows a point, None where there is none. Raises `Misuse`."""
+        item = item_of(self._registers, path)
+        if item is not None:
+            return item.name if item.register.reads else None
+        point = self._points.get(path.upper())
+        if point is not None and point.addresses:
+            address = point.addresses[0]
+            return self._registers.at(Space(address.space), int(address.place)).name
+        if point is None and path.upper() not in self._pins:
+            known = [each.path for each in self.datasheet.points]
+            listed = f"{', '.join(known[:MOST_NAMED])} and more, {len(known)} in all, and pins"
+            raise Misuse(f"no point {path!r}{NearMiss().hint(path, (*known, *self._pins))}; there are {listed}")
+        return None
+
+    def _unit(self, path: str) -> str:
+        found = self._points.get(path.upper()) or self._pins.get(path.upper())
+        return "" if found is None else found.unit
+
+    # ------------------------------------------------------------------ commands
+
+    def actions(self) -> Mapping[type, Action]:
+        return {
+            command.Enable: self._enable,
+            command.Move: self._move,
+            command.Home: self._home,
+            command.Jog: self._jog,
+            command.StopAxes: self._stop,
+            command.ControlProgram: self._program,
+            command.Encoders: self._encoders,
+            steps.Write: self._write,
+            steps.Request: self._request,
+        }
+
+    async def _enable(self, wanted: command.Enable) -> None:
+        axis = self._mic.axis(wanted.axis)
+        await (axis.enable() if wanted.on else axis.disable())
+
+    async def _move(self, wanted: command.Move) -> None:
+        axis = self._mic.axis(wanted.axis)
+        await (axis.move_by(wanted.by or 0.0) if wanted.to is None else axis.move_to(wanted.to))
+
+    async def _home(self, wanted: command.Home) -> None:
+        await self._mic.axis(wanted.axis).home(wanted.velocity)
+
+    async def _jog(self, wanted: command.Jog) -> None:
+        await self._mic.axis(wanted.axis).move_velocity(wanted.velocity)
+
+    async def _stop(self, wanted: command.StopAxes) -> None:
+        await (self._mic.stop_all() if wanted.axis is None else self._mic.axis(wanted.axis).stop())
+
+    async def _program(self, wanted: command.ControlProgram) -> None:
+        program = self._mic.program
+        await {"start": program.start, "pause": program.pause, "stop": program.stop}[wanted.action]()
+
+    async def _encoders(self, _: command.Encoders) -> object:
+        return [{"axis": n, "counts": await self._mic.axis(n).encoder(), "turned_by": None} for n in ALL_AXES]
+
+    async def _write(self, wanted: steps.Write) -> None:
+        """One after the other; names are checked before the first is written."""
+        for _, name, _ in wanted.values:
+            if not named(self._registers, name).register.accepts:
+                raise Misuse(f"{name} can only be read")
+        for _, name, value in wanted.values:
+            await self._mic.set(name, value)
+
+    async def _request(self, wanted: steps.Request) -> object:
+        if wanted.unit != self.address:
+            raise Misuse(f"unit = {wanted.unit}: this subject is the device with address {self.address}")
+        try:
+            request = pdu.decode_request(wanted.pdu)
+        except pdu.ModbusException as error:
+            raise Misuse(f"pdu = {wanted.pdu.hex()}: {error.detail or error}") from None
+        try:
+            return {"pdu": pdu.encode_response(await self._mic.request(request)).hex()}
+        except ModbusRefusal as refused:
+            return {"pdu": pdu.exception_pdu(wanted.pdu[0], refused.code).hex()}
+
+    # ------------------------------------------------------------------ polling
+
+    async def look(self, kinds: frozenset[str]) -> list[Payload]:
+        status = await self._mic.status()
+        before, self._last = self._last, status
+        found: list[Payload] = []
+        if "sample" in kinds:
+            for axis, position in zip(ALL_AXES, status.positions, strict=True):
+                if before is None or position != before.positions[axis - 1]:
+                    found.append(SamplePayload(str(axis), position, status.units[axis - 1]))
+        if before is None:
+            return found
+        return found + [payload for payload in (*_edges(before, status), *_changes(before, status)) if payload.kind in kinds]
+
+
+def _edges(before: Mic488Status, status: Mic488Status) -> list[Payload]:
+    levels = (("IN", before.inputs, status.inputs), ("OUT", before.outputs, status.outputs))
+    return [
+        EdgePayload(f"{name}{number}", float(new))
+        for name, olds, news in levels
+        for number, (old, new) in enumerate(zip(olds, news, strict=True), start=1)
+        if old != new
+    ]
+
+
+def _changes(before: Mic488Status, status: Mic488Status) -> list[Payload]:
+    """Of the registers that say what the controller does."""
+    found: list[Payload] = [
+        StatusPayload("axis-status", f"M{axis}: {status_text(new)}", (("axis", axis), ("status", new)))
+        for axis, (old, new) in enumerate(zip(before.axes, status.axes, strict=True), start=1)
+        if old != new
+    ]
+    if status.controller != before.controller and status.controller is not None:
+        text = CONTROLLER_STATUS_TEXTS.get(status.controller, f"unknown status {status.controller}")
+        found.append(StatusPayload("controller-status", f"controller: {text}", (("status", status.controller),)))
+    if status.program != before.program:
+        known = {state.value: state.name.lower() for state in ProgramState}
+        text = known.get(status.program, f"unknown state {status.program}")
+        found.append(StatusPayload("program-state", f"program: {text}", (("state", status.program),)))
+    return found

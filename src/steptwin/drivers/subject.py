@@ -1,0 +1,213 @@
+"""A device behind a driver as a subject (`steptwin.subject.contract`): the same commands, points and events as a twin has.
+
+with Mic488("/dev/ttyUSB0", config="machine.cfg") as mic:
+    subject = mic.subject("table")
+    subject.do(Move("table", 1, to=20.0))
+
+Drivers do the commands, with their own safety (ADR 12). What no register and no command shows has the quality `UNKNOWN`. What
+only a twin can do (pins, faults, time, power) is a `Refusal`. Events come from polling, and only while there are followers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from typing import Any, Protocol, TypeAlias
+
+from steptwin.datasheet import Datasheet
+from steptwin.drivers.blocking import Blocking, blocking, finish
+from steptwin.drivers.line import DriverLine
+from steptwin.errors import Misuse, Refusal
+from steptwin.machine import SECOND, Nanos
+from steptwin.nearmiss import NearMiss
+from steptwin.subject import commands as command
+from steptwin.subject.commands import COMMANDS, Command, row_of
+from steptwin.subject.contract import GOOD, UNKNOWN, Description, LinePart, MachinePart, Reading, Result
+from steptwin.subject.events import Numbering, Payload
+from steptwin.subject.following import Filter, Followers, Following, Taken
+
+PERIOD_S = 0.2
+PERIODS_S = (0.02, 60.0)
+Action: TypeAlias = Callable[[Any], Awaitable[object]]
+Value: TypeAlias = tuple[float | None, str]
+"""Of a point, None where it is unknown; and its unit."""
+
+
+class DevicePart(Protocol):
+    """One controller behind a driver that is open."""
+
+    @property
+    def line(self) -> DriverLine[Any, Any]: ...
+
+    @property
+    def line_kind(self) -> str: ...
+
+    @property
+    def address(self) -> int | None:
+        """On its line; None where it is alone there."""
+        ...
+
+    @property
+    def datasheet(self) -> Datasheet:
+        """Its axes are in the units of the driver."""
+        ...
+
+    async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
+        """By the names that were asked for. Raises `Misuse` for a point that is not there."""
+        ...
+
+    def actions(self) -> Mapping[type, Action]:
+        """The commands that it can do; names of machine and line have been checked."""
+        ...
+
+    async def look(self, kinds: frozenset[str]) -> list[Payload]:
+        """What has changed since the last look, and samples; of the kinds that are wanted."""
+        ...
+
+
+class AsyncDeviceSubject:
+    """The controller ``name``. Others may drive it, too, over the same line. Events come of `poll`; `run` polls again and again.
+
+    Times begin with the subject. A cause is known of nothing but what a command is seen to lead to at once.
+    """
+
+    def __init__(self, name: str, device: DevicePart, period_s: float = PERIOD_S) -> None:
+        if not PERIODS_S[0] <= period_s <= PERIODS_S[1]:
+            raise Misuse(f"period_s = {period_s:g}: permitted are {PERIODS_S[0]:g} to {PERIODS_S[1]:g} s")
+        self.name = name
+        self.period_ns: Nanos = round(period_s * SECOND)
+        self._device = device
+        self._line = device.line
+        self._begin = self._line.now()
+        self._actions: dict[type, Action] = {
+            **device.actions(),
+            command.Describe: self._describe,
+            command.ReadPoints: self._read,
+            command.ReadPins: self._pins,
+            command.Time: self._time,
+        }
+        self.description = self._described()
+        self.followers = Followers()
+        self._numbering = Numbering({})
+
+    def _described(self) -> Description:
+        place = self._line.place
+        machine = MachinePart(self.name, self._device.datasheet, place, self._device.address)
+        names = tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
+        return Description(self.name, (machine,), lines=(LinePart(place, self._device.line_kind, None),), commands=names)
+
+    def now(self) -> Nanos:
+        return self._line.now() - self._begin
+
+    # ------------------------------------------------------------------ what a subject is
+
+    async def read(self, *points: str) -> tuple[Reading, ...]:
+        """In as few exchanges as there can be."""
+        paths = {point: self._path(point) for point in points if point != "time"}
+        values = await self._device.values(tuple(dict.fromkeys(paths.values()))) if paths else {}
+        found: dict[str, Value] = {point: values[path] for point, path in paths.items()}
+        found["time"] = self.now() / SECOND, "s"
+        return tuple(Reading(point, *found[point], UNKNOWN if found[point][0] is None else GOOD) for point in points)
+
+    def _path(self, point: str) -> str:
+        owner, _, path = point.partition(".")
+        if owner != self.name:
+            raise Misuse(f"nothing is called {owner!r}{NearMiss().hint(owner, (self.name,))}; there are {self.name}, time")
+        return path
+
+    async def do(self, wanted: Command) -> Result:
+        """Raises `Misuse`, `Refusal`, `LineFailure`."""
+        action = self._actions.get(type(wanted))
+        if action is None:
+            can = ", ".join(self.description.commands)
+            raise Refusal(f"{row_of(wanted).name} cannot be done with this device ({self._line.place}); what can: {can}")
+        self._check_names(wanted)
+        number = self._numbering.command(self.now())
+        try:
+            value = await action(wanted)
+        finally:
+            self._numbering.done()
+        return Result(value, self.now(), number)
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        return self.followers.follow(what, bound)
+
+    async def poll(self) -> None:
+        """Look once, where anybody follows, and make events of what has changed. Raises `LineFailure`."""
+        if self.followers:
+            for payload in await self._device.look(self.followers.kinds):
+                self.followers.publish(self._numbering.event(self.now(), self.name, payload))
+
+    async def run(self) -> None:
+        """Until cancelled. Raises `LineFailure`."""
+        while True:
+            await self.poll()
+            await self._line.sleep(self.period_ns / SECOND)
+
+    # ------------------------------------------------------------------ commands
+
+    def _check_names(self, wanted: Command) -> None:
+        """Those of machines and lines in a command."""
+        for field in row_of(wanted).fields:
+            value: Any = getattr(wanted, field.key)
+            if field.name == "machine":
+                self._check_name("machine", value, self.name)
+            elif field.name == "line":
+                self._check_name("line", value, self._line.place)
+            elif field.name == "values":
+                for machine, _, _ in value:
+                    self._check_name("machine", machine, self.name)
+
+    def _check_name(self, what: str, name: str | None, there: str) -> None:
+        if name is not None and name != there:
+            raise Misuse(f"no {what} is called {name!r}{NearMiss().hint(name, (there,))}; there are {there}")
+
+    async def _describe(self, _: command.Describe) -> object:
+        return self.description.plain()
+
+    async def _read(self, wanted: command.ReadPoints) -> object:
+        return [reading._asdict() for reading in await self.read(*wanted.points)]
+
+    async def _pins(self, _: command.ReadPins) -> object:
+        pins = (f"{self.name}.{pin.name}" for pin in self._device.datasheet.pins)
+        return {one.point: one.value for one in await self.read(*pins)}
+
+    async def _time(self, _: command.Time) -> object:
+        now = self.now()
+        return {"world": self.name, "time_ns": str(now), "time_s": now / SECOND, "paused": False, "speed": 1.0, "stopped": None}
+
+
+class DeviceSubject(Blocking):
+    """The same for threads: a `Subject`. Whoever takes events has the device polled for them, at most once in a period."""
+
+    _driver: AsyncDeviceSubject
+
+    @property
+    def description(self) -> Description:
+        return self._driver.description
+
+    read = blocking(AsyncDeviceSubject.read)
+    do = blocking(AsyncDeviceSubject.do)
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        following = _Polled(self._driver, what, bound)
+        finish(self._driver.poll())  # changes are changes from now on
+        return following
+
+
+class _Polled(Following):
+    """Events of a device that is polled when they are taken."""
+
+    __slots__ = ("_due", "_subject")
+
+    def __init__(self, subject: AsyncDeviceSubject, what: Filter, bound: int) -> None:
+        super().__init__(what, bound, subject.followers.remove)
+        self._subject = subject
+        self._due = subject.now() + subject.period_ns
+        subject.followers.add(self)
+
+    def take(self, most: int | None = None) -> Taken:
+        now = self._subject.now()
+        if now >= self._due:
+            self._due = now + self._subject.period_ns
+            finish(self._subject.poll())
+        return super().take(most)

@@ -1,0 +1,38 @@
+"""Times as people write them: ``5 ms``, ``1.5s``, ``2 min``, or a number of seconds."""
+
+from __future__ import annotations
+
+import re
+from decimal import Decimal
+
+from steptwin.errors import Misuse
+from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
+
+UNITS: dict[str, Nanos] = {"us": MICROSECOND, "ms": MILLISECOND, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}
+LONGEST_NS: Nanos = 366 * 24 * UNITS["h"]
+_DURATION = re.compile(r"(\d{1,30}(?:\.\d{1,30})?|\.\d{1,30}) *([a-z]*)\Z", re.ASCII)
+
+
+def duration(value: object) -> Nanos:
+    """Nanoseconds of a text or of a number of seconds. Raises `Misuse` with what is permitted."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < float("inf"):
+        text: object = f"{Decimal(str(value)):f}"
+    else:
+        text = value
+    match = _DURATION.match(text.strip().lower()) if isinstance(text, str) else None
+    unit = UNITS.get(match[2] or "s") if match else None
+    if match is None or unit is None:
+        raise Misuse(f"{value!r} is no time: expected a number with {', '.join(UNITS)}, such as '90 s' or '500 ms'")
+    found = int(Decimal(match[1]) * unit)
+    if found > LONGEST_NS:
+        raise Misuse(f"{value!r} is too long: permitted are 0 to {LONGEST_NS // UNITS['h']} h")
+    return found
+
+
+def duration_text(time: Nanos) -> str:
+    """A duration as `duration` reads it, exactly: ``90 s``, ``1500 us``."""
+    for unit, size in (("s", SECOND), ("ms", MILLISECOND), ("us", MICROSECOND)):
+        if time % size == 0:
+            return f"{time // size} {unit}"
+    whole, rest = divmod(time, MICROSECOND)
+    return f"{whole}.{rest:03d} us"

@@ -1,0 +1,97 @@
+"""What is kept of what happens in a running world: nothing, a ring of the last records, or a file that grows on disk."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.files.export.axes import AxisViews
+from steptwin.files.export.records import begin_records, end_records, record_line
+from steptwin.machine import Nanos
+from steptwin.system import reason
+from steptwin.world.trace import Trace, TraceRecord
+
+MOST_IN_RING = 10_000_000
+
+
+class Ring:
+    """The last records of a trace, at most ``size``."""
+
+    def __init__(self, trace: Trace, size: int) -> None:
+        self._machines = trace.machines
+        self._records: deque[TraceRecord] = deque(trace, maxlen=size)
+        trace.watchers.append(self._records.append)
+
+    def trace(self) -> Trace:
+        """What it holds now."""
+        held = Trace(self._machines)
+        for record in self._records:
+            held.add(record)
+        return held
+
+
+class TraceFile:
+    """A file of JSON lines to which records are added as they happen; `read_trace` reads it, also one that was cut.
+
+    ``show`` is called once where the disk refuses more. Raises `Misuse` where it cannot be made.
+    """
+
+    def __init__(self, trace: Trace, path: Path, views: AxisViews, title: str, show: Callable[[str], None]) -> None:
+        self.path = path
+        self._trace = trace
+        self._show = show
+        self._failure: str | None = None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: IO[str] = path.open("w", buffering=1, encoding="utf-8")  # each line is there at once
+        except OSError as error:
+            raise Misuse(f"cannot write {path}: {reason(error)}") from error
+        self._write(begin_records(trace, views, title))
+        for record in trace:
+            self._add(record)
+        trace.watchers.append(self._add)
+
+    def _add(self, record: TraceRecord) -> None:
+        self._write(record_line(record))
+
+    def _write(self, line: str) -> None:
+        if self._failure is None:
+            try:
+                self._file.write(line)
+            except OSError as error:
+                self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        self._failure = f"cannot write {self.path}: {reason(error)}"
+        self._show(self._failure)
+
+    def close(self, until: Nanos) -> None:
+        """The run has ended at a moment. Raises `Misuse` where not all of it could be written."""
+        if self._add in self._trace.watchers:
+            self._trace.watchers.remove(self._add)
+        self._write(end_records(self._trace, until))
+        try:
+            self._file.close()
+        except OSError as error:
+            self._fail(error)
+        if self._failure is not None:
+            raise Misuse(self._failure)
+
+
+Kept: TypeAlias = int | Path | None
+"""How much of a trace is kept: so many records, those in a file or a directory, none."""
+
+
+def read_kept(text: str) -> Kept:
+    """``off``, ``ring 10000``, or a file. Raises `Misuse`."""
+    if text == "off":
+        return None
+    word, _, number = text.partition(" ")
+    if word != "ring":
+        return Path(text)
+    if not number.strip().isdecimal() or not 1 <= int(number) <= MOST_IN_RING:
+        raise Misuse(f"trace = {text!r}: a ring takes a number of records from 1 to {MOST_IN_RING}, such as 'ring 10000'")
+    return int(number)

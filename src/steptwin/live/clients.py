@@ -1,0 +1,68 @@
+"""TCP clients of a process, however they are served."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from steptwin.world.addresses import Address
+
+BACKLOG = 1024
+RETRY_S = 1.0
+"""How long no client is accepted when the system has no room for one more."""
+
+
+class Client(Protocol):
+    @property
+    def waiting(self) -> int:
+        """Bytes for which the client has no room."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send; what finds no room waits for it."""
+        ...
+
+    def close(self) -> None: ...
+
+
+def _unnoticed(text: str) -> None:
+    """For shells without an observer."""
+
+
+@dataclass(slots=True)
+class Clients:
+    """All TCP clients of a process. Every one is an open file, so there is a limit: ``most``.
+
+    ``notice`` is called for clients that were turned away or made no sense.
+    """
+
+    most: int = 65536
+    notice: Callable[[str], None] = _unnoticed
+    present: set[Client] = field(default_factory=set)
+
+    def have_room(self) -> bool:
+        """Whether one more client may connect; it is a notice if not."""
+        if len(self.present) < self.most:
+            return True
+        self.notice(f"more than {self.most} clients at once are turned away")
+        return False
+
+    def made_no_sense(self, peer: Address, why: str) -> None:
+        self.notice(f"client {peer}: {why}; its connection is closed")
+
+
+def listening(address: Address) -> socket.socket:
+    """A socket that listens. Raises `OSError`, or `UnicodeError` for what is no name of a host."""
+    family = socket.getaddrinfo(*address, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0][0]
+    listener = socket.create_server(address, family=family, backlog=BACKLOG)
+    listener.setblocking(False)
+    set_up(listener)  # what is accepted inherits it on Linux
+    return listener
+
+
+def set_up(connection: socket.socket) -> None:
+    """Small answers leave at once, and clients that are gone are noticed."""
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)

@@ -1,0 +1,46 @@
+"""The directory in which running twins of a user are found: control endpoints, links to pseudo terminals, locks."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.system import is_own, user
+
+
+def runtime_directory() -> Path:
+    """Where control endpoints and pty links of this user's twins lie; it need not exist.
+
+    ``XDG_RUNTIME_DIR`` on Linux, ``LOCALAPPDATA`` on Windows, which are private to the user; otherwise, as on macOS, a directory
+    for temporary files.
+    """
+    for variable in ("XDG_RUNTIME_DIR", "LOCALAPPDATA"):
+        base = os.environ.get(variable)
+        if base:
+            return Path(base) / "steptwin"
+    number = user()
+    return Path(tempfile.gettempdir()) / ("steptwin" if number is None else f"steptwin-{number}")
+
+
+def private_directory(path: Path) -> Path:
+    """Make ``path`` for this user alone. Raises `Misuse` where it is something else or belongs to another user."""
+    path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if permissions(path) & 0o077:
+        path.chmod(0o700)
+    return path
+
+
+def permissions(path: Path) -> int:
+    """The permission bits of a directory; 0o700 where they mean nothing (Windows: access follows the directory above).
+
+    Raises `Misuse` for what is no directory, or of another user.
+    """
+    found = path.lstat()
+    if not stat.S_ISDIR(found.st_mode):
+        raise Misuse(f"{path} is no directory")
+    if not is_own(found):
+        raise Misuse(f"{path} belongs to another user")
+    return 0o700 if user() is None else stat.S_IMODE(found.st_mode)

@@ -1,0 +1,91 @@
+"""How a running world appears to a person: a line for each thing, or a live view on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from steptwin.files.world import World
+from steptwin.live.output import Output
+from steptwin.live.server import EndPoint, Server
+from steptwin.live.world import LiveWorld
+from steptwin.live.world_frames import follow_frames
+from steptwin.world.records import describe, is_shown
+from steptwin.world.trace import TraceRecord
+
+
+class Face(Protocol):
+    """What shows a world while it runs."""
+
+    def notice(self, text: str) -> None:
+        """Something the person should know."""
+        ...
+
+    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
+        """Show ``head`` (`banner`), what has happened when the world was made, and what happens from now on."""
+        ...
+
+    async def show(self, server: Server) -> None:
+        """Until the server ends."""
+        ...
+
+
+class Lines:
+    """Records and notices, and with ``frames`` every frame."""
+
+    def __init__(self, live: LiveWorld, output: Output, *, frames: bool) -> None:
+        self._live = live
+        self._output = output
+        if frames:
+            follow_frames(live, lambda frame: output.line(str(frame)))
+
+    def notice(self, text: str) -> None:
+        self._output.line(text)
+
+    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
+        for text in (*head, *map(describe, past)):
+            self._output.line(text)
+        self._live.world.trace.watchers.append(self._tell)
+
+    async def show(self, server: Server) -> None:
+        await server.until_ended()
+
+    def _tell(self, record: TraceRecord) -> None:
+        if is_shown(record):
+            self._output.line(describe(record))
+
+
+def banner(world: World, end_points: Sequence[EndPoint], remarks: Sequence[str]) -> list[str]:
+    """What runs, where it listens, and what to know about it."""
+    width = max((len(end_point.protocol) for end_point in end_points), default=0)
+    places = [f"  {end_point.protocol:<{width}}  {end_point.place}" for end_point in end_points]
+    return [title_of(world), *places, *(f"  {remark}" for remark in remarks), "Ctrl-C ends"]
+
+
+def title_of(world: World) -> str:
+    """The world and its controllers, in a line."""
+    titles = {name: _titled(world, name) for name in world.machines}
+    if len(titles) == 1:
+        return f"{world.spec.name}: {next(iter(titles.values()))}"
+    return "; ".join([world.spec.name, *(f"{name}: {title}" for name, title in titles.items())])
+
+
+def _titled(world: World, name: str) -> str:
+    kind, on = world.kind(name), world.plan.line_of.get(name)
+    _, _, title = kind.title.partition(" ")  # the article
+    where = {} if on is None else kind.announced(world.machines[name], on[1])
+    return ", ".join([title, *(f"{key} {value}" for key, value in where.items() if key != "kind")])
+
+
+def remarks_on(world: World, *, listen_any: bool) -> list[str]:
+    """What the person who started it should know."""
+    found = [remark for name, machine in world.machines.items() for remark in world.kind(name).remarks(name, machine)]
+    if listen_any:
+        found.append("the lines have no authentication: whoever reaches these addresses moves the axes")
+    lasting = {name: world.kind(name).keeps_memory(machine) for name, machine in world.machines.items()}
+    where = world.state
+    if where is None and any(lasting.values()):
+        found.append("non-volatile memory ends with this process (--state DIR keeps it)")
+    elif where is not None:
+        found += [f"{name} has no non-volatile memory: nothing of it goes into {where}" for name in lasting if not lasting[name]]
+    return found

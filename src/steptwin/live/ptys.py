@@ -1,0 +1,24 @@
+"""Pseudo terminals where the system has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.live.cell import Cell
+from steptwin.live.links import PlacedLink
+from steptwin.machine import Port
+from steptwin.system import HAS_PTYS
+
+
+def pty_link(cell: Cell, path: Path, make_port: Callable[[], Port]) -> PlacedLink:
+    """A link at ``path``, not yet open. Raises `Misuse` on a system without pseudo terminals."""
+    if not HAS_PTYS:
+        raise Misuse(
+            f"cannot make a pseudo terminal at {path}: they exist on Linux and macOS only; use TCP, RTU over TCP or a network "
+            "serial port (RFC 2217)"
+        )
+    from steptwin.live.pty import PtyLink
+
+    return PtyLink(cell, path, make_port)

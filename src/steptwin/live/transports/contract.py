@@ -1,0 +1,51 @@
+"""What a transport is: a way in which programs outside reach a line, one for each key in `steptwin.world.links`."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+
+from steptwin.live.cell import Cell
+from steptwin.live.clients import Clients
+from steptwin.live.links import Link
+from steptwin.live.rfc2217 import TwinLine
+from steptwin.machine import Port
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opening:
+    """What is to be opened."""
+
+    where: str
+    """The value of the key: an address, a path, a device."""
+    make_port: Callable[[], Port]
+    """A port of the line for one more program."""
+    line: TwinLine
+    """Present rate and timing of the line, and where events of the link are shown."""
+    cell: Cell
+    """In which bytes that come are inputs."""
+    clients: Clients
+    """All clients over TCP, of which there is a limit."""
+    listen_any: bool = False
+    """Whether addresses are permitted that others can reach."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """An open link. ``place`` is its address as text, ``details`` as fields."""
+
+    link: Link
+    place: str
+    details: Mapping[str, object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transport:
+    kind: str
+    """Of its end points: ``rtu-tcp``."""
+    is_address: bool
+    """Whether the value of its key is an address on which it listens."""
+    has_several: bool
+    """Whether any number of programs may use it at once; else one after the other."""
+    open: Callable[[Opening], Awaitable[Opened]]
+    """Raises `LineFailure`, or `Misuse` for a value that is not permitted or what the system has not."""

@@ -1,0 +1,281 @@
+"""Which device is meant: running twins and their controllers by name, by file and by the addresses they listen on.
+
+| text | means |
+|---|---|
+| nothing | the controller of the only running twin |
+| ``mic488`` | the twin of this name |
+| ``machine.table`` | the controller ``table`` of the twin ``machine`` |
+| ``machine.toml`` | the twin that was started from this file |
+| ``127.0.0.1:5021``, ``/run/…/mic488`` | an address; of a running twin, what listens there is known |
+| ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:502`` | an address of a device |
+
+Options stand behind each of them: ``mic488,unit=2``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from steptwin.drivers.address import DeviceAddress, device_at, split_device
+from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.live.remote import START, ask, running
+from steptwin.subject.commands import EndPoints
+
+PATIENCE_S = 2.0
+"""How long a twin may take to describe what it serves."""
+_PREFERRED = ("tcp", "rtu-tcp", "rfc2217", "pty")
+"""Links that a driver on this computer can open, the fastest first."""
+_HERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+"""Where a twin that listens on all interfaces is reached from this computer."""
+_DESCRIPTIONS = (".toml", ".json")
+_NAME = re.compile(r"[\w-]+(\.[\w-]+)?")
+_HOST_PORT = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[\w.-]+):\d+")
+_SERIAL_PORT = re.compile(r"COM\d+", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class TwinController:
+    """A controller of a running twin.
+
+    ``address`` is what a driver selects it by on its line: its unit, or the address of the chip; None where it is on no line.
+    ``type``: the firmware of a MIC488, the type of an M1486. ``places`` are addresses of the line from this computer, the fastest
+    first.
+    """
+
+    twin: str
+    name: str
+    kind: str
+    line: str | None
+    address: int | None
+    type: str | None
+    places: tuple[str, ...]
+
+    @property
+    def full_name(self) -> str:
+        return self.twin if self.name == self.twin else f"{self.twin}.{self.name}"
+
+    @property
+    def selection(self) -> str:
+        """``unit=1`` or ``chip=F``."""
+        if self.address is None:
+            return ""
+        return f"chip={self.address:X}" if self.kind == "m1486" else f"unit={self.address}"
+
+    def is_meant(self, options: Mapping[str, Any]) -> bool:
+        """Whether it is what options behind a name select."""
+        kind = options.get("kind", "m1486" if "chip" in options else "mic488" if "unit" in options else self.kind)
+        selected = options.get("chip" if kind == "m1486" else "unit", self.address)
+        return kind == self.kind and selected == self.address
+
+    def device(self, text: str, options: Mapping[str, Any]) -> DeviceAddress:
+        """Where a driver reaches it; ``text`` is how it was named. Raises `LineFailure` where no driver can."""
+        if not self.places:
+            raise LineFailure(f"{self.full_name} is on no line that this computer can open: {self._why()}")
+        known: dict[str, Any] = {"kind": self.kind}
+        if self.kind == "m1486":
+            known |= {"chip": self.address, "variant": self.type}
+        else:
+            known |= {"unit": self.address, "firmware": self.type}
+        return device_at(text, self.places[0], {**known, **options})
+
+    def _why(self) -> str:
+        if self.line is None:
+            return "its description gives it no line"
+        return f"line {self.line!r} has no pty and no network address; name a serial port at the other end of its cable"
+
+
+@dataclass(frozen=True, slots=True)
+class Twin:
+    """A running twin as it announces itself. ``places``: addresses on this computer, with the line that is reached there."""
+
+    name: str
+    pid: int
+    file: Path | None
+    controllers: tuple[TwinController, ...]
+    places: Mapping[str, str]
+
+    def line_at(self, address: str) -> str | None:
+        """The line that is reached at an address."""
+        if "://" in address:
+            return self.places.get(address)
+        real = os.path.realpath(address)
+        return next((line for place, line in self.places.items() if "://" not in place and os.path.realpath(place) == real), None)
+
+
+# ---------------------------------------------------------------------- what runs
+
+
+def running_twins() -> list[Twin]:
+    """The twins of this user that answer, by name. Raises `Misuse` as `running`."""
+    found = []
+    for name in running():
+        with contextlib.suppress(LineFailure, Refusal):  # ended meanwhile, or suspended
+            found.append(_ask(name))
+    return found
+
+
+def _ask(name: str) -> Twin:
+    return _twin(ask(name, EndPoints(), timeout_s=PATIENCE_S))
+
+
+def _twin(announced: Mapping[str, Any]) -> Twin:
+    points = [point for point in announced["end_points"] if point["kind"] in _PREFERRED and point["line"] is not None]
+    points.sort(key=lambda point: _PREFERRED.index(point["kind"]))
+    places: dict[str, str] = {_place(point): point["line"] for point in points}
+    name, file = announced["name"], announced["file"]
+    controllers = tuple(_controller(name, each, places) for each in announced["controllers"])
+    return Twin(name, announced["pid"], None if file is None else Path(file), controllers, places)
+
+
+def _place(point: Mapping[str, Any]) -> str:
+    """The address of an end point from this computer."""
+    if point["kind"] == "pty":
+        return str(point["path"])
+    host = _HERE.get(point["host"], point["host"])
+    return f"{point['kind']}://{f'[{host}]' if ':' in host else host}:{point['port']}"
+
+
+def _controller(twin: str, announced: Mapping[str, Any], places: Mapping[str, str]) -> TwinController:
+    line = announced["line"]
+    address: int | None = announced.get("unit")
+    if "chip" in announced:
+        address = int(announced["chip"], 16)
+    reached = () if line is None else tuple(place for place, there in places.items() if there == line)
+    return TwinController(
+        twin, announced["name"], announced["kind"], line, address, announced.get("variant") or announced.get("firmware"), reached
+    )
+
+
+# ---------------------------------------------------------------------- which one is meant
+
+
+def find_device(text: str | None, *, whole_line: bool = False) -> DeviceAddress:
+    """Where a driver reaches the device that ``text`` names; None: the controller of the only running twin.
+
+    ``whole_line``: where several chips of one line may be meant, none of them is selected.
+    Raises `Misuse` where it is not clear which one is meant, `LineFailure` where there is none.
+    """
+    place, options = (None, dict[str, Any]()) if text is None else split_device(text)
+    shown = text or ""
+    of_twin = _named(place)
+    if of_twin is None:
+        address = _address(place or "")
+        there = _controllers_at(address) if "kind" not in options else ()
+        return device_at(shown, address, {**({"kind": there[0].kind} if there else {}), **options})
+    meant = [each for each in of_twin if each.is_meant(options)]
+    if whole_line and len(meant) > 1 and {each.kind for each in meant} == {"m1486"} and len({each.line for each in meant}) == 1:
+        types = {each.type for each in meant}
+        line = replace(meant[0], address=None, type=types.pop() if len(types) == 1 else None)
+        return line.device(shown, options)
+    if len(meant) != 1:
+        raise _unclear(shown, of_twin, meant)
+    return meant[0].device(shown, options)
+
+
+def controller_of(text: str | None) -> TwinController | None:
+    """The controller of a running twin that ``text`` names, by name, file or address; None for another device. Errors as of
+    `find_device`."""
+    place, options = (None, dict[str, Any]()) if text is None else split_device(text)
+    of_twin = _named(place)
+    if of_twin is None:
+        of_twin = _controllers_at(_address(place or ""))
+        if not of_twin:
+            return None
+    meant = [each for each in of_twin if each.is_meant(options)]
+    if len(meant) != 1:
+        raise _unclear(text or "", of_twin, meant)
+    return meant[0]
+
+
+def find_controller(text: str | None) -> tuple[str, str | None]:
+    """The running twin that ``text`` names (None: the only one), and its controller where ``text`` selects one.
+
+    Errors as of `find_device`; `Misuse` for a device that is no twin.
+    """
+    place, options = (None, dict[str, Any]()) if text is None else split_device(text)
+    of_twin = _named(place)
+    if of_twin is None:
+        of_twin = _controllers_at(_address(place or ""))
+        if not of_twin:
+            raise Misuse(f"{text} is no running twin, and this command is for twins: {_there()}")
+    meant = [each for each in of_twin if each.is_meant(options)]
+    if not meant:
+        raise _unclear(text or "", of_twin, meant)
+    selects = bool(options) or "." in (place or "")
+    return meant[0].twin, meant[0].name if len(meant) == 1 and selects else None
+
+
+def _named(place: str | None) -> Sequence[TwinController] | None:
+    """The controllers that a name or a file stands for; None where it is neither. Asks no other twin than the one named."""
+    if place is None:
+        names = running()
+        if len(names) > 1:
+            raise Misuse(f"several twins are running: name one with --device (-d): {', '.join(names)}")
+        if not names:
+            raise LineFailure(f"no twin is running: {START}, or name a device with --device (-d) or STEPTWIN_DEVICE")
+        return _ask(names[0]).controllers
+    if Path(place).suffix in _DESCRIPTIONS and "://" not in place:
+        file = Path(place).absolute()
+        started = [twin for twin in running_twins() if twin.file == file]
+        if len(started) != 1:
+            raise LineFailure(f"no running twin was started from {place}: {_there()}. 'steptwin up {place}' starts one")
+        return started[0].controllers
+    name, dot, controller = place.partition(".")
+    if not _NAME.fullmatch(place) or name not in running():
+        return None
+    twin = _ask(name)
+    called = [each for each in twin.controllers if not dot or each.name.upper() == controller.upper()]
+    found = called or [each for each in twin.controllers if controller.upper() in each.selection.upper().split("=")[1:]]
+    if not found:
+        raise Misuse(f"{name} has no controller {controller!r}: there are {', '.join(each.name for each in twin.controllers)}")
+    return found
+
+
+def _address(place: str) -> str:
+    """The address that ``place`` is. Raises `LineFailure` for what can only be a name."""
+    if "://" in place:
+        return place.replace("//localhost:", "//127.0.0.1:")
+    if _HOST_PORT.fullmatch(place):
+        address = f"tcp://{place.replace('localhost:', '127.0.0.1:')}"
+        known = [known for twin in running_twins() for known in twin.places] if _is_here(address) else []
+        return next((each for each in known if each.endswith(address[len("tcp:") :])), address)
+    if not _NAME.fullmatch(place) or _SERIAL_PORT.fullmatch(place) or Path(place).exists():
+        return place
+    raise LineFailure(f"no twin named {place!r} is running: {_there()}; a serial port is named as /dev/ttyUSB0 or COM3")
+
+
+def _is_here(address: str) -> bool:
+    """Whether a twin of this computer could be there. For other addresses no twin is asked, because one that is suspended would
+    delay a stop."""
+    if "://" not in address:
+        return os.path.realpath(address).startswith("/dev/pts/")
+    return address.partition("://")[2].startswith(("127.", "[::1]"))
+
+
+def _controllers_at(address: str) -> Sequence[TwinController]:
+    """The controllers that are reached at an address of a running twin."""
+    if not _is_here(address):
+        return ()
+    for twin in running_twins():
+        line = twin.line_at(address)
+        if line is not None:
+            return [each for each in twin.controllers if each.line == line]
+    return ()
+
+
+def _unclear(text: str, of_twin: Sequence[TwinController], meant: Sequence[TwinController]) -> Misuse:
+    listed = ", ".join(f"{each.full_name} ({' '.join(filter(None, (each.kind, each.selection)))})" for each in meant or of_twin)
+    if meant:
+        return Misuse(f"{meant[0].twin} has several controllers: name one with --device (-d): {listed}")
+    return Misuse(f"device {text!r}: no controller fits its options: there are {listed}")
+
+
+def _there() -> str:
+    names = running()
+    return f"running twins are {', '.join(names)}" if names else f"no twin is running; {START}"

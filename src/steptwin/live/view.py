@@ -1,0 +1,128 @@
+"""The live view of a world on a terminal: controllers, what happened last, frames."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from steptwin.live.cell import Cell
+from steptwin.live.output import Output
+from steptwin.live.server import Server
+from steptwin.live.view_m1486 import chip_lines
+from steptwin.live.view_mic488 import controller_lines
+from steptwin.live.world import LiveWorld
+from steptwin.live.world_frames import follow_frames
+from steptwin.machine import SECOND
+from steptwin.wire.slave import FrameDirection
+from steptwin.words.frames import FrameLine
+from steptwin.world.records import describe, is_shown
+from steptwin.world.trace import TraceRecord
+
+REFRESH_S = 0.1
+LINES_KEPT = 200
+"""Of events and of frames; as many as the terminal has room for are shown."""
+EVENTS_SHOWN = 5
+FEWEST_FRAMES = 4
+
+
+class LiveView:
+    """Controllers, the last events and frames, ten times a second, on the terminal's second screen."""
+
+    def __init__(self, live: LiveWorld, cell: Cell, output: Output) -> None:
+        self._live = live
+        self._cell = cell
+        self._output = output
+        self._console = Console(file=output, force_terminal=True)  # type: ignore[arg-type]
+        self._frames: deque[FrameLine] = deque(maxlen=LINES_KEPT)
+        self._events: deque[str] = deque(maxlen=EVENTS_SHOWN)
+        self._head: list[Text] = []
+        self._timer: asyncio.TimerHandle | None = None
+        follow_frames(live, self._frames.append)
+        live.world.trace.watchers.append(self._record)
+
+    def notice(self, text: str) -> None:
+        self._events.append(f"{self._live.now / SECOND:12.6f} s  {text}")
+
+    def _record(self, record: TraceRecord) -> None:
+        if is_shown(record):
+            self._events.append(describe(record))
+
+    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
+        for text in head:
+            self._output.line(text)
+        self._events.extend(map(describe, past))
+        title, *places, ending = head
+        self._head = [Text(f"{title}   {ending}", style="bold"), *(Text(text, style="dim") for text in places)]
+
+    async def show(self, server: Server) -> None:
+        with Live(console=self._console, auto_refresh=False, screen=True) as screen:
+            self._draw(screen)
+            try:
+                await server.until_ended()
+            finally:
+                if self._timer is not None:
+                    self._timer.cancel()
+
+    def _draw(self, screen: Live) -> None:
+        self._timer = asyncio.get_running_loop().call_later(REFRESH_S, self._draw, screen)
+        self._cell.enter()
+        self._cell.leave()
+        width, height = self._console.size
+        screen.update(page(self.lines(width, height)), refresh=True)
+
+    def lines(self, width: int, height: int) -> list[Text]:
+        """What the screen shows, from top to bottom: as much as it has room for."""
+        lines = [*self._head, Text()]
+        blocks = self._blocks(width)
+        for left, block in zip(range(len(blocks), 0, -1), blocks, strict=True):
+            if len(lines) + len(block) > height - FEWEST_FRAMES and left < len(blocks):
+                lines += [Text(f"… and {left} more controllers: make the window higher", style="yellow"), Text()]
+                break
+            lines += [*block, Text()]
+        if self._events:
+            lines += [Text("events", style="bold"), *map(Text, self._events), Text()]
+        room = height - len(lines) - 1
+        if room > 0 and self._frames:
+            shown = list(self._frames)[-room:]
+            lines += [Text("frames", style="bold"), *map(_frame, shown)]
+        return lines[:height]
+
+    def _blocks(self, width: int) -> list[list[Text]]:
+        """The lines of each controller, then those of the axes of the world."""
+        world = self._live.world
+        world.settle_all()
+        now = world.now
+        controllers = [controller_lines(name, view.device, now, width) for name, view in world.mic488.items()]
+        chips = [chip_lines(name, view.chip, now) for name, view in world.m1486.items()]
+        return [*controllers, *chips, *self._axes()]
+
+    def _axes(self) -> list[list[Text]]:
+        """Where the loads of axes are that need not be where their drives have counted to."""
+        world = self._live.world
+        own = {name: axis for name, axis in world.axis.items() if not world.axes[name].mechanism.build.ideal}
+        if not own:
+            return []
+        lines = [Text(f"{'axis':<12}{'load':>15}", style="dim")]
+        for name, axis in own.items():
+            line = Text(f"{name:<12}{axis.position:>12.3f} {axis.unit}")
+            if axis.stalled:
+                line.append("  stalled", style="bold red")
+            lines.append(line.append(f"  {axis.lost} pulses lost" if axis.lost else "", style="yellow"))
+        return [lines]
+
+
+def page(lines: Iterable[Text]) -> Text:
+    page = Text(no_wrap=True, overflow="ellipsis", end="")
+    page.append_text(Text("\n").join(lines))
+    return page
+
+
+def _frame(frame: FrameLine) -> Text:
+    incoming = frame.direction is FrameDirection.IN
+    text = Text(f"{frame.time / SECOND:10.3f} s  {frame.link:<7} ")
+    return text.append(f"{'→' if incoming else '←'} {frame.meaning}", style="" if incoming else "dim")

@@ -1,0 +1,139 @@
+"""Values of a controller of a running twin, without polling it.
+
+Positions and velocities are computed from its plans; other points are read again only when something has happened there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+from steptwin.datasheet import Point
+from steptwin.errors import Misuse
+from steptwin.live.remote import RemoteSubject
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.subject import commands as command
+from steptwin.subject.contract import MachinePart
+from steptwin.subject.events import Event, PacePayload
+from steptwin.subject.following import USUAL, filter_of
+from steptwin.subject.motion import Motions
+from steptwin.world.plant import WORLD
+
+BOUND = 10_000
+SETTLING_NS: Nanos = 100 * MILLISECOND
+"""What an event leads to that is none itself, as through the filter of an input, has happened so long after it."""
+Value: TypeAlias = bool | int | float | None
+
+
+class TwinWatch:
+    """The points ``paths`` of the controller ``machine``. ``subject`` is asked by nothing else meanwhile."""
+
+    def __init__(
+        self, subject: RemoteSubject, machine: str, paths: Sequence[str], wall_ns: Callable[[], Nanos] = time.monotonic_ns
+    ) -> None:
+        found = next((part for part in subject.description.machines if part.name == machine), None)
+        if found is None:
+            raise Misuse(f"{subject.name} has no controller {machine!r}")
+        self._subject = subject
+        self._wall_ns = wall_ns
+        self._part: MachinePart = found
+        points = {point.path.upper(): point for point in found.datasheet.points}
+        self._points = {path: points.get(path.upper()) for path in paths}
+        self._computed = {path: at for path, point in self._points.items() if (at := _computed(point, found)) is not None}
+        self._encoders = any(any(mark in path.upper() for mark in ("ENC_", ".ENCODER")) for path in self._points)
+        self._values: dict[str, tuple[Value, str]] = {}
+        self._was_moving = False
+        self._due: Nanos | None = None
+        """The moment of the twin until which points are read at every look; None: no more."""
+        self._begin()
+
+    def _begin(self) -> None:
+        what = filter_of(USUAL - {"load"}, (self._part.name, WORLD))
+        self._following, plans = self._subject.follow_from_now(what, BOUND)
+        self._motions = Motions(self._part, plans)
+        self._ask_time()
+        self._due = self.now()
+
+    # ------------------------------------------------------------------ time
+
+    def _ask_time(self) -> None:
+        there = self._subject.do(command.Time()).value
+        self._set_clock(int(there["time_ns"]), 0.0 if there["paused"] else there["speed"])
+
+    def _set_clock(self, now: Nanos, speed: float | str | None) -> None:
+        """From now on the time of the twin goes at ``speed``. Where it stands, or goes as fast as can be, the moment is
+        asked for at every look."""
+        self._at, self._speed, self._wall = now, speed if isinstance(speed, float | int) else 0.0, self._wall_ns()
+
+    def now(self) -> Nanos:
+        """The present moment of the twin."""
+        return self._at + round((self._wall_ns() - self._wall) * self._speed)
+
+    # ------------------------------------------------------------------ values
+
+    def look(self) -> dict[str, tuple[Value, str]]:
+        """Values and units, by path."""
+        missed, events = self._following.take()
+        if missed:
+            self._following.close()
+            self._begin()
+        for event in events:
+            self._take(event)
+        if not self._speed:
+            self._ask_time()
+        now = self.now()
+        was_moving, moving = self._was_moving, self._motions.is_moving(now)
+        self._was_moving = moving
+        if events or was_moving is not moving:
+            self._due = now + SETTLING_NS
+        if self._due is not None or (moving and self._encoders):
+            if self._due is not None and now >= self._due:
+                self._due = None
+            self._read()
+        for path, (axis, of) in self._computed.items():
+            self._values[path] = of(self._motions, axis, now), self._values[path][1]
+        return {path: self._values[path] for path in self._points}
+
+    def _take(self, event: Event) -> None:
+        self._motions.take(event)
+        if isinstance(event.payload, PacePayload):
+            self._set_clock(event.time, 0.0 if event.payload.paused else event.payload.speed)
+        elif event.time > self.now():
+            self._set_clock(event.time, self._speed)
+
+    def _read(self) -> None:
+        for path, reading in zip(
+            self._points, self._subject.read(*(f"{self._part.name}.{path}" for path in self._points)), strict=True
+        ):
+            self._values[path] = _typed(self._points[path], reading.value), reading.unit
+
+
+def _position(motions: Motions, axis: str, now: Nanos) -> float:
+    return motions.position(axis, now)
+
+
+def _velocity(motions: Motions, axis: str, now: Nanos) -> float:
+    return motions.velocity(axis, now)
+
+
+_COMPUTED = {"POS_ACT": _position, "POSITION": _position, "VEL_ACT": _velocity, "VELOCITY": _velocity}
+
+
+def _computed(point: Point | None, part: MachinePart) -> tuple[str, Callable[[Motions, str, Nanos], float]] | None:
+    """The axis of a point that follows from its plan, and how."""
+    if point is None:
+        return None
+    for axis in part.datasheet.axes:
+        of = _COMPUTED.get(point.path.upper().removeprefix(axis.name)[1:])
+        if of is not None and point.path.upper().startswith(axis.name):
+            return str(axis.number), of
+    return None
+
+
+def _typed(point: Point | None, value: float | None) -> Value:
+    """Switches and whole numbers as such."""
+    if value is None or point is None or not point.addresses:
+        return value
+    kind = point.addresses[0].type
+    return bool(value) if kind == "BIT" else int(value) if kind == "WORD" else value

@@ -1,0 +1,1 @@
+"""Programs of the M1486 in an editor."""

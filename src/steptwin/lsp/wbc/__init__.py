@@ -1,0 +1,1 @@
+"""Programs of the MIC488 in an editor."""

@@ -1,0 +1,89 @@
+"""What is written behind the words of a program: values of constants, rows of positions, times of moves, memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from steptwin.errors import Misuse
+from steptwin.lsp.answers import Hint
+from steptwin.lsp.wbc.names import Names, row_values
+from steptwin.mic488.config import ControllerConfig
+from steptwin.mic488.program import MAX_SPEED_P
+from steptwin.motion.planner import MotionState, plan_position
+from steptwin.symbols import Role, SymbolKind, Use
+from steptwin.wbc import steps as s
+from steptwin.wbc.check import CheckedProgram
+from steptwin.wbc.incremental import Edited
+from steptwin.wbc.scope import Scope
+from steptwin.wbc.tree import Assign, DecimalNumber, Identifier, KeywordStatement, Value
+
+_SETTINGS = ("ACCM", "DECM", "VMAXM")
+
+
+def hints(edited: Edited, checked: CheckedProgram, names: Names, uses: Sequence[Use]) -> Iterator[Hint]:
+    """In no order."""
+    table = names.around.positions
+    for use in uses:
+        if use.role is not Role.READ:
+            continue
+        if use.symbol.kind is SymbolKind.CONSTANT:
+            meaning = names.meaning(use.symbol.key)
+            if meaning:
+                yield Hint(use.span.end, f"= {meaning}", f"the constant {use.symbol.text}")
+        elif use.symbol.kind is SymbolKind.POSITION and table is not None:
+            index = table.index(use.symbol.text)
+            if index is not None:
+                yield Hint(use.span.end, row_values(table.rows[index]), f"row {index} of the position table")
+    if names.around.config is not None:
+        yield from _times(edited, names, names.around.config)
+    if checked.lines:
+        most = names.around.dialect.max_steps
+        last = max(n for n, line in enumerate(edited.program.lines) if line.statement is not None)
+        place = edited.starts[last] + len(edited.contents[last])
+        yield Hint(place, f"{checked.lines} of {most} lines", "executable lines of the program, and what the memory holds")
+
+
+def _times(edited: Edited, names: Names, config: ControllerConfig) -> Iterator[Hint]:
+    """How long a move over a known distance takes, where the program leaves ramps and velocity as configured."""
+    changed = {
+        statement.target.key
+        for line in edited.program.lines
+        if isinstance(statement := line.statement, Assign) and names.scope.family(statement.target) in _SETTINGS
+    }
+    numbers = {_number(names.scope, key) for key in changed}
+    for line in edited.program.lines:
+        statement = line.statement
+        if not isinstance(statement, KeywordStatement) or statement.keyword != "PREL":
+            continue
+        drive, distance = statement.operands
+        register = names.scope.register(drive) if isinstance(drive, Identifier) else None
+        value = _literal(names.scope, distance) if isinstance(distance, Identifier | DecimalNumber) else None
+        if register is None or value is None or register.number in numbers or not 1 <= register.number <= len(config.axes):
+            continue
+        seconds = _seconds(config, register.number, value)
+        if seconds is not None:
+            text = "time of the move from rest, with ramps and velocity of the configuration"
+            yield Hint(edited.place(statement.end), f"{seconds:.3g} s", text)
+
+
+def _number(scope: Scope, key: str) -> int:
+    register = scope.register(Identifier(0, 0, key, key))
+    return 0 if register is None else register.number
+
+
+def _literal(scope: Scope, node: Value) -> float | None:
+    if isinstance(node, DecimalNumber):
+        return node.value
+    known = scope.known.get(node.key)
+    return known.value if isinstance(known, s.Literal) else None
+
+
+def _seconds(config: ControllerConfig, number: int, distance_u: float) -> float | None:
+    axis = config.axes[number - 1]
+    gear = axis.gear
+    try:
+        speed = min(axis.vel * gear, MAX_SPEED_P)
+        profile = plan_position(MotionState(0, 0, 0.0, 0.0), round(distance_u * gear), axis.acc * gear, axis.dec * gear, speed)
+    except (Misuse, OverflowError, ValueError):
+        return None
+    return profile.segments[-1].end_s if profile.segments else 0.0

@@ -1,0 +1,18 @@
+"""What a program is looked at with: the other files of its machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from steptwin.mic488.config import ControllerConfig
+from steptwin.wbc.dialect import DEFAULT, Dialect
+from steptwin.wbc.positions import PositionTable
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """Position table and configuration, None where the machine has none, and the firmware it is for."""
+
+    positions: PositionTable | None = None
+    config: ControllerConfig | None = None
+    dialect: Dialect = DEFAULT

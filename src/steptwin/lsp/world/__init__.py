@@ -1,0 +1,1 @@
+"""Descriptions of worlds in an editor."""

@@ -1,0 +1,39 @@
+"""Everything that is wrong with a world: as it is said when the world is started."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from steptwin.diagnostics import Diagnostic, in_order
+from steptwin.errors import Misuse
+from steptwin.world.description import describe
+from steptwin.world.plant import Plant
+from steptwin.world.reader import WorldError
+
+LONGEST_MESSAGE = 500
+"""What is wrong with a program that a world names can be long; the program says it itself."""
+
+
+def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Sequence[Diagnostic]:
+    """``read`` gives the content of a file by the name it has in the text. Never raises."""
+    try:
+        spec = describe(name, text)
+    except WorldError as error:
+        return error.findings
+    try:
+        files: dict[str, bytes] = {}
+        for file, key in spec.files():
+            try:
+                files[file] = read(file)
+            except Misuse as error:
+                spec.text.wrong(key, "D009", str(error))
+        Plant(spec, files, keep_trace=False, keep_inputs=False)
+    except WorldError as error:
+        return [_short(finding) for finding in error.findings]
+    return [_short(finding) for finding in in_order(spec.text.findings)]
+
+
+def _short(finding: Diagnostic) -> Diagnostic:
+    message = finding.message
+    return finding if len(message) <= LONGEST_MESSAGE else replace(finding, message=f"{message[:LONGEST_MESSAGE]}…")

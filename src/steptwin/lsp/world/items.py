@@ -1,0 +1,138 @@
+"""Completions in descriptions of worlds: tables, keys, and values of keys."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from steptwin.diagnostics import Span
+from steptwin.lsp.answers import Completion, CompletionKind, Completions
+from steptwin.lsp.world.outline import Outline, Table
+from steptwin.symbols import SymbolKind
+from steptwin.world.kind import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, AnyKind
+from steptwin.world.kinds import KINDS
+from steptwin.world.reader import Key, Word, flag
+from steptwin.world.script import ACTIONS
+from steptwin.world.tables import all_keys, written
+
+_KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]*)\Z")
+_VALUE = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*([\"']?)([^\"'=,#]*)\Z")
+_STEP = re.compile(r"[{,][ \t]*([A-Za-z_]*)\Z")
+_STEP_VALUE = re.compile(r"([A-Za-z_]+)[ \t]*=[ \t]*([\"'])([^\"']*)\Z")
+_PINS = {
+    ("switch", "to"): DIGITAL_INPUT,
+    ("button", "to"): DIGITAL_INPUT,
+    ("source", "to"): ANALOG_INPUT,
+    ("wire", "from"): OUTPUT,
+    ("wire", "to"): DIGITAL_INPUT,
+}
+_STEP_NAMES = {
+    "press": SymbolKind.BUTTON,
+    "release": SymbolKind.BUTTON,
+    "send": SymbolKind.LINE,
+    "power_cycle": SymbolKind.CONTROLLER,
+}
+_FILES = {"config": (".cfg",), "program": (".prg", ".m1486"), "programs": (".prg",), "positions": (".csv",)}
+
+
+def keys_of(table: Table) -> Sequence[Key]:
+    """The keys that a table may have."""
+    if len(table.names) > 1 and table.names[0] in KINDS:
+        kind = KINDS[table.names[0]]
+        return kind.inner_keys(table.names[1]) if table.names[1] in kind.inner_tables else ()
+    return all_keys().get(table.kind, ())
+
+
+class Maker:
+    """For one text. ``files`` gives the names of files beside it by ending."""
+
+    def __init__(self, outline: Outline, controllers: Mapping[str, AnyKind], files: Iterable[str]) -> None:
+        self._outline = outline
+        self._controllers = controllers
+        self._files = tuple(files)
+
+    def items(self, before: str, place: int, present: Iterable[str]) -> Completions:
+        """``before`` is the line up to the cursor, ``present`` the keys that the table there has."""
+        if before.lstrip().startswith("["):
+            return Completions(tuple(_tables(Span(place - len(before.lstrip()), place))))
+        table = self._outline.table_at(place)
+        if table is None:
+            return Completions(())
+        if table.kind in ("event", "script") and (steps := self._step(before, place)) is not None:
+            return Completions(tuple(steps))
+        found = _KEY.match(before)
+        if found is not None:
+            return Completions(tuple(_keys(table, Span(place - len(found[1]), place), frozenset(present))))
+        found = _VALUE.match(before)
+        if found is None:
+            return Completions(())
+        return Completions(tuple(self._values(table, found[1], found[2], Span(place - len(found[3]), place))))
+
+    def _step(self, before: str, place: int) -> Iterator[Completion] | None:
+        """Within steps: their keys and the names they take; None elsewhere."""
+        found = _STEP.search(before)
+        if found is not None:
+            return _actions(Span(place - len(found[1]), place))
+        found = _STEP_VALUE.search(before)
+        if found is None or found[1] not in _STEP_NAMES:
+            return None
+        return self._names(_STEP_NAMES[found[1]], Span(place - len(found[3]), place), "")
+
+    def _values(self, table: Table, name: str, quote: str, span: Span) -> Iterator[Completion]:
+        mark = "" if quote else '"'
+        key = next((key for key in keys_of(table) if key.name == name), None)
+        if key is None:
+            return
+        if isinstance(key.read, Word):
+            yield from (_text(word, span, mark, key.meaning) for word in key.read.words)
+        elif key.read is flag:
+            yield from (Completion(word, CompletionKind.VALUE, span, key.meaning) for word in ("true", "false"))
+        elif name == "line":
+            yield from self._names(SymbolKind.LINE, span, mark)
+        elif name == "follows":
+            yield from self._names(SymbolKind.AXIS, span, mark)
+        elif name == "drive":
+            for controller, kind in self._controllers.items():
+                axes = [table for table in kind.inner_tables if table.startswith("M")] or ["M1"]
+                yield from (_text(f"{controller}.{axis}", span, mark, kind.title) for axis in axes)
+        elif (table.kind, name) in _PINS:
+            yield from self._pins(_PINS[table.kind, name], span, mark)
+        elif name in _FILES:
+            endings = _FILES[name]
+            yield from (_text(file, span, mark, "file") for file in self._files if file.lower().endswith(endings))
+
+    def _names(self, kind: SymbolKind, span: Span, mark: str) -> Iterator[Completion]:
+        for use in self._outline.definitions.values():
+            if use.symbol.kind is kind:
+                yield _text(use.symbol.text, span, mark, kind.value)
+
+    def _pins(self, kind: str, span: Span, mark: str) -> Iterator[Completion]:
+        for controller, of in self._controllers.items():
+            there = of.terminals
+            pins = {DIGITAL_INPUT: there.digital_inputs, ANALOG_INPUT: there.analog_inputs, OUTPUT: there.outputs}[kind]
+            yield from (_text(f"{controller}.{pin}", span, mark, kind) for pin in pins)
+
+
+def _text(text: str, span: Span, mark: str, detail: str) -> Completion:
+    return Completion(text, CompletionKind.VALUE, span, detail, insert=f"{mark}{text}{mark}")
+
+
+def _tables(span: Span) -> Iterator[Completion]:
+    for name in (*all_keys(), "fault"):
+        yield Completion(written(name), CompletionKind.KEY, span, "table")
+    for kind in KINDS.values():
+        yield from (Completion(f"[{kind.name}.{inner}]", CompletionKind.KEY, span, "table") for inner in kind.inner_tables)
+
+
+def _keys(table: Table, span: Span, present: frozenset[str]) -> Iterator[Completion]:
+    for key in keys_of(table):
+        if key.name not in present:
+            detail = f"{key.meaning} (needed)" if key.is_required else key.meaning
+            yield Completion(
+                key.name, CompletionKind.KEY, span, detail, insert=f"{key.name} = ", rank=0 if key.is_required else 5
+            )
+
+
+def _actions(span: Span) -> Iterator[Completion]:
+    for name, action in ACTIONS.items():
+        yield Completion(name, CompletionKind.KEY, span, action.main.meaning, insert=f"{name} = ")

@@ -1,0 +1,82 @@
+"""The data sheet of an M1486, from its command table, points and pins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+
+from steptwin.datasheet import (
+    Argument,
+    AxisDescription,
+    CommandDescription,
+    Datasheet,
+    Limits,
+    Pin,
+    PinDirection,
+    PointEffect,
+)
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.commands import TABLE, ArgType, CommandSpec
+from steptwin.m1486.events import EVENTS
+from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS
+from steptwin.m1486.points import POINTS, UNIT
+from steptwin.m1486.variants import Variant
+
+MOTION_SECTION = "VII.2"
+STARTS = frozenset({"R", ")", "("})
+"""Commands that start a motion; the others of their section set what the next one does."""
+AXES = (AxisDescription(number=1, name="M1", unit=UNIT, pulses_per_unit=1.0),)
+
+
+def datasheet(chip: M1486Chip) -> Datasheet:
+    return datasheet_of(chip.variant)
+
+
+@cache
+def datasheet_of(variant: Variant) -> Datasheet:
+    return Datasheet(
+        kind="m1486",
+        title="M1486",
+        variant=variant.name,
+        axes=AXES,
+        pins=tuple(_pins()),
+        points=tuple(POINTS.values()),
+        commands=tuple(_command(spec, variant) for spec in TABLE),
+        events=tuple(EVENTS.values()),
+    )
+
+
+def _pins() -> Iterator[Pin]:
+    for name in LINE_PINS:
+        yield Pin(name=name, direction=PinDirection.BOTH)
+    for name in CONTROL_PINS:
+        yield Pin(name=name, direction=PinDirection.INPUT)
+    for name in OUTPUT_PINS:
+        yield Pin(name=name, direction=PinDirection.OUTPUT)
+
+
+def _command(spec: CommandSpec, variant: Variant) -> CommandDescription:
+    permitted = spec.permitted(variant)
+    arguments: tuple[Argument, ...] = ()
+    if spec.kind is not ArgType.NONE:
+        is_range = isinstance(permitted, range)
+        arguments = (
+            Argument(
+                name=spec.kind.value,
+                type="whole number",
+                unit=spec.unit,
+                limits=Limits(permitted[0], permitted[-1]) if permitted else None,
+                values=() if is_range else tuple(permitted),
+            ),
+        )
+    effect = PointEffect.ACTS
+    if spec.section == MOTION_SECTION:
+        effect = PointEffect.MOVES if spec.key in STARTS else PointEffect.PARAMETER
+    return CommandDescription(
+        name=spec.name,
+        code=spec.key,
+        meaning=f"{spec.effect} ({spec.when.value})",
+        arguments=arguments,
+        effect=effect,
+        source=spec.section,
+    )

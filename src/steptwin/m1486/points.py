@@ -1,0 +1,153 @@
+"""The points of an M1486: what conditions ask for most, numeric registers, and the bytes that ``U`` sends. A world reads them
+without a command; on a device each takes a command and its time, and ``<`` changes the internal variable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import NamedTuple
+
+from steptwin.datasheet import Access, Limits, Point, PointAddress, PointEffect
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.io_effects import UPLOADED
+from steptwin.m1486.registers import POSITION_REGISTER, REGISTERS, REMAINDER_REGISTER, UPLOADS
+from steptwin.machine import Nanos
+from steptwin.motion import Profile
+from steptwin.points import LivePoint, Turns, turns_of, turns_of_round
+
+UNIT = "microstep"
+"""The smallest one, 1/64 of a full step."""
+POSITION_BITS = 24
+
+
+class _Row(NamedTuple):
+    point: Point
+    read: Callable[[M1486Chip, Nanos], float]
+    follows: bool = False
+    """Whether it changes between events."""
+    bits: int | None = None
+    """Of a count that begins anew: how many of the position's low bits make it up."""
+    has_version: bool = False
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _value(path: str, meaning: str, unit: str = "", source: str = "") -> Point:
+    return Point(
+        path=path,
+        meaning=meaning,
+        type="number",
+        unit=unit,
+        values={},
+        access=Access.READ,
+        effect=PointEffect.NONE,
+        source=source,
+    )
+
+
+def _has_room(chip: M1486Chip, now: Nanos) -> bool:
+    """Whether a host that heeds the chip's answers would send another line."""
+    receiver = chip.receiver
+    return not receiver.is_listening or not (receiver.is_stalled or receiver.busy_until is not None)
+
+
+def _values() -> Iterator[_Row]:
+    yield _Row(
+        _value("position", "Where the pulses given so far have led, since power-on.", UNIT),
+        lambda chip, now: chip.drive.true_u(now),
+        follows=True,
+        has_version=True,
+    )
+    yield _Row(
+        _value("velocity", "Commanded velocity.", f"{UNIT}/s"),
+        lambda chip, now: chip.drive.profile.velocity(now),
+        follows=True,
+        has_version=True,
+    )
+    yield _Row(
+        _value("counter", "Position counter, 24 bits.", UNIT, "VII.7"),
+        lambda chip, now: chip.drive.counter_u(now),
+        follows=True,
+        bits=POSITION_BITS,
+    )
+    yield _Row(_value("moving", "Whether a motion is being made."), lambda chip, now: chip.drive.is_busy)
+    yield _Row(_value("room", "Whether a host may send the next line: chips not addressed take any."), _has_room)
+    yield _Row(_value("variable", "Internal variable, 24 bits.", "", "VII.7"), lambda chip, now: chip.unit.variable)
+
+
+def _registers() -> Iterator[_Row]:
+    """Numeric registers: ``<`` reads one into the internal variable, ``>`` writes it."""
+    for register in REGISTERS:
+        number = register.number
+        point = Point(
+            path=f"register{number}",
+            meaning=_sentence(register.name),
+            type="number",
+            unit=UNIT if number == POSITION_REGISTER else "",
+            limits=Limits(0, 2**register.bits - 1),
+            values={},
+            access=Access.BOTH,
+            effect=PointEffect.PARAMETER,
+            addresses=(PointAddress(space="command", place=f"<{number}"), PointAddress(space="command", place=f">{number}")),
+            source="VII.7",
+        )
+        if number == POSITION_REGISTER:
+            yield _Row(point, lambda chip, now: chip.drive.counter_u(now), follows=True, bits=POSITION_BITS)
+        elif number == REMAINDER_REGISTER:
+            yield _Row(point, lambda chip, now: chip.unit.remainder)
+        else:
+            yield _Row(point, partial(_general, number))
+
+
+def _general(number: int, chip: M1486Chip, now: Nanos) -> float:
+    return chip.memory.register(number)
+
+
+def _uploads() -> Iterator[_Row]:
+    for number, what in UPLOADS.items():
+        point = Point(
+            path=f"U{number}",
+            meaning=_sentence(what),
+            type="byte",
+            values={},
+            access=Access.READ,
+            effect=PointEffect.NONE,
+            addresses=(PointAddress(space="command", place=f"U{number}"),),
+            source="VII.1",
+        )
+        is_of_position = number <= POSITION_BITS // 8
+        yield _Row(point, UPLOADED[number], follows=is_of_position, bits=8 * number if is_of_position else None)
+
+
+_ROWS: Mapping[str, _Row] = {row.point.path.upper(): row for row in (*_values(), *_registers(), *_uploads())}
+POINTS: Mapping[str, Point] = {path: row.point for path, row in _ROWS.items()}
+"""By path in capitals."""
+
+
+def live_point(chip: M1486Chip, text: str) -> LivePoint | None:
+    """The point of a name; None where there is none."""
+    row = _ROWS.get(text.upper())
+    if row is None:
+        return None
+    version = partial(_version, chip) if row.has_version else None
+    return LivePoint(point=row.point, read=partial(row.read, chip), turns=_turns(chip, row), version=version)
+
+
+def _turns(chip: M1486Chip, row: _Row) -> Turns | None:
+    if not row.follows:
+        return None
+    profile = partial(_profile, chip)
+    if row.bits is None:
+        return turns_of(profile)
+    # While a move goes on the counter shows its end (M-16): then there are turns at which nothing changes.
+    return turns_of_round(profile, lambda now: chip.drive.true_u(now) + chip.drive.offset_u, 2**row.bits)
+
+
+def _profile(chip: M1486Chip) -> Profile:
+    return chip.drive.profile
+
+
+def _version(chip: M1486Chip) -> object:
+    return chip.drive.revision

@@ -1,0 +1,449 @@
+"""The motion of one axis: planning, limits, switches, and how a motion ends.
+
+Suffixes: ``_p`` pulses (and pulses/s, pulses/s²), ``_u`` configured units, ``_ns`` moments and durations.
+
+Three positions: the *motor* count is pulses since power-on and never jumps; profiles live in it. The *coordinate* is what
+registers show: motor count plus ``offset_p`` (writing POS_ACT only moves the offset, MIC-13). The *true* position is that of
+the shaft according to the encoder.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from steptwin.machine import Nanos
+from steptwin.mic488.config import NO_INPUT, AxisConfig
+from steptwin.mic488.encoder import Coupling, Encoder
+from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, wrapped_dint
+from steptwin.mic488.homing import Homing
+from steptwin.mic488.position_control import PositionControl
+from steptwin.mic488.status import LIMIT, AxisStatus
+from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop, plan_velocity
+from steptwin.motion.planner import LEAST, MOST
+from steptwin.state import Plain, Stateful
+
+MAX_SPEED_P = 64_000.0
+"""Pulses/s an axis can give [1.74]; higher commanded speeds are clamped and reported."""
+
+SLOWEST_RAMP_P = 0.01
+"""Pulses/s²: 74 days to the highest speed. With less, ways of braking would outgrow what a double resolves to a pulse."""
+
+STRIDE_P = 2**32
+"""Bound of what an encoder may ask for at once: more than any position register holds, little enough to plan."""
+
+NEAR_P = 1e-6
+"""A braking that ends this close behind a soft limit ends on it: more than rounding errors, less than any pulse."""
+
+
+class AxisHost(Protocol):
+    """What an axis needs of its controller."""
+
+    def input_active(self, number: int) -> bool:
+        """State of input ``number`` (from 0) after polarity, before the filter (MIC-30)."""
+        ...
+
+    def axis_event(self, axis: int, code: str, detail: str, now: Nanos) -> None:
+        """Record an event of ``axis`` (from 1)."""
+        ...
+
+    def drive_output(self, axis: int, on: bool, now: Nanos) -> None:
+        """The EN output of ``axis`` (from 1) changed."""
+        ...
+
+    def position_error(self, axis: int, now: Nanos) -> None:
+        """``axis`` gave up correcting its position (status 5)."""
+        ...
+
+
+class AxisMotion(Stateful):
+    """The motion of axis ``number`` (from 1) of a MIC488: what follows a command, and what it shows."""
+
+    __slots__ = (
+        "_blocked_leg",
+        "acc_p",
+        "arrival",
+        "config",
+        "control",
+        "dec_p",
+        "enabled",
+        "encoder",
+        "fall_p",
+        "gear",
+        "homing",
+        "host",
+        "jogging",
+        "limit_l_p",
+        "limit_r_p",
+        "number",
+        "offset_p",
+        "on_arc",
+        "on_path",
+        "pending",
+        "profile",
+        "ramp_p",
+        "revision",
+        "rise_p",
+        "speed_p",
+        "status",
+        "target_p",
+        "velocity_p",
+        "vmax_p",
+    )
+    FIXED = frozenset({"config", "gear", "host", "number", "revision"})
+
+    def __init__(self, number: int, config: AxisConfig, host: AxisHost) -> None:
+        self.number = number
+        self.config = config
+        self.host = host
+        self.gear: float = config.gear
+        self.profile: Profile = at_rest(0, 0)
+        self.revision = 0
+        """Counts replacements of ``profile``, so that mechanics notice."""
+        follows = config.pos_ctrl_mode == PositionControl.ENCFOLLOW
+        self.encoder = Encoder(config.enc_resol, config.mot_resol, Coupling.FREE if follows else Coupling.DRIVE)
+        self.homing = Homing()
+        self.control = PositionControl()
+        self.power_on(0)
+
+    @property
+    def plan(self) -> Profile:
+        """What gives the pulses: the profile itself."""
+        return self.profile
+
+    def power_on(self, now: Nanos) -> None:
+        """Registers as configured (MIC-27), drive off, position 0; the motor stays where it is."""
+        config, gear = self.config, self.gear
+        # Stored in pulses, whatever DATA_TYPE is (MIC-17).
+        self.acc_p = min(max(config.acc * gear, LEAST), MOST)
+        self.dec_p = min(max(config.dec * gear, LEAST), MOST)
+        self.vmax_p = min(max(config.vel * gear, LEAST), MOST)
+        # MIC-12: not limiting until written.
+        self.limit_l_p = DINT_MIN
+        self.limit_r_p = DINT_MAX
+        self.jogging = 0
+        """Direction the JOG bits have started: +1, −1 or 0."""
+        self.pending: dict[str, float] = {}
+        """Values (pulses) stored in TRIGGER mode, by kind: VEL_ABS, VEL_REL, POS_ABS, POS_REL (MIC-16)."""
+        self._take_ramps()
+        self.target_p = 0
+        self.speed_p = self.vmax_p
+        """Motor position a position move goes to, and its cruise speed."""
+        self.velocity_p = 0.0
+        self.ramp_p = self.up_p
+        """Velocity a velocity move (or a homing) goes to, and its ramp while slowing down."""
+        self.on_path = False
+        """On a line, circle or arc, which it runs together with another axis."""
+        self.on_arc = False
+        self.enabled = False
+        """Whether the EN output is on."""
+        self._rest(now, AxisStatus.OFF)
+        motor = self.profile.count(now)
+        self.offset_p = -motor
+        self.encoder.set_counter(config.enc_offset, self.shaft(now))
+        self.control.reference(self, now)
+
+    def set_state(self, plain: Plain) -> None:
+        """As ever, but what is put back is a replaced profile too."""
+        super().set_state(plain)
+        self.revision += 1
+
+    # ------------------------------------------------------------------ what it shows
+
+    @property
+    def can_move(self) -> bool:
+        """Whether motion commands move it: with EN on, or where EN is not wired (MIC-8)."""
+        return self.enabled or not self.config.en_wired
+
+    def coordinate_p(self, now: Nanos) -> int:
+        """Position register in pulses (MIC-14: the pulse count), a DINT that wraps."""
+        coordinate = self.profile.count(now) + self.offset_p
+        return coordinate if DINT_MIN <= coordinate <= DINT_MAX else wrapped_dint(coordinate)
+
+    def shaft(self, now: Nanos) -> int:
+        """What the encoder's shaft has turned since power-on, in counts."""
+        return self.encoder.shaft(self.profile.count(now), now)
+
+    def encoder_counts(self, now: Nanos) -> int:
+        return self.encoder.counter(self.shaft(now))
+
+    # ------------------------------------------------------------------ time
+
+    def deadline(self) -> Nanos | None:
+        due = self.profile.end if self.arrival is not self.status else None
+        leg = self._blocked_leg
+        if leg is not None and (due is None or leg[0] < due):
+            due = leg[0]
+        tick = self.control.tick_ns
+        if tick is not None and (due is None or tick < due):
+            due = tick
+        return due
+
+    def advance(self, now: Nanos) -> None:
+        """Run what is due at ``now``; called by the controller at each of the axis' deadlines, in order."""
+        leg, end = self._blocked_leg, self.profile.end
+        if leg is not None and leg[0] <= now:
+            self._limit_stop(now, leg[1])
+        elif end is not None and end <= now and self.arrival is not self.status:
+            self._arrive(now)
+        tick = self.control.tick_ns
+        if tick is not None and tick <= now:
+            self.control.tick(self, now)
+
+    def _arrive(self, now: Nanos) -> None:
+        self.profile = at_rest(now, self.profile.count(now), self.profile.phase(now))
+        self.revision += 1
+        self.status = self.arrival
+        self.homing.leg = Homing.NONE
+        self.on_path = False
+        # WBC-17
+        self.control.arrived(self, now, corrects=not self.on_arc)
+
+    def _rest(self, now: Nanos, status: AxisStatus) -> None:
+        """Stand on the counted pulse with ``status``."""
+        self._forget()
+        self.profile = at_rest(now, self.profile.count(now))
+        self.revision += 1
+        self.status = self.arrival = status
+        self._blocked_leg: tuple[Nanos, int] | None = None
+        """When and in which direction the profile will turn into an active limit switch."""
+        self.control.rested(self, now)
+
+    def _forget(self) -> None:
+        """A new command replaces whatever was going on."""
+        self.jogging = 0
+        self.on_path = self.on_arc = False
+        self.homing.leg = Homing.NONE
+        self.control.stop()
+
+    # ------------------------------------------------------------------ planning
+
+    def run(self, velocity_p: float, status: AxisStatus, now: Nanos) -> None:
+        """Run at ``velocity_p`` (already clamped) with ramps of ACC; towards a soft limit the motion is planned to stop on it."""
+        self.velocity_p = velocity_p
+        self._take_ramps()
+        self.ramp_p = self.up_p
+        self._steer(status, now)
+
+    def follow(self, target_p: int, now: Nanos) -> None:
+        """Go to motor position ``target_p``, which the encoder asks for."""
+        count = self.profile.count(now)
+        self.target_p = count + min(max(target_p - count, -STRIDE_P), STRIDE_P)
+        self.speed_p = self.cruise_p
+        self._take_ramps()
+        self._go(now)
+
+    def creep(self, distance_p: int, now: Nanos) -> None:
+        """A step of the correction of the position, which knows no soft limits: its target was within them."""
+        state = MotionState.of(self.profile, now)
+        distance_p = min(max(distance_p, -STRIDE_P), STRIDE_P)
+        profile = plan_position(state, state.count + distance_p, self.up_p, self.down_p, self.cruise_p)
+        self._begin(profile, AxisStatus.CORRECTION, AxisStatus.CORRECTION)
+
+    @property
+    def cruise_p(self) -> float:
+        """VMAX as far as the outputs can give it."""
+        return min(self.vmax_p, MAX_SPEED_P)
+
+    @property
+    def up_p(self) -> float:
+        """ACC as far as motions can be planned with it."""
+        return max(self.acc_p, SLOWEST_RAMP_P)
+
+    @property
+    def down_p(self) -> float:
+        """DEC as far as motions can be planned with it."""
+        return max(self.dec_p, SLOWEST_RAMP_P)
+
+    def halt(self, now: Nanos) -> None:
+        """Stand on the counted pulse between two legs of a homing."""
+        self.profile = at_rest(now, self.profile.count(now))
+
+    def _replan(self, now: Nanos) -> None:
+        """Limits or coordinates have changed under a motion: plan it anew from where it is."""
+        if not self.profile.moving(now) or self.homing.passes_soft_limits or self.on_path:
+            return
+        if self.status is AxisStatus.POSITION:
+            self._go(now)
+        elif self.status in (AxisStatus.VELOCITY, AxisStatus.HOMING):
+            self._steer(self.status, now)
+
+    def _take_ramps(self) -> None:
+        """A motion keeps the ramps with which it was commanded (MIC-40)."""
+        self.rise_p, self.fall_p = self.up_p, self.down_p
+
+    def _steer(self, status: AxisStatus, now: Nanos) -> None:
+        """Towards ``velocity_p``, slowing down with ``ramp_p``."""
+        state = self.state(now)
+        ramp_p = self._braking(state, self.ramp_p)
+        velocity_p = self.velocity_p
+        direction = 1 if velocity_p > 0.0 else -1
+        edge = None if velocity_p == 0.0 else self.edge(direction)
+        if edge is None:
+            self._begin(plan_velocity(state, velocity_p, self.rise_p, ramp_p), status, AxisStatus.ON)
+        else:
+            profile = self._to_edge(state, edge, direction, ramp_p, abs(velocity_p))
+            self._begin(profile, status, LIMIT[direction])
+
+    def _go(self, now: Nanos) -> None:
+        """Position mode to ``target_p``, at most to the soft limit on the way."""
+        state = self.state(now)
+        dec_p = self._braking(state, self.fall_p)
+        target, velocity = self.target_p, state.velocity
+        rest = _rest_p(state, dec_p)
+        for direction in (-1, 1):
+            outward = (target - rest) * direction > 0.0 or velocity * direction > 0.0
+            edge = self.edge(direction) if outward else None
+            if edge is not None and (target - edge) * direction > 0:
+                profile = self._to_edge(state, edge, direction, dec_p, self.speed_p)
+                self._begin(profile, AxisStatus.POSITION, LIMIT[direction])
+                return
+        self._begin(plan_position(state, target, self.rise_p, dec_p, self.speed_p), AxisStatus.POSITION, AxisStatus.REACHED)
+
+    def _to_edge(self, state: MotionState, edge: int, direction: int, dec_p: float, speed_p: float) -> Profile:
+        """To rest on the soft limit ``edge``; behind it already, or too late to brake before it, come to rest there."""
+        if (_rest_p(state, dec_p) - edge) * direction > NEAR_P:
+            return plan_stop(state, dec_p)
+        return plan_position(state, edge, self.rise_p, dec_p, speed_p)
+
+    def _braking(self, state: MotionState, dec_p: float) -> float:
+        """``dec_p`` when it brakes before the soft limit ahead; else the hardest ramp, and an overrun if that is too late too."""
+        velocity = state.velocity
+        if velocity == 0.0:
+            return dec_p
+        direction = 1 if velocity > 0.0 else -1
+        edge = self.edge(direction)
+        if edge is None or (_rest_p(state, dec_p) - edge) * direction <= NEAR_P:
+            return dec_p
+        hardest = max(self.rise_p, self.fall_p)
+        if (_rest_p(state, hardest) - edge) * direction > NEAR_P:
+            self.host.axis_event(self.number, "overrun", f"M{self.number} cannot brake before its soft limit", state.now)
+        return hardest
+
+    def edge(self, direction: int) -> int | None:
+        """Soft limit in ``direction`` as motor position; None where nothing limits (MIC-12) or homing ignores it (MIC-30)."""
+        limit, none = (self.limit_r_p, DINT_MAX) if direction > 0 else (self.limit_l_p, DINT_MIN)
+        return None if limit == none or self.homing.passes_soft_limits else limit - self.offset_p
+
+    def state(self, now: Nanos) -> MotionState:
+        """Where a motion begins. A coordinate that has wrapped is the new one from here on."""
+        state = MotionState.of(self.profile, now)
+        coordinate = state.count + self.offset_p
+        if not DINT_MIN <= coordinate <= DINT_MAX:
+            self.offset_p = wrapped_dint(coordinate) - state.count
+        return state
+
+    def _begin(self, profile: Profile, status: AxisStatus, arrival: AxisStatus) -> None:
+        """Follow ``profile`` from now on with ``status``; ``arrival`` is the status at its end."""
+        now = profile.start
+        self.profile = profile
+        self.revision += 1
+        self.status = status
+        self.arrival = arrival
+        self._guard_switches(now)
+        if not profile.moving(now) and self.arrival is not self.status:
+            self._arrive(now)
+
+    def _clamped(self, velocity_p: float, now: Nanos) -> float:
+        if abs(velocity_p) <= MAX_SPEED_P:
+            return velocity_p if abs(velocity_p) >= LEAST else 0.0
+        text = f"M{self.number}: {velocity_p:g} imp/s is more than the outputs give, {MAX_SPEED_P:g} imp/s"
+        self.host.axis_event(self.number, "speed-clamped", text, now)
+        return MAX_SPEED_P if velocity_p > 0.0 else -MAX_SPEED_P
+
+    # ------------------------------------------------------------------ switches
+
+    def input_changed(self, number: int, active: bool, now: Nanos) -> None:
+        """Input ``number`` (from 0) changed after polarity, before the filter."""
+        if self.homing.leg != Homing.NONE:
+            self.homing.input_changed(self, number, active, now)
+        if number in (self.config.in_kl, self.config.in_kr):
+            self._guard_switches(now)
+
+    def _switch_blocks(self, direction: int) -> bool:
+        """Whether an active limit switch forbids motion in ``direction``; the switch being homed to does not (MIC-30)."""
+        number, bit = (self.config.in_kl, 1) if direction < 0 else (self.config.in_kr, 2)
+        if not self.config.limit_mode & bit or number == NO_INPUT:
+            return False
+        if self.homing.leg != Homing.NONE and self.homing.sensor == number:
+            return False
+        return self.input_active(number)
+
+    def _guard_switches(self, now: Nanos) -> None:
+        """Stop now, or know when to stop, where the profile moves into an active limit switch (MIC-12)."""
+        self._blocked_leg = None
+        if not self.config.limit_mode:
+            return
+        blocked = [direction for direction in (-1, 1) if self._switch_blocks(direction)]
+        if not blocked:
+            return
+        for begin, direction in self.profile.legs(now):
+            if direction in blocked:
+                if begin <= now:
+                    self._limit_stop(now, direction)
+                else:
+                    self._blocked_leg = (begin, direction)
+                return
+
+    def _limit_stop(self, now: Nanos, direction: int) -> None:
+        """A KL/KR switch stops at once (MIC-12)."""
+        self._rest(now, LIMIT[direction])
+        self.host.axis_event(self.number, "limit", f"M{self.number} stopped by {'KR' if direction > 0 else 'KL'}", now)
+
+    def input_active(self, number: int) -> bool:
+        """State of input ``number`` (from 0) after polarity, before the filter (MIC-30)."""
+        return self.host.input_active(number)
+
+    # ------------------------------------------------------------------ homing
+
+    def run_to_stop(self, velocity_p: float, now: Nanos) -> None:
+        """HOME3: run while position control watches for the mechanical stop."""
+        self.control.reference(self, now)
+        self.run(velocity_p, AxisStatus.HOMING, now)
+        self.control.watch(self, now)
+
+    @property
+    def seeks_stop(self) -> bool:
+        """Whether it is on its way to a mechanical stop (HOME3)."""
+        return self.homing.leg == Homing.TO_STOP
+
+    def stop_reached(self, now: Nanos) -> None:
+        """HOME3: the mechanical stop was found."""
+        self.homing.stop_reached(self, now)
+
+    def homed(self, now: Nanos) -> None:
+        """The last leg of homing ends here: position 0, status 4 (MIC-30)."""
+        self._rest(now, AxisStatus.REACHED)
+        motor = self.profile.count(now)
+        self.offset_p = -motor
+        if self.homing.to_index:
+            self.encoder.set_counter(self.config.enc_offset, self.shaft(now))
+        self.control.reference(self, now)
+        self.host.axis_event(self.number, "homed", f"M{self.number} is at its home position", now)
+
+    # ------------------------------------------------------------------ position control
+
+    def begin_correction(self) -> None:
+        """Position control found the shaft away from the target."""
+        self.status = self.arrival = AxisStatus.CORRECTION
+
+    def end_correction(self) -> None:
+        """The shaft is within the tolerance of the target."""
+        self.status = self.arrival = AxisStatus.REACHED
+
+    def drop_lost_steps(self, lost_p: int) -> None:
+        """``lost_p`` pulses did not turn the shaft: they leave the coordinate and are added to the way to the target."""
+        self.offset_p -= lost_p
+        self.target_p += lost_p
+
+    def position_lost(self, now: Nanos) -> None:
+        """Position control gave up: stop, status 5, and the coordinate becomes the encoder's (MIC-19)."""
+        self._rest(now, AxisStatus.ERROR)
+        self.offset_p += round(self.control.true_p(self, now)) - self.profile.count(now)
+        self.control.reference(self, now)
+        self.host.position_error(self.number, now)
+
+
+def _rest_p(state: MotionState, dec_p: float) -> float:
+    """Motor position at which braking with ``dec_p`` would end."""
+    velocity = state.velocity
+    return state.count + state.phase + velocity * abs(velocity) / (2.0 * dec_p)

@@ -1,0 +1,74 @@
+"""The data sheet of a MIC488, from its register map and its configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+from steptwin.datasheet import Argument, AxisDescription, CommandDescription, Datasheet, Limits, Pin, PinDirection, PointEffect
+from steptwin.mic488.core import ANALOG_PINS, ENABLE_PINS, INPUT_PINS, OUTPUT_PINS
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.events import EVENTS
+from steptwin.mic488.points import EFFECTS, limits, points, unit_of
+from steptwin.mic488.registermap import RegisterMap
+from steptwin.mic488.registers import AXES, register_map
+
+MOST_KEPT = 64
+"""Controllers of one firmware with the same units share a data sheet."""
+DEFAULT_SCALES = (("imp", 1.0),) * AXES
+
+
+def datasheet(device: Mic488Device) -> Datasheet:
+    """Of a controller as it is configured."""
+    return datasheet_of(device.firmware.name, tuple((axis.config.unit_name, axis.gear) for axis in device.axes))
+
+
+@lru_cache(MOST_KEPT)
+def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = DEFAULT_SCALES) -> Datasheet:
+    """Of a firmware; ``scales`` are unit and pulses per unit of each axis, None where these are not known.
+    Raises `Misuse` for one that is not known."""
+    registers, units = register_map(firmware), [unit for unit, _ in scales]
+    return Datasheet(
+        kind="mic488",
+        title="MIC488",
+        variant=registers.firmware.name,
+        axes=tuple(
+            AxisDescription(number=number, name=f"M{number}", unit=unit, pulses_per_unit=gear)
+            for number, (unit, gear) in enumerate(scales, start=1)
+        ),
+        pins=tuple(_pins()),
+        points=tuple(points(registers, units)),
+        commands=tuple(_commands(registers, units)),
+        events=tuple(EVENTS.values()),
+    )
+
+
+def _pins() -> Iterator[Pin]:
+    for name in INPUT_PINS:
+        yield Pin(name=name, direction=PinDirection.INPUT)
+    for name in ANALOG_PINS:
+        yield Pin(name=name, direction=PinDirection.INPUT, is_analog=True, unit="V", limits=Limits(0, 10))
+    for name in (*OUTPUT_PINS, *ENABLE_PINS, "ERR"):
+        yield Pin(name=name, direction=PinDirection.OUTPUT)
+
+
+def _commands(registers: RegisterMap, units: Sequence[str]) -> Iterator[CommandDescription]:
+    """Registers whose writing does something at once."""
+    for register in registers:
+        effect = EFFECTS[register.effect]
+        if effect in (PointEffect.ACTS, PointEffect.MOVES):
+            argument = Argument(
+                name="value",
+                type=register.kind.value,
+                unit=unit_of(register, units),
+                limits=limits(register.permitted),
+                values=tuple(register.values),
+            )
+            yield CommandDescription(
+                name=register.name,
+                code=register.name,
+                meaning=register.meaning,
+                arguments=(argument,),
+                effect=effect,
+                source=register.section,
+            )

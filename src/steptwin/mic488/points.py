@@ -1,0 +1,254 @@
+"""The points of a MIC488: its registers, and short names of what conditions ask for most. Values are in configured units,
+whatever DATA_TYPE says."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+from steptwin.datasheet import Access, Limits, Point, PointAddress, PointEffect
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.mic488 import registermap
+from steptwin.mic488.axis import Axis
+from steptwin.mic488.behaviour import BEHAVIOUR
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.encoding import DINT_MIN, word_to_int, words_to_dint, words_to_real
+from steptwin.mic488.ranges import Range
+from steptwin.mic488.registermap import Register, RegisterMap, Space, Type, UnknownRegister
+from steptwin.mic488.registers import AXES
+from steptwin.mic488.values import RegisterItem, View, named
+from steptwin.motion import Profile
+from steptwin.points import LivePoint, Turns, turns_of, turns_of_round
+from steptwin.tables import complete
+
+EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
+    "effect of a register",
+    registermap.WriteEffect,
+    "effect in a data sheet",
+    {
+        registermap.WriteEffect.NONE: PointEffect.NONE,
+        registermap.WriteEffect.STORE: PointEffect.PARAMETER,
+        registermap.WriteEffect.ACT: PointEffect.ACTS,
+        registermap.WriteEffect.MOVE: PointEffect.MOVES,
+        registermap.WriteEffect.ADD: PointEffect.ACTS,
+    },
+)
+SPACES: Mapping[str, Space] = {"hr": Space.HOLDING, "co": Space.COIL, "di": Space.INPUT}
+"""How addresses are written: ``hr:10020``, ``di:5006``."""
+_ADDRESS = re.compile(r"(?P<space>[a-z]+):(?P<address>\d{1,5})(?::(?P<view>\w+))?", re.IGNORECASE)
+
+
+# ---------------------------------------------------------------------- short names
+
+
+class ShortName(NamedTuple):
+    """A value of the controller or of each axis, and the key of the register that shows it."""
+
+    name: str
+    key: str
+    meaning: str = ""
+    read: Callable[[Any, Nanos], float] | None = None
+    """Where no register can be read for it in every firmware."""
+
+
+SHORT_NAMES = (
+    ShortName("status", "M_STATUS", "Status of the controller.", lambda device, now: device.status()),
+    ShortName("program", "PROGRAM_CTRL", "State of the program."),
+)
+AXIS_SHORT_NAMES = (
+    ShortName("status", "STATUS"),
+    ShortName("enabled", "EN", "Whether the drive is switched on.", lambda axis, now: axis.enabled),
+    ShortName("moving", "", "Whether a motion is being made.", lambda axis, now: axis.profile.moving(now)),
+    ShortName("position", "POS_ACT", "Counted position."),
+    ShortName("velocity", "VEL_ACT"),
+    ShortName("encoder", "ENC_IMP"),
+)
+
+
+# ---------------------------------------------------------------------- descriptions
+
+
+def points(registers: RegisterMap, units: Sequence[str]) -> Iterator[Point]:
+    """All of them; ``units`` are those of the axes."""
+    for short in SHORT_NAMES:
+        yield _short(registers, units, short, None)
+    for axis in range(1, len(units) + 1):
+        for short in AXIS_SHORT_NAMES:
+            yield _short(registers, units, short, axis)
+    for register in registers:
+        yield _point(register, units)
+
+
+def _short(registers: RegisterMap, units: Sequence[str], short: ShortName, axis: int | None) -> Point:
+    path = short.name if axis is None else f"M{axis}.{short.name}"
+    try:
+        register = registers.of(short.key, axis)
+    except UnknownRegister:
+        # No register of this firmware shows it: WBC programs and mechanics see it.
+        return Point(
+            path=path, meaning=short.meaning, type="number", values={}, access=Access.READ, effect=PointEffect.NONE, source=""
+        )
+    found = _point(register, units)
+    return replace(
+        found,
+        path=path,
+        meaning=short.meaning or found.meaning,
+        access=Access.READ,
+        effect=PointEffect.NONE,
+        limits=None,
+        addresses=found.addresses if register.reads else (),
+    )
+
+
+def _point(register: Register, units: Sequence[str]) -> Point:
+    return Point(
+        path=register.name,
+        meaning=register.meaning,
+        type=register.kind.value,
+        unit=unit_of(register, units),
+        limits=limits(register.permitted) if register.accepts else None,
+        values=register.values,
+        access=Access.BOTH if register.reads and register.accepts else Access.WRITE if register.accepts else Access.READ,
+        effect=EFFECTS[register.effect],
+        addresses=(
+            PointAddress(space=register.space.value, place=register.address, words=register.span, type=register.type.value),
+        ),
+        source=register.section,
+    )
+
+
+def unit_of(register: Register, units: Sequence[str]) -> str:
+    return register.unit(unit="u" if register.axis is None else units[register.axis - 1])
+
+
+def limits(permitted: Range) -> Limits:
+    return Limits(permitted.low, permitted.high, permitted.above)
+
+
+# ---------------------------------------------------------------------- values
+
+
+def live_point(device: Mic488Device, text: str) -> LivePoint | None:
+    """The point of a name (``M1.position``, ``M1_ACC``, ``USER_REGISTER[12]:real``) or address (``hr:10020``), else None.
+    Raises `Misuse` for what is no whole value."""
+    registers, units = device.registers, [axis.unit_name for axis in device.config.axes]
+    short = _short_name(text)
+    if short is not None:
+        row, number = short
+        point = _short(registers, units, row, number)
+        owner = device if number is None else device.axes[number - 1]
+        return _live(point, owner, row.key or row.name, row.read or BEHAVIOUR[row.key].read)
+    item = item_of(registers, text)
+    if item is None:
+        return None
+    register = item.register
+    point = _point(register, units)
+    if register.type is Type.MEMORY:
+        address = replace(point.addresses[0], place=item.address, words=item.size, type=item.view.name)
+        point = replace(point, path=item.name, addresses=(address,))
+        return LivePoint(point=point, read=_user_value(device, item), is_kept=True)
+    behaviour = BEHAVIOUR[register.key]
+    if not register.reads:
+        return LivePoint(point=point, read=None)
+    if register.type is Type.BIT:
+        return LivePoint(point=point, read=_bit(device, behaviour.read((register.index or 1) - 1)))
+    owner = device if register.axis is None else device.axes[register.axis - 1]
+    return _live(point, owner, register.key, behaviour.read, is_kept=behaviour.quiet)
+
+
+def _short_name(text: str) -> tuple[ShortName, int | None] | None:
+    axis, dot, name = text.rpartition(".")
+    if not dot:
+        return next(((short, None) for short in SHORT_NAMES if short.name == name.lower()), None)
+    found = next((short for short in AXIS_SHORT_NAMES if short.name == name.lower()), None)
+    number = axis.upper().removeprefix("M")
+    known = {str(n) for n in range(1, AXES + 1)}
+    return None if found is None or number not in known or not axis.upper().startswith("M") else (found, int(number))
+
+
+def item_of(registers: RegisterMap, text: str) -> RegisterItem | None:
+    """What a name or an address of a register means, None where there is none. Raises `Misuse` for what is no whole value."""
+    match = _ADDRESS.fullmatch(text)
+    if match is None:
+        if "." in text:
+            return None
+        try:
+            return named(registers, text)
+        except UnknownRegister:
+            return None
+    space, address = SPACES.get(match["space"].lower()), int(match["address"])
+    if space is None:
+        raise Misuse(f"{text!r}: addresses begin with {', '.join(f'{name}:' for name in SPACES)}")
+    register = registers.at(space, address)
+    if register.type is Type.MEMORY:
+        return named(registers, f"{register.name}[{address - register.address}]:{match['view'] or View.WORD.value}")
+    if match["view"] is not None:
+        raise Misuse(f"{text!r}: {register.name} is of type {register.type.value}; leave out :{match['view']}")
+    if address != register.address:
+        raise Misuse(f"{text!r}: this is the second word of {register.name}, which is at {register.address}")
+    return RegisterItem(register)
+
+
+def _live(point: Point, owner: Any, key: str, read: Callable[[Any, Nanos], float], *, is_kept: bool = False) -> LivePoint:
+    follows = _FOLLOWING.get(key)
+    if follows is None:
+        return LivePoint(point=point, read=partial(read, owner), is_kept=is_kept)
+    turns, has_version = follows(owner)
+    version = partial(_version, owner) if has_version else None
+    return LivePoint(point=point, read=partial(read, owner), turns=turns, version=version)
+
+
+def _bit(device: Mic488Device, read: Callable[[Mic488Device], bool]) -> Callable[[Nanos], float]:
+    return lambda now: read(device)
+
+
+def _user_value(device: Mic488Device, item: RegisterItem) -> Callable[[Nanos], float]:
+    cell = item.cell
+    match item.view:
+        case View.WORD:
+            return lambda now: device.user[cell]
+        case View.INT:
+            return lambda now: word_to_int(device.user[cell])
+        case View.DINT:
+            return lambda now: words_to_dint(device.user[cell], device.user[cell + 1])
+        case View.REAL:
+            return lambda now: words_to_real(device.user[cell], device.user[cell + 1])
+
+
+# ---------------------------------------------------------------------- between events
+
+
+def _profile(axis: Axis) -> Profile:
+    return axis.profile
+
+
+def _version(axis: Axis) -> object:
+    return axis.revision, axis.offset_p
+
+
+def _as_profile(axis: Axis) -> tuple[Turns, bool]:
+    return turns_of(partial(_profile, axis)), True
+
+
+def _as_coordinate(axis: Axis) -> tuple[Turns, bool]:
+    """A DINT of pulses (MIC-42)."""
+    return turns_of_round(partial(_profile, axis), lambda now: axis.profile.count(now) + axis.offset_p - DINT_MIN, 2**32), True
+
+
+def _as_encoder(axis: Axis) -> tuple[Turns, bool]:
+    """What turns its shaft has no version."""
+    return turns_of(partial(_profile, axis)), False
+
+
+_FOLLOWING: Mapping[str, Callable[[Axis], tuple[Turns, bool]]] = {
+    "moving": _as_profile,
+    "POS_ACT": _as_coordinate,
+    "VEL_ACT": _as_profile,
+    "ENC_IMP": _as_encoder,
+    "ENC_XPOS": _as_encoder,
+}
+"""What changes between events, by the key of its register."""

@@ -1,0 +1,75 @@
+"""The value of a point of one controller: how it is read, and how it goes on between events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from steptwin.datasheet import Point
+from steptwin.machine import Nanos
+from steptwin.motion import Profile
+
+FARTHEST_NS: Nanos = 1 << 55
+"""What lies more than a year ahead is never."""
+MOST_TURNS = 3
+"""Of a count that begins anew, in one segment: in two of its rounds it takes every value that it ever has."""
+
+Turns: TypeAlias = Callable[[Nanos], Iterator[Nanos]]
+"""Moments after one, in order, between which (and after the last of which) a value goes one way only."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LivePoint:
+    """A point of one controller. Between its events the value stays as it is unless there are ``turns``."""
+
+    point: Point
+    read: Callable[[Nanos], float] | None
+    """The value at the moment to which the controller has come; reading changes nothing. None where it can only be written."""
+    turns: Turns | None = None
+    version: Callable[[], object] | None = None
+    """Another one whenever ``turns`` may be others; None where that cannot be told."""
+    is_kept: bool = False
+    """Whether a write only keeps the value, which is no event of the controller."""
+
+
+def turns_of(profile: Callable[[], Profile]) -> Turns:
+    """The ends of the segments of a profile."""
+
+    def turns(now: Nanos) -> Iterator[Nanos]:
+        present = profile()
+        for end in present.ends:
+            if end != float("inf") and present.start + int(end) > now:
+                yield present.start + int(end)
+
+    return turns
+
+
+def turns_of_round(profile: Callable[[], Profile], count: Callable[[Nanos], int], size: int) -> Turns:
+    """The same for what is shown of a ``count`` that begins anew at every multiple of ``size``: there it jumps."""
+    ends = turns_of(profile)
+
+    def turns(now: Nanos) -> Iterator[Nanos]:
+        begin = now
+        for end in ends(now):
+            yield from _jumps(count, size, begin, end)
+            yield end
+            begin = end
+        yield from _jumps(count, size, begin, now + FARTHEST_NS)
+
+    return turns
+
+
+def _jumps(count: Callable[[Nanos], int], size: int, begin: Nanos, end: Nanos) -> Iterator[Nanos]:
+    """Moments before and at which a count that goes one way from ``begin`` to ``end`` jumps."""
+    at = count(begin) // size
+    last = count(end) // size
+    for _ in range(MOST_TURNS):
+        if at == last:
+            return
+        low, high = begin, end
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if count(middle) // size == at else (low, middle)
+        yield from (moment for moment in (high - 1, high) if moment > begin)
+        begin, at = high, count(high) // size

@@ -1,0 +1,134 @@
+"""What a subject is: something with a description, a present, commands that can be done, and events that can be followed.
+
+There are three: a world in this process (`steptwin.subject.world`), a world in another one (`steptwin.live.remote`), and a device
+behind a driver (`steptwin.drivers.subject`). What one of them cannot know has the quality `UNKNOWN`; what it cannot do is a
+`Refusal`. Commands raise `Misuse`, `Refusal` or `LineFailure`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, NamedTuple, Protocol
+
+from steptwin.datasheet import Datasheet, plain, read_datasheet
+from steptwin.machine import Nanos
+from steptwin.subject.commands import VERSION, Command
+from steptwin.subject.following import Filter, Following
+
+GOOD, UNKNOWN = "good", "unknown"
+
+
+class Reading(NamedTuple):
+    """The value of a point at a moment; None where it is not known, or can only be written."""
+
+    point: str
+    value: float | None
+    unit: str
+    quality: str = GOOD
+
+
+class Result(NamedTuple):
+    """What a command gave. ``number`` is what causes of events name; ``time`` the moment at which it was done."""
+
+    value: Any
+    time: Nanos
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class MachinePart:
+    """A controller. The position of an axis is (pulses of its plan + origin) / ``pulses_per_unit`` of its data sheet."""
+
+    name: str
+    datasheet: Datasheet
+    line: str | None = None
+    unit: int | None = None
+    """Slave address, or address of a chip."""
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """What can be named: its pins, and its points that are no pins."""
+        paths = (*(pin.name for pin in self.datasheet.pins), *(point.path for point in self.datasheet.points))
+        return tuple(dict.fromkeys(f"{self.name}.{path}" for path in paths))
+
+
+@dataclass(frozen=True, slots=True)
+class MechanicsPart:
+    """What an axis of a controller moves."""
+
+    name: str
+    machine: str
+    axis: str
+    unit: str
+    points: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LinePart:
+    """A line with controllers on it."""
+
+    name: str
+    kind: str
+    baud: int | None
+    """None where it is not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What there is. It does not change."""
+
+    name: str
+    machines: tuple[MachinePart, ...]
+    axes: tuple[MechanicsPart, ...] = ()
+    buttons: tuple[str, ...] = ()
+    lines: tuple[LinePart, ...] = ()
+    commands: tuple[str, ...] = ()
+    """Names of the commands that can be done here."""
+    version: int = VERSION
+
+    def plain(self) -> dict[str, object]:
+        """As JSON. Data sheets are in a list of their own, because many controllers may have the same."""
+        sheets = {id(part.datasheet): part.datasheet for part in self.machines}
+        numbers = {key: number for number, key in enumerate(sheets)}
+        machines = [
+            {"name": part.name, "datasheet": numbers[id(part.datasheet)], "line": part.line, "unit": part.unit}
+            for part in self.machines
+        ]
+        return {
+            **{field.name: getattr(self, field.name) for field in fields(self)},
+            "machines": machines,
+            "axes": [asdict(part) for part in self.axes],
+            "lines": [asdict(part) for part in self.lines],
+            "datasheets": [plain(sheet) for sheet in sheets.values()],
+        }
+
+
+def read_description(data: Mapping[str, Any]) -> Description:
+    """The description in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
+    sheets = [read_datasheet(sheet) for sheet in data["datasheets"]]
+    machines = tuple(MachinePart(one["name"], sheets[one["datasheet"]], one["line"], one["unit"]) for one in data["machines"])
+    axes = tuple(
+        MechanicsPart(one["name"], one["machine"], one["axis"], one["unit"], tuple(one["points"])) for one in data["axes"]
+    )
+    lines = tuple(LinePart(**one) for one in data["lines"])
+    return Description(
+        data["name"], machines, axes, tuple(data["buttons"]), lines, tuple(data["commands"]), version=data["version"]
+    )
+
+
+class Subject(Protocol):
+    """What faces hold; they do not know what is behind it."""
+
+    @property
+    def description(self) -> Description: ...
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        """Present values. `Misuse` for points that are not there."""
+        ...
+
+    def do(self, wanted: Command, /) -> Result: ...
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        """Events from now on, at most ``bound`` of them waiting. `Following.close` ends it."""
+        ...

@@ -1,0 +1,32 @@
+"""The description of a world."""
+
+from __future__ import annotations
+
+from steptwin.subject.commands import COMMANDS
+from steptwin.subject.contract import Description, LinePart, MachinePart, MechanicsPart
+from steptwin.world.plant import Plant
+from steptwin.world.signals import MECHANICS
+
+
+def describe(world: Plant) -> Description:
+    """What is in a world."""
+    return Description(
+        world.spec.name,
+        tuple(_machine(world, name) for name in world.machines),
+        tuple(_mechanics(world, name) for name in world.axes),
+        tuple(world.plan.buttons),
+        tuple(LinePart(line.name, line.kind, world.lines[line.name].baud) for line in world.spec.lines),
+        tuple(COMMANDS),
+    )
+
+
+def _machine(world: Plant, name: str) -> MachinePart:
+    on = world.plan.line_of.get(name)
+    line, unit = (None, None) if on is None else (on[0].name, on[1])
+    return MachinePart(name, world.kind(name).datasheet(world.machines[name]), line, unit)
+
+
+def _mechanics(world: Plant, name: str) -> MechanicsPart:
+    fitted = world.axes[name]
+    place = fitted.mechanism.machine, str(fitted.mechanism.number)
+    return MechanicsPart(name, *place, fitted.scale.unit, tuple(f"{name}.{what}" for what in MECHANICS))

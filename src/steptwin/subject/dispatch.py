@@ -1,0 +1,118 @@
+"""The dispatcher: takes a command, gives a result or a refusal. Messages and the command line come to the same place."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.plaintypes import shown
+from steptwin.subject.commands import COMMANDS, VERSION, Command, read_command, row_of
+from steptwin.subject.contract import Result
+from steptwin.subject.fields import ID
+
+LONGEST_REQUEST = 65536
+"""Bytes of a message."""
+FORM = 'a request is a line of JSON: {"do": NAME, "id": ANY, FIELD: VALUE, ...}'
+
+Action: TypeAlias = Callable[[Any], object]
+"""Does a command; gives what its answer is, as plain data."""
+Message: TypeAlias = dict[str, object]
+
+
+class Dispatcher:
+    """Commands by class, and what does them. ``number`` counts a command when it is done; ``done`` ends it."""
+
+    def __init__(self, actions: Mapping[Any, Action], begin: Callable[[], int], end: Callable[[], int]) -> None:
+        self._actions = dict(actions)
+        self._begin = begin
+        self._end = end
+
+    def add(self, actions: Mapping[Any, Action]) -> None:
+        """Commands that something around the subject does: its time, its files, its end points."""
+        self._actions.update(actions)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
+
+    def do(self, command: Command) -> Result:
+        """Raises `Misuse`, `Refusal`, `LineFailure`."""
+        action = self._actions.get(type(command))
+        if action is None:
+            raise Refusal(f"{row_of(command).name} cannot be done here; what can: {', '.join(self.names)}")
+        number = self._begin()
+        try:
+            value = action(command)
+        finally:
+            time = self._end()
+        return Result(value, time, number)
+
+
+# ---------------------------------------------------------------------- messages
+
+
+def read_message(line: bytes, key: str = "do") -> Message:
+    """An object with a text under ``key``. Raises `Misuse`."""
+    try:
+        message = json.loads(line)
+    except (ValueError, RecursionError):
+        raise Misuse(FORM) from None
+    if not isinstance(message, dict) or not isinstance(message.get(key), str):
+        raise Misuse(FORM)
+    return message
+
+
+def id_of(message: Mapping[str, object]) -> object:
+    """The id of a request, None without. Raises `Misuse`."""
+    found = message.get("id")
+    try:
+        return None if found is None else ID.read(found)
+    except Misuse as error:
+        raise Misuse(f"id: {error}") from None
+
+
+def command_of(message: Mapping[str, object]) -> Command:
+    """The command in a request. Raises `Misuse`."""
+    version = message.get("version", VERSION)
+    if version != VERSION or isinstance(version, bool):
+        raise Misuse(f"version = {shown(version)}: this subject has version {VERSION}")
+    fields = {name: value for name, value in message.items() if name not in ("do", "id", "version")}
+    return read_command(message["do"], fields)
+
+
+def answer(result: Result) -> Message:
+    return {"ok": result.value, "number": result.number, "time_ns": str(result.time)}
+
+
+def failure(error: Exception) -> Message:
+    """An error as a value. ``code``: misuse, refusal, failure (the line or the peer), internal."""
+    if isinstance(error, SteptwinError):
+        return {"error": {"code": _code(error), "message": str(error)}}
+    return {"error": {"code": "internal", "message": f"internal error, please report it: {type(error).__name__}: {error}"}}
+
+
+def _code(error: SteptwinError) -> str:
+    return "misuse" if isinstance(error, Misuse) else "refusal" if isinstance(error, Refusal) else "failure"
+
+
+def raised(error: Mapping[str, Any]) -> SteptwinError:
+    """The exception that an error as a value stands for."""
+    kinds: Mapping[str, type[SteptwinError]] = {"misuse": Misuse, "refusal": Refusal, "failure": LineFailure}
+    return kinds.get(error["code"], SteptwinError)(error["message"])
+
+
+def respond(do: Callable[[Command, object], Result], line: bytes, on_internal: Callable[[Exception], object]) -> Message:
+    """The one answer to a message, whatever it is. ``do`` gets the command and the id of its message; ``on_internal`` is called
+    with exceptions that should not be."""
+    found: dict[str, object] = {}
+    try:
+        message = read_message(line)
+        identity = id_of(message)
+        found = {} if identity is None else {"id": identity}
+        return {**found, **answer(do(command_of(message), identity))}
+    except Exception as error:  # noqa: BLE001  whoever waits is never left without an answer
+        if not isinstance(error, SteptwinError):
+            on_internal(error)
+        return {**found, **failure(error)}

@@ -1,0 +1,119 @@
+"""Following events: every follower has a bound, and what it missed is counted."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from steptwin.subject.events import KINDS, Event
+
+USUAL = frozenset(KINDS) - {"frame"}
+"""What is followed where no kinds are named: frames are as frequent as requests."""
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """Which events. ``machines`` None: all of them; ``axes`` None: all, and what belongs to no axis in any case."""
+
+    kinds: frozenset[str] = USUAL
+    machines: frozenset[str] | None = None
+    axes: frozenset[str] | None = None
+
+    def wants(self, event: Event) -> bool:
+        if event.kind not in self.kinds or (self.machines is not None and event.machine not in self.machines):
+            return False
+        return self.axes is None or event.axis is None or event.axis in self.axes
+
+
+def filter_of(
+    kinds: Iterable[str] | None = None, machines: Iterable[str] | None = None, axes: Iterable[str] | None = None
+) -> Filter:
+    return Filter(
+        USUAL if kinds is None else frozenset(kinds),
+        None if machines is None else frozenset(machines),
+        None if axes is None else frozenset(axes),
+    )
+
+
+class Taken(NamedTuple):
+    """Events in order. ``missed``: how many before them were dropped since the last time."""
+
+    missed: int
+    events: list[Event]
+
+
+class Following:
+    """The events of one follower that were not taken yet, the newest ``bound`` of them."""
+
+    __slots__ = ("_close", "_missed", "_waiting", "filter", "on_event")
+
+    def __init__(self, what: Filter, bound: int, close: Callable[[Following], None]) -> None:
+        self.filter = what
+        self.on_event: Callable[[], None] | None = None
+        """Called when an event has come and none was waiting."""
+        self._waiting: deque[Event] = deque(maxlen=bound)
+        self._missed = 0
+        self._close = close
+
+    def add(self, event: Event) -> None:
+        waiting = self._waiting
+        if len(waiting) == waiting.maxlen:
+            self._missed += 1
+        waiting.append(event)
+        if len(waiting) == 1 and self.on_event is not None:
+            self.on_event()
+
+    def miss(self, count: int) -> None:
+        """Count events that were lost on their way here."""
+        self._missed += count
+
+    def take(self, most: int | None = None) -> Taken:
+        """What has come since the last time, the oldest ``most`` of it."""
+        missed, self._missed = self._missed, 0
+        count = len(self._waiting) if most is None else min(most, len(self._waiting))
+        return Taken(missed, [self._waiting.popleft() for _ in range(count)])
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def close(self) -> None:
+        """Follow no more. What has come can still be taken."""
+        self._close(self)
+
+
+class Followers:
+    """All followers of a subject. ``on_change`` is called when the kinds that are wanted have changed."""
+
+    def __init__(self, on_change: Callable[[], None] = lambda: None) -> None:
+        self._all: list[Following] = []
+        self._on_change = on_change
+        self.kinds: frozenset[str] = frozenset()
+        """Kinds that at least one follower wants."""
+
+    def __bool__(self) -> bool:
+        return bool(self._all)
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        following = Following(what, bound, self.remove)
+        self.add(following)
+        return following
+
+    def add(self, following: Following) -> None:
+        self._all.append(following)
+        self._changed()
+
+    def publish(self, event: Event) -> None:
+        for following in self._all:
+            if following.filter.wants(event):
+                following.add(event)
+
+    def remove(self, following: Following) -> None:
+        if following in self._all:
+            self._all.remove(following)
+            self._changed()
+
+    def _changed(self) -> None:
+        self.kinds = frozenset().union(*(following.filter.kinds for following in self._all))
+        self._on_change()

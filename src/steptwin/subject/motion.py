@@ -1,0 +1,43 @@
+"""Where axes are, computed from the plans that were followed: no subject is asked for positions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from steptwin.machine import Nanos
+from steptwin.motion.divisions import Plan, profile_of
+from steptwin.subject.contract import MachinePart
+from steptwin.subject.events import CoordinatePayload, Event, PlanPayload
+
+
+class Motions:
+    """The axes of a controller; ``plans`` are those that hold when following begins."""
+
+    def __init__(self, machine: MachinePart, plans: Iterable[Event]) -> None:
+        self._machine = machine.name
+        self._scales = {str(axis.number): axis.pulses_per_unit or 1.0 for axis in machine.datasheet.axes}
+        self._plans: dict[str, Plan] = {}
+        self._origins: dict[str, int] = {}
+        for plan in plans:
+            self.take(plan)
+
+    def take(self, event: Event) -> None:
+        if event.machine != self._machine:
+            return
+        match event.payload:
+            case PlanPayload(axis, plan, origin):
+                self._plans[axis] = plan
+                if origin is not None:
+                    self._origins[axis] = origin
+            case CoordinatePayload(axis, origin):
+                self._origins[axis] = origin
+
+    def position(self, axis: str, now: Nanos) -> float:
+        """Counted, as the controller shows it, in units of the axis."""
+        return (self._plans[axis].count(now) + self._origins.get(axis, 0)) / self._scales[axis]
+
+    def velocity(self, axis: str, now: Nanos) -> float:
+        return profile_of(self._plans[axis]).velocity(now) / self._scales[axis]
+
+    def is_moving(self, now: Nanos) -> bool:
+        return any(profile_of(plan).moving(now) for plan in self._plans.values())

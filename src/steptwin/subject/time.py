@@ -1,0 +1,68 @@
+"""Advances the time of a world in this process."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND, Nanos
+from steptwin.subject.commands import Advance
+from steptwin.subject.events import SHOWN_KINDS, STEP_KINDS
+from steptwin.subject.following import Filter, Following, filter_of
+
+if TYPE_CHECKING:
+    from steptwin.subject.world import WorldSubject
+    from steptwin.world.plant import Plant
+
+LONGEST_RUN_NS: Nanos = 3600 * SECOND
+"""A condition that never comes true is given up after an hour, where no other limit is given."""
+MOST_SHOWN = 1000
+"""Events in the answer to a step."""
+
+
+def advance(subject: WorldSubject, wanted: Advance) -> object:
+    """A step in virtual time."""
+    world = subject.world
+    if wanted.until is not None:
+        world.condition(wanted.until)  # raises `Misuse` here
+    end = end_of(world, wanted, next_due(world))
+    following = subject.follow(shown_of(wanted), MOST_SHOWN)
+    try:
+        came = False
+        if end is not None:
+            if end < world.now:
+                raise Misuse(f"to_ns = {end}: this world is at {world.now} ns already")
+            reason = world.run_to(end, wanted.until)
+            came = reason is not None and reason == wanted.until
+    finally:
+        following.close()
+    return {**subject.time(), **happened(following), "came": came, "idle": end is None}
+
+
+def shown_of(wanted: Advance) -> Filter:
+    """The events in the answer to a step: levels and motions too, where the next thing is waited for."""
+    is_next = wanted.duration is None and wanted.to is None and wanted.until is None
+    return filter_of(STEP_KINDS if is_next else SHOWN_KINDS)
+
+
+def happened(following: Following) -> dict[str, object]:
+    """The events in the answer to a step."""
+    missed, events = following.take()
+    return {"events": [event.plain() for event in events if event.is_shown or event.kind not in SHOWN_KINDS], "missed": missed}
+
+
+def end_of(world: Plant, wanted: Advance, due: Nanos | None) -> Nanos | None:
+    """The moment to which a step goes; without a time that is ``due``, when something happens next by itself, None for never."""
+    if wanted.to is not None:
+        return wanted.to
+    if wanted.duration is not None:
+        return world.now + wanted.duration
+    return due if wanted.until is None else world.now + LONGEST_RUN_NS
+
+
+def next_due(world: Plant) -> Nanos | None:
+    """The next moment at which anything happens by itself; None when nothing will."""
+    dues = [due for kernel in world.kernels if (due := kernel.deadline()) is not None]
+    own = world.next()
+    due = min(dues if own is None else [*dues, own], default=None)
+    return None if due is None else max(due, world.now)

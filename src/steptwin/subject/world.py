@@ -1,0 +1,235 @@
+"""A world in this process as a subject."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import isfinite
+from typing import Any, get_args
+
+from steptwin.errors import Refusal
+from steptwin.machine import Nanos
+from steptwin.subject import commands as command
+from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
+from steptwin.subject.describe import describe
+from steptwin.subject.dispatch import Action, Dispatcher
+from steptwin.subject.events import Event, FramePayload, Numbering, PacePayload, Payload, PlanPayload, payload_of
+from steptwin.subject.following import Filter, Followers, Following
+from steptwin.subject.time import advance
+from steptwin.wire.slave import FrameDirection
+from steptwin.world import script as steps
+from steptwin.world.actions import Outside, See
+from steptwin.world.control import ControllerCommand
+from steptwin.world.plant import WORLD, Plant
+from steptwin.world.trace import TraceRecord
+
+STEPS = (
+    steps.Set, steps.Press, steps.Release, steps.Write, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple, steps.ClearFault,
+    steps.Note, See,
+)  # fmt: skip
+"""Commands that are done as they are, and whose answer is nothing."""
+
+
+class WorldSubject:
+    """The world ``world``; ``outside`` does something from outside to it, at its present moment."""
+
+    def __init__(self, world: Plant, outside: Callable[[Outside], None] | None = None) -> None:
+        self.world = world
+        self.description: Description = describe(world)
+        self._outside = outside or world.outside
+        lines = {name: line.name for name, (line, _) in world.plan.line_of.items()}
+        self._numbering = Numbering(lines)
+        self.followers = Followers(self._followed)
+        self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
+        self._frames: dict[str, _Frames] = {}
+        self._is_watching = False
+
+    def _actions(self) -> dict[Any, Action]:
+        taken: dict[Any, Action] = dict.fromkeys(STEPS, self._step)
+        control: dict[Any, Action] = dict.fromkeys(get_args(ControllerCommand), self._control)
+        return {
+            **taken,
+            **control,
+            steps.Request: self._request,
+            steps.SetFault: self._set_fault,
+            steps.Expect: self._expect,
+            command.Describe: lambda _: self.description.plain(),
+            command.ReadPoints: lambda wanted: [reading._asdict() for reading in self.read(*wanted.points)],
+            command.ReadPins: self._pins,
+            command.State: self._state,
+            command.Encoders: self._encoders,
+            command.ListFaults: lambda _: self._faults(),
+            command.Time: lambda _: self.time(),
+            command.Advance: lambda wanted: advance(self, wanted),
+        }
+
+    # ------------------------------------------------------------------ what a subject is
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        return tuple(map(self._reading, points))
+
+    def _reading(self, point: str) -> Reading:
+        signal = self.world.signal(point)
+        if not signal.is_readable:
+            return Reading(point, None, signal.unit, UNKNOWN)
+        value = self.world.read(point)
+        return Reading(point, value, signal.unit) if isfinite(value) else Reading(point, None, signal.unit, UNKNOWN)
+
+    def do(self, wanted: command.Command) -> Result:
+        return self.dispatcher.do(wanted)
+
+    def follow(self, what: Filter, bound: int) -> Following:
+        return self.followers.follow(what, bound)
+
+    # ------------------------------------------------------------------ commands
+
+    def _begin(self) -> int:
+        """Everything due by now happens before, so that it has no cause in the command."""
+        if self.followers:
+            self.world.settle_all()
+        return self._numbering.command(self.world.now)
+
+    def _end(self) -> Nanos:
+        """What the command leads to at its moment has its cause in it."""
+        if self.followers:
+            self.world.settle_all()
+        self._numbering.done()
+        return self.world.now
+
+    def _step(self, step: Outside) -> None:
+        self._outside(step)
+
+    def _control(self, wanted: ControllerCommand) -> None:
+        """As the master of the controller does it."""
+        world, name = self.world, wanted.machine
+        kind, machine = world.kind(name), world.machine(name)
+        make = kind.control.get(type(wanted))
+        if make is None:
+            known = ", ".join(command.name_of(one) for one in kind.control)
+            raise Refusal(f"{name!r} is {kind.title}, which cannot do {command.name_of(type(wanted))}; it can do {known}")
+        world.touch(name)
+        on = world.plan.line_of.get(name)
+        self._outside(make(machine, None if on is None else on[0].name, wanted))
+
+    def _request(self, step: steps.Request) -> object:
+        master = self.world.line_called(step.line).master
+        number = master.asked + 1
+        master.wanted |= {number}
+        try:
+            self._outside(step)
+        finally:
+            master.wanted -= {number}
+        found = master.answers.pop(number, None)
+        return {"pdu": found[1:-2].hex() if found else None}
+
+    def _set_fault(self, step: steps.SetFault) -> object:
+        self._outside(step)
+        return {"name": self.world.plan.faults.active[-1].name}
+
+    def _expect(self, step: steps.Expect) -> object:
+        before = len(self.world.failures)
+        self._outside(step)
+        return {"holds": len(self.world.failures) == before}
+
+    def _pins(self, wanted: command.ReadPins) -> object:
+        world = self.world
+        names = list(world.machines) if wanted.machine is None else [wanted.machine]
+        return {f"{name}.{pin}": level for name in names for pin, level in self._levels(name).items()}
+
+    def _levels(self, name: str) -> Mapping[str, float]:
+        machine = self.world.machine(name)
+        self.world.touch(name)
+        return machine.pins()
+
+    def _state(self, wanted: command.State) -> object:
+        machine = self.world.machine(wanted.machine)
+        self.world.touch(wanted.machine)
+        return self.world.kind(wanted.machine).state(machine, self.world.now)
+
+    def _encoders(self, wanted: command.Encoders) -> object:
+        encoders = self.world.encoders(wanted.machine)
+        self.world.touch(wanted.machine)
+        return encoders.shown(self.world.machine(wanted.machine), self.world.now)
+
+    def _faults(self) -> object:
+        return [
+            {"name": a.name, "fault": str(a.fault), "seen": a.seen, "happened": a.struck} for a in self.world.plan.faults.active
+        ]
+
+    def time(self) -> dict[str, object]:
+        """The present moment; a world in virtual time stands unless it is advanced."""
+        now = self.world.now
+        return {
+            "world": self.world.spec.name,
+            "time_ns": str(now),
+            "time_s": now / 1e9,
+            "paused": True,
+            "speed": None,
+            "stopped": self.world.stopped,
+        }
+
+    # ------------------------------------------------------------------ events
+
+    def plans(self, what: Filter) -> list[Event]:
+        """The present plan of every axis that ``what`` wants, as events of now."""
+        world = self.world
+        found: list[Event] = []
+        for part in self.description.machines:
+            world.touch(part.name)
+            for axis, drive in zip(part.datasheet.axes, world.machines[part.name].axes, strict=True):
+                event = Event(0, world.now, part.name, PlanPayload(str(axis.number), drive.plan, drive.offset_p))
+                if what.wants(event):
+                    found.append(event)
+        return found
+
+    def paced(self, pace: PacePayload) -> None:
+        """Time stands or goes on, from now on."""
+        self._publish(self.world.now, WORLD, pace)
+
+    def _publish(self, time: Nanos, machine: str, payload: Payload) -> None:
+        if self.followers:
+            self.followers.publish(self._numbering.event(time, machine, payload))
+
+    def _recorded(self, record: TraceRecord) -> None:
+        if record.kind == "frame":  # they come from the lines, whether they are recorded or not
+            return
+        payload = payload_of(record)
+        if isinstance(payload, PlanPayload):
+            payload = self._with_origin(record.machine, payload)
+        self._publish(record.time, record.machine, payload)
+
+    def _with_origin(self, machine: str, payload: PlanPayload) -> PlanPayload:
+        drive = self.world.machines[machine].axes[int(payload.axis) - 1]
+        return PlanPayload(payload.axis, payload.plan, drive.offset_p)
+
+    def _followed(self) -> None:
+        """Subscribe to the world only while it is followed, and to frames only while they are wanted."""
+        watchers = self.world.trace.watchers
+        if bool(self.followers) is not self._is_watching:
+            self._is_watching = not self._is_watching
+            if self._is_watching:
+                watchers.append(self._recorded)
+            else:
+                watchers.remove(self._recorded)
+        wanted = "frame" in self.followers.kinds
+        if wanted is bool(self._frames):
+            return
+        for line in self.world.lines.values():
+            if wanted:
+                self._frames[line.name] = _Frames(self._publish, line.name)
+                line.follow_frames(self._frames[line.name])
+            else:
+                line.unfollow_frames(self._frames.pop(line.name))
+
+
+class _Frames:
+    """The frames of a line as events."""
+
+    def __init__(self, publish: Callable[[Nanos, str, Payload], None], line: str) -> None:
+        self._publish = publish
+        self._line = line
+
+    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+        self._publish(now, self._line, FramePayload(place, direction.value, data))
+
+    def rubbish(self, now: Nanos, place: str, count: int) -> None:
+        """Bytes that belong to no frame are no frame."""

@@ -1,0 +1,53 @@
+"""Names in source text: what they name and what is done with it there. One type for all languages."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+from steptwin.diagnostics import Span
+
+
+class SymbolKind(enum.Enum):
+    """What a name names; the values are for people."""
+
+    CONSTANT = "constant"
+    VARIABLE = "variable"
+    REGISTER = "register"
+    VALUE = "predefined name"
+    FUNCTION = "function"
+    LABEL = "label"
+    POSITION = "position"
+    SECTION = "section"
+    KEY = "key"
+    CONTROLLER = "controller"
+    LINE = "line"
+    AXIS = "axis"
+    BUTTON = "button"
+    SCRIPT = "script"
+
+
+class Role(enum.Enum):
+    """``DEFINE``: here it comes into being."""
+
+    DEFINE = "define"
+    WRITE = "write"
+    READ = "read"
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """What a name names: two uses belong together when kind and key are equal. ``text`` is the name as written there."""
+
+    kind: SymbolKind
+    key: str
+    text: str = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """A name at one place."""
+
+    symbol: Symbol
+    span: Span
+    role: Role

@@ -1,0 +1,72 @@
+"""What operating systems have and lack. Other modules ask here, so that they need not know on which system they run."""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import sys
+from pathlib import Path
+
+HAS_EPOLL = hasattr(select, "epoll")
+"""Linux: many descriptors are watched as one. Elsewhere links are asyncio's."""
+
+HAS_PTYS = hasattr(os, "openpty")
+"""Pseudo terminals: Linux and macOS."""
+
+READ_FLAGS = (
+    os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+)  # fmt: skip
+"""Open for reading: no waiting for the other end of a pipe, not inherited by processes, no translation of line ends."""
+LOCK_FLAGS = READ_FLAGS | os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+"""Make or open a file to lock it, through no symbolic link."""
+
+
+def reason(error: Exception) -> str:
+    """Why something failed, in words; of a system error without what libraries add to it, such as the address."""
+    if not isinstance(error, OSError):
+        return str(error) or type(error).__name__
+    number = error.errno if error.errno in errno.errorcode else None
+    return (error.strerror or str(error) if number is None else os.strerror(number)).lower() or type(error).__name__
+
+
+def user() -> int | None:
+    """The number of this user; None where users have no numbers (Windows)."""
+    return os.getuid() if hasattr(os, "getuid") else None
+
+
+def is_own(found: os.stat_result) -> bool:
+    """Whether a file belongs to this user. Windows does not say; the directories used there are private to the user."""
+    number = user()
+    return number is None or found.st_uid == number
+
+
+def sync_directory(directory: Path) -> None:
+    """Make renames and new names in a directory survive power loss, where a directory can be opened (not on Windows)."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def process_exists(number: int) -> bool:
+    """Whether a process of this number is running."""
+    if sys.platform == "win32":  # os.kill ends the process there, whatever the signal
+        import ctypes
+
+        synchronize = 0x00100000
+        kernel = ctypes.windll.kernel32
+        handle = kernel.OpenProcess(synchronize, False, number)
+        if handle:
+            kernel.CloseHandle(handle)
+        return bool(handle)
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True  # of another user
+    return True

@@ -1,0 +1,69 @@
+"""Commands for controllers, in the units of their data sheets. What a master sends for them is for each kind of controller to say
+(`steptwin.world.kind.ControllerKind.control`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from steptwin.errors import Misuse
+
+
+@dataclass(frozen=True, slots=True)
+class Enable:
+    """Switch a drive on or off."""
+
+    machine: str
+    axis: int
+    on: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Begin to move to a position, or by a distance."""
+
+    machine: str
+    axis: int
+    to: float | None = None
+    by: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.to is None) is (self.by is None):
+            raise Misuse("move: give either to (a position) or by (a distance)")
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Begin to home; the sign of the velocity chooses the switch."""
+
+    machine: str
+    axis: int
+    velocity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Jog:
+    """Begin to move at a velocity, without end."""
+
+    machine: str
+    axis: int
+    velocity: float
+
+
+@dataclass(frozen=True, slots=True)
+class StopAxes:
+    """Stop an axis as fast as the controller does; without one, all axes of the machine."""
+
+    machine: str
+    axis: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ControlProgram:
+    """Start, pause or stop the program of a machine."""
+
+    machine: str
+    action: str
+
+
+ControllerCommand: TypeAlias = Enable | Move | Home | Jog | StopAxes | ControlProgram

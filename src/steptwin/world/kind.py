@@ -1,0 +1,246 @@
+"""What a world asks of a kind of controller, and of a kind of line: one value of each, and no question which one it is.
+
+A piece that is missing is a `TypeError` at import. What only some controllers have is None in others: a step that needs it is
+refused with a text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import MachineEvent, MotionController, Nanos
+from steptwin.textcodec import decode
+from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.mechanics import EncoderReader
+from steptwin.world.reader import Key, TomlText
+from steptwin.world.scale import DriveScale
+from steptwin.world.spec import AxisSpec, ControllerSpec, LineSpec, WorldSpec
+
+if TYPE_CHECKING:
+    from steptwin.datasheet import Datasheet
+    from steptwin.diagnostics import Diagnostic, SourceText
+    from steptwin.points import LivePoint
+    from steptwin.words.frames import FrameLine
+    from steptwin.world.control import ControllerCommand
+    from steptwin.world.faults import AxisLoad, Body, Faults
+    from steptwin.world.lanes import AxisLane
+    from steptwin.world.lines import Line, LineWords
+    from steptwin.world.plant import Plant
+    from steptwin.world.script import Step
+    from steptwin.world.trace import Recorder
+
+S = TypeVar("S", bound=ControllerSpec)
+M = TypeVar("M", bound=MotionController)
+V = TypeVar("V")
+
+Row: TypeAlias = dict[str, Any]
+"""The values of a table that were read by its keys, by attribute, with ``path``."""
+
+Values: TypeAlias = tuple[tuple[str, float], ...]
+"""Registers by name, and what they are to take."""
+
+DIGITAL_INPUT, ANALOG_INPUT, OUTPUT = "digital input", "analog input", "output"
+
+
+class BuildContext(Protocol):
+    """What the description of a controller refers to, while it is built."""
+
+    spec: WorldSpec
+
+    def data(self, name: str) -> bytes:
+        """The content of a file the description names. Raises `Misuse` where it is not given."""
+        ...
+
+    def warn(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
+        """Report the warnings among what was found in a file."""
+        ...
+
+
+def text_of(context: BuildContext, name: str) -> str:
+    """The text of a file the description names."""
+    return decode(context.data(name), name).text
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Terminals:
+    """Names of pins that wires, switches, buttons and sources may be joined to; a pin may be both input and output."""
+
+    digital_inputs: Sequence[str]
+    analog_inputs: Sequence[str]
+    outputs: Sequence[str]
+
+    def check(self, name: PinName, kind: str) -> None:
+        """Raises `Misuse` unless a pin is of a kind: `DIGITAL_INPUT`, `ANALOG_INPUT` or `OUTPUT`."""
+        pins = {DIGITAL_INPUT: self.digital_inputs, ANALOG_INPUT: self.analog_inputs, OUTPUT: self.outputs}[kind]
+        if name.pin not in pins:
+            there = ", ".join(pins) or "none"
+            raise Misuse(f"{name} is no {kind}: {kind}s of {name.machine!r} are {there}")
+
+
+class Service(NamedTuple):
+    """Where a controller is served."""
+
+    unit: int = 1
+    """Under which faults know it."""
+    line: str = ""
+    """Empty without one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Encoders(Generic[M]):
+    """The encoder inputs of a controller. Axes count from 1."""
+
+    reader: Callable[[M], EncoderReader]
+    """What takes the counts."""
+    counts_per_pulse: Callable[[M, int], Fraction]
+    """As the controller is configured for an axis."""
+    index_input: Callable[[int], str]
+    """The pin of channel C of an axis."""
+    shown: Callable[[M, Nanos], list[dict[str, object]]]
+    """Counts of each axis and what turns its encoder, as plain data."""
+    couple: Callable[[M, int, str, Nanos], None]
+    """Choose what turns the shaft of an axis without mechanics: one of `steptwin.world.script.COUPLINGS`."""
+    check_turn: Callable[[int, int], None]
+    """Raises `Misuse` for an axis that is not there, and for counts beyond what is permitted at once."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedRegisters(Generic[M]):
+    """Registers that scripts write by name."""
+
+    requests: Callable[[M, Values], tuple[bytes, ...]]
+    """The PDUs that write values by name. Raises `Misuse` for what a register does not take."""
+    dialect: Callable[[M], Hashable]
+    """What requests depend on besides names and values."""
+    execute: Callable[[M, bytes, Nanos], bytes]
+    """The answer to a PDU that reaches the controller without a line."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vision(Generic[S, M]):
+    """An input for the records of a vision system: number, x, y, angle."""
+
+    address: Callable[[S], str | None]
+    """HOST:PORT where a running world takes records."""
+    see: Callable[[M, tuple[float, float, float, float], Nanos], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerKind(Generic[S, M, V]):
+    """A kind of controller: its spec, its machine, and what Python programs see of it."""
+
+    name: str
+    """Of its table in a description: ``[[name]]``."""
+    title: str
+    """With its article, for messages: ``a MIC488``."""
+    keys: tuple[Key, ...]
+    """Of its table; ``name`` and ``line`` are among them."""
+    inner_tables: tuple[str, ...] = ()
+    """Tables in its table, which ``read`` reads."""
+    inner_keys: Callable[[str], tuple[Key, ...]] = lambda table: ()
+    """The keys of one of these."""
+    exclusive: tuple[tuple[str, str], ...] = ()
+    """Pairs of keys of which a table has one at most."""
+    read: Callable[[TomlText, Row, Mapping[str, Any]], S]
+    """The spec of a table; what is wrong is reported to the text. The mapping is the table itself."""
+    files: Callable[[S], Iterable[tuple[str, str]]]
+    """Names of the files that a spec refers to, and the keys that do."""
+    build: Callable[[S, bytes | None, BuildContext], M]
+    """The machine at time 0, with what its non-volatile memory has kept, if anything. Raises `Misuse`."""
+    watch_events: Callable[[M, Callable[[MachineEvent], None]], None]
+    """Have a function called with everything that happens in the machine."""
+    keep_memory: Callable[[M, bytes | None, Callable[[bytes], None]], None]
+    """Have a function called with its non-volatile memory whenever that has changed; at once, where it differs from what is kept
+    already."""
+    announced: Callable[[M, int], dict[str, object]]
+    """How drivers reach it at present: ``kind``, address, type. The number is its address on the line, as it was built."""
+    line: LineKind
+    """What it is connected to."""
+    address: Callable[[S, M], int]
+    """Unit or address on its line."""
+    terminals: Terminals
+    input_pin: Callable[[str, float], str]
+    """The pin that a name means. Raises `Misuse` with the inputs, or for a value that the pin does not take."""
+    refuse_taken: Callable[[M, str], None] = lambda machine, pin: None
+    """Raises `Misuse` for a pin that is neither input nor output as the machine is configured."""
+    scale: Callable[[AxisSpec, M, int], DriveScale]
+    """How its axis of a number (from 1) counts. Raises `Misuse`."""
+    is_idle: Callable[[M, Nanos], bool]
+    """Whether all axes stand and no program runs."""
+    datasheet: Callable[[M], Datasheet]
+    """Its static description, the same object for all machines that have the same."""
+    datasheet_of: Callable[[str | None], Datasheet]
+    """That of a controller that is not configured: of a variant by its name, or the usual one. Raises `Misuse`."""
+    point: Callable[[M, str], LivePoint | None]
+    """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it. None
+    where there is none; raises `Misuse` for what is half a value."""
+    control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step]]
+    """The steps by which its master does the commands for controllers that it can do. The text is the name of its line; the
+    machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""
+    state: Callable[[M, Nanos], dict[str, object]]
+    """Its present state as plain data; the machine is at that moment."""
+    statement: Callable[[M], str | None] = lambda machine: None
+    """The statement that its program is at, while one runs or is paused, as text."""
+    view: Callable[[Plant, str, M], V]
+    """What Python programs see of it in a running world."""
+    lanes: Callable[[M], Mapping[str, AxisLane]]
+    """How its axes are shown in a trace, by the subject of their plans."""
+    body: Callable[[M, Service, Mapping[int, AxisLoad]], Body]
+    """What can fail of it; shafts are those of the mechanics of its axes, by number."""
+    keeps_memory: Callable[[M], bool]
+    """Whether it has non-volatile memory."""
+    remarks: Callable[[str, M], Sequence[str]] = lambda name, machine: ()
+    """What a person who starts it, under a name, should know."""
+    encoders: Encoders[M] | None = None
+    registers: NamedRegisters[M] | None = None
+    vision: Vision[S, M] | None = None
+
+
+AnyKind: TypeAlias = ControllerKind[Any, Any, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """A controller on a line."""
+
+    spec: ControllerSpec
+    machine: Any
+    address: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LineKind:
+    """A kind of line, ``kind`` of ``[[line]]``."""
+
+    name: str
+    meaning: str
+    """For people: ``modbus (MIC488)``."""
+    links: Mapping[str, LinkKind]
+    """Keys of ``[[line]]`` that open it for programs outside, and what they open."""
+    keys: frozenset[str] = frozenset()
+    """Other keys of ``[[line]]`` that not all kinds have."""
+    make: Callable[[LineSpec, Sequence[Member], Kernel, Recorder, Faults], Line]
+    """The line with its members, which are one at least. Raises `Misuse` where they do not go together."""
+    words: Callable[[Any, str, Callable[[FrameLine], None]], LineWords]
+    """What goes over a line that was made, in words for a function; the text is put before the name of a place."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkKind:
+    """What a key of ``[[line]]`` opens."""
+
+    place_kind: str
+    """The kind of its places on the line, one of `steptwin.world.lines.Line.kinds`."""
+    place: str
+    """What its places are called; links that any number of programs may use number them."""
+    protocol: str
+    """For people: ``Modbus RTU``."""
+
+
+def lacks(name: str, kind: AnyKind, what: str) -> Misuse:
+    """Of something that only other controllers have."""
+    return Misuse(f"{name!r} is {kind.title}, which has no {what}")

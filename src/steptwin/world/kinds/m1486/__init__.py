@@ -1,0 +1,64 @@
+"""The M1486 in a world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from steptwin.m1486 import datasheet, points
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, refuse_taken, settable_pin
+from steptwin.m1486.variants import Store, variant
+from steptwin.machine import MachineEvent
+from steptwin.words.m1486_state import state_of
+from steptwin.world.kind import ControllerKind, LineKind, LinkKind, Terminals
+from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line, table
+from steptwin.world.kinds.m1486.table import M1486Spec
+from steptwin.world.kinds.m1486.view import M1486View
+from steptwin.world.kinds.m1486.words import ChipLineWords
+
+
+def _watch_events(chip: M1486Chip, call: Callable[[MachineEvent], None]) -> None:
+    chip.on_event = call
+
+
+CHARACTERS = LineKind(
+    name="m1486",
+    meaning="m1486",
+    links={
+        "pty": LinkKind("raw", "pty", "M1486 line"),
+        "serial": LinkKind("raw", "serial", "M1486 line"),
+        "tcp": LinkKind("raw", "tcp", "M1486 line"),
+        "rfc2217": LinkKind("raw", "tcp", "network port"),
+    },
+    make=line.make,
+    words=ChipLineWords,
+)
+
+M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
+    name="m1486",
+    title="an M1486",
+    keys=table.KEYS,
+    read=table.read,
+    files=table.files,
+    build=build.build,
+    watch_events=_watch_events,
+    keep_memory=build.keep_memory,
+    announced=lambda chip, _: {"kind": "m1486", "chip": f"{chip.address:X}", "variant": chip.variant.name},
+    line=CHARACTERS,
+    address=lambda spec, chip: chip.address,
+    # User lines are both inputs and outputs (manual chapter II).
+    terminals=Terminals(digital_inputs=(*LINE_PINS, *CONTROL_PINS), analog_inputs=(), outputs=(*LINE_PINS, *OUTPUT_PINS)),
+    input_pin=settable_pin,
+    refuse_taken=lambda chip, pin: refuse_taken(pin, chip.interface),
+    scale=axes.scale,
+    is_idle=lambda chip, now: chip.is_idle(),
+    datasheet=datasheet.datasheet,
+    datasheet_of=lambda name: datasheet.datasheet_of(variant(name or table.DEFAULT_VARIANT)),
+    point=points.live_point,
+    control=control.CONTROL,
+    state=state_of,
+    view=M1486View,
+    lanes=lanes.lanes,
+    body=faults.body,
+    keeps_memory=lambda chip: chip.variant.store is Store.EEPROM,
+)

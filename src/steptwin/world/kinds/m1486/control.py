@@ -1,0 +1,83 @@
+"""What a host types to command an M1486. Positions are in microsteps, as in its data sheet: the smallest ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.points import UNIT
+from steptwin.m1486.ranges import out_of_range
+from steptwin.m1486.syntax import Command
+from steptwin.words.m1486_state import program_words
+from steptwin.world import script as do
+from steptwin.world.control import ControllerCommand, Jog, Move, StopAxes
+
+
+def _typed(chip: M1486Chip, line: str | None, command: Any, *texts: str) -> do.Send:
+    """Commands for this chip alone: it is selected by its address. Raises `Refusal` where nothing can be typed."""
+    if command.axis not in (None, 1):
+        raise Misuse(f"{command.machine}: no axis {command.axis}: an M1486 has one, 1")
+    if line is None:
+        raise Refusal(f"{command.machine} is on no line, so no commands can be sent to it")
+    return do.Send(line, "".join(f"{text}\r" for text in (f"x{chip.address:X}", *texts)).encode("ascii"))
+
+
+def _refuse_busy(chip: M1486Chip, name: str) -> None:
+    """What is typed now would be done at a moment, and from a place, that are not known."""
+    if not chip.is_idle():
+        raise Refusal(f"{name} is not at rest ({program_words(chip, chip.now)}): wait, or stop it")
+
+
+def _number(chip: M1486Chip, letter: str, value: float, what: str) -> str:
+    """A command with its number. Raises `Misuse` for one that it does not take."""
+    if value != int(value):
+        raise Misuse(f"{what}: a whole number is needed")
+    why = out_of_range(Command(letter, int(value)), chip.variant)
+    if why is not None:
+        raise Misuse(f"{what}: {why}")
+    return f"{letter.lower()}{int(value)}"
+
+
+def _on_grid(chip: M1486Chip, distance: float, what: str) -> None:
+    if distance % chip.drive.grid_u:
+        raise Misuse(f"{what}: no multiple of {chip.drive.grid_u}, the microstep of M{chip.drive.microstep}")
+
+
+def _move(chip: M1486Chip, line: str | None, command: Move) -> do.Send:
+    _refuse_busy(chip, command.machine)
+    if command.to is not None:
+        if not chip.drive.is_valid:
+            raise Refusal(f"{command.machine} was stopped in a move: its counter does not show where it is (M-16)")
+        what = f"position {command.to:g} {UNIT}"
+        text = "h" if command.to == 0 else _number(chip, "G", command.to, what)
+        _on_grid(chip, command.to - chip.drive.counter_u(chip.now), what)
+    else:
+        distance = command.by or 0.0
+        what = f"distance {distance:g} {UNIT}"
+        text = _number(chip, "F" if distance >= 0 else "B", abs(distance), what)
+        _on_grid(chip, distance, what)
+    return _typed(chip, line, command, text, "r")
+
+
+def _jog(chip: M1486Chip, line: str | None, command: Jog) -> do.Send:
+    """V is in full steps/s; a type for 24 MHz makes twice as many of them."""
+    _refuse_busy(chip, command.machine)
+    steps = abs(command.velocity) / (FULL_STEP * chip.variant.clock)
+    velocity = _number(chip, "V", steps, f"velocity {command.velocity:g} {UNIT}/s, V{steps:g}")
+    return _typed(chip, line, command, velocity, "g+" if command.velocity > 0 else "g-", "r")
+
+
+def _stop(chip: M1486Chip, line: str | None, command: StopAxes) -> do.Send:
+    """With its ramp. A program goes on after it unless function 51 is off."""
+    return _typed(chip, line, command, "k")
+
+
+CONTROL: Mapping[type[ControllerCommand], Callable[[M1486Chip, str | None, Any], do.Send]] = {
+    Move: _move,
+    Jog: _jog,
+    StopAxes: _stop,
+}
+"""It has no enable, which line is home is not known, and programs begin at labels: for that characters go to its line."""

@@ -1,0 +1,42 @@
+"""What goes over a line of M1486 chips in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from steptwin.machine import Nanos
+from steptwin.wire.slave import FrameDirection
+from steptwin.words.characters import CharacterLog, LineSplitter
+from steptwin.words.frames import FrameLine
+from steptwin.world.kinds.m1486.line import ChipLine
+from steptwin.world.trace import TraceRecord
+
+
+class ChipLineWords:
+    """The characters of a line in words. As `steptwin.world.lines.LineWords`."""
+
+    def __init__(self, line: ChipLine, prefix: str, sink: Callable[[FrameLine], None]) -> None:
+        self._line = line
+        self._log = CharacterLog(next(iter(line.chain.chips.values())).variant)
+        self._log.sinks.append(lambda shown: sink(shown._replace(link=prefix + shown.link)))
+        self._splitters: dict[str, LineSplitter] = {}
+
+    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+        if direction is FrameDirection.OUT:
+            for byte in data:
+                self._log.sent(now, byte)
+            return
+        splitter = self._splitters.get(place)
+        if splitter is None:
+            for gone in [name for name in self._splitters if name not in self._line.places]:
+                del self._splitters[gone]
+            splitter = self._splitters[place] = LineSplitter(self._log, place)
+        splitter.take(data, now)
+
+    def rubbish(self, now: Nanos, place: str, count: int) -> None:
+        """Every character is one of the line."""
+
+    def recorded(self, record: TraceRecord) -> None:
+        """A chip announces the byte that it sends."""
+        if record.kind == "event" and record.subject == "upload":
+            self._log.upload(**dict(record.facts))

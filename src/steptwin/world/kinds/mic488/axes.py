@@ -1,0 +1,55 @@
+"""How a MIC488 counts positions and encoders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from steptwin.machine import Nanos
+from steptwin.mic488.core import check_turn
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.encoder import Coupling
+from steptwin.mic488.inputs import index_input
+from steptwin.world.kind import Encoders
+from steptwin.world.lanes import AxisLane, plain_view
+from steptwin.world.scale import FULL_STEPS, DriveScale
+from steptwin.world.spec import AxisSpec
+
+
+def scale(spec: AxisSpec, device: Mic488Device, number: int) -> DriveScale:
+    axis = device.axes[number - 1]
+    full_steps = None if spec.motor is None else spec.motor.full_steps
+    return DriveScale(
+        pulses_per_rev=axis.config.mot_resol if spec.pulses_per_rev is None else spec.pulses_per_rev,
+        full_steps=FULL_STEPS if full_steps is None else full_steps,
+        unit=axis.config.unit_name,
+        pulses_per_unit=Fraction(str(axis.gear)),
+        text=f"is told that axis {number} goes in {axis.config.unit_name}",
+    )
+
+
+def lanes(device: Mic488Device) -> Mapping[str, AxisLane]:
+    """In configured units."""
+    return {
+        str(axis.number): plain_view(str(axis.number))._replace(unit=axis.config.unit_name, pulses_per_unit=axis.gear)
+        for axis in device.axes
+    }
+
+
+def _counts_per_pulse(device: Mic488Device, number: int) -> Fraction:
+    encoder = device.axes[number - 1].encoder
+    return Fraction(encoder.enc_resol, encoder.mot_resol)
+
+
+def _shown(device: Mic488Device, now: Nanos) -> list[dict[str, object]]:
+    return [{"axis": a.number, "counts": a.encoder_counts(now), "turned_by": a.encoder.coupling.value} for a in device.axes]
+
+
+ENCODERS: Encoders[Mic488Device] = Encoders(
+    reader=lambda device: device,
+    counts_per_pulse=_counts_per_pulse,
+    index_input=lambda number: f"IN{index_input(number - 1) + 1}",
+    shown=_shown,
+    couple=lambda device, number, coupling, now: device.couple_encoder(number, Coupling(coupling), now),
+    check_turn=check_turn,
+)

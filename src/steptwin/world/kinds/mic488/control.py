@@ -1,0 +1,55 @@
+"""What a master writes to command a MIC488."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.registers import AXES
+from steptwin.world import script as do
+from steptwin.world.control import ControllerCommand, ControlProgram, Enable, Home, Jog, Move, StopAxes
+
+PROGRAM = {"stop": 0, "start": 1, "pause": 2}
+"""PROGRAM_CTRL by action."""
+
+
+def _write(command: Any, register: str, value: float) -> do.Write:
+    """A register of the axis of a command, by the rest of its name."""
+    return do.Write(((command.machine, f"M{command.axis}_{register}", value),))
+
+
+def _enable(device: Mic488Device, line: str | None, command: Enable) -> do.Write:
+    return _write(command, "EN", float(command.on))
+
+
+def _move(device: Mic488Device, line: str | None, command: Move) -> do.Write:
+    return _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
+
+
+def _home(device: Mic488Device, line: str | None, command: Home) -> do.Write:
+    return _write(command, "HOME", command.velocity)
+
+
+def _jog(device: Mic488Device, line: str | None, command: Jog) -> do.Write:
+    return _write(command, "VEL_ABS", command.velocity)
+
+
+def _stop(device: Mic488Device, line: str | None, command: StopAxes) -> do.Write:
+    axes = range(1, AXES + 1) if command.axis is None else (command.axis,)
+    return do.Write(tuple((command.machine, f"M{axis}_STOP", 1.0) for axis in axes))
+
+
+def _program(device: Mic488Device, line: str | None, command: ControlProgram) -> do.Write:
+    return do.Write(((command.machine, "PROGRAM_CTRL", float(PROGRAM[command.action])),))
+
+
+CONTROL: Mapping[type[ControllerCommand], Callable[[Mic488Device, str | None, Any], do.Write]] = {
+    Enable: _enable,
+    Move: _move,
+    Home: _home,
+    Jog: _jog,
+    StopAxes: _stop,
+    ControlProgram: _program,
+}
+"""Ranges are those of the registers."""

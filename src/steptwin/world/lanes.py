@@ -1,0 +1,82 @@
+"""How the axes of a trace are shown: unit, and the terminals that carry their pulses or currents.
+
+A trace knows pulses only. A view is static: it is read from a machine once and then goes with the trace.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, TypeAlias
+
+from steptwin.machine import MICROSECOND, Nanos
+
+
+class StepOutputs(NamedTuple):
+    """STEP and DIR of one axis."""
+
+    step: str = "STEP"
+    dir: str | None = "DIR"
+    """None: the machine has this pin itself, so that its edges are in the trace."""
+    active_low: bool = False
+    width_ns: Nanos = 5 * MICROSECOND
+    """How long a pulse is drawn; shorter where the next one comes within twice this time."""
+
+
+class PhaseOutputs(NamedTuple):
+    """Two phase currents, −127…127, that follow a waveform (`steptwin.motion.waveforms`)."""
+
+    phases: tuple[str, str] = ("PHASE1", "PHASE2")
+    characteristic: int = 1
+    """Until the trace says otherwise: an edge of ``characteristic_pin``."""
+    characteristic_pin: str = "N"
+
+
+class Mechanics(NamedTuple):
+    """What an axis moves, which has a name, a unit and a zero of its own.
+
+    Its true position is (pulses of the load + ``zero_p``) / ``pulses_per_unit``; negative where positive pulses go down.
+    """
+
+    name: str
+    unit: str
+    pulses_per_unit: float
+    zero_p: int = 0
+    is_ideal: bool = True
+    """Whether the load is where the pulses have it, unless a trace says otherwise."""
+
+    @property
+    def position_name(self) -> str:
+        return f"{self.name}_true_position_{self.unit}"
+
+
+class AxisLane(NamedTuple):
+    """``pulses_per_unit``: units of its profiles in one ``unit``."""
+
+    name: str
+    unit: str = "imp"
+    pulses_per_unit: float = 1.0
+    outputs: StepOutputs | PhaseOutputs = StepOutputs()
+    mechanics: Mechanics | None = None
+
+    # Names of variables and columns.
+
+    @property
+    def position_name(self) -> str:
+        return f"{self.name}_position_{self.unit}"
+
+    @property
+    def counted_name(self) -> str:
+        return f"{self.name}_since_power_on_{self.unit}"
+
+    @property
+    def velocity_name(self) -> str:
+        return f"{self.name}_velocity_{self.unit}_s"
+
+
+AxisViews: TypeAlias = Mapping[tuple[str, str], AxisLane]
+"""By machine and subject of its ``plan`` records (``"1"``…)."""
+
+
+def plain_view(axis: str) -> AxisLane:
+    """The view of an axis of which nothing is known."""
+    return AxisLane(f"M{axis}", outputs=StepOutputs(f"M{axis}_STEP", f"M{axis}_DIR"))

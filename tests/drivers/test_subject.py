@@ -1,0 +1,439 @@
+"""Devices as subjects: what they do, what they cannot know, and that they and the two other subjects agree."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from host_rig import Wire, async_driver, run_virtual, task_line
+from tests.conftest import until
+
+from steptwin.drivers.m1486 import M1486
+from steptwin.drivers.mic488.subject import Mic488Part
+from steptwin.drivers.mic488.sync import Mic488
+from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject
+from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.files.world import World
+from steptwin.live.remote import RemoteSubject
+from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.machine import SECOND
+from steptwin.subject import commands as command
+from steptwin.subject.commands import row_of
+from steptwin.subject.contract import UNKNOWN, Reading, Subject, read_description
+from steptwin.subject.events import SamplePayload, read_event
+from steptwin.subject.following import filter_of
+from steptwin.subject.world import WorldSubject
+from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip, joined_driver
+from steptwin.world import script as do
+from steptwin.world.faults import read as read_fault
+
+CELL = """
+[world]
+name = "cell"
+
+[[line]]
+name = "bus"
+kind = "modbus"
+tcp = "127.0.0.1:0"
+
+[[line]]
+name = "chips"
+kind = "m1486"
+tcp = "127.0.0.1:0"
+
+[[mic488]]
+name = "table"
+line = "bus"
+
+[mic488.M1]
+unit = "mm"
+gear = 100.0
+acc = 100.0
+dec = 100.0
+vel = 40.0
+in_kl = "IN1"
+home_mode = "HOME1"
+
+[[m1486]]
+name = "drum"
+line = "chips"
+variant = "B"
+address = 3
+
+[[axis]]
+name = "x"
+drive = "table.M1"
+travel = [-5.0, 105.0]
+start = 10.0
+
+[[axis.switch]]
+below = 0.0
+to = "table.IN1"
+"""
+
+
+class Rig:
+    """A world in virtual time, and drivers on its lines."""
+
+    def __init__(self) -> None:
+        self.world = World.from_toml(CELL)
+        self.live = LiveWorld(self.world)
+        self.time = VirtualTime(self.live)
+        bus = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "bus", "tcp-1", "tcp"), "bus")
+        config = self.world.mic488["table"].device.config
+        self.mic: Mic488 = joined_driver(bus, self.time, 1, framed=True, firmware="1.70", config=config)
+        chips = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "chips", "raw-1", "raw"), "chips")
+        self.chip: M1486 = joined_chip(chips, self.time, 3)
+
+
+@pytest.fixture
+def rig() -> Iterator[Rig]:
+    rig = Rig()
+    with rig.mic, rig.chip:
+        yield rig
+
+
+@pytest.fixture
+def table(rig: Rig) -> DeviceSubject:
+    return rig.mic.subject("table")
+
+
+@pytest.fixture
+def drum(rig: Rig) -> DeviceSubject:
+    return rig.chip.subject("drum")
+
+
+# ---------------------------------------------------------------------- the three subjects agree
+
+
+class Way(NamedTuple):
+    """A subject, and how time goes on there."""
+
+    subject: Subject
+    advance: Callable[[int], object]
+
+
+@contextmanager
+def in_this_process(directory: Path) -> Generator[Way]:
+    subject = WorldSubject(World.from_toml(CELL))
+    yield Way(subject, lambda ns: subject.do(command.Advance(duration=ns)))
+
+
+@contextmanager
+def in_another_process(directory: Path) -> Generator[Way]:
+    (directory / "cell.toml").write_text(CELL)
+    environment = {**os.environ, "TERM": "dumb"}
+    started = [sys.executable, "-m", "steptwin", "up", "cell.toml", "--speed", "0", "--ready-file", "ready.json"]
+    with (directory / "out").open("w") as out:
+        process = subprocess.Popen(started, cwd=directory, env=environment, stdout=out, stderr=out)
+    try:
+        ready = directory / "ready.json"
+        until(lambda: ready.exists() or process.poll() is not None, "the ready file is there")
+        with RemoteSubject(json.loads(ready.read_text())["name"]) as subject:
+            yield Way(subject, lambda ns: subject.do(command.Advance(duration=ns)))
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+@contextmanager
+def behind_a_driver(directory: Path) -> Generator[Way]:
+    rig = Rig()
+    with rig.mic:
+        yield Way(rig.mic.subject("table"), lambda ns: rig.time.sleep(ns / SECOND))
+
+
+WAYS = {"in this process": in_this_process, "in another process": in_another_process, "behind a driver": behind_a_driver}
+AXIS_POINTS = ("position", "velocity", "status", "encoder", "enabled", "moving")
+POINTS = (
+    *(f"table.M1.{name}" for name in AXIS_POINTS),
+    *("table.status", "table.program", "table.IN1", "table.OUT2", "table.M1_EN", "table.AIN1", "table.ERR"),
+    *("table.M1_ACC", "table.hr:10020", "table.M1_HOME", "table.USER_REGISTER[12]:real"),
+)
+UNKNOWN_PINS = {"M1_EN", "M2_EN", "M3_EN", "M4_EN", "AIN1", "AIN2", "ERR"}
+UNKNOWN_TO_DRIVERS = {"table.M1.moving", "table.M1.enabled", "table.M1_EN", "table.AIN1", "table.ERR", "table.M1_HOME"}
+STORY: tuple[command.Command | int, ...] = (
+    command.Move("table", 1, to=5.0),  # the drive is off
+    command.Enable("table", 1),
+    command.Home("table", 1, -20.0),
+    20 * SECOND,
+    command.Move("table", 1, to=30.0),
+    3 * SECOND,
+    command.Move("table", 1, by=-10.5),
+    3 * SECOND,
+    do.Write((("table", "M1_ACC", 250.0), ("table", "OUT2", 1.0))),
+    do.Write((("table", "M1_STATUS", 1.0),)),
+    do.Write((("table", "NOTHING", 1.0),)),
+    command.Jog("table", 1, 4.0),
+    1 * SECOND,
+    command.Move("table", 1, to=20.0),
+    3 * SECOND,
+    command.StopAxes("table", 1),
+    command.StopAxes("table"),
+    command.Enable("table", 7),
+    command.Enable("tabel", 1),
+    command.ReadPins("table"),
+    command.ReadPins("tabel"),
+    command.Encoders("table"),
+    command.ReadPoints(("table.M1.position", "table.nothing")),
+    command.ReadPoints(("nothing.M1.position",)),
+    command.Enable("table", 1, on=False),
+    command.ControlProgram("table", "stop"),
+)
+
+
+ONLY_TWINS = (do.Set((("table", "IN3", 1.0),)), do.SetFault(read_fault("busy unit=1")), do.PowerCycle("table"), command.Pause())
+
+
+def answer_of(subject: Subject, wanted: command.Command) -> Any:
+    """What a command gives, or the family of its error."""
+    try:
+        return subject.do(wanted).value
+    except Misuse:
+        return "misuse"
+    except Refusal:
+        return "refusal"
+
+
+class Step(NamedTuple):
+    answer: Any
+    points: dict[str, Reading]
+
+
+def told_by(way: Way) -> list[Step]:
+    """What each step of the story gave, and the points after it."""
+    told: list[Step] = []
+    for each in STORY:
+        answer = None
+        if isinstance(each, int):
+            way.advance(each)
+        else:
+            answer = answer_of(way.subject, each)
+        told.append(Step(answer, {reading.point: reading for reading in way.subject.read(*POINTS)}))
+    return told
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Step]]:
+    found = {}
+    for name, way in WAYS.items():
+        with way(tmp_path_factory.mktemp("way")) as one:
+            found[name] = told_by(one)
+    return found
+
+
+def test_a_world_in_another_process_answers_the_same(told: dict[str, list[Step]]) -> None:
+    assert told["in another process"] == told["in this process"]
+    assert [step.answer for step in told["in this process"]].count("misuse") == 7
+
+
+def test_a_device_answers_the_same_but_for_what_it_cannot_know_or_refuses(told: dict[str, list[Step]]) -> None:
+    different: dict[int, tuple[Any, Any]] = {}
+    for number, (world, device) in enumerate(zip(told["in this process"], told["behind a driver"], strict=True)):
+        if device.answer != world.answer:
+            different[number] = world.answer, device.answer
+        assert {point for point, reading in device.points.items() if reading.quality == UNKNOWN} == UNKNOWN_TO_DRIVERS
+        if world.points["table.M1.moving"].value == 0.0:  # the exchanges of a driver take time
+            for point in set(POINTS) - UNKNOWN_TO_DRIVERS:
+                assert device.points[point].value == pytest.approx(world.points[point].value, abs=1e-6), (number, point)
+        assert [reading.unit for reading in device.points.values()] == [reading.unit for reading in world.points.values()]
+    refused, pins, encoders = (STORY.index(one) for one in (STORY[0], command.ReadPins("table"), command.Encoders("table")))
+    assert different.keys() == {refused, pins, encoders}
+    # The controller ignores a motion while the drive is off (MIC-8): the driver refuses it before anything is sent.
+    assert different[refused] == (None, "refusal")
+    levels, known = different[pins]
+    assert known == {pin: None if pin.split(".")[1] in UNKNOWN_PINS else level for pin, level in levels.items()}
+    counts, known = different[encoders]
+    assert known == [{**one, "turned_by": None} for one in counts]
+
+
+# ---------------------------------------------------------------------- what only twins can do
+
+
+@pytest.mark.parametrize("wanted", ONLY_TWINS, ids=lambda wanted: type(wanted).__name__)
+def test_what_only_a_twin_can_do_is_refused(table: DeviceSubject, wanted: command.Command) -> None:
+    with pytest.raises(Refusal, match=r"cannot be done with this device \(bus\); what can: describe, read, pins, .*write"):
+        table.do(wanted)
+    assert row_of(wanted).name not in table.description.commands
+
+
+def test_the_description_of_a_device(table: DeviceSubject, rig: Rig) -> None:
+    twin = WorldSubject(rig.world).description.machines[0]
+    found = table.description
+    (machine,) = found.machines
+    assert (machine.name, machine.unit, machine.datasheet) == (twin.name, twin.unit, twin.datasheet)
+    assert read_description(json.loads(json.dumps(found.plain()))) == found
+    assert found.lines[0].baud is None
+
+
+def test_pulses_are_unknown_without_the_configuration() -> None:
+    bare = Mic488("tcp://127.0.0.1:1", firmware="1.70")
+    axes = bare.subject().description.machines[0].datasheet.axes
+    assert {(axis.unit, axis.pulses_per_unit) for axis in axes} == {("u", None)}
+
+
+def test_a_request_gives_the_answer_of_the_controller(table: DeviceSubject) -> None:
+    # Function 3, POS_ACT of M1 at 10020: two words; 9800 is a hole: exception 2.
+    assert table.do(do.Request("bus", 1, bytes.fromhex("0327240002"), SECOND)).value == {"pdu": "030400000000"}
+    assert table.do(do.Request("bus", 1, bytes.fromhex("0326480001"), SECOND)).value == {"pdu": "8302"}
+    with pytest.raises(Misuse, match="unit = 2: this subject is the device with address 1"):
+        table.do(do.Request("bus", 2, bytes.fromhex("0327240002"), SECOND))
+    with pytest.raises(Misuse, match="no line is called 'buss'"):
+        table.do(do.Request("buss", 1, bytes.fromhex("0327240002"), SECOND))
+
+
+def test_nothing_is_written_where_one_name_is_wrong(table: DeviceSubject) -> None:
+    with pytest.raises(Misuse, match="M1_STATUS can only be read"):
+        table.do(do.Write((("table", "OUT2", 1.0), ("table", "M1_STATUS", 1.0))))
+    assert table.read("table.OUT2")[0].value == 0.0
+
+
+@pytest.mark.parametrize(
+    ("point", "message"),
+    [
+        ("tabel.IN1", "nothing is called 'tabel' .did you mean 'table'"),
+        ("table.M1_POS", "no point 'M1_POS'; there are status, program, M1.status"),
+        ("table.hr:10021", "this is the second word of M1_POS_ACT"),
+    ],
+)
+def test_points_that_cannot_be_read(table: DeviceSubject, point: str, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        table.read(point)
+
+
+def test_user_registers_are_points(table: DeviceSubject) -> None:
+    table.do(do.Write((("table", "USER_REGISTER[12]:real", 1.5),)))
+    assert table.read("table.USER_REGISTER[12]:real")[0].value == 1.5
+
+
+def test_time_begins_with_the_subject(table: DeviceSubject, rig: Rig) -> None:
+    rig.time.sleep(2.0)
+    assert table.read("time")[0].value == table.do(command.Time()).value["time_s"] == 2.0
+    assert table.do(command.Time()).time == 2 * SECOND
+
+
+def test_a_line_that_fails_is_a_failure(table: DeviceSubject, rig: Rig) -> None:
+    rig.world.outside(do.SetFault(read_fault("no-answer lost=answer")))
+    with pytest.raises(LineFailure):
+        table.read("table.M1.position")
+
+
+# ---------------------------------------------------------------------- events
+
+
+def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) -> None:
+    following = table.follow(filter_of(), 99)
+    assert [(event.kind, event.payload.plain()["position"]) for event in following.take().events] == [("sample", 0.0)] * 4
+    table.do(command.Enable("table", 1))
+    table.do(command.Move("table", 1, to=10.0))
+    rig.world.outside(do.Set((("table", "IN7", 1.0),)))
+    rig.time.sleep(0.3)
+    events = following.take().events
+    assert [(event.kind, event.axis) for event in events] == [("sample", "1"), ("edge", None), ("status", "1")]
+    assert [event.text for event in events][1:] == ["IN7: 1", "M1: moving to position"]
+    sample = events[0].payload
+    assert isinstance(sample, SamplePayload)
+    assert 0.0 < sample.position < 10.0
+    assert sample.unit == "mm"
+    assert [read_event(json.loads(json.dumps(event.plain()))) for event in events] == events
+    assert following.take().events == []  # not before the next period
+    following.close()
+
+
+def test_a_device_that_nobody_follows_is_not_polled(table: DeviceSubject, rig: Rig) -> None:
+    following = table.follow(filter_of(), 99)
+    following.close()
+    frames = WorldSubject(rig.world).follow(filter_of(["frame"]), 9)
+    rig.time.sleep(1.0)
+    following.take()
+    assert frames.take().events == []
+    table.read("table.IN1")
+    assert len(frames.take().events) > 1
+
+
+def test_a_slow_follower_loses_the_oldest_and_is_told_how_many(table: DeviceSubject, rig: Rig) -> None:
+    following = table.follow(filter_of(["sample"]), 3)
+    missed, events = following.take()
+    assert (missed, [event.axis for event in events]) == (1, ["2", "3", "4"])
+
+
+# ---------------------------------------------------------------------- an M1486
+
+
+def test_an_m1486_moves_and_is_unknown_meanwhile(drum: DeviceSubject, rig: Rig) -> None:
+    assert drum.description.machines[0].datasheet.axes[0].unit == "step"
+    drum.do(command.Move("drum", 1, by=5000.0))
+    moving = {reading.point: reading for reading in drum.read("drum.counter", "drum.moving", "drum.B1", "drum.position")}
+    assert {reading.quality for reading in moving.values()} == {UNKNOWN}
+    rig.time.sleep(60.0)
+    values = {reading.point: reading.value for reading in drum.read("drum.counter", "drum.moving", "drum.U20", "drum.position")}
+    assert values == {"drum.counter": 5000 * 64, "drum.moving": 0.0, "drum.U20": ord("B"), "drum.position": None}
+    assert rig.world.read("drum.counter") == 5000 * 64
+
+
+def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:
+    following = drum.follow(filter_of(), 9)
+    following.take()
+    drum.do(command.Jog("drum", 1, -50.0))
+    rig.time.sleep(2.0)
+    assert [event.text for event in following.take().events] == ["moves, waits or runs its program"]
+    drum.do(command.StopAxes("drum", 1))
+    rig.time.sleep(2.0)
+    status, sample = following.take().events
+    assert status.text == "is at rest"
+    assert sample.kind == "sample"
+    assert rig.world.read("drum.velocity") == 0.0
+
+
+def test_characters_for_an_m1486_are_whole_commands_that_move_nothing(drum: DeviceSubject, rig: Rig) -> None:
+    line = drum.description.lines[0].name
+    drum.do(do.Send(line, b":17\rt80\r"))
+    assert drum.read("drum.variable")[0].value == 17.0
+    for text, message in ((b":18", "each with CR behind it"), (b":18\rf100\rr\r", "motions, files and questions"), (b"", "CR")):
+        with pytest.raises(Misuse, match=message):
+            drum.do(do.Send(line, text))
+    assert drum.read("drum.variable")[0].value == 17.0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "kind", "message"),
+    [
+        (command.Home("drum", 1, -5.0), Refusal, "home cannot be done with this device"),
+        (command.Enable("drum", 1), Refusal, "enable cannot be done with this device"),
+        (command.ControlProgram("drum", "start"), Refusal, "an M1486 has no command to start its program"),
+        (command.Jog("drum", 1, 0.0), Misuse, "the sign of the velocity is the direction"),
+        (command.StopAxes("drum", 2), Misuse, "axis = 2: an M1486 has axis 1 only"),
+        (command.ReadPoints(("drum.B99",)), Misuse, "'B99' is no point of an M1486: there are position"),
+    ],
+)
+def test_what_an_m1486_does_not_do(drum: DeviceSubject, wanted: command.Command, kind: type[SteptwinError], message: str) -> None:
+    with pytest.raises(kind, match=message):
+        drum.do(wanted)
+
+
+# ---------------------------------------------------------------------- for asyncio
+
+
+def test_tasks_have_the_same() -> None:
+    wire = Wire()
+
+    async def play() -> None:
+        async with async_driver(task_line(wire), wire) as mic:
+            subject = AsyncDeviceSubject("table", Mic488Part(mic))
+            following = subject.follow(filter_of(["status"]), 9)
+            running = asyncio.create_task(subject.run())
+            await asyncio.sleep(0.5)
+            await subject.do(command.Enable("table", 1))
+            await asyncio.sleep(1.0)
+            running.cancel()
+            assert [event.text for event in following.take().events] == ["M1: on at rest"]
+
+    run_virtual(wire, play())

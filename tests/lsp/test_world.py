@@ -1,0 +1,225 @@
+"""Descriptions of worlds in the session."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.lsp.test_session import Shelf
+
+from steptwin.diagnostics import Span
+from steptwin.errors import Misuse
+from steptwin.lsp import navigation
+from steptwin.lsp.analysis import Analysis
+from steptwin.lsp.session import EditorSession
+
+URI = "file:///m/cell.toml"
+PROGRAM_URI = "file:///m/a.prg"
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+WORLD = """\
+[world]
+name = "cell"
+
+[[line]]
+name = "bus"
+
+[[mic488]]
+name = "table"
+line = "bus"
+firmware = "1.23"
+programs = ["a.prg"]
+positions = "rows.csv"
+
+[mic488.M1]
+unit = "mm"
+
+[[axis]]
+name = "x"
+drive = "table.M1"
+pitch = 5.0
+
+[[axis.switch]]
+below = 0.0
+to = "table.IN1"
+
+[[button]]
+name = "start"
+to = "table.IN5"
+
+[[script]]
+name = "operator"
+steps = [
+  { write = { "table.M1_EN" = 1 } },
+  { until = "x.position > 10 and table.M1.status == 4", within = "1 s" },
+  { press = "start", for = "1 s" },
+  { note = "start the table" },
+]
+"""
+
+
+def session(text: str = WORLD, **files: str) -> EditorSession:
+    made = EditorSession(
+        Shelf(**({"a_prg": "x = 1\nOUT1 = x\nMOVEPTP @row\nM1 = ON\nEND\n", "rows_csv": "row;1;x;x;x\n"} | files))
+    )
+    made.open(URI, "", 1, text)
+    return made
+
+
+def of(made: EditorSession, uri: str = URI) -> Analysis:
+    found = made.analysis(uri)
+    assert found is not None
+    return found
+
+
+def test_a_world_that_is_right() -> None:
+    assert of(session()).diagnostics() == []
+
+
+@pytest.mark.parametrize("name", ["feeder", "handwheel", "lift"])
+def test_examples_are_right(name: str) -> None:
+    made = session((EXAMPLES / f"{name}.toml").read_text())
+    assert of(made).diagnostics() == []
+    assert len(of(made).outline()) > 5
+
+
+def test_what_is_wrong_has_its_place_and_a_fix() -> None:
+    text = WORLD.replace("pitch =", "pich =").replace('to = "table.IN5"', 'to = "table.IN5"\ncontact = "N0"')
+    made = session(text)
+    found = {d.code: text[d.span.start : d.span.end] for d in of(made).diagnostics()}
+    assert found == {"D004": "pich = 5.0", "D003": 'contact = "N0"'}
+    fixed = text
+    for action in reversed(navigation.fixes(made, URI, Span(0, len(text)))):
+        ((edit,),) = action.edits.values()
+        fixed = fixed[: edit.span.start] + edit.text + fixed[edit.span.end :]
+    assert fixed == WORLD.replace('to = "table.IN5"', 'to = "table.IN5"\ncontact = "N0"')
+
+
+def test_references_that_lead_nowhere_are_found() -> None:
+    made = session(WORLD.replace('line = "bus"', 'line = "buss"').replace("rows.csv", "nothing.csv"))
+    assert [d.code for d in of(made).diagnostics()] == ["D009", "D009"]
+    assert [action.title for action in navigation.fixes(made, URI, Span(0, len(WORLD)))] == ["Replace buss by bus (D009)"]
+
+
+def test_half_typed_text_still_has_names() -> None:
+    made = session(WORLD + "\n[[wire]]\nfrom = \n")
+    assert [d.code for d in of(made).diagnostics()] == ["D001"]
+    assert len(navigation.references(made, URI, WORLD.index('"table.IN1"') + 2)) == 6
+
+
+def items(text: str, made: EditorSession | None = None) -> list[str]:
+    made = session(text) if made is None else made
+    return [item.label for item in of(made).items(len(text)).items]
+
+
+def test_completions() -> None:
+    assert {"[[axis]]", "[axis.motor]", "[mic488.M1]", "[[fault]]"} <= set(items(WORLD + "\n["))
+    found = items(WORLD + "\n[[axis]]\nname = 'y'\npi")
+    assert {"pitch", "drive"} <= set(found)
+    assert "name" not in found
+    assert items(WORLD + '\n[[axis]]\nkind = "') == ["linear", "rotary"]
+    assert "home_mode" in items("[[mic488]]\nname='t'\n[mic488.M1]\nho")
+    assert items(WORLD + "\n[[axis]]\ninverted = ") == ["true", "false"]
+    assert items(WORLD + '\n[[mic488]]\nline = "') == ["bus"]
+    assert items(WORLD + '\n[[axis]]\ndrive = "table')[:2] == ["table.M1", "table.M2"]
+    assert items(WORLD + '\n[[wire]]\nfrom = "')[0] == "table.OUT1"
+    assert items(WORLD + '\n[[mic488]]\nprogram = "') == ["a.prg"]
+    assert items(WORLD + '\n[[script]]\nsteps = [\n{ press = "') == ["start"]
+    assert "until" in items(WORLD + "\n[[script]]\nsteps = [\n{ ")
+    assert items("# [[axis]]\n[[mic488]]\n# ") == []
+
+
+def test_hovers() -> None:
+    analysis = of(session())
+    for mark, text in {
+        "pitch": "Units per motor revolution",
+        "[[axis]]": "* `drive`: what drives it",
+        "unit = ": "`unit` of `mic488.M1`",
+        "table.IN5": "`table`: controller, named in line 8",
+    }.items():
+        found = analysis.hover(WORLD.index(mark))
+        assert found is not None, mark
+        assert text in found.text
+
+
+def test_a_rename_changes_names_and_conditions_but_no_notes() -> None:
+    made = session()
+    edits = navigation.rename(made, URI, WORLD.index('name = "table"') + 9, "bench")
+    text = WORLD
+    for edit in sorted(edits[URI], key=lambda edit: -edit.span.start):
+        text = text[: edit.span.start] + edit.text + text[edit.span.end :]
+    assert text == WORLD.replace('"table', '"bench').replace("and table.", "and bench.")
+    assert "start the table" in text
+    for name, message in (("x", "taken already"), ("1x", "is no name"), ("idle", "is a signal"), ("TIME", "is a signal")):
+        with pytest.raises(Misuse, match=message):
+            navigation.rename(made, URI, WORLD.index('name = "table"') + 9, name)
+
+
+def test_files_are_links_and_programs_look_at_the_files_of_their_world() -> None:
+    made = session()
+    links = of(made).links()
+    assert [link.uri for link in links] == ["file:///m/a.prg", "file:///m/rows.csv"]
+    (place,) = navigation.definition(made, URI, WORLD.index("a.prg"))
+    assert place.uri == PROGRAM_URI
+    made.open(PROGRAM_URI, "wbc", 1, "PULSE(OUT1, 1)\nMOVEPTP @row\nM1 = ON\nEND\n")
+    # Firmware 1.23 has no PULSE; the row is in the table that the world names.
+    assert [d.code for d in of(made, PROGRAM_URI).diagnostics()] == ["W139"]
+    assert set(made.affected(PROGRAM_URI)) == {PROGRAM_URI, URI}
+    made.open("file:///m/rows.csv", "", 1, "row;1;x;x;x\n")
+    assert [use.uri for use in navigation.references(made, "file:///m/rows.csv", 1)] == ["file:///m/rows.csv", PROGRAM_URI]
+
+
+def test_a_world_reads_only_what_lies_beside_it() -> None:
+    made = session(WORLD.replace("a.prg", "../../etc/passwd"))
+    (found,) = of(made).diagnostics()
+    assert "does not lie beside" in found.message
+
+
+def test_while_a_world_is_no_toml_its_programs_keep_their_firmware() -> None:
+    made = session()
+    made.open(PROGRAM_URI, "wbc", 1, "PULSE(OUT1, 1)\nEND\n")
+    assert [d.code for d in of(made, PROGRAM_URI).diagnostics()] == ["W139"]
+    made.open(URI, "", 2, WORLD + "[[")
+    assert [d.code for d in of(made, PROGRAM_URI).diagnostics()] == ["W139"]
+
+
+LINES = [
+    *WORLD.splitlines(),
+    "[[",
+    "[mic488",
+    "x =",
+    'y = "',
+    "'''",
+    "steps = [",
+    "]",
+    "{ press = ",
+    "[[axis]]",
+    "a.b.c = 1",
+    "[axis.motor]",
+    "torque = [[0, 1]]",
+]
+
+
+@given(st.lists(st.sampled_from(LINES), max_size=16), st.data())
+def test_every_question_about_any_text_is_answered(lines: list[str], data: st.DataObject) -> None:
+    text = "\n".join(["[world]", *lines])
+    made = session(text)
+    analysis = of(made)
+    place = data.draw(st.integers(0, len(text)))
+    for diagnostic in analysis.diagnostics():
+        assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(text)
+    analysis.hover(place)
+    for item in analysis.items(place).items:
+        assert item.span.start <= place <= item.span.end
+    for section in analysis.outline():
+        assert section.span.start <= section.name_span.start <= section.name_span.end <= section.span.end
+    for fold in analysis.folds():
+        assert fold.first < fold.last < len(analysis.lines.starts)
+    for one, other in zip(analysis.tokens(), analysis.tokens()[1:], strict=False):
+        assert one.span.end <= other.span.start
+    assert analysis.signature(place) is None
+    analysis.links()
+    navigation.definition(made, URI, place)
+    navigation.fixes(made, URI, Span(0, len(text)))
+    navigation.workspace_symbols(made, "")

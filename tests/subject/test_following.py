@@ -1,0 +1,92 @@
+"""Followers: what they want, in order, at most so many, and how many were missed."""
+
+from __future__ import annotations
+
+from steptwin.motion.profile import at_rest
+from steptwin.subject.events import EdgePayload, Event, FramePayload, NotePayload, PlanPayload, StatusPayload
+from steptwin.subject.following import Followers, Following, Taken, filter_of
+
+EDGE = EdgePayload("IN1", 1.0)
+
+
+def event(number: int, payload: object = EDGE, machine: str = "a") -> Event:
+    return Event(number, number, machine, payload)  # type: ignore[arg-type]
+
+
+def test_events_come_in_order_and_once() -> None:
+    followers = Followers()
+    following = followers.follow(filter_of(), 10)
+    followers.publish(event(1))
+    followers.publish(event(2))
+    assert following.take() == Taken(0, [event(1), event(2)])
+    assert following.take() == Taken(0, [])
+
+
+def test_beyond_the_bound_the_oldest_are_dropped_and_counted() -> None:
+    followers = Followers()
+    slow, quick = followers.follow(filter_of(), 2), followers.follow(filter_of(), 10)
+    for number in range(5):
+        followers.publish(event(number))
+    assert slow.take() == Taken(3, [event(3), event(4)])
+    assert slow.take() == Taken(0, [])
+    assert quick.take() == Taken(0, [event(number) for number in range(5)])
+
+
+def test_part_of_what_waits_can_be_taken() -> None:
+    followers = Followers()
+    following = followers.follow(filter_of(), 3)
+    for number in range(4):
+        followers.publish(event(number))
+    assert following.take(2) == Taken(1, [event(1), event(2)])
+    assert len(following) == 1
+
+
+def test_only_what_is_wanted_comes() -> None:
+    followers = Followers()
+    usual = followers.follow(filter_of(), 9)
+    frames = followers.follow(filter_of(["frame"]), 9)
+    of_b = followers.follow(filter_of(machines=["b"]), 9)
+    of_axis = followers.follow(filter_of(axes=["2"]), 9)
+    one, two = PlanPayload("1", at_rest(0, 0)), PlanPayload("2", at_rest(0, 0))
+    events = [
+        event(1, FramePayload("tcp-1", "in", b"\1")),
+        event(2, one),
+        event(3, two, "b"),
+        event(4, NotePayload("x"), "world"),
+        event(5, StatusPayload("limit", "M1 stopped by KL", (("axis", 1),))),
+    ]
+    for each in events:
+        followers.publish(each)
+    numbers = [[each.number for each in following.take().events] for following in (usual, frames, of_b, of_axis)]
+    assert numbers == [[2, 3, 4, 5], [1], [3], [3, 4]]
+
+
+def test_who_waits_is_called_once_for_what_has_come() -> None:
+    followers = Followers()
+    following = followers.follow(filter_of(), 9)
+    calls: list[int] = []
+    following.on_event = lambda: calls.append(len(following))
+    followers.publish(event(1))
+    followers.publish(event(2))
+    following.take()
+    followers.publish(event(3))
+    assert calls == [1, 1]
+
+
+def test_closed_followers_get_nothing_more_and_nobody_is_followed_then() -> None:
+    changes: list[frozenset[str]] = []
+    followers = Followers(lambda: changes.append(followers.kinds))
+    following: Following = followers.follow(filter_of(["edge"]), 9)
+    followers.publish(event(1))
+    following.close()
+    following.close()
+    followers.publish(event(2))
+    assert following.take().events == [event(1)]
+    assert not followers
+    assert changes == [frozenset({"edge"}), frozenset()]
+
+
+def test_what_was_lost_on_its_way_is_counted() -> None:
+    following = Followers().follow(filter_of(), 9)
+    following.miss(3)
+    assert following.take() == Taken(3, [])

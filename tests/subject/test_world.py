@@ -1,0 +1,400 @@
+"""A world in this process as a subject: what it answers, which events it gives, and that sessions replay."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tests.support.small_world import small
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.files.session import session_of
+from steptwin.files.world import World
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.motion.divisions import profile_of
+from steptwin.motion.plain import read_plan
+from steptwin.subject import commands as command
+from steptwin.subject.commands import COMMANDS
+from steptwin.subject.contract import read_description
+from steptwin.subject.dispatch import respond
+from steptwin.subject.events import Event, FramePayload, InputPayload, PlanPayload
+from steptwin.subject.following import filter_of
+from steptwin.subject.world import WorldSubject
+from steptwin.wire.crc import with_crc
+from steptwin.world import script as do
+from steptwin.world.actions import Bytes
+from steptwin.world.faults import read as read_fault
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+READ_POSITION = with_crc(bytes.fromhex("01 03 27 24 00 02"))
+
+
+def of(world: World) -> WorldSubject:
+    return WorldSubject(world)
+
+
+def feeder() -> World:
+    return World.load(EXAMPLES / "feeder.toml")
+
+
+def said(subject: WorldSubject, **message: object) -> dict[str, Any]:
+    """The answer to a message, as it goes over a wire."""
+
+    def fail(error: Exception) -> None:
+        raise error
+
+    return json.loads(json.dumps(respond(lambda wanted, _: subject.do(wanted), json.dumps(message).encode(), fail)))
+
+
+def test_a_command_moves_an_axis_and_its_answer_says_when() -> None:
+    subject = of(small())
+    subject.do(command.Enable("a", 1))
+    subject.do(command.Move("a", 1, to=20.0))
+    done = subject.do(command.Advance(duration=2 * SECOND))
+    assert done.time == 2 * SECOND
+    # x begins at 50 mm; its drive counts from there.
+    assert [(r.point, r.value, r.unit) for r in subject.read("a.M1.position", "x.position", "time")] == [
+        ("a.M1.position", 20.0, "mm"),
+        ("x.position", 70.0, "mm"),
+        ("time", 2.0, "s"),
+    ]
+
+
+def test_what_each_command_of_a_controller_writes() -> None:
+    subject = of(small())
+    following = subject.follow(filter_of(["input"]), 99)
+    subject.do(command.Enable("a", 1))
+    subject.do(command.Jog("a", 1, 5.0))
+    subject.do(command.StopAxes("a", 1))
+    subject.do(command.StopAxes("a"))
+    subject.do(command.Home("a", 1, -20.0))
+    subject.do(command.Move("a", 1, by=1.5))
+    subject.do(command.ControlProgram("a", "stop"))
+    values = [event.payload.value for event in following.take().events if isinstance(event.payload, InputPayload)]
+    found = [value.hex() for value in values if isinstance(value, bytes)]
+    # M1_EN is coil 2000, M1_STOP to M4_STOP are 2004 to 2007; a REAL has its low word first.
+    assert found[0] == "0507d0ff00"
+    assert found[1].endswith("0000" + "40a0")
+    assert found[2:7] == ["0507d4ff00", "0507d4ff00", "0507d5ff00", "0507d6ff00", "0507d7ff00"]
+    assert found[7].endswith("0000" + "c1a0")
+    assert found[8].endswith("0000" + "3fc0")
+    assert found[9].startswith("06")
+    assert len(found) == 10
+    assert subject.read("a.M1.enabled")[0].value == 1.0
+
+
+def test_a_description_survives_json_and_names_points_that_can_be_read() -> None:
+    subject = of(feeder())
+    description = subject.description
+    assert read_description(json.loads(json.dumps(description.plain()))) == description
+    points = [point for part in (*description.machines, *description.axes) for point in part.points]
+    assert len(points) > 150
+    found = {reading.point: reading for reading in subject.read(*(point for point in points if "USER_REGISTER" not in point))}
+    for reading in found.values():
+        assert (reading.value is None) is (reading.quality == "unknown")
+    # POS_ABS can only be written; EN too, but there is a pin of that name.
+    unknown = {point for point, reading in found.items() if reading.value is None}
+    assert {"table.M1_POS_ABS", "table.M1_STOP", "table.JOG_SPEED"} <= unknown
+    assert found["table.M1_EN"].value == 0.0
+    assert len(found) - len(unknown) > 100
+
+
+def test_what_is_not_there_is_misuse_and_changes_nothing() -> None:
+    subject = of(small())
+    with pytest.raises(Misuse, match="no machine is called 'd'"):
+        subject.do(do.Set((("a", "IN1", 1.0), ("d", "IN1", 1.0))))
+    assert subject.read("a.IN1")[0].value == 0.0
+    with pytest.raises(Misuse, match="M9"):
+        subject.do(command.Enable("a", 9))
+
+
+def test_what_a_world_in_virtual_time_cannot_do_is_refused_with_what_it_can() -> None:
+    with pytest.raises(Refusal, match=r"^save cannot be done here; what can: describe, read, pins"):
+        of(small()).do(command.Save("/tmp/x.json"))
+
+
+def test_steps_end_at_a_moment_a_condition_or_the_next_event() -> None:
+    subject = of(small())
+    subject.do(command.Enable("a", 1))
+    subject.do(command.Move("a", 1, to=20.0))
+    found = subject.do(command.Advance(until="a.M1.position > 5")).value
+    assert (found["came"], found["idle"]) == (True, False)
+    found = subject.do(command.Advance(duration=SECOND, until="a.M1.position < 0")).value
+    assert (found["came"], found["idle"]) == (False, False)
+    found = subject.do(command.Advance()).value
+    assert (found["came"], found["idle"], found["events"]) == (False, True, [])
+    with pytest.raises(Misuse, match="to_ns = 1: this world is at"):
+        subject.do(command.Advance(to=1))
+
+
+def test_an_answer_that_comes_at_once_is_in_the_result_of_a_request() -> None:
+    at_once = of(
+        World.from_toml("[[mic488]]\nname = 'a'\nline = 'bus'\n[[line]]\nname = 'bus'\nkind = 'modbus'\ntiming = 'off'\n")
+    )
+    assert at_once.do(do.Request("bus", 1, READ_POSITION[1:-2], SECOND)).value == {"pdu": "030400000000"}
+    later = of(feeder())
+    following = later.follow(filter_of(["frame"]), 9)
+    assert later.do(do.Request("bus", 1, READ_POSITION[1:-2], SECOND)).value == {"pdu": None}
+    later.do(command.Advance(duration=SECOND))
+    frames = [event.payload.plain() for event in following.take().events]
+    assert frames[:2] == [
+        {"client": "script", "direction": "in", "data": READ_POSITION.hex()},
+        {"client": "script", "direction": "out", "data": with_crc(bytes.fromhex("01 03 04 00 00 00 00")).hex()},
+    ]
+
+
+# ---------------------------------------------------------------------- events
+
+
+def test_events_name_what_led_to_them() -> None:
+    subject = of(small())
+    subject.world.settle_all()
+    following = subject.follow(filter_of(), 99)
+    number = subject.do(do.Press("go")).number
+    pressed, *edges = following.take().events
+    assert (pressed.kind, pressed.cause) == ("button", number)
+    assert {edge.cause for edge in edges} == {pressed.number}
+    assert [edge.text for edge in edges] == ["go: 1", "IN4: 1"]
+
+
+def test_what_was_due_before_a_command_has_no_cause_in_it() -> None:
+    subject = of(small("[[script]]\nname = 's'\nsteps = [{ wait = '1 s' }, { set = { 'a.IN2' = 1 } }]\n"))
+    following = subject.follow(filter_of(["edge"]), 99)
+    subject.do(command.Advance(duration=SECOND))
+    subject.do(do.Set((("b", "IN2", 1.0),)))
+    first, second = (event for event in following.take().events if event.text == "IN2: 1")
+    assert first.cause is None
+    assert second.cause is not None
+
+
+def test_nobody_who_follows_costs_nothing() -> None:
+    subject = of(small())
+    assert subject.world.trace.watchers == []
+    following = subject.follow(filter_of(["frame"]), 9)
+    assert len(subject.world.trace.watchers) == 1
+    following.close()
+    assert subject.world.trace.watchers == []
+
+
+def test_frames_are_followed_on_connections_that_are_there_and_where_nothing_is_recorded() -> None:
+    world = feeder()
+    subject = of(world)
+    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    world.run(for_=0.5)
+    world.stop_recording()
+    following = subject.follow(filter_of(["frame"], ["bus"]), 99)
+    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    world.run(for_=0.5)
+    frames = [plain for event in following.take().events if (plain := event.payload.plain())["client"] == "tcp-1"]
+    assert frames[0] == {"client": "tcp-1", "direction": "in", "data": READ_POSITION.hex()}
+    assert [frame["direction"] for frame in frames] == ["in", "out"]
+    following.close()
+    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    assert following.take().events == []
+
+
+def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
+    """Who watches computes positions itself, from the plain numbers and nothing else."""
+    world = feeder()
+    subject = of(world)
+    plans = {(e.machine, e.axis): e for e in subject.plans(filter_of())}
+    following = subject.follow(filter_of(["plan", "coordinate"]), 10_000)
+    axes = [(m.name, a) for m in subject.description.machines for a in m.datasheet.axes]
+    scales = {(name, str(a.number)): a.pulses_per_unit for name, a in axes if a.pulses_per_unit is not None}
+    origins: dict[tuple[str, str | None], int] = {}
+    for _ in range(200):
+        world.run(for_=0.05)
+        for event in following.take().events:
+            plain = json.loads(json.dumps(event.plain()))
+            key = event.machine, event.axis
+            origins[key] = plain["origin"]
+            if event.kind == "plan":
+                plans[key] = event
+        for (machine, axis), event in plans.items():
+            if machine != "table":
+                continue
+            assert isinstance(event.payload, PlanPayload)
+            plan = profile_of(read_plan(json.loads(json.dumps(event.plain()))["plan"]))
+            origin = origins.get((machine, axis), event.payload.origin or 0)
+            shown = (plan.count(world.now) + origin) / scales[machine, str(axis)]
+            assert shown == pytest.approx(world.read(f"{machine}.M{axis}.position"), abs=1e-9)
+    assert len({event.number for event in plans.values()}) > 1
+
+
+# ---------------------------------------------------------------------- whatever comes
+
+NAMES = st.sampled_from(["table", "drum", "x", "bus", "chips", "start", "nobody", "table.IN8", "drum.B3", "1", "crc", ""])
+LEAVES = st.none() | st.booleans() | st.integers(-5, 5) | st.sampled_from([2**63, -1.5, 1e308]) | NAMES | st.text(max_size=6)
+VALUES = LEAVES | st.lists(LEAVES, max_size=3) | st.dictionaries(NAMES, LEAVES, max_size=3)
+
+
+@st.composite
+def messages(draw: st.DrawFn) -> dict[str, Any]:
+    row = COMMANDS[draw(st.sampled_from(list(COMMANDS)))]
+    fields = {field.name: draw(VALUES) for field in row.fields if draw(st.booleans())}
+    if row.name == "step":  # one that is granted goes on for that long
+        fields = {"for_ns": draw(st.integers(-1, 10**7))}
+    return {"do": row.name, "id": draw(LEAVES), **fields, **draw(st.dictionaries(st.text(max_size=3), LEAVES, max_size=1))}
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(given=st.lists(messages(), max_size=8))
+def test_no_exception_escapes_the_dispatcher(given: list[dict[str, Any]]) -> None:
+    subject = of(feeder())
+    for message in given:
+        answer = said(subject, **message)
+        assert ("ok" in answer) is not ("error" in answer)
+        assert answer.get("error", {}).get("code") in (None, "misuse", "refusal")
+
+
+@settings(max_examples=100, deadline=None)
+@given(line=st.binary(max_size=80) | st.text(max_size=40).map(str.encode))
+def test_every_line_has_an_answer(line: bytes) -> None:
+    subject = of(small())
+
+    def fail(error: Exception) -> None:
+        raise error
+
+    assert respond(lambda wanted, _: subject.do(wanted), line, fail)["error"]
+
+
+DEEDS = st.one_of(
+    st.builds(command.Advance, duration=st.integers(0, 2 * SECOND)),
+    st.builds(command.Advance, duration=st.just(SECOND), until=st.sampled_from(["x.position < 110", "drum.moving"])),
+    st.builds(lambda pin, level: do.Set((("table", pin, level),)), st.sampled_from(["IN8", "IN9"]), st.sampled_from([0.0, 1.0])),
+    st.builds(do.Press, st.just("start"), st.sampled_from([None, 1, 300 * MILLISECOND])),
+    st.builds(do.Release, st.just("start")),
+    st.builds(command.Move, st.just("table"), st.integers(1, 4), to=st.floats(-10, 10)),
+    st.builds(command.Enable, st.just("table"), st.integers(1, 4), st.booleans()),
+    st.builds(command.StopAxes, st.just("table"), st.none() | st.integers(1, 4)),
+    st.builds(do.Send, st.just("chips"), st.sampled_from([b"r\r", b"x3\rf640\rr\r", b"k\r", b"\\\r"])),
+    st.builds(do.Request, st.just("bus"), st.just(1), st.just(READ_POSITION[1:-2]), st.sampled_from([0, MILLISECOND, SECOND])),
+    st.builds(do.PowerCycle, st.sampled_from(["table", "drum"])),
+    st.builds(do.Turn, st.just("table"), st.integers(2, 4), st.integers(-100, 100)),
+    st.builds(do.Couple, st.just("table"), st.integers(2, 4), st.sampled_from(do.COUPLINGS)),
+    st.builds(do.Note, st.sampled_from(["here", "there"])),
+    st.builds(do.Expect, st.sampled_from(["table.IN8", "idle"])),
+    st.builds(do.SetFault, st.sampled_from(["crc nth=2", "no-answer"]).map(read_fault)),
+    st.builds(do.ClearFault, st.sampled_from(["crc", "no-answer"])),
+    st.builds(command.ReadPins),
+    st.builds(command.State, st.sampled_from(["table", "drum"])),
+    st.tuples(st.just("bus"), st.sampled_from([READ_POSITION, READ_POSITION[:3], b"\0"])),
+    st.tuples(st.just("chips"), st.sampled_from([b"x3\rf640\rr\r", b"?\r"])),
+)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(deeds=st.lists(DEEDS, max_size=14), follows=st.booleans())
+def test_any_interleaving_of_commands_bytes_and_scripts_replays_to_the_same_digest(deeds: list[Any], follows: bool) -> None:
+    world = feeder()
+    subject = of(world)
+    following = subject.follow(filter_of(["plan", "frame", "edge"]), 5) if follows else None
+    for deed in deeds:
+        if isinstance(deed, tuple) and len(deed) == 2 and deed[0] in ("bus", "chips"):
+            line, data = deed
+            world.outside(Bytes(line, "tcp-1", world.lines[line].kinds[0], data))
+            continue
+        try:
+            subject.do(deed)
+        except (Misuse, Refusal):
+            continue
+        if following is not None:
+            following.take()
+    session = session_of(world)
+    again = session.replay()
+    assert again.trace.digest() == session.digest
+    assert list(again.trace) == list(world.trace)
+
+
+def test_events_of_the_same_run_are_the_same() -> None:
+    def run() -> list[Event]:
+        subject = of(feeder())
+        following = subject.follow(filter_of(), 100_000)
+        subject.do(do.Press("start", 300 * MILLISECOND))
+        subject.do(command.Advance(duration=20 * SECOND))
+        return following.take().events
+
+    events = run()
+    assert events == run()
+    assert {"plan", "edge", "button"} <= {event.kind for event in events}
+    assert [event.number for event in events] == sorted({event.number for event in events})
+
+
+CHIPS = """
+[[line]]
+name = "bus"
+kind = "m1486"
+[[m1486]]
+name = "lift"
+line = "bus"
+address = 3
+[[m1486]]
+name = "other"
+line = "bus"
+address = 4
+"""
+
+
+def test_an_m1486_is_commanded_by_what_its_host_types() -> None:
+    """Manual chapter VII.2: F sets a distance, V the speed in full steps/s, R makes the move; a step is 64 minimum microsteps."""
+    subject = of(World.from_toml(CHIPS))
+    following = subject.follow(filter_of(["frame"]), 999)
+
+    def typed() -> str:
+        frames = [event.payload for event in following.take().events]
+        return "".join(frame.data.decode() for frame in frames if isinstance(frame, FramePayload) and frame.direction == "in")
+
+    subject.do(command.Move("lift", 1, by=6400.0))
+    assert typed() == "x3\rf6400\rr\r"
+    with pytest.raises(Refusal, match="lift is not at rest"):
+        subject.do(command.Move("lift", 1, to=0.0))
+    subject.do(command.Advance(until="idle"))
+    assert [reading.value for reading in subject.read("lift.counter", "other.counter", "lift.U1")] == [6400.0, 0.0, 0.0]
+    subject.do(command.Move("lift", 1, to=0.0))
+    assert "h\rr\r" in typed()
+    subject.do(command.Advance(until="idle"))
+    subject.do(command.Jog("lift", 1, -6400.0))
+    assert "v100\rg-\rr\r" in typed()
+    subject.do(command.Advance(duration=SECOND))
+    assert subject.read("lift.velocity") == (("lift.velocity", -6400.0, "microstep/s", "good"),)
+    subject.do(command.StopAxes("lift"))
+    subject.do(command.Advance(until="idle"))
+    assert subject.read("lift.moving")[0].value == 0.0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        (command.Move("lift", 1, to=0.5), "position 0.5 microstep: a whole number is needed"),
+        (
+            command.Move("lift", 1, by=16_000_064.0),
+            r"microstep: F16000064 is out of range: permitted is 1 to",
+        ),
+        (command.Move("lift", 1, by=7.0), "distance 7 microstep: no multiple of"),
+        (command.Move("lift", 2, by=640.0), "no axis 2: an M1486 has one, 1"),
+        (command.Jog("lift", 1, 640.0), "velocity 640 microstep/s, V10: V10 is out of range: permitted is 16 to"),
+        (command.Home("lift", 1, 5.0), "'lift' is an M1486, which cannot do home; it can do move, jog, stop"),
+        (command.Enable("lift", 1), "cannot do enable"),
+    ],
+)
+def test_what_an_m1486_cannot_do_is_refused(wanted: command.Command, message: str) -> None:
+    subject = of(World.from_toml(CHIPS))
+    with pytest.raises((Misuse, Refusal), match=message):
+        subject.do(wanted)
+    subject.do(command.Advance(duration=SECOND))
+    assert subject.read("lift.counter")[0].value == 0.0
+
+
+def test_a_position_that_a_chip_does_not_know_is_no_beginning() -> None:
+    """M-16: after Kill in a move the counter shows its target."""
+    subject = of(World.from_toml(CHIPS))
+    subject.do(command.Move("lift", 1, by=640_000.0))
+    subject.do(command.Advance(duration=SECOND))
+    subject.do(command.StopAxes("lift"))
+    subject.do(command.Advance(until="idle"))
+    with pytest.raises(Refusal, match=r"lift was stopped in a move: its counter does not show where it is \(M-16\)"):
+        subject.do(command.Move("lift", 1, to=0.0))

@@ -1,0 +1,205 @@
+"""The toy as a kind of controller that descriptions of worlds may have, all of it: `TOY` and its line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from steptwin.datasheet import Access, AxisDescription, Datasheet, Pin, PinDirection, Point, PointEffect
+from steptwin.errors import Misuse, Refusal
+from steptwin.machine import MachineEvent, Nanos
+from steptwin.points import LivePoint, turns_of
+from steptwin.wire.slave import FrameDirection as Way
+from steptwin.words.frames import FrameLine
+from steptwin.world import script as do
+from steptwin.world.control import Move, StopAxes
+from steptwin.world.faults import AxisLoad, Faults
+from steptwin.world.kernel import Kernel
+from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LinkKind, Member, Row, Service, Terminals
+from steptwin.world.kinds import KINDS, register
+from steptwin.world.lanes import AxisLane, plain_view
+from steptwin.world.reader import Key, TomlText, name_value, optional, whole
+from steptwin.world.scale import FULL_STEPS, DriveScale
+from steptwin.world.spec import AxisSpec, ControllerSpec, LineSpec
+from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.views import MachineView
+from toy.faults import ToyBody
+from toy.line import ToyLine
+from toy.machine import STEP_P, Toy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToySpec(ControllerSpec):
+    steps: int
+
+
+class ToyView(MachineView):
+    def __init__(self, plant: Any, name: str, toy: Toy) -> None:
+        super().__init__(plant, name)
+        self._toy = toy
+
+    @property
+    def position(self) -> int:
+        self._touch()
+        return self._toy.axis.plan.count(self._toy.now)
+
+
+class ToyWords:
+    """``M`` and ``P`` with their numbers."""
+
+    def __init__(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> None:
+        self._prefix = prefix
+        self._sink = sink
+
+    def frame(self, now: Nanos, place: str, direction: Way, data: bytes) -> None:
+        text = f"{chr(data[0])} {int.from_bytes(data[1:], signed=True)}"
+        self._sink(FrameLine(now, self._prefix + place, direction, data, text))
+
+    def rubbish(self, now: Nanos, place: str, count: int) -> None:
+        """Every two bytes are a command."""
+
+    def recorded(self, record: TraceRecord) -> None:
+        """Frames alone say what goes over the line."""
+
+
+def _make_line(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: Recorder, faults: Faults) -> ToyLine:
+    if len(members) != 1:
+        raise Misuse("a toy is alone on its line")
+    return ToyLine(kernel, spec.name, members[0].machine, faults, record)
+
+
+def _read(text: TomlText, row: Row, table: Mapping[str, Any]) -> ToySpec:
+    return ToySpec(**row)
+
+
+def _build(spec: ToySpec, memory: bytes | None, context: BuildContext) -> Toy:
+    return Toy()
+
+
+def _watch_events(toy: Toy, call: Callable[[MachineEvent], None]) -> None:
+    """It reports nothing."""
+
+
+def _keep_memory(toy: Toy, memory: bytes | None, keep: Callable[[bytes], None]) -> None:
+    """It keeps nothing."""
+
+
+def _input_pin(pin: str, level: float) -> str:
+    if pin.upper() != "STOP" or level not in (0.0, 1.0):
+        raise Misuse(f"{pin} = {level:g}: the input is STOP, 0 or 1")
+    return "STOP"
+
+
+def _scale(spec: AxisSpec, toy: Toy, number: int) -> DriveScale:
+    return DriveScale(pulses_per_rev=spec.pulses_per_rev or 200, full_steps=FULL_STEPS, text="counts pulses")
+
+
+def _body(toy: Toy, service: Service, shafts: Mapping[int, AxisLoad]) -> ToyBody:
+    return ToyBody(shafts.values())
+
+
+def _state(toy: Toy, now: Nanos) -> dict[str, object]:
+    return {"controller": "toy", "position": toy.axis.plan.count(now), "pins": dict(toy.pins())}
+
+
+def _lanes(toy: Toy) -> Mapping[str, AxisLane]:
+    return {"1": plain_view("1")}
+
+
+POSITION = Point(
+    path="position",
+    meaning="Pulses.",
+    type="number",
+    unit="pulse",
+    values={},
+    access=Access.READ,
+    effect=PointEffect.NONE,
+    source="P",
+)
+DATASHEET = Datasheet(
+    kind="toy",
+    title="toy",
+    variant="",
+    axes=(AxisDescription(number=1, name="M1", unit="pulse", pulses_per_unit=1.0),),
+    pins=(Pin(name="STOP", direction=PinDirection.INPUT), Pin(name="BUSY", direction=PinDirection.OUTPUT)),
+    points=(POSITION,),
+    commands=(),
+    events=(),
+)
+
+
+def _point(toy: Toy, name: str) -> LivePoint | None:
+    if name.lower() != "position":
+        return None
+    axis = toy.axis
+    return LivePoint(
+        point=POSITION, read=partial(_position, toy), turns=turns_of(lambda: axis.plan), version=lambda: axis.revision
+    )
+
+
+def _position(toy: Toy, now: Nanos) -> float:
+    return float(toy.axis.plan.count(now))
+
+
+def _move(toy: Toy, line: str | None, command: Move) -> do.Send:
+    """M takes a number of `STEP_P` pulses."""
+    number, rest = divmod(0 if command.by is None else command.by, STEP_P)
+    if line is None or command.by is None or rest or not -128 <= number <= 127:
+        raise Refusal(f"{command}: by -1280 to 1270 pulses, in tens, on its line")
+    return do.Send(line, b"M" + int(number).to_bytes(signed=True))
+
+
+def _stop(toy: Toy, line: str | None, command: StopAxes) -> do.Send:
+    return do.Send(line or "", b"H\0")
+
+
+TOYS = LineKind(
+    name="toys",
+    meaning="toys",
+    links={"pty": LinkKind("raw", "pty", "toys"), "tcp": LinkKind("raw", "tcp", "toys")},
+    make=_make_line,
+    words=ToyWords,
+)
+TOY: ControllerKind[ToySpec, Toy, ToyView] = ControllerKind(
+    name="toy",
+    title="a toy",
+    keys=(
+        Key("name", name_value, "how the rest of the file names it"),
+        optional(name_value, "line", "the line it is on"),
+        optional(whole(1, 10), "steps", "for nothing", 10),
+    ),
+    read=_read,
+    files=lambda spec: (),
+    build=_build,
+    watch_events=_watch_events,
+    keep_memory=_keep_memory,
+    announced=lambda toy, address: {"kind": "toy"},
+    line=TOYS,
+    address=lambda spec, toy: 0,
+    terminals=Terminals(digital_inputs=("STOP",), analog_inputs=(), outputs=("BUSY",)),
+    input_pin=_input_pin,
+    scale=_scale,
+    is_idle=lambda toy, now: not toy.is_busy,
+    datasheet=lambda toy: DATASHEET,
+    datasheet_of=lambda variant: DATASHEET,
+    point=_point,
+    control={Move: _move, StopAxes: _stop},
+    state=_state,
+    view=ToyView,
+    lanes=_lanes,
+    body=_body,
+    keeps_memory=lambda toy: False,
+)
+
+
+@contextmanager
+def registered() -> Generator[None]:
+    """Descriptions may have toys meanwhile."""
+    register(TOY)
+    try:
+        yield
+    finally:
+        del KINDS[TOY.name]

@@ -1,0 +1,182 @@
+"""Transcripts of what drivers say to twins in virtual time, in files that are reviewed.
+
+A case is ``=== name``, the script, ``---``, the transcript. Lines of a script:
+
+    @ 7 8                  options of the line; what they mean says the test
+    chip.move_by(10.0)     Python: the call, what was sent meanwhile (after a pause with its milliseconds), what happened, the
+                           result or the error, and how many milliseconds it took
+    | chip.open()          the same without a transcript
+    % drop 0 to chip       the next line meets this fault (kind, number of the byte, direction)
+    %% drop, invert        as the last line before a call: each byte of the call goes wrong once, with the next of these kinds;
+                           what stands before and behind is done anew each time. One line of transcript each: the fault, how long
+                           the call took, and what was different from a call without: what was sent then, its result, what
+                           happened, the result of the last line
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from steptwin.errors import SteptwinError
+from steptwin.machine import MILLISECOND, Nanos
+
+CASE, RESULT = "=== ", "---"
+PAUSE_NS = 20 * MILLISECOND
+"""Longer ones are shown, with their moment since the call."""
+MANY = 5
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A line with a twin, made anew for a case."""
+
+    wire: Any
+    names: dict[str, Any]
+    """What scripts may use."""
+    fault: Callable[[str, str, int], Any]
+    """A fault of a kind, in a direction, at a byte."""
+    passed: Callable[[], Mapping[str, int]]
+    """How many bytes have gone in each direction since faults were put."""
+    shown: Callable[[bytes], str]
+    happened: Callable[[], list[str]]
+    """What the twin has reported since the last time."""
+
+
+@dataclass(frozen=True)
+class Case:
+    name: str
+    script: str
+    expected: str
+
+    def transcript(self, make: Callable[[str], Bench]) -> str:
+        lines = self.script.splitlines()
+        options = " ".join(line[2:] for line in lines if line.startswith("@ "))
+        steps = [line for line in lines if line and line[0] not in "@#"]
+        sweep = next((at for at, step in enumerate(steps) if step.startswith("%% ")), None)
+        if sweep is None:
+            return "\n".join(_run(make(options), steps))
+        before, kinds, (call, *after) = steps[:sweep], steps[sweep][3:].split(", "), steps[sweep + 1 :]
+        return "\n".join(_sweep(lambda: make(options), before, kinds, call, after))
+
+
+def _run(bench: Bench, steps: list[str]) -> Iterator[str]:
+    for step in steps:
+        if step.startswith("% "):
+            kind, number, direction = step[2:].split(" ", 2)
+            bench.wire.put(bench.fault(kind, direction, int(number)))
+            yield f"  {step}"
+        elif step.startswith("| "):
+            _call(bench, step[2:])
+            bench.happened()
+        else:
+            yield f"> {step}"
+            begin, sent = bench.wire.now, len(bench.wire.sent)
+            result = _call(bench, step)
+            if said := " ".join(_said(bench, begin, sent)):
+                yield f"    {said}"
+            for text in bench.happened():
+                yield f"    {text}"
+            yield f"    {result} ({_ms(bench.wire.now - begin)})"
+
+
+def _said(bench: Bench, begin: Nanos, first: int) -> Iterator[str]:
+    """Of what is sent many times, one after the other, the first, how many, and the last."""
+    before = begin
+    for data, group in groupby(bench.wire.sent[first:], key=itemgetter(1)):
+        times = [at for at, _ in group]
+        shown = [f"{_pause(at, last, begin)}{bench.shown(data)}" for last, at in pairwise((before, *times))]
+        yield from (shown[0], f"… {len(times) - 2} …", shown[-1]) if len(times) > MANY else shown
+        before = times[-1]
+
+
+def _pause(at: Nanos, before: Nanos, begin: Nanos) -> str:
+    return f"[{_ms(at - begin)}] " if at - before > PAUSE_NS else ""
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    said: list[str]
+    result: str
+    happened: str
+    end: str
+    took: Nanos
+
+    def beside(self, usual: _Outcome) -> str:
+        """What is not as usual."""
+        same = next((n for n, (a, b) in enumerate(zip(self.said, usual.said, strict=False)) if a != b), len(usual.said))
+        pairs = ((self.result, usual.result), (self.happened, usual.happened), (self.end, usual.end))
+        return " | ".join((" ".join(self.said[same:]), *(mine for mine, other in pairs if mine != other)))
+
+
+def _sweep(make: Callable[[], Bench], before: list[str], kinds: list[str], call: str, after: list[str]) -> Iterator[str]:
+    """``after`` is done when the fault is over; of its results the last is shown."""
+
+    def outcome(*fault: Any) -> tuple[_Outcome, Mapping[str, int]]:
+        bench = make()
+        for step in before:
+            _call(bench, step.removeprefix("| "))
+        bench.happened()
+        bench.wire.put(*(bench.fault(*one) for one in fault))
+        begin, sent = bench.wire.now, len(bench.wire.sent)
+        result = _brief(_call(bench, call))
+        took = bench.wire.now - begin
+        said = list(_said(bench, begin, sent))
+        passed = bench.passed()
+        bench.wire.put()
+        ends = [_call(bench, step) for step in after]
+        happened = "; ".join(_brief(text) for text in bench.happened())
+        return _Outcome(said, result, happened, _brief("".join(ends[-1:])), took), passed
+
+    usual, passed = outcome()
+    yield f"> {call}: {usual.result} ({_ms(usual.took)}) {' '.join(usual.said)}"
+    yield f"    {usual.happened} | {usual.end}"
+    number = 0
+    for direction, count in passed.items():
+        for index in range(count):
+            kind = kinds[number % len(kinds)]
+            number += 1
+            found, _ = outcome((kind, direction, index))
+            yield f"{kind} {index} {direction} ({_ms(found.took)}): {found.beside(usual)}".rstrip(" |")
+
+
+def _call(bench: Bench, text: str) -> str:
+    try:
+        try:
+            code = compile(text, "<script>", "eval")
+        except SyntaxError:
+            exec(text, bench.names)  # an assignment
+            return "done"
+        found = eval(code, bench.names)
+    except SteptwinError as error:
+        marks = [name for name in ("uncertain",) if getattr(error, name, False)]
+        return f"{type(error).__name__}{''.join(f' {mark}' for mark in marks)}: {error}"
+    return f"= {found!r}"
+
+
+def _brief(text: str) -> str:
+    """Without the words of a message."""
+    return text if text.startswith("= ") else text.partition(":")[0]
+
+
+def _ms(nanos: int) -> str:
+    return f"{nanos / 1e6:.9g}"
+
+
+def cases(golden: Path) -> list[Case]:
+    found = []
+    for part in golden.read_text(encoding="utf-8").split(CASE)[1:]:
+        name, _, body = part.partition("\n")
+        script, _, expected = body.partition(f"{RESULT}\n")
+        found.append(Case(name.strip(), script, expected.strip("\n")))
+    return found
+
+
+def regenerate(golden: Path, make: Callable[[str], Bench]) -> None:
+    head = golden.read_text(encoding="utf-8").split(CASE)[0]
+    written = (f"{CASE}{case.name}\n{case.script}{RESULT}\n{case.transcript(make)}\n" for case in cases(golden))
+    golden.write_text(head + "\n".join(written), encoding="utf-8")

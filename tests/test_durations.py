@@ -1,0 +1,45 @@
+"""Times as people write them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.durations import LONGEST_NS, duration
+from steptwin.errors import Misuse
+from steptwin.machine import SECOND
+
+NANOSECONDS = {"us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9, "h": 3600 * 10**9}
+
+
+@given(unit=st.sampled_from([*NANOSECONDS]), whole=st.integers(0, 8784), thousandths=st.integers(0, 999), blank=st.booleans())
+def test_a_number_with_a_unit(unit: str, whole: int, thousandths: int, blank: bool) -> None:
+    text = f"{whole}.{thousandths:03}{' ' * blank}{unit}"
+    expected = whole * NANOSECONDS[unit] + thousandths * NANOSECONDS[unit] // 1000
+    if expected > 8784 * NANOSECONDS["h"]:
+        with pytest.raises(Misuse, match=r"is too long: permitted are 0 to 8784 h$"):
+            duration(text)
+    else:
+        assert duration(text) == duration(f"  {text.upper()} ") == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "nanoseconds"),
+    [("1.5", SECOND * 3 // 2), (".5 s", SECOND // 2), (2, 2 * SECOND), (0, 0), (0.25, SECOND // 4), (1e-5, 10_000)],
+)
+def test_a_number_alone_is_of_seconds(value: object, nanoseconds: int) -> None:
+    assert duration(value) == nanoseconds
+
+
+def test_the_longest_is_a_leap_year() -> None:
+    assert 8784 * NANOSECONDS["h"] == LONGEST_NS
+    assert duration("8784 h") == LONGEST_NS
+    with pytest.raises(Misuse, match="too long"):
+        duration(31_622_400.001)
+
+
+@pytest.mark.parametrize("value", ["", "ms", "5 parsec", "-1 s", "1.", True, None, [1], -1e-5, float("inf"), float("nan")])
+def test_what_is_no_duration_is_misuse(value: object) -> None:
+    with pytest.raises(Misuse, match=r"is no time: expected a number with us, ms, s, min, h, such as '90 s' or '500 ms'$"):
+        duration(value)

@@ -1,0 +1,187 @@
+"""A world, its faces and its files with a kind of controller that only the tests know: nothing else knows it either."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from toy.kind import TOY, registered
+from typer.testing import CliRunner
+
+from steptwin.cli import app
+from steptwin.commands.up_world import UpOptions, up
+from steptwin.datasheet import plain
+from steptwin.errors import Misuse, Refusal
+from steptwin.files.export import axis_views, read_trace, write_trace
+from steptwin.files.session import load, save, session_of
+from steptwin.files.world import World
+from steptwin.live.world import LiveWorld, PlacePort, announced
+from steptwin.live.world_frames import follow_frames
+from steptwin.subject.commands import Advance, Describe, Home, Move, ReadPins, State
+from steptwin.subject.world import WorldSubject
+from steptwin.words.frames import FrameLine
+from steptwin.world.reader import WorldError
+
+TEXT = """
+[world]
+name = "toys"
+[[line]]
+name = "bus"
+kind = "toys"
+tcp = "127.0.0.1:0"
+[[toy]]
+name = "t"
+line = "bus"
+[[axis]]
+name = "x"
+drive = "t.M1"
+pulses_per_unit = 10
+[[axis.switch]]
+to = "t.STOP"
+above = 3.0
+[[script]]
+name = "operator"
+steps = [
+  { send = "bus", text = "M\\n" },
+  { until = "t.position >= 20" },
+  { note = "past 20" },
+  { until = "idle" },
+  { expect = "x.position > 7" },
+]
+"""
+"""M 10 is a move of 100 pulses; from the switch at 30 it needs as much again to stop."""
+
+
+@pytest.fixture(autouse=True)
+def toys() -> Iterator[None]:
+    with registered():
+        yield
+
+
+def noted(world: World) -> list[int]:
+    return [record.time for record in world.trace if record.subject == "note"]
+
+
+def test_a_description_a_script_a_condition_and_a_switch() -> None:
+    world = World.from_toml(TEXT)
+    assert world.run("idle", for_=10) == "idle"
+    # 20 pulses at 1000 p/s² from rest take √(2·20/1000) s.
+    assert noted(world) == [200_000_000]
+    stopped = world.axis["x"].position
+    assert 6.0 <= stopped <= 6.1
+    assert world.views(TOY)["t"].position == world.read("t.position") == stopped * 10
+    assert [record.subject for record in world.failures] == ["expectation"]
+
+
+def test_mistakes_in_its_table_have_their_places() -> None:
+    with pytest.raises(WorldError, match=r"steps: 11: permitted are whole numbers from 1 to 10"):
+        World.from_toml('[[toy]]\nname = "t"\nsteps = 11\n')
+    with pytest.raises(WorldError, match="'t' cannot be on a line of kind modbus"):
+        World.from_toml('[[line]]\nname = "bus"\n[[toy]]\nname = "t"\nline = "bus"\n')
+    with pytest.raises(WorldError, match="gap means nothing for kind = 'toys'"):
+        World.from_toml(TEXT.replace("tcp =", "gap = 1\ntcp ="))
+    with pytest.raises(Misuse, match="'t' is a toy, which has no registers"):
+        World.from_toml('[[toy]]\nname = "t"\n[[script]]\nname = "s"\nsteps = [{ write = { "t.POS_ABS" = 1 } }]\n')
+
+
+def test_a_snapshot_goes_on_alike_and_can_be_pickled() -> None:
+    world = World.from_toml(TEXT)
+    world.run(for_=0.1)
+    other = pickle.loads(pickle.dumps(world))
+    for one in (world, other):
+        one.run(for_=2)
+    assert other.trace.digest() == world.trace.digest()
+
+
+def test_a_fault() -> None:
+    world = World.from_toml(TEXT)
+    world.fault("stuck pin=STOP value=1")
+    world.run(for_=1)
+    assert world.read("t.position") == 0
+    with pytest.raises(Misuse, match="'t' is a toy"):
+        world.fault("wear")
+
+
+def test_a_session_is_replayed(tmp_path: Path) -> None:
+    world = World.from_toml(TEXT)
+    world.run(for_=0.1)
+    world.views(TOY)["t"].set_pin("STOP", 1)
+    world.run(for_=1)
+    save(session_of(world), tmp_path / "s.json")
+    assert load(tmp_path / "s.json").replay().trace.digest() == world.trace.digest()
+
+
+def test_its_trace_is_exported_and_read_back(tmp_path: Path) -> None:
+    world = World.from_toml(TEXT)
+    world.run(for_=2)
+    write_trace(world.trace, tmp_path / "t.jsonl", views=axis_views(world), ended=world.now)
+    assert read_trace(tmp_path / "t.jsonl").trace.digest() == world.trace.digest()
+    write_trace(world.trace, tmp_path / "t.vcd", views=axis_views(world), ended=world.now)
+    assert "M1_STEP" in (tmp_path / "t.vcd").read_text("utf-8")
+
+
+def test_a_subject_describes_it_and_shows_its_state() -> None:
+    subject = WorldSubject(World.from_toml(TEXT))
+    (part,) = subject.description.machines
+    assert (part.datasheet.kind, part.line, part.points) == ("toy", "bus", ("t.STOP", "t.BUSY", "t.position"))
+    assert subject.do(Describe()).value["datasheets"][0]["axes"][0]["unit"] == "pulse"
+    assert subject.do(State("t")).value == {"controller": "toy", "position": 0, "pins": {"STOP": 0.0, "BUSY": 0.0}}
+    assert subject.do(ReadPins("t")).value == {"t.STOP": 0.0, "t.BUSY": 0.0}
+
+
+def test_a_subject_reads_and_commands_it() -> None:
+    subject = WorldSubject(World.from_toml(TEXT.replace("{ send", "{ wait = '1 min' }, { send")))
+    subject.do(Move("t", 1, by=20))
+    subject.do(Advance(until="idle"))
+    assert subject.read("t.position", "t.BUSY") == (("t.position", 20.0, "pulse", "good"), ("t.BUSY", 0.0, "", "good"))
+    with pytest.raises(Refusal, match="'t' is a toy, which cannot do home; it can do move, stop"):
+        subject.do(Home("t", 1, 1.0))
+
+
+def test_its_data_sheet_is_json() -> None:
+    world = World.from_toml(TEXT)
+    sheet = plain(world.kind("t").datasheet(world.machines["t"]))
+    assert json.loads(json.dumps(sheet))["points"][0]["path"] == "position"
+
+
+def test_what_goes_over_its_line_is_put_into_words() -> None:
+    world = World.from_toml(TEXT)
+    shown: list[FrameLine] = []
+    follow_frames(LiveWorld(world), shown.append)
+    world.run(for_=0.1)
+    assert [(line.link, line.meaning) for line in shown] == [("script", "M 10"), ("script", "M 10")]
+
+
+def test_run_checks_and_runs_it(tmp_path: Path) -> None:
+    place = tmp_path / "toys.toml"
+    place.write_text(TEXT, "utf-8")
+    ended = CliRunner().invoke(app, ["run", str(place), "--for", "2", "--trace", str(tmp_path / "t.csv")])
+    assert "past 20" in ended.output
+    assert "expectation failed" in ended.output
+    assert ended.exit_code == 1
+    assert (tmp_path / "t.csv").exists()
+
+
+def test_a_program_outside_talks_to_it() -> None:
+    live = LiveWorld(World.from_toml(TEXT))
+    port = PlacePort(live, "bus", "tcp-1", "raw")
+    assert port.exchange(b"P", 0) == b""
+    assert port.exchange(b"\0", 0) == b"P\0"
+    live.advance(200_000_000)
+    assert port.exchange(b"P\0", 200_000_000) == b"P\x02"
+    assert announced(live.world) == [{"line": "bus", "name": "t", "kind": "toy"}]
+
+
+def test_up_serves_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    place = tmp_path / "toys.toml"
+    place.write_text(TEXT.replace("{ expect", '{ stop = "done" },\n  { expect'), "utf-8")
+    assert up(UpOptions(world=place, speed="1000", log_frames=True))
+    shown = capfd.readouterr().out
+    assert "toys" in shown
+    assert "127.0.0.1:" in shown
+    assert "M 10" in shown
+    assert "past 20" in shown
