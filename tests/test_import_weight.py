@@ -22,7 +22,9 @@ HEAVY = {
     "pygls",
     "rich",
     "serialx",
+    "starlette",
     "textual",
+    "uvicorn",
     "uvloop",
 }
 

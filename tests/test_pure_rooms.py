@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-PURE = ("motion", "wire", "wbc", "mic488", "m1486", "world", "subject")
+PURE = ("motion", "wire", "wbc", "mic488", "m1486", "world", "subject", "access")
 BLOCKED = (
     "fastcrc", "numpy", "serialx", "typer", "rich",
     "asyncio", "concurrent", "multiprocessing", "queue", "select", "selectors", "signal", "socket", "ssl", "subprocess",

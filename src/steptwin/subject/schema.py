@@ -3,34 +3,108 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from typing import get_type_hints
 
+from steptwin.datasheet import Datasheet
 from steptwin.subject.commands import COMMANDS, VERSION, CommandRow
+from steptwin.subject.contract import Description
 from steptwin.subject.events import KINDS
-from steptwin.subject.fields import LONGEST_ID
+from steptwin.subject.fields import LONGEST_ID, Field
+from steptwin.subject.shapes import members, shape
+from steptwin.tables import complete
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ID = {"type": ["string", "integer", "null"], "maxLength": LONGEST_ID, "description": "Comes back with the answer."}
 _MOMENT = {"type": "string", "pattern": "^[0-9]{1,20}$", "description": "Virtual time, as decimal text [ns]"}
 _NUMBER = {"type": "integer", "minimum": 1, "description": "Commands and events are numbered together."}
+_NUMBER_OF_EVENT = {**_NUMBER, "minimum": 0, "description": "Commands and events are numbered together; 0: a plan from before."}
+_TEXT = {"type": "string"}
+_TEXT_OR_NULL = {"type": ["string", "null"]}
+_WHOLE = {"type": "integer"}
+_REAL = {"type": "number"}
+_FLAG = {"type": "boolean"}
+_NUMBERS = {"type": "array", "items": {"type": ["number", "null"]}}
+_ARC = members(
+    {
+        "end_s": {"type": ["number", "null"]},
+        "direction": _WHOLE,
+        "way": _NUMBERS,
+        "course": _NUMBERS,
+        "half": _WHOLE,
+        "end_p": _REAL,
+    }
+)
+_PLAN = {
+    "type": "object",
+    "description": "Numbers for the position at any moment; docs/control.md has the formulas.",
+    "properties": {
+        "start_ns": _MOMENT,
+        "base": _WHOLE,
+        "final": _REAL,
+        "segments": {"type": "array", "items": {"anyOf": [_NUMBERS, _ARC]}},
+        "microstepping": _NUMBERS,
+        "divisions": {"type": "array", "items": {"type": "array", "items": _WHOLE}},
+    },
+    "required": ["start_ns", "base", "final", "segments"],
+    "additionalProperties": False,
+}
+_PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
+    "kind of event",
+    KINDS,
+    "schema",
+    {
+        "plan": {"axis": _TEXT, "plan": _PLAN, "origin": {"type": ["integer", "null"]}},
+        "coordinate": {"axis": _TEXT, "origin": _WHOLE},
+        "sample": {"axis": _TEXT, "position": _REAL, "unit": _TEXT},
+        "load": {
+            "axis": _TEXT,
+            "pieces": {"type": "array", "items": members({"time_ns": _MOMENT, "follows": _FLAG, "pulses": _WHOLE})},
+        },
+        "edge": {"pin": _TEXT, "level": _REAL},
+        "frame": {"client": _TEXT, "direction": {"enum": ["in", "out"]}, "data": {**_TEXT, "description": "Hexadecimal."}},
+        "statement": {"program": _TEXT, "line": _WHOLE},
+        "status": {"code": _TEXT, "axis": _TEXT_OR_NULL, "facts": {"type": "object"}},
+        "note": {"note": _TEXT},
+        "report": {"code": _TEXT, "what": _TEXT},
+        "button": {"button": _TEXT, "pressed": _FLAG},
+        "input": {"what": _TEXT, "value": {}},
+        "fault": {"fault": _TEXT, "words": _TEXT},
+        "pace": {"paused": _FLAG, "speed": {"anyOf": [_REAL, {"const": "max"}, {"type": "null"}]}},
+    },
+)
 
 
 def schema() -> dict[str, object]:
     """Of requests, with those of answers and events under ``$defs``."""
+    requests = {row.name: _request(row) for row in COMMANDS.values()}
     return {
         "$schema": DIALECT,
         "title": f"steptwin control endpoint, version {VERSION}: a request is one line of JSON",
         "oneOf": [{"$ref": f"#/$defs/{name}"} for name in COMMANDS],
-        "$defs": {**{row.name: _request(row) for row in COMMANDS.values()}, "(answer)": _answer(), "(event)": _event()},
+        "$defs": {**requests, **definitions(), "(message)": _message()},
     }
 
 
+def definitions() -> dict[str, dict[str, object]]:
+    """Of what is sent, by the names under which schemas of messages refer to it."""
+    return {"(answer)": _answer(), "(event)": _event(), "(description)": _description()}
+
+
 def _request(row: CommandRow) -> dict[str, object]:
-    fields = {field.name: _or_null(field.schema(), is_required=field.is_required) for field in row.fields}
+    return request_schema(row.name, f"{row.meaning} Answer: {row.answer}.", row.fields)
+
+
+def request_schema(name: str, meaning: str, fields: Iterable[Field]) -> dict[str, object]:
+    """Of a request with these fields."""
+    fields = list(fields)
+    properties = {field.name: _or_null(field.schema(), is_required=field.is_required) for field in fields}
     return {
         "type": "object",
-        "description": f"{row.meaning} Answer: {row.answer}.",
-        "properties": {"do": {"const": row.name}, "id": _ID, "version": {"const": VERSION}, **fields},
-        "required": ["do", *(field.name for field in row.fields if field.is_required)],
+        "description": meaning,
+        "properties": {"do": {"const": name}, "id": _ID, "version": {"const": VERSION}, **properties},
+        "required": ["do", *(field.name for field in fields if field.is_required)],
         "additionalProperties": False,
     }
 
@@ -61,24 +135,42 @@ def _answer() -> dict[str, object]:
 
 
 def _event() -> dict[str, object]:
-    event = {
-        "type": "object",
-        "properties": {
-            "number": _NUMBER,
-            "time_ns": _MOMENT,
-            "machine": {"type": "string"},
-            "kind": {"enum": list(KINDS)},
-            "cause": {**_NUMBER, "type": ["integer", "null"], "description": "The command or the event that led to it."},
-            "text": {"type": "string", "description": "As text; it adds nothing to the rest."},
-        },
-        "required": ["number", "time_ns", "machine", "kind", "cause", "text"],
-    }
+    return {"oneOf": [_event_of(kind, given) for kind, given in _PAYLOADS.items()]}
+
+
+def _event_of(kind: str, given: Mapping[str, object]) -> dict[str, object]:
+    head = {"number": _NUMBER_OF_EVENT, "time_ns": _MOMENT, "machine": {"type": "string"}, "kind": {"const": kind}}
+    cause = {"type": ["integer", "null"], "minimum": 1, "description": "The command or the event that led to it."}
+    text = {"type": "string", "description": "As text; it adds nothing to the rest."}
+    return members({**head, **given, "cause": cause, "text": text})
+
+
+def _message() -> dict[str, object]:
     return {
         "type": "object",
-        "description": "After the answer to follow, with its id.",
-        "properties": {"id": _ID, "event": event, "missed": {"type": "integer", "minimum": 1}},
+        "description": "An event, after the answer to follow, with its id.",
+        "properties": {"id": _ID, "event": {"$ref": "#/$defs/(event)"}, "missed": {"type": "integer", "minimum": 1}},
         "required": ["event"],
     }
+
+
+def _description() -> dict[str, object]:
+    """As `Description.plain` writes it."""
+    machine = members(
+        {
+            "name": _TEXT,
+            "datasheet": {"type": "integer", "minimum": 0, "description": "Index of its data sheet."},
+            "line": _TEXT_OR_NULL,
+            "unit": {"type": ["integer", "null"], "description": "Slave address, or address of a chip."},
+        }
+    )
+    own: Mapping[str, object] = {
+        "machines": {"type": "array", "items": machine},
+        "datasheets": {"type": "array", "items": shape(Datasheet)},
+    }
+    hints = get_type_hints(Description)
+    rest = {field.name: shape(hints[field.name]) for field in fields(Description) if field.name not in own}
+    return {**members({**rest, **own}), "description": "What there is. It does not change."}
 
 
 def text() -> str:

@@ -1,0 +1,41 @@
+"""Roles, and what a command needs of whoever gives it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+
+class Role(IntEnum):
+    """A higher role may do what a lower one may."""
+
+    VIEWER = 1
+    """Looks, and stops."""
+    OPERATOR = 2
+    """Moves axes, sets inputs, starts and stops programs, changes the pace of time."""
+    ENGINEER = 3
+    """Also sends raw requests, switches faults and power, writes files."""
+
+    @property
+    def title(self) -> str:
+        return self.name.lower()
+
+
+ROLES = {role.title: role for role in Role}
+
+
+class Permit(NamedTuple):
+    """What a command needs: a role, and whether its giver must hold control."""
+
+    role: Role
+    control: bool = False
+
+
+LOOK = Permit(Role.VIEWER)
+"""Changes nothing; also a stop, which everybody may give at any time."""
+ACT = Permit(Role.OPERATOR, control=True)
+"""Changes something that can be seen at the machine."""
+TAKE = Permit(Role.OPERATOR)
+"""Takes control, which cannot need it."""
+SERVICE = Permit(Role.ENGINEER, control=True)
+"""Reaches below the commands of an operator, or outside of the subject."""

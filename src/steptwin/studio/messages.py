@@ -1,0 +1,121 @@
+"""What the studio sends without being asked: one table of messages with their members."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from steptwin.access.roles import ROLES
+from steptwin.subject.fields import Schema
+from steptwin.subject.shapes import members
+
+VERSION = 1
+"""Of the messages; in the message hello."""
+
+MOMENT: Schema = {"type": "string", "pattern": "^[0-9]{1,20}$", "description": "Virtual time, as decimal text [ns]"}
+_COUNT: Schema = {"type": "integer", "minimum": 0}
+_WHOLE: Schema = {"type": "integer"}
+_TEXT: Schema = {"type": "string"}
+SPEED: Schema = {
+    "anyOf": [{"type": "number"}, {"const": "max"}],
+    "description": "Virtual seconds in a second; the one at which time will go on where it stands.",
+}
+
+
+def _or_null(schema: Schema) -> dict[str, object]:
+    return {"anyOf": [schema, {"type": "null"}]}
+
+
+CONTROL = _or_null(members({"viewer": _WHOLE, "name": _TEXT}))
+LEASES: Schema = {
+    "type": "array",
+    "items": members(
+        {
+            "lease": _WHOLE,
+            "viewer": _WHOLE,
+            "machine": _TEXT,
+            "axis": _WHOLE,
+            "velocity": {"type": "number", "description": "[units of the data sheet/s]"},
+        }
+    ),
+}
+EVENTS: Schema = {"type": "array", "items": {"$ref": "#/$defs/(event)"}}
+CLOCK = members({"time_ns": MOMENT, "running": {"type": "boolean"}, "speed": SPEED})
+
+
+@dataclass(frozen=True, slots=True)
+class MessageRow:
+    """A message: the member that it is known by, what that is, and the other members but ``seq``."""
+
+    name: str
+    meaning: str
+    content: Schema
+    others: Mapping[str, Schema] = field(default_factory=dict)
+
+    def schema(self) -> dict[str, object]:
+        seq = {**_COUNT, "description": "Counts the messages to this viewer from hello on, which has 0."}
+        found = members({"seq": seq, **self.others, self.name: self.content})
+        return {**found, "description": self.meaning}
+
+
+_ROWS = (
+    MessageRow(
+        "hello",
+        "The whole state, after hello and resync.",
+        members(
+            {
+                "version": {"const": VERSION},
+                "program": {**_TEXT, "description": "Version of steptwin."},
+                "viewer": {**_WHOLE, "description": "Number of this viewer."},
+                "name": _TEXT,
+                "role": {"enum": list(ROLES)},
+                "may": {"type": "array", "items": _TEXT, "description": "Names of requests that can be done here by this role."},
+                "control": CONTROL,
+                "viewers": {**_COUNT, "description": "How many there are."},
+                "leases": LEASES,
+                "number": {**_COUNT, "description": "Events with greater numbers are news."},
+                "time_ns": MOMENT,
+                "pace": members({"running": {"type": "boolean"}, "speed": SPEED}),
+                "virtual": {"type": "boolean", "description": "Whether it is a twin; a device gives samples, not plans."},
+                "description": {"$ref": "#/$defs/(description)"},
+                "state": {
+                    "type": "object",
+                    "additionalProperties": {"type": "object"},
+                    "description": "By machine, as the answer to state; empty for a device.",
+                },
+                "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},
+                "plans": {"type": "array", "items": {"$ref": "#/$defs/(event)"}, "description": "Present plans of all axes."},
+            }
+        ),
+    ),
+    MessageRow(
+        "events",
+        "What has happened, of what is followed; each event once.",
+        EVENTS,
+        {"time_ns": MOMENT, "missed": {**_COUNT, "description": "Events before these that were dropped."}},
+    ),
+    MessageRow(
+        "values",
+        "By the number of a watch as text: [index, value] of the points that have changed; null for unknown.",
+        {
+            "type": "object",
+            "additionalProperties": {
+                "type": "array",
+                "items": {
+                    "type": "array",
+                    "prefixItems": [{"type": "integer"}, {"type": ["number", "null"]}],
+                    "minItems": 2,
+                    "maxItems": 2,
+                },
+            },
+        },
+        {"time_ns": MOMENT},
+    ),
+    MessageRow("clock", "The present moment: once a second, and whenever time stands or goes on.", CLOCK),
+    MessageRow("control", "Who holds control from now on.", CONTROL),
+    MessageRow("viewers", "How many viewers there are now.", _COUNT),
+    MessageRow("leases", "The jogs that are held now.", LEASES),
+    MessageRow("lost", "The connection to the device is lost, and why; null when it is there again.", _or_null(_TEXT)),
+)
+
+MESSAGES: Mapping[str, MessageRow] = {row.name: row for row in _ROWS}

@@ -1,0 +1,234 @@
+"""What a viewer can ask for beside the commands of a subject: one table, and the reading of both.
+
+A request is as at the control endpoint: ``{"do": NAME, FIELD: VALUE, ..., "id": ANY}``. The commands of a subject stand in
+`steptwin.subject.commands`; `jog` has another answer here, because it is a lease.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from steptwin.access.commands import PERMITS
+from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
+from steptwin.errors import Misuse
+from steptwin.nearmiss import NearMiss
+from steptwin.plaintypes import shown
+from steptwin.subject.commands import COMMANDS, Command, CommandRow, read_command
+from steptwin.subject.fields import FLAG, NAMES, TEXT, Field, Schema, number, read_fields, whole
+from steptwin.subject.shapes import members
+
+FASTEST_RATE = 30.0
+"""Updates in a second of the wall clock."""
+MOST_ENTRIES = 1000
+"""Of the audit log in one answer."""
+
+# ---------------------------------------------------------------------- the values
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The first request of a viewer: who it is."""
+
+    token: str | None = None
+    name: str | None = None
+    lang: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Resync:
+    """The whole state again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """Be sent the values of points whenever they have changed."""
+
+    points: tuple[str, ...]
+    rate: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Unwatch:
+    watch: int
+
+
+@dataclass(frozen=True, slots=True)
+class TakeControl:
+    """Hold control; ``over`` another viewer who holds it, too."""
+
+    over: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ReleaseControl:
+    """Hold control no more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Renew:
+    """A jog goes on."""
+
+    lease: int
+
+
+@dataclass(frozen=True, slots=True)
+class LetGo:
+    """A jog ends."""
+
+    lease: int
+
+
+@dataclass(frozen=True, slots=True)
+class StopAll:
+    """Stop every axis, and every program that runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadAudit:
+    """Who did what."""
+
+    most: int = 100
+
+
+StudioRequest: TypeAlias = Hello | Resync | Watch | Unwatch | TakeControl | ReleaseControl | Renew | LetGo | StopAll | ReadAudit
+"""Another kind of request is a class, its row here, and what does it in `steptwin.studio.session`."""
+
+# ---------------------------------------------------------------------- the table
+
+
+@dataclass(frozen=True, slots=True)
+class RequestRow:
+    """A request: its name, its class, what it needs, its fields, and the schema of its answer."""
+
+    name: str
+    kind: Callable[..., StudioRequest]
+    permit: Permit
+    meaning: str
+    answer: Schema
+    fields: tuple[Field, ...] = ()
+    is_of_connection: bool = False
+    """Whether it is about what is sent to its connection, and so means nothing over REST."""
+
+
+NOTHING: Schema = {"type": "null"}
+_TEXT: Schema = {"type": "string"}
+_WHOLE: Schema = {"type": "integer"}
+_LEASE = Field("lease", whole(1, 2**53), "The number in the answer to jog.")
+
+LEASE: Schema = members({"lease": _WHOLE, "lasts_ms": {**_WHOLE, "description": "Renew it in a third of this. [ms]"}})
+"""The answer to jog."""
+
+_ROWS = (
+    RequestRow(
+        "hello",
+        Hello,
+        LOOK,
+        "The first request of a connection. Its answer is followed by the whole state.",
+        members({"viewer": _WHOLE, "name": _TEXT, "role": {"enum": list(ROLES)}}),
+        (
+            Field("token", TEXT, "Where the studio asks for one.", None),
+            Field("name", TEXT, "What others see.", None),
+            Field("lang", TEXT, "Language of the page, such as en or pl.", None),
+        ),
+        is_of_connection=True,
+    ),
+    RequestRow("resync", Resync, LOOK, "The whole state once more, with seq 0.", NOTHING, is_of_connection=True),
+    RequestRow(
+        "watch",
+        Watch,
+        LOOK,
+        "Values of points, sent whenever they have changed.",
+        members(
+            {
+                "watch": _WHOLE,
+                "points": {
+                    "type": "array",
+                    "items": members({"point": _TEXT, "unit": _TEXT}),
+                    "description": "In the order of their indices.",
+                },
+            }
+        ),
+        (
+            Field("points", NAMES, "Points, as for read."),
+            Field("rate", number(0.1, FASTEST_RATE), "At most this often.", 10.0, "1/s"),
+        ),
+        is_of_connection=True,
+    ),
+    RequestRow(
+        "unwatch",
+        Unwatch,
+        LOOK,
+        "No more values.",
+        NOTHING,
+        (Field("watch", whole(1, 2**53), "The number in the answer to watch."),),
+        is_of_connection=True,
+    ),
+    RequestRow(
+        "take_control",
+        TakeControl,
+        TAKE,
+        "Hold control. Whoever acts while nobody holds it takes it, too.",
+        NOTHING,
+        (Field("over", FLAG, "Also from a viewer who holds it.", False),),
+    ),
+    RequestRow("release_control", ReleaseControl, LOOK, "Hold control no more; jogs of this viewer end.", NOTHING),
+    RequestRow("renew", Renew, ACT, "A jog goes on for as long as its lease lasts from now.", LEASE, (_LEASE,)),
+    RequestRow("let_go", LetGo, LOOK, "A jog ends: its axis stops with its ramp.", NOTHING, (_LEASE,)),
+    RequestRow(
+        "stop_all",
+        StopAll,
+        LOOK,
+        "Stop every axis as stop does, and every program that runs. Needs no control.",
+        members(
+            {
+                "machines": {"type": "array", "items": _TEXT},
+                "failed": {"type": "object", "additionalProperties": _TEXT, "description": "Why, by machine."},
+            }
+        ),
+    ),
+    RequestRow(
+        "audit",
+        ReadAudit,
+        SERVICE._replace(control=False),
+        "Who did what, the newest last.",
+        {
+            "type": "array",
+            "items": members(
+                {
+                    "at": {**_TEXT, "description": "Wall clock, ISO 8601."},
+                    "time_ns": {**_TEXT, "description": "Virtual time, as decimal text [ns]"},
+                    "viewer": _TEXT,
+                    "role": {"enum": list(ROLES)},
+                    "do": _TEXT,
+                    "fields": {"type": "object"},
+                    "outcome": {"enum": ["done", "misuse", "refusal", "failure", "internal"]},
+                }
+            ),
+        },
+        (Field("most", whole(1, MOST_ENTRIES), "Entries.", 100),),
+    ),
+)
+
+REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in _ROWS}
+ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
+"""Every request by name."""
+_BY_KIND: Mapping[object, RequestRow] = {row.kind: row for row in _ROWS}
+OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})
+
+
+def read_request(name: object, given: Mapping[str, object]) -> Command | StudioRequest:
+    """The request called ``name`` with fields as in JSON. Raises `Misuse`."""
+    row = REQUESTS.get(name) if isinstance(name, str) else None
+    if row is not None:
+        return row.kind(**read_fields(row.name, row.fields, given))
+    if name not in COMMANDS:
+        hint = NearMiss().hint(name, ALL) if isinstance(name, str) else ""
+        raise Misuse(f"no request {shown(name)}{hint}; requests are {', '.join(ALL)}")
+    return read_command(name, given)
+
+
+def permit_of(name: str) -> Permit:
+    """What the request called ``name`` needs."""
+    return REQUESTS[name].permit if name in REQUESTS else PERMITS[name]
