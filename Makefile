@@ -74,7 +74,7 @@ peers:  ## Install the system packages the tests talk to (Debian)
 
 lock: $(UV)  ## Pin the dependencies anew (ARGS="--upgrade" takes newer ones)
 	$(COMPILE) requirements/tools.in -o requirements/tools.txt
-	$(COMPILE) pyproject.toml --extra lsp --group build -o requirements/run.txt
+	$(COMPILE) pyproject.toml --extra lsp --extra studio --group build -o requirements/run.txt
 	$(COMPILE) pyproject.toml --all-extras --group build --group dev -c requirements/run.txt -o requirements/dev.txt
 
 COMPILE := env -u UV_FIND_LINKS -u PIP_FIND_LINKS UV_CUSTOM_COMPILE_COMMAND="make lock" \
