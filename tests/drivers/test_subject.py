@@ -370,6 +370,7 @@ def test_a_slow_follower_loses_the_oldest_and_is_told_how_many(table: DeviceSubj
 
 def test_an_m1486_moves_and_is_unknown_meanwhile(drum: DeviceSubject, rig: Rig) -> None:
     assert drum.description.machines[0].datasheet.axes[0].unit == "step"
+    assert drum.description.machines[0].controls == ("move", "jog", "stop", "program")
     drum.do(command.Move("drum", 1, by=5000.0))
     moving = {reading.point: reading for reading in drum.read("drum.counter", "drum.moving", "drum.B1", "drum.position")}
     assert {reading.quality for reading in moving.values()} == {UNKNOWN}

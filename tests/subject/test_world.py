@@ -91,6 +91,10 @@ def test_a_description_survives_json_and_names_points_that_can_be_read() -> None
     subject = of(feeder())
     description = subject.description
     assert read_description(json.loads(json.dumps(description.plain()))) == description
+    assert {part.name: part.controls for part in description.machines} == {
+        "table": ("enable", "move", "home", "jog", "stop", "program"),
+        "drum": ("move", "jog", "stop"),
+    }
     points = [point for part in (*description.machines, *description.axes) for point in part.points]
     assert len(points) > 150
     found = {reading.point: reading for reading in subject.read(*(point for point in points if "USER_REGISTER" not in point))}

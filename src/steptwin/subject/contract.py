@@ -45,6 +45,8 @@ class MachinePart:
     line: str | None = None
     unit: int | None = None
     """Slave address, or address of a chip."""
+    controls: tuple[str, ...] = ()
+    """Names of those commands for controllers (`steptwin.world.control`) that it takes: ``enable``, ``jog``."""
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -92,7 +94,13 @@ class Description:
         sheets = {id(part.datasheet): part.datasheet for part in self.machines}
         numbers = {key: number for number, key in enumerate(sheets)}
         machines = [
-            {"name": part.name, "datasheet": numbers[id(part.datasheet)], "line": part.line, "unit": part.unit}
+            {
+                "name": part.name,
+                "datasheet": numbers[id(part.datasheet)],
+                "line": part.line,
+                "unit": part.unit,
+                "controls": part.controls,
+            }
             for part in self.machines
         ]
         return {
@@ -107,7 +115,10 @@ class Description:
 def read_description(data: Mapping[str, Any]) -> Description:
     """The description in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
     sheets = [read_datasheet(sheet) for sheet in data["datasheets"]]
-    machines = tuple(MachinePart(one["name"], sheets[one["datasheet"]], one["line"], one["unit"]) for one in data["machines"])
+    machines = tuple(
+        MachinePart(one["name"], sheets[one["datasheet"]], one["line"], one["unit"], tuple(one["controls"]))
+        for one in data["machines"]
+    )
     axes = tuple(
         MechanicsPart(one["name"], one["machine"], one["axis"], one["unit"], tuple(one["points"])) for one in data["axes"]
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.subject.commands import COMMANDS
+from steptwin.subject.commands import COMMANDS, name_of
 from steptwin.subject.contract import Description, LinePart, MachinePart, MechanicsPart
 from steptwin.world.plant import Plant
 from steptwin.world.signals import MECHANICS
@@ -23,7 +23,8 @@ def describe(world: Plant) -> Description:
 def _machine(world: Plant, name: str) -> MachinePart:
     on = world.plan.line_of.get(name)
     line, unit = (None, None) if on is None else (on[0].name, on[1])
-    return MachinePart(name, world.kind(name).datasheet(world.machines[name]), line, unit)
+    kind = world.kind(name)
+    return MachinePart(name, kind.datasheet(world.machines[name]), line, unit, tuple(map(name_of, kind.control)))
 
 
 def _mechanics(world: Plant, name: str) -> MechanicsPart:

@@ -162,6 +162,11 @@ def _description() -> dict[str, object]:
             "datasheet": {"type": "integer", "minimum": 0, "description": "Index of its data sheet."},
             "line": _TEXT_OR_NULL,
             "unit": {"type": ["integer", "null"], "description": "Slave address, or address of a chip."},
+            "controls": {
+                "type": "array",
+                "items": _TEXT,
+                "description": "Which of enable, move, home, jog, stop, program it takes.",
+            },
         }
     )
     own: Mapping[str, object] = {
