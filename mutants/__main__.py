@@ -48,13 +48,18 @@ class Mutant:
         return f"{self.module}:{self.mutation.line(self.source)}: {self.mutation.kind}\n    - {before}\n    + {after}"
 
 
-def sample(root: Path, packages: list[str], seed: int) -> Iterator[Mutant]:
-    """All mutants of these packages in random order."""
+def sources(root: Path, places: Iterable[str]) -> list[Path]:
+    """The modules at these places of ``src/steptwin``: packages, folders of them, modules (``wire``, ``wire/rtu.py``)."""
+    found = [root / "src/steptwin" / place for place in places]
+    return sorted({path for place in found for path in ([place] if place.is_file() else place.rglob("*.py"))})
+
+
+def sample(root: Path, places: list[str], seed: int) -> Iterator[Mutant]:
+    """All mutants of these places in random order."""
     mutants = []
-    for name in packages:
-        for path in sorted((root / "src/steptwin" / name).rglob("*.py")):
-            source = path.read_text()
-            mutants += [Mutant(path.relative_to(root), mutation, source) for mutation in mutations(source)]
+    for path in sources(root, places):
+        source = path.read_text()
+        mutants += [Mutant(path.relative_to(root), mutation, source) for mutation in mutations(source)]
     random.Random(seed).shuffle(mutants)
     return (mutant for mutant in mutants if compiles(mutant.mutation.apply(mutant.source)))
 
@@ -124,9 +129,9 @@ class Workers:
             self._free.put(tree)
 
 
-def recorded(workers: Workers, root: Path, packages: list[str]) -> Reach:
-    """What the tests execute; recorded where sources or tests have changed since the last time."""
-    records = {folder: BUILD / f"{Path(folder).name}-{digest(root, folder)}.json" for folder in folders(root, packages)}
+def recorded(workers: Workers, root: Path, chosen: list[str]) -> Reach:
+    """What the tests of these folders execute; recorded where sources or tests have changed since the last time."""
+    records = {folder: BUILD / f"{Path(folder).name}-{digest(root, folder)}.json" for folder in chosen}
     missing = [folder for folder, file in records.items() if not file.exists()]
     for folder in missing:
         for old in BUILD.glob(f"{Path(folder).name}-*.json"):
@@ -156,13 +161,20 @@ def main() -> None:
     parser.add_argument(
         "-j", type=int, default=os.cpu_count() or 1, metavar="JOBS", help="how many at the same time (default: all cores)"
     )
-    parser.add_argument("packages", nargs="*", metavar="PACKAGE", help=f"packages to mutate (default: {' '.join(CORE)})")
+    parser.add_argument("--mirrored", action="store_true", help="run only the tests of the mirrored folders: quicker")
+    parser.add_argument(
+        "places",
+        nargs="*",
+        metavar="PLACE",
+        help=f"what to mutate: packages, or places in them such as drivers/m1486 and wire/rtu.py (default: {' '.join(CORE)})",
+    )
     options = parser.parse_args()
-    if unknown := set(options.packages) - set(CORE):
-        parser.error(f"no package of the core: {', '.join(sorted(unknown))}; they are {', '.join(CORE)}")
+    places = options.places or list(CORE)
+    if unknown := [place for place in places if Path(place).parts[0] not in CORE or not sources(ROOT, [place])]:
+        parser.error(f"no place in a package of the core: {', '.join(unknown)}; the packages are {', '.join(CORE)}")
     if options.j < 1:
         parser.error(f"-j {options.j}: 1 or more")
-    packages = options.packages or list(CORE)
+    packages = [name for name in CORE if any(Path(place).parts[0] == name for place in places)]
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the tests that run are ended, too
     os.nice(5)
     BUILD.mkdir(parents=True, exist_ok=True)
@@ -171,8 +183,9 @@ def main() -> None:
         base, *trees = (Tree(ROOT, Path(directory, str(number))) for number in range(options.j + 1))
         workers = Workers(trees)
         try:
-            reach = recorded(workers, base.path, packages)
-            mutants = islice(sample(base.path, packages, options.seed), options.n)
+            chosen = [f"tests/{name}" for name in packages] if options.mirrored else folders(base.path, packages)
+            reach = recorded(workers, base.path, chosen)
+            mutants = islice(sample(base.path, places, options.seed), options.n)
             for tree in trees:
                 tree.fork(reach.folders)
             tasks = [partial(_tried, reach, equivalents(), mutant) for mutant in mutants]

@@ -7,9 +7,9 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from mutants.__main__ import equivalents
+from mutants.__main__ import equivalents, sources
 from mutants.mutations import compiles, mutations
-from mutants.reach import CORE, Reach, digest, folders, imported_files
+from mutants.reach import CORE, FOLDERS, Reach, digest, folders, imported_files
 from mutants.trial import Tree
 
 ROOT = Path(__file__).parent.parent
@@ -66,8 +66,18 @@ def test_nearly_all_mutations_of_a_module_compile() -> None:
     assert found.count(False) < len(found) / 20
 
 
-def test_all_packages_of_the_core_are_there() -> None:
-    assert [name for name in CORE if not ((ROOT / "src/steptwin" / name).is_dir() and (ROOT / "tests" / name).is_dir())] == []
+def test_all_packages_of_the_core_and_all_folders_of_tests_are_there() -> None:
+    assert [name for name in CORE if not (ROOT / "src/steptwin" / name).is_dir()] == []
+    assert [folder for folder in FOLDERS if not (ROOT / folder).is_dir()] == []
+
+
+def test_what_is_mutated_is_a_package_a_folder_of_one_or_a_module() -> None:
+    assert sources(ROOT, ["wire/rtu.py", "wire/rtu.py"]) == [ROOT / "src/steptwin/wire/rtu.py"]
+    assert ROOT / "src/steptwin/wire/rtu.py" in sources(ROOT, ["wire"])
+    inside = sources(ROOT, ["drivers/m1486"])
+    assert inside
+    assert {path.parent for path in inside} == {ROOT / "src/steptwin/drivers/m1486"}
+    assert sources(ROOT, ["wire/nothing.py"]) == []
 
 
 def test_mutants_said_to_be_equivalent_are_still_possible() -> None:
