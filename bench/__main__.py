@@ -1,4 +1,4 @@
-"""``make bench``: requests per second and latencies against pymodbus' and libmodbus' servers, in one run on pinned processors.
+"""Requests per second and latencies against pymodbus' and libmodbus' servers, in one run on pinned processors.
 
 The server runs on the last processor, the client (C, so that it is not what is measured) on the first. Four axes of the
 controller are moving while their positions and velocities are read; the peers serve static registers.
@@ -7,6 +7,7 @@ controller are moving while their positions and velocities are read; the peers s
 from __future__ import annotations
 
 import argparse
+import ast
 import contextlib
 import importlib
 import json
@@ -27,8 +28,25 @@ HERE = Path(__file__).parent
 BIN = Path(sys.executable).parent
 PROCESSORS = sorted(os.sched_getaffinity(0))
 
-MODULES = sorted(path.stem for path in HERE.glob("*.py") if path.stem not in {"__init__", "__main__", "fleet", "pymodbus_server"})
-"""Every other module here measures something in its `main`."""
+SERVERS = {
+    "tcp": "Modbus TCP against both peers.",
+    "pty": "RTU on a pty against both.",
+    "fleet": "5000 controllers in one process.",
+}
+USUAL = [*SERVERS, "motion"]
+
+
+def modules() -> dict[str, str]:
+    """Every module with a `main` measures something; by its name, the first sentence of its docstring."""
+    found: dict[str, str] = {}
+    for path in sorted(HERE.glob("*.py")):
+        tree = ast.parse(path.read_text())
+        text = ast.get_docstring(tree) or ""
+        mains = [part for part in tree.body if isinstance(part, ast.FunctionDef) and part.name == "main"]
+        if mains and path.stem != "__main__":
+            found[path.stem] = " ".join(text.split("\n\n")[0].split(";")[0].split())
+    return found
+
 
 # name: (request PDU, bytes of the response PDU)
 REQUESTS = {
@@ -218,15 +236,31 @@ def fleet(client: Path, seconds: float, controllers: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
-    parser.add_argument(
-        "what", nargs="*", default=["tcp", "pty", "fleet", "motion"], help="tcp, pty, fleet, motion (default: all)"
+    measured = SERVERS | modules()
+    listed = "\n".join(f"  {name:<8} {text}" for name, text in measured.items())
+    parser = argparse.ArgumentParser(
+        prog="python -m bench",
+        description=__doc__,
+        epilog=f"what can be measured:\n{listed}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("what", nargs="*", default=USUAL, metavar="WHAT", help=f"see below (default: {' '.join(USUAL)})")
     parser.add_argument("--seconds", type=float, default=0.25, help="of each measurement")
     parser.add_argument("--rounds", type=int, default=9, help="of each measurement, the median counts")
     parser.add_argument("--controllers", type=int, default=5000)
     options = parser.parse_args()
-    if not shutil.which("cc"):
+    unknown = [name for name in options.what if name not in measured]
+    if unknown:
+        parser.error(f"nothing is called {', '.join(unknown)}: there are {', '.join(measured)}")
+    if SERVERS.keys() & set(options.what):
+        measure_servers(parser, options)
+    for name in options.what:
+        if name not in SERVERS:
+            importlib.import_module(f"bench.{name}").main()
+
+
+def measure_servers(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    if not shutil.which("cc") or subprocess.run(["pkg-config", "--exists", "libmodbus"], check=False).returncode:
         parser.error("a C compiler and libmodbus are needed: make peers")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -245,9 +279,6 @@ def main() -> None:
             compare_tty(client, libmodbus, folder, options.seconds, options.rounds)
         if "fleet" in options.what:
             fleet(client, max(5.0, options.seconds), options.controllers)
-    for name in MODULES:
-        if name in options.what:
-            importlib.import_module(f"bench.{name}").main()
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""``make bench ARGS=ways``: a controller of `serve` and the same recorded in a file, interleaved: rate, processor time."""
+"""A controller of `serve` and the same recorded in a file, interleaved: rate, processor time."""
 
 from __future__ import annotations
 

@@ -27,6 +27,7 @@ from typing import Any, NoReturn, TypeVar
 
 import pytest
 from facts import checked_facts
+from guard import guarded
 from hypothesis import Phase, settings
 from soak import time_limit
 from virtual_loop import VirtualLoop, run_virtually
@@ -86,6 +87,13 @@ def _missing(peer: str) -> NoReturn:
 def facts_of_all_events() -> Iterator[None]:
     """Whatever happens in a controller in any test, its facts are those of its data sheet."""
     with checked_facts():
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def processes_end_with_the_run() -> Iterator[None]:
+    """A run that is killed leaves no twins behind."""
+    with guarded():
         yield
 
 

@@ -17,7 +17,7 @@ ASKS = """
 @pytest.fixture
 def asking(pytester: pytest.Pytester) -> pytest.Pytester:
     pytester.makeconftest((Path(__file__).parent / "conftest.py").read_text())
-    pytester.makeini("[pytest]\nmarkers = peers\naddopts = --strict-markers -ra")
+    pytester.makeini("[pytest]\nmarkers = peers\naddopts = --strict-markers -ra\nasyncio_default_fixture_loop_scope = function")
     pytester.makepyfile(ASKS)
     return pytester
 

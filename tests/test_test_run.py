@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -33,7 +34,8 @@ def test_hangs():
 def test_a_test_that_hangs_in_a_callback_of_asyncio_is_ended(pytester: pytest.Pytester) -> None:
     """A limit that raises an exception would be caught by asyncio, and the test would wait on."""
     assert SETTINGS["timeout"] <= 300
-    pytester.makeini(f"[pytest]\ntimeout = 0.5\ntimeout_method = {SETTINGS['timeout_method']}\n")
+    copied = "".join(f"{name} = {SETTINGS[name]}\n" for name in ("timeout_method", "asyncio_default_fixture_loop_scope"))
+    pytester.makeini(f"[pytest]\ntimeout = 0.5\n{copied}")
     pytester.makepyfile(HANGS_IN_A_CALLBACK)
     outcome = pytester.runpytest_subprocess("-p", "no:xdist", "-p", "no:steptwin", timeout=30)
     assert outcome.ret != 0
@@ -51,6 +53,30 @@ def test_interrupts_are_tested_where_sigint_is_ignored_too() -> None:
         check=False,
     )
     assert ended.returncode == 0, ended.stdout
+
+
+STARTS_AND_WAITS = """
+import subprocess
+import sys
+
+from guard import guarded
+
+with guarded():
+    subprocess.run([sys.executable, "-c", "pass"])
+    wait = "import threading; print('started', flush=True); threading.Event().wait()"
+    with subprocess.Popen([sys.executable, "-c", wait]) as child:
+        child.wait()
+"""
+
+
+def test_a_run_that_is_killed_leaves_no_processes_behind() -> None:
+    """Its standard output ends when the last one that writes to it has: the process that it had started."""
+    support = {**os.environ, "PYTHONPATH": str(ROOT / "tests/support")}
+    with subprocess.Popen([sys.executable, "-c", STARTS_AND_WAITS], stdout=subprocess.PIPE, text=True, env=support) as run:
+        assert run.stdout is not None
+        assert run.stdout.readline() == "started\n"
+        run.kill()
+        assert run.stdout.read() == ""
 
 
 def test_signals_are_not_ignored() -> None:
