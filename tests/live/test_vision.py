@@ -6,7 +6,7 @@ import struct
 from functools import partial
 
 import pytest
-from wbc_rig import loaded
+from mic488_rig import loaded
 
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort

@@ -7,8 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
-from mic488_rig import Rig, controller
-from wbc_rig import PAUSED, RUNNING, STOPPED, ProgramRig, loaded
+from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, controller, loaded, programmed
 
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
@@ -29,7 +28,7 @@ COUNTER = "n = n + 1\n$R0 = n\nWAIT 1 = 2\n"
 
 @pytest.mark.parametrize(("firmware", "last"), [("1.23", 7), ("1.40", 7), ("1.70", 5)])
 def test_mic_28_banks_of_the_firmware(firmware: str, last: int) -> None:
-    rig = ProgramRig("OUT1 = ON\nWAIT 1 = 2\n", "", None, firmware)
+    rig = programmed("OUT1 = ON\nWAIT 1 = 2\n", "", None, firmware)
     rig.load("MOVEPTP @A\nOUT2 = ON\nWAIT 1 = 2\n", "A;1;2;3;4\n", bank=last)
     program, table = loaded("END\n", "A;1;2;3;4\n", firmware)
     with pytest.raises(Misuse, match=rf"program bank {last + 1}: permitted are 0…{last}"):
@@ -44,7 +43,7 @@ def test_mic_28_banks_of_the_firmware(firmware: str, last: int) -> None:
 
 
 def test_mic_31_a_bank_chosen_counts_from_the_next_start() -> None:
-    rig = ProgramRig("OUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed("OUT1 = ON\nWAIT 1 = 2\n")
     rig.load("OUT2 = ON\nWAIT 1 = 2\n", bank=1)
     rig.start()
     rig.word("PROG_BANK_SEL", 1)
@@ -60,7 +59,7 @@ def test_mic_31_a_bank_chosen_counts_from_the_next_start() -> None:
 
 
 def test_a_bank_in_use_cannot_be_loaded() -> None:
-    rig = ProgramRig(COUNTER)
+    rig = programmed(COUNTER)
     rig.start()
     with pytest.raises(Misuse, match="program bank 0 is in use: stop the program first"):
         rig.load("END\n")
@@ -105,7 +104,7 @@ def test_wbc_25_a_program_that_uses_positions_needs_a_position_bank(rows: str | 
 
 
 def test_wbc_25_a_row_0_that_the_program_writes_needs_no_position_bank() -> None:
-    rig = ProgramRig(
+    rig = programmed(
         "M1 = ON\nM2 = ON\nLinX = 5\nLinVel = 50\nMOVELIN 0\nWAITPOS\nPTPM2 = 3\nMOVEPTP 0\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\n"
     )
     rig.start()
@@ -116,7 +115,7 @@ def test_wbc_25_a_row_0_that_the_program_writes_needs_no_position_bank() -> None
 def test_positions_of_an_image_replace_rows_of_the_table() -> None:
     record = "0005" + "0000803f" + "00004040" + "0000a040" + "0000e040"
     moves = "M1 = ON\nM2 = ON\nM3 = ON\nMOVEPTP 1\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\n"
-    rig = ProgramRig(f"//!position 1 {record}\n{moves}", "A;1;2;3;4\nB;9;9;9;9\n")
+    rig = programmed(f"//!position 1 {record}\n{moves}", "A;1;2;3;4\nB;9;9;9;9\n")
     rig.start()
     rig.pin_until("OUT1", 1.0)
     # 1 and 5 for M1 and M3: the mask is 0101.
@@ -127,7 +126,7 @@ def test_positions_of_an_image_replace_rows_of_the_table() -> None:
 
 
 def test_mic_22_the_state_is_read() -> None:
-    rig = ProgramRig("WAIT IN1 = ON\nEND\n")
+    rig = programmed("WAIT IN1 = ON\nEND\n")
     assert rig.state == STOPPED
     rig.start()
     assert rig.state == RUNNING
@@ -140,7 +139,7 @@ def test_mic_22_the_state_is_read() -> None:
 
 
 def test_mic_31_starting_a_running_program_changes_nothing() -> None:
-    rig = ProgramRig(COUNTER)
+    rig = programmed(COUNTER)
     rig.start()
     rig.wait(1)
     rig.start()
@@ -149,7 +148,7 @@ def test_mic_31_starting_a_running_program_changes_nothing() -> None:
 
 
 def test_mic_31_program_and_master_command_the_same_axis_and_the_last_wins() -> None:
-    rig = ProgramRig("M1 = ON\nPABS M1 5000\nDELAY 2\nPABS M1 100\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed("M1 = ON\nPABS M1 5000\nDELAY 2\nPABS M1 100\nWAITPOS\nOUT1 = ON\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(1)
     rig.set("VEL_ABS", -300.0)
@@ -160,7 +159,7 @@ def test_mic_31_program_and_master_command_the_same_axis_and_the_last_wins() -> 
 
 
 def test_user_registers_are_shared_with_the_master() -> None:
-    rig = ProgramRig("WAIT $I10 = 7\n$D12 = $I10 * -100000\n$R14 = $D12 / 3\nWAIT 1 = 2\n")
+    rig = programmed("WAIT $I10 = 7\n$D12 = $I10 * -100000\n$R14 = $D12 / 3\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(100)
     rig.i(10, 7)
@@ -169,7 +168,7 @@ def test_user_registers_are_shared_with_the_master() -> None:
 
 
 def test_registers_of_axes_and_inputs_as_a_program_sees_them() -> None:
-    rig = ProgramRig(
+    rig = programmed(
         "M1 = ON\nAccM1 = 250\nDecM1 = 500\nVmaxM1 = 40\nLimLM1 = -7\nLimRM1 = 90\nPosM1 = 10\nENC1 = 55\n"
         "$I0 = StatM1\n$I1 = M1\nPREL M1 20\n$I2 = StatM1\n$I3 = M1\nWAITPOS\n"
         "$R10 = PosM1\n$R12 = VactM1\n$D14 = ENC1\n$R16 = AIN1\n$I18 = INPUTS\n"
@@ -187,7 +186,7 @@ def test_registers_of_axes_and_inputs_as_a_program_sees_them() -> None:
 
 @pytest.mark.parametrize(("firmware", "status"), [("1.23", 0), ("1.40", 0), ("1.70", 1)])
 def test_status_is_that_of_the_controller_from_1_70_on(firmware: str, status: int) -> None:
-    rig = ProgramRig("WAIT IN1 = ON\n$I0 = STATUS\nWAIT 1 = 2\n", "", None, firmware)
+    rig = programmed("WAIT IN1 = ON\n$I0 = STATUS\nWAIT 1 = 2\n", "", None, firmware)
     rig.start()
     rig.wait(0.1)
     rig.device.command(rig.device.axes[0].position_lost, rig.now)
@@ -215,7 +214,7 @@ def test_the_configuration_starts_a_program_at_power_on() -> None:
 
 
 def test_power_off_ends_a_program_that_nothing_starts_again() -> None:
-    rig = ProgramRig("TIMB1 = 7\nOUT1 = ON\nPULSE(OUT2, 1)\nWAIT 1 = 2\n")
+    rig = programmed("TIMB1 = 7\nOUT1 = ON\nPULSE(OUT2, 1)\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(0.5)
     rig.device.power_cycle(rig.now)
@@ -252,10 +251,10 @@ def test_a_snapshot_in_the_middle_of_any_statement_goes_on_elsewhere() -> None:
 
 
 def test_a_snapshot_belongs_to_the_contents_of_the_banks() -> None:
-    rig = ProgramRig(BUSY)
+    rig = programmed(BUSY)
     rig.start()
     snapshot = rig.device.snapshot()
-    other = ProgramRig(COUNTER)
+    other = programmed(COUNTER)
     with pytest.raises(Misuse, match="other programs or positions in its banks"):
         other.device.restore(snapshot)
     other.load(BUSY)
@@ -296,7 +295,7 @@ def test_outputs_of_programs_travel_over_wires_and_back_in_one_world() -> None:
 
 def test_a_program_without_any_wait_does_not_hang_and_lets_others_work() -> None:
     for statement_time in (0, MILLISECOND):
-        rig = ProgramRig("L:\nn = n + 1\n$R0 = n\nJUMP L\n", statement_time=statement_time)
+        rig = programmed("L:\nn = n + 1\n$R0 = n\nJUMP L\n", statement_time=statement_time)
         rig.start()
         for step in range(1, 100):
             rig.wait(0.01)
@@ -316,7 +315,7 @@ def test_a_program_without_any_wait_does_not_hang_and_lets_others_work() -> None
 )
 def test_a_waiting_program_notices_what_a_master_writes(name: str, key: str) -> None:
     """It waits without looking all the time; a write of the register lets it look."""
-    rig = ProgramRig(f"WAIT {name} = 5\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed(f"WAIT {name} = 5\nOUT1 = ON\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(3.0)
     assert not rig.out(1)
@@ -327,7 +326,7 @@ def test_a_waiting_program_notices_what_a_master_writes(name: str, key: str) -> 
 
 @pytest.mark.parametrize("paused", [False, True])
 def test_mic_31_program_control_0_ends_a_program_with_drives_and_outputs_off(paused: bool) -> None:
-    rig = ProgramRig("M1 = ON\nVABS M1 100\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed("M1 = ON\nVABS M1 100\nOUT1 = ON\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(0.1)
     if paused:
@@ -338,7 +337,7 @@ def test_mic_31_program_control_0_ends_a_program_with_drives_and_outputs_off(pau
 
 
 def test_mic_8_a_program_stops_and_moves_an_axis_whose_en_is_not_wired() -> None:
-    rig = ProgramRig(
+    rig = programmed(
         "VABS M1 100\nDELAY 1\nM1 = OFF\nWAIT IN1 = ON\nM2 = ON\nLinX = 5\nLinY = 5\nLinVel = 50\nMOVELIN 0\nWAITPOS\nOUT1 = ON\n"
         "WAIT 1 = 2\n",
         "",
@@ -356,7 +355,7 @@ def test_mic_8_a_program_stops_and_moves_an_axis_whose_en_is_not_wired() -> None
 
 def test_behind_the_last_line_a_program_stands_at_the_end_of_its_text() -> None:
     text = "OUT1 = ON\nOUT2 = ON\n"
-    rig = ProgramRig(text)
+    rig = programmed(text)
     rig.start()
     places = []
     for _ in range(4):

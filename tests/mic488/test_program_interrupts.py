@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mic488_rig import controller
-from wbc_rig import PAUSED, RUNNING, STOPPED, ProgramRig, started
+from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, controller, programmed, started
 
 from steptwin.mic488.config import InputConfig
 
@@ -107,7 +106,7 @@ def test_a_pulse_shorter_than_the_filter_does_not_interrupt() -> None:
 
 def test_interrupts_preset_by_the_configuration() -> None:
     inputs = (InputConfig(),) * 11 + (InputConfig(interrupt=2),) + (InputConfig(),) * 8
-    rig = ProgramRig("WAIT IN9 = ON\nINT_IN12:\n$I0 = $I0 + 1\nRETURN\n", config=controller(inputs=inputs))
+    rig = programmed("WAIT IN9 = ON\nINT_IN12:\n$I0 = $I0 + 1\nRETURN\n", config=controller(inputs=inputs))
     rig.start()
     for level in (1.0, 0.0):
         rig.pin("IN12", level)
@@ -188,7 +187,7 @@ def test_ticks_and_modbus_writes_and_drive_states_interrupt() -> None:
 @pytest.mark.parametrize("statement", IN_PROGRESS)
 @pytest.mark.parametrize("seconds", [0.0, 0.0005, 0.3, 40.0])
 def test_wbc_9_a_pause_shifts_every_statement_by_its_length(statement: str, seconds: float) -> None:
-    def play(pause_s: float | None) -> ProgramRig:
+    def play(pause_s: float | None) -> Rig:
         rig = started(IN_PROGRESS[statement])
         rig.wait(0.4)
         if pause_s is not None:
@@ -247,7 +246,7 @@ def test_pause_in_an_interrupt_and_interrupts_in_a_pause() -> None:
 
 
 def test_pause_without_a_program_and_stop_of_a_pause() -> None:
-    rig = ProgramRig("OUT1 = ON\nWAIT IN9 = ON\n")
+    rig = programmed("OUT1 = ON\nWAIT IN9 = ON\n")
     rig.pause()
     assert rig.state == STOPPED
     rig.start()

@@ -9,8 +9,7 @@ from math import atan2, cos, hypot, inf, radians, sin, sqrt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mic488_rig import controller
-from wbc_rig import RUNNING, STOPPED, ProgramRig
+from mic488_rig import RUNNING, STOPPED, Rig, controller, programmed
 
 from steptwin.machine import SECOND
 from steptwin.mic488.config import AxisConfig
@@ -21,13 +20,13 @@ ON = "M1 = ON\nM2 = ON\n"
 DONE = "WAITPOS\nOUT1 = ON\nWAIT 1 = 2\n"
 
 
-def ready(text: str, rows: str = "", *axes: AxisConfig) -> ProgramRig:
-    rig = ProgramRig(text, rows, controller(*(axes or (XY, XY))))
+def ready(text: str, rows: str = "", *axes: AxisConfig) -> Rig:
+    rig = programmed(text, rows, controller(*(axes or (XY, XY))))
     rig.start()
     return rig
 
 
-def failed(rig: ProgramRig) -> str:
+def failed(rig: Rig) -> str:
     assert (rig.state, rig.m_status) == (STOPPED, 2)
     fault = rig.device.program.fault
     assert fault is not None
@@ -116,7 +115,7 @@ def test_wbc_8_a_drive_on_its_limit_or_in_error_has_finished() -> None:
 @pytest.mark.parametrize(("mode", "firmware", "state"), [(2, "1.23", 0), (2, "1.70", 2), (1, "1.70", 1), (3, "1.70", 2)])
 def test_a_position_error_stops_the_program_or_from_1_70_pauses_it(mode: int, firmware: str, state: int) -> None:
     axis = replace(XY, pos_ctrl_mode=1, err_ctrl_mode=mode)
-    rig = ProgramRig("M1 = ON\nPABS M1 50\nDELAY 9\nOUT1 = ON\nWAIT 1 = 2\n", "", controller(axis), firmware)
+    rig = programmed("M1 = ON\nPABS M1 50\nDELAY 9\nOUT1 = ON\nWAIT 1 = 2\n", "", controller(axis), firmware)
     rig.device.couple_encoder(1, Coupling.BLOCKED, 0)
     rig.start()
     rig.wait(5)
@@ -147,9 +146,7 @@ def trapezoid(length: float, speed: float, acc: float, dec: float) -> Callable[[
     return way
 
 
-def follows(
-    rig: ProgramRig, begin_s: float, course: Course, way: Callable[[float], float], gears: Place = (100.0, 100.0)
-) -> None:
+def follows(rig: Rig, begin_s: float, course: Course, way: Callable[[float], float], gears: Place = (100.0, 100.0)) -> None:
     """From ``begin_s`` on, each axis' count is within a pulse of the course at every moment looked at, up to its end."""
     x, y = rig.device.axes[:2]
     end = max(x.profile.end or 0, y.profile.end or 0)

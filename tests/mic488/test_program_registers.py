@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mic488_rig import controller
-from wbc_rig import MM, RUNNING, STOPPED, ProgramRig, started
+from mic488_rig import MM, RUNNING, STOPPED, controller, programmed, started
 
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.program_registers import position_p
@@ -14,7 +13,7 @@ from steptwin.wbc.real import ProgramFault
 
 
 def test_user_registers_are_one_memory_with_the_low_word_first() -> None:
-    rig = ProgramRig("$D10 = $R20 + 0\n$R30 = $I40\n$I50 = $D60\n$I51 = $I41\nWAIT IN9 = ON\n")
+    rig = programmed("$D10 = $R20 + 0\n$R30 = $I40\n$I50 = $D60\n$I51 = $I41\nWAIT IN9 = ON\n")
     rig.r(20, 70000.4)
     rig.i(40, -5)
     rig.write_words(60, 0x2345, 0x0001)
@@ -26,7 +25,7 @@ def test_user_registers_are_one_memory_with_the_low_word_first() -> None:
 
 
 def test_wbc_14_whole_registers_take_the_nearest_number() -> None:
-    rig = ProgramRig("$I0 = $R20\n$D2 = $R20\nOUTPUTS = $R20\n$I1 = OUTPUTS\nWAIT IN9 = ON\n")
+    rig = programmed("$I0 = $R20\n$D2 = $R20\nOUTPUTS = $R20\n$I1 = OUTPUTS\nWAIT IN9 = ON\n")
     for value, word, dint, bits in [
         (2.5, 2, 2, 2), (3.5, 4, 4, 4), (-0.4, 0, 0, 0), (40000.0, 32767, 40000, 0x40), (-1e20, -32768, -(2**31), 0),
     ]:  # fmt: skip
@@ -103,7 +102,7 @@ def test_analog_inputs_are_scaled() -> None:
 
 @pytest.mark.parametrize("gear", [1.0, 4.0])
 def test_mic_14_positions_that_the_counter_holds_after_rounding(gear: float) -> None:
-    axis = ProgramRig("OUT1 = ON\n", "", controller(AxisConfig(gear=gear))).device.axes[0]
+    axis = programmed("OUT1 = ON\n", "", controller(AxisConfig(gear=gear))).device.axes[0]
     for pulses, rounded in ((-(2**31) - 0.25, -(2**31)), (2**31 - 0.75, 2**31 - 1), (12.75, 13), (-0.25, 0)):
         assert position_p(axis, pulses / gear, "PABS M1") == rounded
     for pulses in (-(2**31) - 0.5, -(2**31) - 1.25, 2**31 - 0.5, 2**31 + 0.25):
@@ -147,7 +146,7 @@ def test_a_loop_that_changes_a_register_and_changes_it_back_does_not_rest(name: 
 def test_a_wait_notices_that_an_encoder_wraps(counts: int, pulses: int, first: int, seconds: float) -> None:
     """At 1000 pulses/s, with as many counts per pulses as the encoder gives, whatever is configured."""
     wait = f"WAIT ENC1 {'<' if counts > 0 else '>'} 0"
-    rig = ProgramRig(f"M1 = ON\nVABS M1 1000\n{wait}\nOUT1 = ON\nWAIT IN9 = ON\n")
+    rig = programmed(f"M1 = ON\nVABS M1 1000\n{wait}\nOUT1 = ON\nWAIT IN9 = ON\n")
     rig.device.gear_encoder(1, counts, pulses, 0)
     rig.set("ENC_IMP", first)
     rig.start()
@@ -215,7 +214,7 @@ def test_a_line_from_the_registers_of_row_0() -> None:
     ],
 )
 def test_paths_that_cannot_be_run_are_program_errors(statement: str, rows: str, problem: str) -> None:
-    rig = ProgramRig(f"M1 = ON\nM2 = ON\n{statement}\nWAIT IN9 = ON\n", rows, controller(MM, MM))
+    rig = programmed(f"M1 = ON\nM2 = ON\n{statement}\nWAIT IN9 = ON\n", rows, controller(MM, MM))
     rig.i(0, 99)
     rig.start()
     rig.wait(0.1)

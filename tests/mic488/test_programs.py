@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
-from mic488_rig import controller
-from wbc_rig import MM, RUNNING, STOPPED, ProgramRig, loaded, started
+from mic488_rig import MM, RUNNING, STOPPED, controller, loaded, programmed, started
 
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ProgramConfig
@@ -18,7 +17,7 @@ from steptwin.mic488.config import ProgramConfig
 
 
 def test_a_bank_is_chosen_for_the_next_start() -> None:
-    rig = ProgramRig("$I0 = 10\nWAIT IN1 = ON\n", "a;1;x;x;x\n")
+    rig = programmed("$I0 = 10\nWAIT IN1 = ON\n", "a;1;x;x;x\n")
     rig.load("$I0 = 15\nM1 = ON\nMOVEPTP 0\nWAIT IN1 = ON\n", "b;5;x;x;x\n", bank=5)
     rig.start()
     rig.wait(0.1)
@@ -39,7 +38,7 @@ def test_a_bank_is_chosen_for_the_next_start() -> None:
 
 
 def test_an_empty_bank_lights_err_and_the_next_start_clears_it() -> None:
-    rig = ProgramRig("OUT1 = ON\nWAIT IN1 = ON\n")
+    rig = programmed("OUT1 = ON\nWAIT IN1 = ON\n")
     rig.word("PROG_BANK_SEL", 2)
     rig.start()
     assert (rig.state, rig.m_status, rig.pins()["ERR"]) == (STOPPED, 2, 1.0)
@@ -75,7 +74,7 @@ def test_banks_that_are_not_there_or_in_use() -> None:
 
 def test_power_on_starts_what_the_configuration_says() -> None:
     config = controller(program=ProgramConfig(activate=1, prog_bank=0, pos_bank=0))
-    rig = ProgramRig("$I3 = $I3 + 1\nWAIT IN1 = ON\nEND\n", config=config)
+    rig = programmed("$I3 = $I3 + 1\nWAIT IN1 = ON\nEND\n", config=config)
     rig.wait(0.01)
     assert (rig.state, rig.i(3)) == (RUNNING, 1)
     rig.device.power_cycle(rig.now)
@@ -150,7 +149,7 @@ def test_wbc_1_looping_by_jump_never_ends_the_memory() -> None:
     ["$R8 = 1 / $I0", "$R8 = 5 % $I0", "$R8 = asin($R2)", "$R8 = acos($R2)", "$R8 = sqrt($R4)", "RETURN", "OUT1 = $I0 / $I0"],
 )
 def test_wbc_5_what_cannot_be_done_stops_the_program(statement: str) -> None:
-    rig = ProgramRig(f"M1 = ON\nVABS M1 40\nOUT2 = ON\nDELAY 1\n{statement}\n$R10 = 1\n", config=controller(MM))
+    rig = programmed(f"M1 = ON\nVABS M1 40\nOUT2 = ON\nDELAY 1\n{statement}\n$R10 = 1\n", config=controller(MM))
     rig.r(2, 1.01)
     rig.r(4, -0.01)
     rig.start()
@@ -228,7 +227,7 @@ def test_nested_conditions_take_the_path_they_say(block: list[object], inputs: l
     marks = marks_of(block, inputs)
     subroutines = [f"MARK{n}:\n$D0 = $D0 * 10\n$D0 = $D0 % 1000000\n$D0 = $D0 + {n}\n$I2 = $I2 + 1\nRETURN" for n in range(1, 10)]
     used = [s for n, s in enumerate(subroutines, 1) if f"JUMP MARK{n}" in source_of(block)]
-    rig = ProgramRig("\n".join([*source_of(block), "OUT1 = ON", "WAIT IN1 = ON", *used]) + "\n")
+    rig = programmed("\n".join([*source_of(block), "OUT1 = ON", "WAIT IN1 = ON", *used]) + "\n")
     for index, value in enumerate(inputs):
         rig.i(100 + index, value)
     rig.start()

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from mic488_rig import read_pdu
-from wbc_rig import ProgramRig
+from mic488_rig import programmed, read_pdu
 
 from steptwin.mic488.vision import Com1Port, VisionReceiver, VisionRecord
 from steptwin.wire.rtu import encode_frame
@@ -60,7 +59,7 @@ JUMP L
 
 
 def test_a_program_sees_records() -> None:
-    rig = ProgramRig(PROGRAM)
+    rig = programmed(PROGRAM)
     rig.start()
     rig.wait(1)
     port = Com1Port(rig.device)
@@ -73,7 +72,7 @@ def test_a_program_sees_records() -> None:
 
 
 def test_wbc_15_modbus_and_records_on_one_port() -> None:
-    rig = ProgramRig(PROGRAM)
+    rig = programmed(PROGRAM)
     rig.start()
     modbus = RtuSlavePort({1: rig.device})
     frames: list[FrameDirection] = []

@@ -15,8 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mic488_rig import coil_pdu, controller, word_pdu
-from wbc_rig import RUNNING, ProgramRig
+from mic488_rig import RUNNING, Rig, coil_pdu, controller, programmed, word_pdu
 
 from steptwin.machine import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
@@ -56,12 +55,12 @@ class Case:
         end = _Trace(rig, 4, program=True, in_one_go=in_one_go)
         return rig.edges, list(rig.device.events), [*end.look(), *map(str, rig.device.user)]
 
-    def _run(self, *, in_one_go: bool) -> tuple[list[str], ProgramRig]:
+    def _run(self, *, in_one_go: bool) -> tuple[list[str], Rig]:
         lines = self.script.splitlines()
         program = "".join(line[1:].removeprefix(" ") + "\n" for line in lines if line.startswith("|"))
         rows = "".join(row + "\n" for row in self.settings("row"))
         firmware = (*self.settings("firmware"), "1.70")[0]
-        rig = ProgramRig(program or "WAIT IN20 = ON\n", rows, self.config(), firmware)
+        rig = programmed(program or "WAIT IN20 = ON\n", rows, self.config(), firmware)
         trace = _Trace(rig, int((*self.settings("axes"), "1")[0]), program=bool(program), in_one_go=in_one_go)
         found = []
         for line in lines:
@@ -79,7 +78,7 @@ def _numbers(pairs: str = "") -> dict[str, float]:
 
 
 class _Trace:
-    def __init__(self, rig: ProgramRig, axes: int, *, program: bool, in_one_go: bool) -> None:
+    def __init__(self, rig: Rig, axes: int, *, program: bool, in_one_go: bool) -> None:
         self.in_one_go = in_one_go
         self.rig = rig
         self.axes = axes

@@ -1,4 +1,4 @@
-"""A master in virtual time for tests of the MIC488: it speaks PDUs it makes itself and knows addresses from the manuals.
+"""A master in virtual time for tests of the MIC488 and its programs: it makes its PDUs itself and has addresses from the manuals.
 
 Nothing here uses the product's register table or encoding, so that a mistake there cannot hide itself.
 """
@@ -8,11 +8,18 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 from steptwin.machine import SECOND, PinEdge
-from steptwin.mic488.config import AxisConfig, ControllerConfig
+from steptwin.mic488.config import AxisConfig, ControllerConfig, read_config
 from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.inifile import IniFile
+from steptwin.mic488.program import LoadedProgram, load
+from steptwin.wbc.check import check
+from steptwin.wbc.dialect import dialect_for
+from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.world.contacts import PositionSwitch, place
 from steptwin.world.kernel import Kernel, PinName
 
@@ -28,6 +35,11 @@ VALUES = {
     "POS_REL": 92, "ENC_IMP": 100, "ENC_XPOS": 108, "POSLIM_L": 120, "POSLIM_R": 128,
 }  # fmt: skip
 EN, STOP, JOG, USER_REG_READ, USER_REG_SAVE, USER_REG_ZERO, IN, OUT = 2000, 2004, 2008, 2100, 2101, 2102, 5000, 6000
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "mic488"
+STOPPED, RUNNING, PAUSED = 0, 1, 2
+MM = AxisConfig(unit=3, gear=100.0, acc=200.0, dec=200.0, vel=50.0)
+"""A spindle."""
 
 
 def real_words(value: float) -> tuple[int, int]:
@@ -61,6 +73,13 @@ def controller(*axes: AxisConfig, **others: object) -> ControllerConfig:
     return replace(ControllerConfig(), axes=given, **others)  # type: ignore[arg-type]
 
 
+def loaded(text: str, rows: str = "", firmware: str = "1.70") -> tuple[LoadedProgram, PositionTable]:
+    """A program with its position table as banks take them."""
+    table, wrong = parse_positions(rows)
+    assert wrong == []
+    return load(check(text, table, dialect=dialect_for(firmware))), table
+
+
 class Refused(AssertionError):
     """A request the test expected to succeed was answered with an exception."""
 
@@ -68,8 +87,8 @@ class Refused(AssertionError):
 class Rig:
     """A controller in a kernel, its present moment, and everything that came out of it."""
 
-    def __init__(self, config: ControllerConfig | None = None, firmware: str = "1.70", **options: object) -> None:
-        self.device = Mic488Device(config or ControllerConfig(), firmware, **options)  # type: ignore[arg-type]
+    def __init__(self, config: ControllerConfig | None = None, firmware: str = "1.70", **options: Any) -> None:
+        self.device = Mic488Device(config or ControllerConfig(), firmware, **options)
         self.base = OFFSETS[firmware]
         self.kernel = Kernel()
         self.kernel.add("m", self.device)
@@ -202,3 +221,86 @@ class Rig:
     def use_dint(self) -> None:
         self.word("DATA_TYPE", 1)
         self.dint = True
+
+    def load(self, text: str, rows: str = "", bank: int = 0) -> None:
+        program, table = loaded(text, rows, self.device.firmware.name)
+        self.device.load_program(bank, program)
+        self.device.load_positions(bank, table)
+
+    # -------------------------------------------------------------- the program: PROGRAM_CTRL
+
+    def start(self) -> None:
+        self.word("PROGRAM_CTRL", RUNNING)
+
+    def pause(self) -> None:
+        self.word("PROGRAM_CTRL", PAUSED)
+
+    def halt(self) -> None:
+        self.word("PROGRAM_CTRL", STOPPED)
+
+    @property
+    def state(self) -> int:
+        return self.word("PROGRAM_CTRL")
+
+    @property
+    def m_status(self) -> int:
+        return self.word("M_STATUS")
+
+    # -------------------------------------------------------------- user registers
+
+    def i(self, number: int, value: int | None = None) -> int:
+        if value is not None:
+            self.write_words(number, value & 0xFFFF)
+        word = self.read_words(number, 1)[0]
+        return word - 0x10000 if word & 0x8000 else word
+
+    def d(self, number: int) -> int:
+        low, high = self.read_words(number, 2)
+        return struct.unpack(">i", struct.pack(">HH", high, low))[0]
+
+    def r(self, number: int, value: float | None = None) -> float:
+        if value is not None:
+            high, low = struct.unpack(">HH", struct.pack(">f", value))
+            self.write_words(number, low, high)
+        low, high = self.read_words(number, 2)
+        return struct.unpack(">f", struct.pack(">HH", high, low))[0]
+
+    # -------------------------------------------------------------- pins
+
+    def out(self, number: int) -> bool:
+        return self.pins()[f"OUT{number}"] == 1.0
+
+    def pin_until(self, pin: str, level: float, within: float = 100.0) -> float:
+        """Wait from event to event until ``pin`` has ``level``; the moment in seconds."""
+        end = self.now + round(within * SECOND)
+        while self.pins()[pin] != level:
+            due = self.kernel.deadline()
+            assert due is not None, f"nothing will happen, and {pin} is {self.pins()[pin]:g}"
+            assert due <= end, f"{pin} is {self.pins()[pin]:g} after {within} s"
+            self.wait_ns(due - self.now)
+        return self.now / SECOND
+
+    def changes(self, pin: str) -> list[tuple[float, float]]:
+        """(seconds, level) of every change of an output pin so far."""
+        return [(edge.time / SECOND, edge.value) for edge in self.edges if edge.pin == pin]
+
+
+def programmed(text: str, rows: str = "", config: ControllerConfig | None = None, firmware: str = "1.70", **options: Any) -> Rig:
+    """Bank 0 holds the program of ``text`` and the position table of ``rows``, checked without errors."""
+    program, table = loaded(text, rows, firmware)
+    return Rig(config, firmware, programs={0: program}, positions={0: table}, **options)
+
+
+def started(text: str, rows: str = "", axes: int = 2, **options: Any) -> Rig:
+    """A running program; the first ``axes`` are spindles."""
+    rig = programmed(text, rows, controller(*[MM] * axes), **options)
+    rig.start()
+    return rig
+
+
+def example(name: str) -> Rig:
+    """One of the example machines, from its files."""
+    rows = EXAMPLES / f"{name}.csv"
+    config = read_config(IniFile.parse((EXAMPLES / f"{name}.cfg").read_bytes(), name))
+    text = (EXAMPLES / f"{name}.prg").read_text()
+    return programmed(text, rows.read_text() if rows.exists() else "", config)

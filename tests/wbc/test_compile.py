@@ -6,8 +6,7 @@ from dataclasses import replace
 from itertools import product
 
 import pytest
-from mic488_rig import Rig
-from wbc_rig import loaded
+from mic488_rig import Rig, loaded
 
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.tables import IncompleteTable

@@ -6,7 +6,7 @@ from itertools import pairwise
 from math import hypot
 
 import pytest
-from wbc_rig import RUNNING, STOPPED, ProgramRig, example
+from mic488_rig import RUNNING, STOPPED, Rig, example
 
 from steptwin.mic488.encoder import Coupling
 
@@ -14,7 +14,7 @@ FILTER_S = 0.01
 """Of the inputs that are configured with none longer."""
 
 
-def place_switch(rig: ProgramRig, axis: int, pin: str, gear: float, at_u: float = -5.0) -> None:
+def place_switch(rig: Rig, axis: int, pin: str, gear: float, at_u: float = -5.0) -> None:
     """A home switch that is on from ``at_u`` downwards."""
     rig.switch(axis, None, round(at_u * gear), pin)
 
@@ -23,7 +23,7 @@ def place_switch(rig: ProgramRig, axis: int, pin: str, gear: float, at_u: float 
 
 
 @pytest.fixture
-def arm() -> ProgramRig:
+def arm() -> Rig:
     rig = example("pick_and_place")
     place_switch(rig, 1, "IN1", 80.0)
     place_switch(rig, 2, "IN2", 160.0)
@@ -31,7 +31,7 @@ def arm() -> ProgramRig:
     return rig
 
 
-def arm_waits(rig: ProgramRig) -> None:
+def arm_waits(rig: Rig) -> None:
     """Homed and at the waiting place, gripper first."""
     rig.wait(0.1)
     assert (rig.status(2), rig.status(1)) == (6, 1)
@@ -43,7 +43,7 @@ def arm_waits(rig: ProgramRig) -> None:
     assert [(rig.status(axis), rig.position(axis)) for axis in (1, 2)] == [(4, 120.0), (4, 20.0)]
 
 
-def test_pick_and_place_carries_a_part(arm: ProgramRig) -> None:
+def test_pick_and_place_carries_a_part(arm: Rig) -> None:
     arm_waits(arm)
     assert not any(arm.out(n) for n in (1, 2, 3, 8))
     arm.pin("IN7", 1.0)
@@ -70,7 +70,7 @@ def test_pick_and_place_carries_a_part(arm: ProgramRig) -> None:
     assert (arm.i(10), arm.state) == (1, RUNNING)
 
 
-def test_pick_and_place_shows_a_missing_part_and_goes_on(arm: ProgramRig) -> None:
+def test_pick_and_place_shows_a_missing_part_and_goes_on(arm: Rig) -> None:
     arm_waits(arm)
     arm.pin("IN5", 1.0)
     lit = arm.pin_until("OUT8", 1.0)
@@ -83,7 +83,7 @@ def test_pick_and_place_shows_a_missing_part_and_goes_on(arm: ProgramRig) -> Non
     assert (arm.i(10), arm.state) == (0, RUNNING)
 
 
-def test_pick_and_place_ends_when_the_master_has_enough(arm: ProgramRig) -> None:
+def test_pick_and_place_ends_when_the_master_has_enough(arm: Rig) -> None:
     arm_waits(arm)
     arm.i(0, 3)
     for pin in ("IN5", "IN6", "IN7"):
@@ -101,7 +101,7 @@ def test_pick_and_place_ends_when_the_master_has_enough(arm: ProgramRig) -> None
 # ---------------------------------------------------------------------- feeder
 
 
-def feeder(speed: float = 80.0, length: float = 25.0) -> ProgramRig:
+def feeder(speed: float = 80.0, length: float = 25.0) -> Rig:
     rig = example("feeder")
     rig.start()
     rig.wait(0.05)
@@ -214,7 +214,7 @@ def test_plotter_draws_what_it_says() -> None:
 
 
 @pytest.fixture
-def press() -> ProgramRig:
+def press() -> Rig:
     rig = example("press")
     place_switch(rig, 1, "IN3", 400.0)
     rig.pin("IN4", 1.0)
@@ -225,19 +225,19 @@ def press() -> ProgramRig:
     return rig
 
 
-def both_hands(rig: ProgramRig, apart: float = 0.1) -> None:
+def both_hands(rig: Rig, apart: float = 0.1) -> None:
     rig.wait(0.2)
     rig.pin("IN1", 1.0)
     rig.wait(apart)
     rig.pin("IN2", 1.0)
 
 
-def hands_off(rig: ProgramRig) -> None:
+def hands_off(rig: Rig) -> None:
     rig.pin("IN1", 0.0)
     rig.pin("IN2", 0.0)
 
 
-def test_press_makes_a_good_part(press: ProgramRig) -> None:
+def test_press_makes_a_good_part(press: Rig) -> None:
     both_hands(press)
     press.pin_until("OUT3", 0.0)
     hands_off(press)
@@ -250,7 +250,7 @@ def test_press_makes_a_good_part(press: ProgramRig) -> None:
     assert not press.out(2)
 
 
-def test_press_rejects_a_part_that_is_too_hard(press: ProgramRig) -> None:
+def test_press_rejects_a_part_that_is_too_hard(press: Rig) -> None:
     both_hands(press)
     press.pin_until("OUT3", 0.0)
     hands_off(press)
@@ -266,14 +266,14 @@ def test_press_rejects_a_part_that_is_too_hard(press: ProgramRig) -> None:
     assert (press.i(0), press.i(1)) == (0, 1)
 
 
-def test_press_refuses_a_hand_that_was_tied_down(press: ProgramRig) -> None:
+def test_press_refuses_a_hand_that_was_tied_down(press: Rig) -> None:
     both_hands(press, apart=2.0)
     press.wait(3.0)
     assert (press.position(1), press.status(1)) == (0.0, 4)
     assert press.out(3)
 
 
-def test_press_stops_when_the_light_curtain_is_broken(press: ProgramRig) -> None:
+def test_press_stops_when_the_light_curtain_is_broken(press: Rig) -> None:
     both_hands(press)
     press.pin_until("OUT3", 0.0)
     hands_off(press)
@@ -293,7 +293,7 @@ def test_press_stops_when_the_light_curtain_is_broken(press: ProgramRig) -> None
     assert (press.position(1), press.i(0), press.i(1)) == (0.0, 0, 0)
 
 
-def test_press_lets_a_hand_in_while_the_ram_is_up(press: ProgramRig) -> None:
+def test_press_lets_a_hand_in_while_the_ram_is_up(press: Rig) -> None:
     press.pin("IN4", 0.0)
     press.wait(0.5)
     press.pin("IN4", 1.0)
@@ -307,14 +307,14 @@ def test_press_lets_a_hand_in_while_the_ram_is_up(press: ProgramRig) -> None:
 
 
 @pytest.fixture
-def served() -> ProgramRig:
+def served() -> Rig:
     rig = example("slave")
     rig.start()
     rig.wait(0.1)
     return rig
 
 
-def test_slave_answers_commands_within_a_few_statements(served: ProgramRig) -> None:
+def test_slave_answers_commands_within_a_few_statements(served: Rig) -> None:
     for counted in (1, 2, 3):
         served.i(100, 1)
         served.wait(0.02)
@@ -330,7 +330,7 @@ def test_slave_answers_commands_within_a_few_statements(served: ProgramRig) -> N
 
 
 @pytest.mark.parametrize("later_ms", range(15))
-def test_slave_hears_a_command_whenever_it_follows_its_operands(served: ProgramRig, later_ms: int) -> None:
+def test_slave_hears_a_command_whenever_it_follows_its_operands(served: Rig, later_ms: int) -> None:
     served.r(104, 1.25)
     served.r(106, -3.5)
     served.wait(later_ms / 1000)
@@ -339,7 +339,7 @@ def test_slave_hears_a_command_whenever_it_follows_its_operands(served: ProgramR
     assert (served.i(100), served.i(101), served.r(108)) == (0, 3, -2.25)
 
 
-def test_slave_shows_inputs_and_sets_outputs(served: ProgramRig) -> None:
+def test_slave_shows_inputs_and_sets_outputs(served: Rig) -> None:
     served.pin("IN2", 1.0)
     served.pin("IN16", 1.0)
     served.pin("IN17", 1.0)  # not one of the first sixteen

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from wbc_rig import RUNNING, ProgramRig
+from mic488_rig import RUNNING, Rig, programmed
 
 from steptwin.mic488.config import ControllerConfig, InputConfig
 
@@ -13,13 +13,13 @@ FILTER = 0.010
 """Default filter of inputs."""
 
 
-def started(text: str, config: ControllerConfig | None = None, firmware: str = "1.70") -> ProgramRig:
-    rig = ProgramRig(text, "P;100;0;x;x\n", config, firmware)
+def started(text: str, config: ControllerConfig | None = None, firmware: str = "1.70") -> Rig:
+    rig = programmed(text, "P;100;0;x;x\n", config, firmware)
     rig.start()
     return rig
 
 
-def pulse(rig: ProgramRig, pin: str, seconds: float = 0.05) -> None:
+def pulse(rig: Rig, pin: str, seconds: float = 0.05) -> None:
     rig.pin(pin, 1)
     rig.wait(seconds)
     rig.pin(pin, 0)
@@ -264,7 +264,7 @@ def test_an_event_during_a_pause_comes_when_the_program_goes_on() -> None:
 
 
 def test_an_interrupt_without_statement_time_is_served_at_its_moment() -> None:
-    rig = ProgramRig("CFGINT_IN1 = RIS\nWHILE 1 = 1\nn = n + 1\nENDWHILE\nINT_IN1:\nOUT1 = ON\nRETURN\n", statement_time=0)
+    rig = programmed("CFGINT_IN1 = RIS\nWHILE 1 = 1\nn = n + 1\nENDWHILE\nINT_IN1:\nOUT1 = ON\nRETURN\n", statement_time=0)
     rig.start()
     rig.wait(0.0205)
     rig.pin("IN1", 1)

@@ -6,15 +6,15 @@ import struct
 from math import cos, radians, sin, sqrt
 
 import pytest
-from wbc_rig import PAUSED, RUNNING, STOPPED, ProgramRig
+from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, programmed
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
 from steptwin.wbc.registers import REAL_MAX
 
 
-def run(text: str, seconds: float = 1.0, **options: object) -> ProgramRig:
-    rig = ProgramRig(text, **options)  # type: ignore[arg-type]
+def run(text: str, seconds: float = 1.0, **options: object) -> Rig:
+    rig = programmed(text, **options)  # type: ignore[arg-type]
     rig.start()
     rig.wait(seconds)
     return rig
@@ -100,7 +100,7 @@ def test_wbc_14_user_registers_and_outputs_round_and_saturate() -> None:
 
 
 def test_not_a_number_from_a_master_reads_0() -> None:
-    rig = ProgramRig("WAIT IN1 = ON\n$R2 = $R0\n$R4 = $R6\nWAIT IN1 = OFF\n")
+    rig = programmed("WAIT IN1 = ON\n$R2 = $R0\n$R4 = $R6\nWAIT IN1 = OFF\n")
     rig.start()
     rig.write_words(0, 0, 0x7FC0)
     rig.write_words(6, 0, 0xFF80)
@@ -131,11 +131,11 @@ def test_wbc_6_the_statement_time_is_configurable(time: int) -> None:
 @pytest.mark.parametrize("time", [-1, 999, SECOND + 1])
 def test_wbc_6_other_statement_times_are_refused(time: int) -> None:
     with pytest.raises(Misuse, match=r"statement time = .* ms: permitted are 0 and 0\.001 to 1000 ms"):
-        ProgramRig("END\n", statement_time=time)
+        programmed("END\n", statement_time=time)
 
 
 def test_wbc_24_without_statement_time_a_thousand_statements_take_a_millisecond() -> None:
-    rig = ProgramRig("WHILE 1 = 1\nx = x + 1\n$R0 = x\nENDWHILE\n", statement_time=0)
+    rig = programmed("WHILE 1 = 1\nx = x + 1\n$R0 = x\nENDWHILE\n", statement_time=0)
     rig.start()
     rig.wait_ns(1)
     assert rig.r(0) == 250
@@ -144,7 +144,7 @@ def test_wbc_24_without_statement_time_a_thousand_statements_take_a_millisecond(
 
 
 def test_wbc_24_what_acts_counts_as_twenty() -> None:
-    rig = ProgramRig("L:\nOUT1 = ON\nOUT1 = OFF\nJUMP L\n", statement_time=0)
+    rig = programmed("L:\nOUT1 = ON\nOUT1 = OFF\nJUMP L\n", statement_time=0)
     rig.start()
     rig.wait_ns(MILLISECOND - 1)
     # Two actions and a jump are 41 statements.
@@ -254,7 +254,7 @@ def test_progreset_starts_again_with_drives_off() -> None:
 
 
 def test_wait_looks_on_the_grid_of_statement_times() -> None:
-    rig = ProgramRig("WAIT IN1 = ON\nOUT1 = ON\nWAIT IN1 = OFF\n")
+    rig = programmed("WAIT IN1 = ON\nOUT1 = ON\nWAIT IN1 = OFF\n")
     rig.start()
     rig.wait(1.0003)
     rig.pin("IN1", 1)
@@ -264,7 +264,7 @@ def test_wait_looks_on_the_grid_of_statement_times() -> None:
 
 
 def test_wbc_18_what_is_true_between_two_looks_only_is_missed() -> None:
-    rig = ProgramRig("M1 = ON\nVABS M1 1000\nWAIT PosM1 = 501\nOUT1 = ON\n", statement_time=100 * MILLISECOND)
+    rig = programmed("M1 = ON\nVABS M1 1000\nWAIT PosM1 = 501\nOUT1 = ON\n", statement_time=100 * MILLISECOND)
     rig.start()
     rig.wait(100)
     assert rig.changes("OUT1") == []
@@ -285,7 +285,7 @@ def test_wbc_18_what_is_true_between_two_looks_only_is_missed() -> None:
     ],
 )
 def test_a_wait_costs_nothing_while_it_lasts(wait: str, seconds: float | None) -> None:
-    rig = ProgramRig(f"M1 = ON\nVABS M1 1000\nWAIT {wait}\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed(f"M1 = ON\nVABS M1 1000\nWAIT {wait}\nOUT1 = ON\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(0.0035)
     looks = 0
@@ -318,7 +318,7 @@ def test_wbc_23_delay_is_of_whole_milliseconds() -> None:
     ],
 )
 def test_a_polling_loop_costs_nothing_while_it_finds_nothing(loop: str) -> None:
-    rig = ProgramRig(f"{loop}OUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed(f"{loop}OUT1 = ON\nWAIT 1 = 2\n")
     rig.start()
     for _ in range(600):
         due = rig.device.deadline()
@@ -374,7 +374,7 @@ def test_pulse_inverts_an_output_later_and_does_not_wait() -> None:
     ],
 )
 def test_wbc_5_a_program_error_stops_the_program_and_ramps_drives_down(line: str, text: str) -> None:
-    rig = ProgramRig(f"y = 0\nM1 = ON\nVABS M1 500\nOUT1 = ON\nDELAY 2\n{line}\nOUT2 = ON\n")
+    rig = programmed(f"y = 0\nM1 = ON\nVABS M1 500\nOUT1 = ON\nDELAY 2\n{line}\nOUT2 = ON\n")
     rig.start()
     rig.wait(2.05)
     control = rig.device.program
@@ -422,7 +422,7 @@ def test_mic_26_the_next_start_clears_a_program_error() -> None:
     ],
 )
 def test_wbc_9_pause_in_every_kind_of_statement(statement: str, before: float, after: float) -> None:
-    rig = ProgramRig(f"M1 = ON\nPREL M1 300\n{statement}\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed(f"M1 = ON\nPREL M1 300\n{statement}\nOUT1 = ON\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(before)
     rig.pause()
@@ -441,7 +441,7 @@ def test_wbc_9_pause_in_every_kind_of_statement(statement: str, before: float, a
 
 
 def test_wbc_9_a_delay_is_as_much_later_as_the_pause_was_long() -> None:
-    rig = ProgramRig("DELAY 1\nOUT1 = ON\nWAIT 1 = 2\n")
+    rig = programmed("DELAY 1\nOUT1 = ON\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(0.4)
     rig.pause()
