@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from heapq import heappop, heappush
+from typing import Protocol
 
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
@@ -33,6 +34,13 @@ def announced(world: World) -> list[dict[str, object]]:
     return found
 
 
+class Companion(Protocol):
+    """What acts on a world from outside at moments of its own, exactly at these: `advance` is called with the world there."""
+
+    def deadline(self) -> Nanos | None: ...
+    def advance(self, now: Nanos) -> None: ...
+
+
 class LiveWorld:
     """A world as a `Cell` keeps it up with real time."""
 
@@ -51,6 +59,8 @@ class LiveWorld:
         self.ring: Ring | None = None
         """The last records, where they are kept."""
         self.subject = WorldSubject(world, self.outside)
+        self.companion: Companion | None = None
+        """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
         """Called when a script has stopped it: nothing happens by itself from then on."""
 
@@ -110,6 +120,8 @@ class LiveWorld:
             if world.stopped is not None:
                 break
             self._dues.advance(due)
+            if self.companion is not None:
+                self.companion.advance(due)
         self.stale = True
         world.advance(now)
         if world.stopped is not None and self.on_stop is not None:
@@ -124,7 +136,9 @@ class LiveWorld:
         if self.world.stopped is not None:
             return None
         due, own = self._dues.first(), self.world.next()
-        return due if own is None else own if due is None else min(due, own)
+        due = due if own is None else own if due is None else min(due, own)
+        other = None if self.companion is None else self.companion.deadline()
+        return due if other is None else max(other, self.now) if due is None else min(due, max(other, self.now))
 
 
 class _Dues:

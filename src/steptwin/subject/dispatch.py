@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.plaintypes import shown
@@ -75,11 +75,15 @@ def id_of(message: Mapping[str, object]) -> object:
 
 def command_of(message: Mapping[str, object]) -> Command:
     """The command in a request. Raises `Misuse`."""
+    return read_command(message["do"], fields_of(message))
+
+
+def fields_of(message: Mapping[str, object]) -> dict[str, object]:
+    """The fields in a request. Raises `Misuse` for another version."""
     version = message.get("version", VERSION)
     if version != VERSION or isinstance(version, bool):
         raise Misuse(f"version = {shown(version)}: this subject has version {VERSION}")
-    fields = {name: value for name, value in message.items() if name not in ("do", "id", "version")}
-    return read_command(message["do"], fields)
+    return {name: value for name, value in message.items() if name not in ("do", "id", "version")}
 
 
 def answer(result: Result) -> Message:
@@ -103,15 +107,23 @@ def raised(error: Mapping[str, Any]) -> SteptwinError:
     return kinds.get(error["code"], SteptwinError)(error["message"])
 
 
-def respond(do: Callable[[Command, object], Result], line: bytes, on_internal: Callable[[Exception], object]) -> Message:
-    """The one answer to a message, whatever it is. ``do`` gets the command and the id of its message; ``on_internal`` is called
-    with exceptions that should not be."""
+T = TypeVar("T")
+
+
+def respond(
+    do: Callable[[T, object], Result],
+    line: bytes,
+    on_internal: Callable[[Exception], object],
+    read: Callable[[Message], T] = command_of,
+) -> Message:
+    """The one answer to a message, whatever it is. ``do`` gets what was read of the message, its command, and the id;
+    ``on_internal`` is called with exceptions that should not be."""
     found: dict[str, object] = {}
     try:
         message = read_message(line)
         identity = id_of(message)
         found = {} if identity is None else {"id": identity}
-        return {**found, **answer(do(command_of(message), identity))}
+        return {**found, **answer(do(read(message), identity))}
     except Exception as error:  # noqa: BLE001  whoever waits is never left without an answer
         if not isinstance(error, SteptwinError):
             on_internal(error)

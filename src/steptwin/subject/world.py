@@ -18,7 +18,8 @@ from steptwin.subject.time import advance
 from steptwin.wire.slave import FrameDirection
 from steptwin.world import script as steps
 from steptwin.world.actions import Outside, See
-from steptwin.world.control import ControllerCommand
+from steptwin.world.control import ControllerCommand, Jog
+from steptwin.world.heldjog import HeldJog
 from steptwin.world.plant import WORLD, Plant
 from steptwin.world.trace import TraceRecord
 
@@ -109,6 +110,16 @@ class WorldSubject:
         world.touch(name)
         on = world.plan.line_of.get(name)
         self._outside(make(machine, None if on is None else on[0].name, wanted))
+
+    def held_jog(self, wanted: Jog) -> HeldJog:
+        """A jog that lasts only while it is extended; nothing has been done yet. Raises `Misuse` and `Refusal`."""
+        world, name = self.world, wanted.machine
+        kind, machine = world.kind(name), world.machine(name)
+        if kind.held_jog is None:
+            raise Refusal(f"{name!r} is {kind.title}, which cannot be jogged")
+        world.touch(name)
+        on = world.plan.line_of.get(name)
+        return kind.held_jog(machine, None if on is None else on[0].name, wanted)
 
     def _request(self, step: steps.Request) -> object:
         master = self.world.line_called(step.line).master

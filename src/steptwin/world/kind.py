@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
     from steptwin.words.frames import FrameLine
-    from steptwin.world.control import ControllerCommand
+    from steptwin.world.control import ControllerCommand, Jog
     from steptwin.world.faults import AxisLoad, Body, Faults
+    from steptwin.world.heldjog import HeldJog
     from steptwin.world.lanes import AxisLane
     from steptwin.world.lines import Line, LineWords
     from steptwin.world.plant import Plant
@@ -181,6 +182,8 @@ class ControllerKind(Generic[S, M, V]):
     control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step]]
     """The steps by which its master does the commands for controllers that it can do. The text is the name of its line; the
     machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""
+    held_jog: Callable[[M, str | None, Jog], HeldJog] | None = None
+    """A jog that lasts only while it is extended; arguments and exceptions as those of ``control``."""
     state: Callable[[M, Nanos], dict[str, object]]
     """Its present state as plain data; the machine is at that moment."""
     statement: Callable[[M], str | None] = lambda machine: None

@@ -12,6 +12,7 @@ from steptwin.machine import MachineEvent
 from steptwin.words.m1486_state import state_of
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, Terminals
 from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line, table
+from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.world.kinds.m1486.table import M1486Spec
 from steptwin.world.kinds.m1486.view import M1486View
 from steptwin.world.kinds.m1486.words import ChipLineWords
@@ -56,6 +57,7 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     datasheet_of=lambda name: datasheet.datasheet_of(variant(name or table.DEFAULT_VARIANT)),
     point=points.live_point,
     control=control.CONTROL,
+    held_jog=M1486HeldJog,
     state=state_of,
     view=M1486View,
     lanes=lanes.lanes,

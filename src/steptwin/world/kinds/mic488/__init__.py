@@ -14,6 +14,7 @@ from steptwin.mic488.vision import VisionRecord
 from steptwin.words.mic488_state import empty_banks, state_of, statement_of
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Terminals, Vision
 from steptwin.world.kinds.mic488 import axes, build, control, faults, line, table
+from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
 from steptwin.world.kinds.mic488.table import Mic488Spec
 from steptwin.world.kinds.mic488.view import Mic488View
 from steptwin.world.kinds.mic488.words import ModbusWords
@@ -86,6 +87,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     datasheet_of=lambda variant: datasheet.datasheet_of(variant or DEFAULT_FIRMWARE),
     point=points.live_point,
     control=control.CONTROL,
+    held_jog=Mic488HeldJog,
     state=state_of,
     statement=statement_of,
     view=Mic488View,

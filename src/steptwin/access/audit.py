@@ -1,0 +1,50 @@
+"""The audit log: who did what, and what came of it; the last entries are kept."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from steptwin.access.control import Viewer
+from steptwin.machine import Nanos
+
+MOST_ENTRIES = 10_000
+LONGEST_FIELDS = 1000
+"""Characters of the fields of an entry, as JSON; longer ones are left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """``at`` is the wall clock as text (ISO 8601). ``outcome``: done, misuse, refusal, failure, internal."""
+
+    at: str
+    time: Nanos
+    viewer: str
+    role: str
+    do: str
+    fields: Mapping[str, object]
+    outcome: str
+
+    def plain(self) -> dict[str, object]:
+        head = {"at": self.at, "time_ns": str(self.time), "viewer": self.viewer, "role": self.role}
+        return {**head, "do": self.do, "fields": dict(self.fields), "outcome": self.outcome}
+
+
+class Audit:
+    """``clock`` gives the wall clock as text; ``sink`` is called with every entry, to keep it elsewhere."""
+
+    def __init__(self, clock: Callable[[], str], sink: Callable[[Entry], None] = lambda _: None) -> None:
+        self._entries: deque[Entry] = deque(maxlen=MOST_ENTRIES)
+        self._clock = clock
+        self._sink = sink
+
+    def add(self, viewer: Viewer, time: Nanos, do: str, fields: Mapping[str, object], outcome: str) -> None:
+        kept = fields if len(str(fields)) <= LONGEST_FIELDS else {"left_out": len(fields)}
+        entry = Entry(self._clock(), time, str(viewer), viewer.role.title, do, kept, outcome)
+        self._entries.append(entry)
+        self._sink(entry)
+
+    def last(self, most: int) -> list[Entry]:
+        """The newest last."""
+        return list(self._entries)[-most:]

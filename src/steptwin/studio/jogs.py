@@ -1,0 +1,105 @@
+"""Jogs that are held by viewers: what the studio asks of a subject for them, and those of a world."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from steptwin.errors import Refusal
+from steptwin.machine import Nanos
+from steptwin.subject.commands import Jog
+from steptwin.subject.world import WorldSubject
+from steptwin.world.heldjog import Given, HeldJog
+
+
+class Held(Protocol):
+    """A jog that has begun."""
+
+    @property
+    def lasts_ns(self) -> Nanos:
+        """How long it goes on after it was extended, in virtual time."""
+        ...
+
+    @property
+    def over(self) -> str | None:
+        """Why it has ended; None while it has not."""
+        ...
+
+    def extend(self) -> None:
+        """It goes on. Raises `Refusal` where it is over."""
+        ...
+
+    def release(self) -> None:
+        """It ends, with the ramp of the axis."""
+        ...
+
+    def drop(self) -> None:
+        """Whoever held it has gone."""
+        ...
+
+    def cut(self) -> None:
+        """Its axis was stopped otherwise."""
+        ...
+
+
+class Jogs(Protocol):
+    def begin(self, wanted: Jog) -> Held:
+        """Raises `Misuse` and `Refusal`."""
+        ...
+
+
+class WorldJogs:
+    """Those of a world, which ends them by itself: it is a companion of the world (`steptwin.live.world.Companion`)."""
+
+    def __init__(self, subject: WorldSubject) -> None:
+        self._subject = subject
+        self._held: list[_Held] = []
+
+    def begin(self, wanted: Jog) -> Held:
+        held = _Held(self._subject, self._subject.held_jog(wanted))
+        held.extend()
+        self._held.append(held)
+        return held
+
+    def deadline(self) -> Nanos | None:
+        return min((due for held in self._held if (due := held.jog.deadline()) is not None), default=None)
+
+    def advance(self, now: Nanos) -> None:
+        for held in self._held:
+            due = held.jog.deadline()
+            if due is not None and due <= now:
+                held.give(held.jog.advance(now))
+        self._held = [held for held in self._held if held.jog.deadline() is not None]
+
+
+class _Held:
+    """The moment of each call is the present one of the world."""
+
+    def __init__(self, subject: WorldSubject, jog: HeldJog) -> None:
+        self._subject = subject
+        self.jog = jog
+
+    @property
+    def lasts_ns(self) -> Nanos:
+        return self.jog.lasts_ns
+
+    @property
+    def over(self) -> str | None:
+        return self.jog.over
+
+    def extend(self) -> None:
+        self.give(self.jog.extend(self._subject.world.now))
+        if self.jog.over is not None:
+            raise Refusal(f"the jog has ended: {self.jog.over}")
+
+    def release(self) -> None:
+        self.give(self.jog.release(self._subject.world.now))
+
+    def drop(self) -> None:
+        self.give(self.jog.drop(self._subject.world.now))
+
+    def cut(self) -> None:
+        self.jog.cut()
+
+    def give(self, steps: Given) -> None:
+        for step in steps:
+            self._subject.do(step)
