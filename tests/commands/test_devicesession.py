@@ -105,7 +105,9 @@ def test_two_recordings() -> None:
         differences(one, one[1:])
 
 
-@pytest.mark.parametrize("text", ["", "{}", '{"format": "steptwin session 1"}\n{}', "x", '{"format": "steptwin session 1"}\nx'])
+@pytest.mark.parametrize(
+    "text", ["", "{}", "[" * 100_000, '{"format": "steptwin session 1"}\n{}', "x", '{"format": "steptwin session 1"}\nx']
+)
 def test_what_is_no_recording(text: str) -> None:
     with pytest.raises(Misuse, match=r"a.json is no recording"):
         from_text(text, "a.json")

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -263,3 +264,24 @@ def test_any_text_is_read_and_survives_print(text: str) -> None:
 def test_equality_is_about_meaning_not_place() -> None:
     assert parse("F640").program == parse("  f 640").program == ProgramText((ProgramLine(Command("F", 640)),))
     assert parse("I2H3").program != parse("I2L3").program
+
+
+@pytest.mark.parametrize("command", ["F1", "F1O", "a.", "I1H1", "["])
+def test_a_line_of_many_commands_takes_time_in_proportion(command: str) -> None:
+    assert calls_to_read(command * 800) < 5 * calls_to_read(command * 200)
+
+
+def calls_to_read(text: str) -> int:
+    """Calls of Python functions and steps of generators."""
+    count = 0
+
+    def call(frame: object, event: str, argument: object) -> None:
+        nonlocal count
+        count += event == "call"
+
+    sys.setprofile(call)
+    try:
+        parse(text)
+    finally:
+        sys.setprofile(None)
+    return count

@@ -181,7 +181,7 @@ def from_text(text: str, name: str) -> list[SessionStep]:
         if json.loads(head)["format"] != FORMAT:
             raise ValueError
         return [SessionStep(str(data["line"]), float(data["at_s"]), dict(data["result"])) for data in map(json.loads, lines)]
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise Misuse(f"{name} is no recording of a session ('steptwin record' makes them)") from None
 
 

@@ -210,7 +210,7 @@ class RemoteSubject:
             line, _, self._received = self._received.partition(b"\n")
             try:
                 message = json.loads(line)
-            except ValueError as error:
+            except (ValueError, RecursionError) as error:
                 raise self._silent(error) from error
             yield message
 

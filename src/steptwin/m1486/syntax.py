@@ -183,7 +183,7 @@ class _LineReader:
     @property
     def found(self) -> str:
         """The next character for messages."""
-        return f"found {self.chars[self.at]!r}" if self.left else "found the end of the line"
+        return f"found {self.chars[self.at]!r}" if self.next else "found the end of the line"
 
     def take(self) -> str:
         char = self.next
@@ -258,7 +258,7 @@ def _number(reader: _LineReader) -> int | None:
 
 def _no_word(reader: _LineReader, key: str, number: int | None) -> None:
     """Letters in the place of a number are no row of commands."""
-    if number is None and _WORD.match(reader.left):
+    if number is None and _WORD.match(reader.chars, reader.at):
         hint = "a number, or the end of the line for the internal variable" if takes_variable(key) else "a number"
         reader.give_up(findings.BAD_ARGUMENT, reader.rest_span(), f"{reader.left} is no number", hint)
 
@@ -269,11 +269,12 @@ def _no_other_notation(reader: _LineReader, key: str, start: int) -> None:
     if not rest:
         return
     span = reader.rest_span()
-    digits = "".join(_MEANT_DIGIT.get(char, char) for char in rest)
     apart = reader.places[reader.at] > reader.places[reader.at - 1] + 1
-    whole = reader.chars[start : reader.at] + digits
-    if rest[0] in _MEANT_DIGIT and set(digits) <= _DIGITS and not _DIGITS.isdisjoint(reader.chars[start:]) and not apart:
-        fix = Fix(Span(reader.places[start], span.end), whole)
+    # Most commands end here after one character: a line of many commands is read in a time proportional to its length.
+    all_meant = rest[0] in _MEANT_DIGIT and all(char in _DIGITS or char in _MEANT_DIGIT for char in rest)
+    if all_meant and not apart and not _DIGITS.isdisjoint(reader.chars[start:]):
+        digits = "".join(_MEANT_DIGIT.get(char, char) for char in rest)
+        fix = Fix(Span(reader.places[start], span.end), reader.chars[start : reader.at] + digits)
         reader.give_up(findings.BAD_ARGUMENT, span, f"{rest[0]!r} is a letter, not a digit", None, fix)
     if rest[1:2] not in _DIGITS:
         return

@@ -75,7 +75,7 @@ def test_snapshots_are_text() -> None:
     kept = mic.take_snapshot()
     assert Mic488Snapshot.from_json(kept.to_json()) == kept
     assert kept.user[100:] == (1, 2, 3)
-    for text in ("", "[]", "{}", '{"format": "something"}'):
+    for text in ("", "[]", "{}", '{"format": "something"}', "[" * 100_000):
         with pytest.raises(Misuse, match=r"no snapshot|the format is"):
             Mic488Snapshot.from_json(text)
     with pytest.raises(Misuse, match=r"the snapshot is of firmware 1.70, this controller has 1.23"):

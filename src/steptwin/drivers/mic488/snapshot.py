@@ -52,7 +52,7 @@ class Mic488Snapshot:
             values = {name: _checked(name, value, bool | int | float) for name, value in data["values"].items()}
             user = tuple(_checked(f"USER_REGISTER[{n}]", word, int) for n, word in enumerate(data["user_registers"]))
             return cls(str(data["firmware"]), DataType[data["data_type"]], values, user)
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             if isinstance(error, Misuse):
                 raise
             raise Misuse(f"this is no snapshot of a MIC488 ({type(error).__name__}: {error})") from None
