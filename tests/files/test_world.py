@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from small_world import moved, small
+from world_rig import moved, small
 
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of

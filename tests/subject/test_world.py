@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from tests.support.small_world import small
+from world_rig import small
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import session_of

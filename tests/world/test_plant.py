@@ -7,7 +7,7 @@ from textwrap import dedent
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_world import SMALL, moved, small
+from world_rig import SMALL, moved, small
 
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.files.world import World

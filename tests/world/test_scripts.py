@@ -6,7 +6,7 @@ from textwrap import dedent
 from typing import Any
 
 import pytest
-from small_world import small
+from world_rig import small
 
 from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World

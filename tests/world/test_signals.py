@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from small_world import small
+from world_rig import small
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from small_world import moved, small
+from world_rig import moved, small
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from trace_rig import Run, m1486_run, mic488_run
+from world_rig import Run, m1486_run, mic488_run
 
 from steptwin.m1486.lines import DUAL_DAC
 

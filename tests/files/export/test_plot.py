@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from trace_rig import Run
+from world_rig import Run
 
 from steptwin.files.export import write_trace
 from steptwin.files.export.polyline import curve
@@ -20,9 +20,32 @@ from steptwin.world.trace import Trace, TraceRecord
 def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
     write_trace(mic488.trace, tmp_path / "one.svg", views=mic488.views, until=mic488.until)
     text = (tmp_path / "one.svg").read_text()
-    for label in ("M1 position", "M4 velocity", "mm/s", "IN20", "OUT3", "M2_EN", "AIN1", "tcp-1", "events", "time (s)"):
+    for lane in (
+        "m.M1 position",
+        "m.M4 velocity",
+        "m.IN20",
+        "m.OUT3",
+        "m.M2_EN",
+        "m.AIN1",
+        "m.x.switch1",
+        "bus.tcp-1",
+        "m.events",
+    ):
+        assert f">{lane}<" in text, lane
+    assert ">mm/s<" in text
+    assert ">time (s)<" in text
+    assert "IN9<" not in text
+
+
+def test_lanes_of_the_only_machine_need_no_prefix(tmp_path: Path) -> None:
+    trace = Trace()
+    trace.add(TraceRecord(0, "m", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
+    trace.add(TraceRecord(0, "m", "edge", "IN20", 1.0))
+    trace.add(TraceRecord(5, "m", "edge", "IN20", 0.0))
+    write_trace(trace, tmp_path / "one.svg")
+    text = (tmp_path / "one.svg").read_text()
+    for label in ("M1 position", "IN20", "m"):
         assert f">{label}<" in text, label
-    assert ">IN9<" not in text
 
 
 def test_long_names_are_not_cut_off(tmp_path: Path) -> None:
@@ -96,9 +119,9 @@ def test_a_motion_without_end_is_shown_to_the_end(tmp_path: Path) -> None:
 
 def test_the_title_is_the_name_of_what_ran(mic488: Run, tmp_path: Path) -> None:
     write_trace(mic488.trace, tmp_path / "named.svg", views=mic488.views, title="bar <feeder>")
-    write_trace(mic488.trace, tmp_path / "plain.svg", views=mic488.views)
     assert ">bar &lt;feeder&gt;<" in (tmp_path / "named.svg").read_text()
-    assert ">m<" in (tmp_path / "plain.svg").read_text()
+    write_trace(mic488.trace, tmp_path / "plain.svg", views=mic488.views)
+    assert ">m, bus, world<" in (tmp_path / "plain.svg").read_text()
 
 
 @given(

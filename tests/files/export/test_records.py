@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from trace_rig import Run
+from world_rig import Run
 
 from steptwin.errors import Misuse
 from steptwin.files.export import read_trace, write_trace

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from pyarrow import parquet
-from trace_rig import Run
+from world_rig import Run
 
 from steptwin.files.export import tables, write_trace
 from steptwin.machine import MILLISECOND, SECOND
@@ -26,7 +26,7 @@ def rows(mic488: Run, tmp_path_factory: pytest.TempPathFactory) -> list[dict[str
 def test_there_is_a_row_for_every_period_and_a_column_for_everything(rows: list[dict[str, str]], mic488: Run) -> None:
     assert [float(row["time_s"]) for row in rows] == [n * PERIOD / SECOND for n in range(mic488.until // PERIOD + 1)]
     pins = {f"m.{record.subject}" for record in mic488.trace.edges()}
-    motion = {f"m.M{n}_{what}" for n in range(1, 5) for what in ("position_mm", "velocity_mm_s")}
+    motion = {f"m.M{n}_{what}" for n in range(1, 5) for what in ("position_mm", "velocity_mm_s", "since_power_on_mm")}
     assert set(rows[0]) == pins | motion | {"time_s"}
 
 
@@ -36,7 +36,10 @@ def test_samples_are_the_profiles_exactly(axis: str, rows: list[dict[str, str]],
     speeds = set()
     for n, row in enumerate(rows):
         profile: object = [record.value for record in plans if record.time <= n * PERIOD][-1]
-        assert float(row[f"m.M{axis}_position_mm"]) == profile.position(n * PERIOD) / 100.0  # type: ignore[attr-defined]
+        counted: float = profile.position(n * PERIOD)  # type: ignore[attr-defined]
+        assert float(row[f"m.M{axis}_since_power_on_mm"]) == counted / 100.0
+        position = (counted + mic488.origin_p(axis, n * PERIOD)) / 100.0
+        assert float(row[f"m.M{axis}_position_mm"]) == pytest.approx(position, abs=1e-9)
         assert float(row[f"m.M{axis}_velocity_mm_s"]) == profile.velocity(n * PERIOD) / 100.0  # type: ignore[attr-defined]
         speeds.add(row[f"m.M{axis}_velocity_mm_s"])
     assert len(speeds) > 4

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from trace_rig import Run
+from world_rig import Run
 
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.export.progress import silent
@@ -63,15 +63,17 @@ def test_the_cubics_of_a_page_are_the_motion(name: str, begin: Nanos, request: p
     tracks = sort_out(run.trace, run.views, begin, run.until).axes
     assert len(data["axes"]) == len(tracks) > 0
     for axis, track in zip(data["axes"], tracks, strict=True):
+        (number,) = (number for (_, number), view in run.views.items() if view is track.view)
         pieces = Pieces(axis["pieces"])
         for now in [chance.randrange(begin, run.until) for _ in range(300)] + [t for t in track.times if t >= begin]:
             plan = track.plan(now)
             profile = profile_of(plan)
-            assert pieces.position(now - begin) == pytest.approx(profile.position(max(now, profile.start)), abs=2e-5)
+            position = profile.position(max(now, profile.start)) + run.origin_p(number, now)
+            assert pieces.position(now - begin) == pytest.approx(position, abs=2e-5)
         for piece in pieces.pieces:
             now = begin + int(piece[0])
             plan = track.plan(now)
-            assert piece[5] == plan.count(max(now, profile_of(plan).start))
+            assert piece[5] == plan.count(max(now, profile_of(plan).start)) + run.origin_p(number, now)
             if isinstance(plan, StepTrain) and piece[6]:
                 assert piece[7] == plan.division(now).grid
 

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from trace_rig import Run
+from world_rig import Run
 
 from steptwin.errors import Misuse
 from steptwin.files import export
