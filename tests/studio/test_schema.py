@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from steptwin.studio.messages import MESSAGES
 from steptwin.studio.requests import ALL, OF_CONNECTION, REQUESTS, permit_of
@@ -42,7 +43,7 @@ def test_every_reference_leads_somewhere() -> None:
     def look(value: Any) -> None:
         if isinstance(value, dict):
             if isinstance(value.get("$ref"), str):
-                references.add(value["$ref"].removeprefix("#/$defs/"))
+                references.add(unquote(value["$ref"].removeprefix("#/$defs/")))
             for one in value.values():
                 look(one)
         elif isinstance(value, list):

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-import jsonschema
+import jsonschema_rs
 import pytest
 
 from steptwin import World
@@ -19,9 +19,9 @@ from steptwin.subject.world import WorldSubject
 WORLDS = sorted((Path(__file__).parents[2] / "examples/worlds").glob("*.toml"))
 
 
-def validator(name: str) -> jsonschema.Draft202012Validator:
-    defs: dict[str, Any] = definitions()
-    return jsonschema.Draft202012Validator({**defs[name], "$defs": defs})
+def validator(name: str) -> jsonschema_rs.Draft202012Validator:
+    defs: dict[str, Any] = json.loads(json.dumps(definitions()))
+    return jsonschema_rs.Draft202012Validator({**defs[name], "$defs": defs})
 
 
 @pytest.mark.parametrize("path", WORLDS, ids=lambda path: path.stem)

@@ -15,7 +15,7 @@ from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
-from steptwin.subject.commands import COMMANDS, Command, CommandRow, read_command
+from steptwin.subject.commands import COMMANDS, CommandRow
 from steptwin.subject.fields import FLAG, NAMES, TEXT, Field, Schema, number, read_fields, whole
 from steptwin.subject.shapes import members
 
@@ -214,19 +214,18 @@ _ROWS = (
 REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in _ROWS}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
-_BY_KIND: Mapping[object, RequestRow] = {row.kind: row for row in _ROWS}
 OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})
 
 
-def read_request(name: object, given: Mapping[str, object]) -> Command | StudioRequest:
-    """The request called ``name`` with fields as in JSON. Raises `Misuse`."""
-    row = REQUESTS.get(name) if isinstance(name, str) else None
-    if row is not None:
-        return row.kind(**read_fields(row.name, row.fields, given))
-    if name not in COMMANDS:
-        hint = NearMiss().hint(name, ALL) if isinstance(name, str) else ""
-        raise Misuse(f"no request {shown(name)}{hint}; requests are {', '.join(ALL)}")
-    return read_command(name, given)
+def check_name(name: str) -> None:
+    """Raises `Misuse` for what is no request."""
+    if name not in ALL:
+        raise Misuse(f"no request {shown(name)}{NearMiss().hint(name, ALL)}; requests are {', '.join(ALL)}")
+
+
+def read_request(row: RequestRow, given: Mapping[str, object]) -> StudioRequest:
+    """The request of a row with fields as in JSON. Raises `Misuse`."""
+    return row.kind(**read_fields(row.name, row.fields, given))
 
 
 def permit_of(name: str) -> Permit:

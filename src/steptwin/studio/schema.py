@@ -7,6 +7,7 @@ import json
 from steptwin.studio.messages import MESSAGES, VERSION
 from steptwin.studio.requests import LEASE, OF_CONNECTION, REQUESTS, permit_of
 from steptwin.subject.commands import COMMANDS
+from steptwin.subject.fields import Field
 from steptwin.subject.schema import DIALECT, definitions, request_schema
 
 
@@ -20,7 +21,7 @@ def schema() -> dict[str, object]:
     return {
         "$schema": DIALECT,
         "title": f"steptwin studio, version {VERSION}: a message is a JSON text",
-        "anyOf": [{"$ref": "#/$defs/(answer)"}, *({"$ref": f"#/$defs/{name}"} for name in messages)],
+        "anyOf": [{"$ref": "#/$defs/(answer)"}, *({"$ref": f"#/$defs/{name.replace(' ', '%20')}"} for name in messages)],
         "$defs": {
             "(request)": {"oneOf": [{"$ref": f"#/$defs/{name}"} for name in requests]},
             **{name: defs[name] for name in ("(answer)", "(event)", "(description)")},
@@ -39,7 +40,7 @@ def _request(name: str) -> dict[str, object]:
     return {**found, "x-role": permit.role.title, "x-control": permit.control, "x-rest": name not in OF_CONNECTION}
 
 
-def _of_subject(name: str) -> tuple[str, tuple]:
+def _of_subject(name: str) -> tuple[str, tuple[Field, ...]]:
     row = COMMANDS[name]
     meaning = f"{row.meaning} Answer: {row.answer}."
     return (f"{row.meaning} A lease, which has to be renewed." if name == "jog" else meaning), row.fields

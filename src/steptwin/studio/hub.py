@@ -1,0 +1,325 @@
+"""What viewers share: who there is, who holds control, jogs that are held, watched points, streams of events, the clock.
+
+Pure: moments of the wall clock are arguments, what is to be sent is taken by sessions (`steptwin.studio.session`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from math import inf
+from typing import Any, NamedTuple, Protocol
+
+from steptwin.access.audit import Audit
+from steptwin.access.control import Control, Viewer
+from steptwin.access.roles import Role
+from steptwin.access.tokens import Gate
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.studio.jogs import Held, Jogs
+from steptwin.studio.requests import REQUESTS, permit_of
+from steptwin.studio.streams import Streams
+from steptwin.studio.watches import Watches
+from steptwin.subject import commands as command
+from steptwin.subject.commands import COMMANDS, Command
+from steptwin.subject.contract import Description, Reading, Result
+from steptwin.subject.events import Event
+from steptwin.subject.following import Filter, Following, filter_of
+
+MOST_VIEWERS = 64
+MOST_LEASES = 32
+CLOCK_NS: Nanos = SECOND
+"""How often viewers are sent the moment."""
+FASTEST_JOG = 5.0
+"""Virtual seconds in a second up to which a jog can be renewed in time."""
+LONGEST_LEASE_MS = 250
+IDLE_NS: Nanos = 60 * SECOND
+"""Control that was taken over REST passes when nothing has been asked for so long."""
+
+
+class Moment(NamedTuple):
+    """The present of a subject, and how its time goes; ``speed`` infinite: as fast as possible."""
+
+    time: Nanos
+    running: bool
+    speed: float
+
+    def plain(self) -> dict[str, object]:
+        return {"time_ns": str(self.time), "running": self.running, "speed": "max" if self.speed == inf else self.speed}
+
+
+class Served(Protocol):
+    """The subject that is shown."""
+
+    @property
+    def description(self) -> Description: ...
+    def read(self, *points: str) -> tuple[Reading, ...]: ...
+    def do(self, wanted: Command, /) -> Result: ...
+    def follow(self, what: Filter, bound: int) -> Following: ...
+    def plans(self, what: Filter) -> list[Event]: ...
+
+
+@dataclass(slots=True)
+class Lease:
+    """A jog, and who holds it."""
+
+    number: int
+    viewer: Viewer
+    jog: command.Jog
+    held: Held
+
+    def plain(self) -> dict[str, object]:
+        head = {"lease": self.number, "viewer": self.viewer.number, "machine": self.jog.machine, "axis": self.jog.axis}
+        return {**head, "velocity": self.jog.velocity}
+
+
+class Shared:
+    """A part of the state that all viewers are sent when it has changed. ``version`` counts the changes."""
+
+    __slots__ = ("text", "version")
+
+    def __init__(self, value: object) -> None:
+        self.version = 0
+        self.text = json.dumps(value)
+
+    def put(self, value: object) -> None:
+        text = json.dumps(value)
+        if text != self.text:
+            self.text = text
+            self.version += 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """What a hub is given besides its subject."""
+
+    moment: Callable[[], Moment]
+    gate: Gate
+    audit: Audit
+    program: str
+    """Version of steptwin."""
+    virtual: bool = True
+    on_internal: Callable[[Exception], object] = lambda error: None
+
+
+class Hub:
+    """Of one subject."""
+
+    def __init__(self, subject: Served, jogs: Jogs, around: Surroundings) -> None:
+        self.subject = subject
+        self.around = around
+        self.control = Control()
+        self.streams = Streams(subject)
+        self.watches = Watches()
+        self.viewers: dict[int, Viewer] = {}
+        self.description = json.dumps(subject.description.plain(), separators=(",", ":"))
+        """Of the subject, which does not change, as JSON."""
+        self._jogs = jogs
+        self._numbers = count(1)
+        self._leases: dict[int, Lease] = {}
+        self._lease_numbers = count(1)
+        self._asked: dict[int, Nanos] = {}
+        """When those over REST asked last."""
+        self._clock_due: Nanos = 0
+        self._running: tuple[bool, float] | None = None
+        self.shared: Mapping[str, Shared] = {
+            "lost": Shared(None),
+            "control": Shared(None),
+            "viewers": Shared(0),
+            "leases": Shared([]),
+            "clock": Shared(None),
+        }
+
+    # ------------------------------------------------------------------ who there is
+
+    def number(self) -> int:
+        return next(self._numbers)
+
+    def join(self, viewer: Viewer) -> None:
+        """Raises `Refusal` where there are too many."""
+        if len(self.viewers) >= MOST_VIEWERS:
+            raise Refusal(f"there are {MOST_VIEWERS} viewers already, which is the most")
+        self.viewers[viewer.number] = viewer
+        self.shared["viewers"].put(len(self.viewers))
+
+    def leave(self, viewer: Viewer) -> None:
+        """Jogs end, control passes."""
+        if self.viewers.pop(viewer.number, None) is None:
+            return
+        self.shared["viewers"].put(len(self.viewers))
+        self._drop([lease for lease in self._leases.values() if lease.viewer.number == viewer.number])
+        self.control.release(viewer)
+        self._say_control()
+
+    def may(self, role: Role) -> list[str]:
+        """Names of requests that a role may use here."""
+        of_subject = [name for name in COMMANDS if name in self.subject.description.commands]
+        return [name for name in (*of_subject, *REQUESTS) if permit_of(name).role <= role]
+
+    # ------------------------------------------------------------------ control
+
+    def take_control(self, viewer: Viewer, *, over: bool) -> None:
+        """Raises `Refusal` where another one holds it, without ``over``. Jogs of others end."""
+        self.control.take(viewer, over=over)
+        self._drop([lease for lease in self._leases.values() if lease.viewer.number != viewer.number])
+        self._say_control()
+
+    def release_control(self, viewer: Viewer) -> None:
+        self._drop([lease for lease in self._leases.values() if lease.viewer.number == viewer.number])
+        self.control.release(viewer)
+        self._say_control()
+
+    def _say_control(self) -> None:
+        self.shared["control"].put(self.holder())
+
+    def holder(self) -> object:
+        found = self.control.holder
+        return None if found is None else {"viewer": found.number, "name": found.name}
+
+    def asked(self, viewer: Viewer, now: Nanos) -> None:
+        """Somebody without a connection has asked something."""
+        self._asked[viewer.number] = now
+
+    # ------------------------------------------------------------------ jogs
+
+    def begin_jog(self, viewer: Viewer, wanted: command.Jog) -> dict[str, object]:
+        """Raises `Misuse` and `Refusal`."""
+        speed = self.around.moment().speed
+        if speed > FASTEST_JOG:
+            raise Refusal(f"time goes too fast for a jog ({speed:g} times): it is possible up to {FASTEST_JOG:g} times")
+        own = [one for one in self._leases.values() if (one.jog.machine, one.jog.axis) == (wanted.machine, wanted.axis)]
+        for lease in own:
+            self._end(lease, lease.held.release)
+        if len(self._leases) >= MOST_LEASES:
+            raise Refusal(f"{MOST_LEASES} axes are jogged already, which is the most")
+        held = self._jogs.begin(wanted)
+        lease = Lease(next(self._lease_numbers), viewer, wanted, held)
+        self._leases[lease.number] = lease
+        self._say_leases()
+        return self._lasting(lease)
+
+    def renew(self, viewer: Viewer, number: int) -> dict[str, object]:
+        """Raises `Refusal` for a jog that has ended."""
+        lease = self._lease(viewer, number)
+        try:
+            lease.held.extend()
+        except SteptwinError:
+            self._end(lease, lease.held.release)
+            raise
+        return self._lasting(lease)
+
+    def let_go(self, viewer: Viewer, number: int) -> None:
+        """Nothing for a jog that has ended."""
+        if number in self._leases:
+            lease = self._lease(viewer, number)
+            self._end(lease, lease.held.release)
+
+    def _lease(self, viewer: Viewer, number: int) -> Lease:
+        lease = self._leases.get(number)
+        if lease is None or lease.viewer.number != viewer.number:
+            raise Refusal(f"lease {number} has ended, or is another viewer's")
+        return lease
+
+    def _lasting(self, lease: Lease) -> dict[str, object]:
+        """In milliseconds of the wall clock."""
+        lasts_ms = lease.held.lasts_ns / MILLISECOND / max(self.around.moment().speed, 1.0)
+        return {"lease": lease.number, "lasts_ms": min(int(lasts_ms), LONGEST_LEASE_MS)}
+
+    def _drop(self, leases: Sequence[Lease]) -> None:
+        for lease in leases:
+            self._end(lease, lease.held.drop)
+
+    def _end(self, lease: Lease, end: Callable[[], None]) -> None:
+        del self._leases[lease.number]
+        self._say_leases()
+        try:
+            end()
+        except SteptwinError as error:  # it lapses by itself
+            self.around.on_internal(error)
+
+    def _say_leases(self) -> None:
+        self.shared["leases"].put(self.leases())
+
+    def leases(self) -> list[dict[str, object]]:
+        return [lease.plain() for lease in self._leases.values()]
+
+    # ------------------------------------------------------------------ what the subject is asked
+
+    def stop(self, wanted: command.StopAxes) -> Result:
+        """A stop ends the jogs of what it stops."""
+        self._cut(wanted)
+        return self.subject.do(wanted)
+
+    def _cut(self, stopped: command.StopAxes) -> None:
+        for lease in list(self._leases.values()):
+            if lease.jog.machine == stopped.machine and stopped.axis in (None, lease.jog.axis):
+                self._end(lease, lease.held.cut)
+
+    def stop_all(self) -> dict[str, object]:
+        """Programs first, so that none begins another motion. What cannot be stopped keeps no other from it."""
+        failed: dict[str, str] = {}
+        names = [part.name for part in self.subject.description.machines]
+        for name in names:
+            self._cut(command.StopAxes(name))
+        for name in names:
+            try:
+                self.subject.do(command.ControlProgram(name, "stop"))
+            except Refusal:
+                pass  # it has none
+            except SteptwinError as error:
+                failed[name] = str(error)
+        for name in names:
+            try:
+                self.subject.do(command.StopAxes(name))
+            except SteptwinError as error:
+                failed[name] = str(error)
+        return {"machines": [name for name in names if name not in failed], "failed": failed}
+
+    def present(self) -> tuple[dict[str, object], int]:
+        """The state of the subject for the message hello but its description, and the number of the command that has read it."""
+        subject, can = self.subject, self.subject.description.commands
+        plain: dict[str, Any] = {"state": {}, "faults": []}
+        if "state" in can:
+            plain["state"] = {part.name: subject.do(command.State(part.name)).value for part in subject.description.machines}
+        if "faults" in can:
+            plain["faults"] = subject.do(command.ListFaults()).value
+        plain["plans"] = [plan.plain() for plan in subject.plans(filter_of(["plan"]))]
+        self.streams.flush()
+        return plain, subject.do(command.Time()).number
+
+    def read(self, points: Sequence[str]) -> tuple[Reading, ...]:
+        if not points:
+            raise Misuse("points: at least one is needed")
+        return self.subject.read(*points)
+
+    # ------------------------------------------------------------------ time
+
+    def tick(self, now: Nanos) -> None:
+        """Called about 30 times a second while there are viewers: reads what is watched, spreads events, looks at the clock."""
+        points = self.watches.due(now)
+        if points:
+            try:
+                self.watches.put(self.subject.read(*points))
+                self.shared["lost"].put(None)
+            except SteptwinError as error:
+                self.shared["lost"].put(str(error))
+        self.streams.flush()
+        over = [lease for lease in self._leases.values() if lease.held.over is not None]
+        for lease in over:
+            del self._leases[lease.number]
+        if over:
+            self._say_leases()
+        holder = self.control.holder
+        if holder is not None and now - self._asked.get(holder.number, now) > IDLE_NS:
+            del self._asked[holder.number]
+            self.release_control(holder)
+        self._look_at_clock(now)
+
+    def _look_at_clock(self, now: Nanos) -> None:
+        moment = self.around.moment()
+        goes = moment.running, moment.speed
+        if goes != self._running or now >= self._clock_due:
+            self._running, self._clock_due = goes, now + CLOCK_NS
+            self.shared["clock"].put(moment.plain())

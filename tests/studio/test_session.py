@@ -1,0 +1,522 @@
+"""Viewers of a studio in memory: what they may, what they are sent, what of it waits."""
+
+from __future__ import annotations
+
+import gc
+import json
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tests.support.soak import scaled
+from tests.support.studio_rig import ENGINEER, OPERATOR, VIEWER, Studio, Tab, check_message
+
+from steptwin.access.roles import Role
+from steptwin.machine import MILLISECOND
+from steptwin.studio import session as sessions
+from steptwin.studio.hub import MOST_VIEWERS
+from steptwin.studio.requests import ALL
+from steptwin.studio.session import Session
+
+
+def kinds(messages: list[dict[str, Any]]) -> list[str]:
+    return [next(key for key in message if key not in ("seq", "time_ns", "missed")) for message in messages]
+
+
+# ---------------------------------------------------------------------- hello
+
+
+def test_hello_is_answered_and_followed_by_the_whole_state() -> None:
+    studio = Studio()
+    tab = Tab(studio)
+    assert tab.session.take(studio.now) == []
+    assert tab.ok("hello", name="Anna", lang="pl") == {"viewer": 1, "name": "Anna", "role": "engineer"}
+    (hello,) = tab.read()
+    whole = hello["hello"]
+    assert (whole["viewer"], whole["viewers"], whole["control"], whole["virtual"]) == (1, 1, None, True)
+    assert [one["name"] for one in whole["description"]["machines"]] == ["table", "drum"]
+    assert set(whole["state"]) == {"table", "drum"}
+    axes = [("table", "1"), ("table", "2"), ("table", "3"), ("table", "4"), ("drum", "1")]
+    assert [(plan["machine"], plan["axis"]) for plan in whole["plans"]] == axes
+    assert {"move", "jog", "save", "audit"} <= set(whole["may"])
+    assert tab.read() == []
+
+
+def test_nothing_but_stops_is_done_before_hello() -> None:
+    tab = Tab(Studio())
+    assert tab.error("read", points=["time"]) == ("refusal", "read: the first request is hello")
+    assert tab.error("move", machine="table", axis=1, to=1)[0] == "refusal"
+    assert tab.ok("stop", machine="table") is None
+    assert tab.ok("stop_all") == {"machines": ["table", "drum"], "failed": {}}
+    tab.ok("hello")
+    assert tab.error("hello")[0] == "misuse"
+
+
+def test_a_wrong_token_is_refused_and_the_connection_is_to_be_cut_off() -> None:
+    tab = Tab(Studio(tokens=True))
+    assert tab.error("hello") == ("refusal", "no token: open the address with the token that the studio printed")
+    assert tab.session.is_refused
+    tab = Tab(Studio(tokens=True))
+    assert tab.error("hello", token="engineer-012345678") == ("refusal", "wrong token")
+    assert tab.session.is_refused
+
+
+def test_resync_gives_the_whole_state_and_counts_from_there() -> None:
+    studio = Studio()
+    tab = studio.open()
+    tab.ok("watch", points=["table.M1.position"])
+    tab.ok("enable", machine="table", axis=1)
+    studio.run(100)
+    assert len(tab.read()) > 1
+    tab.ok("resync")
+    messages = tab.read()
+    assert kinds(messages) == ["hello", "values"]  # values are not in the state, so all of them follow
+    assert messages[0]["hello"]["state"]["table"]["axes"][0]["enabled"] is True
+    assert messages[0]["hello"]["control"]["viewer"] == 1
+
+
+def test_no_more_viewers_than_there_is_room_for() -> None:
+    studio = Studio()
+    tabs = [studio.open() for _ in range(MOST_VIEWERS)]
+    assert Tab(studio).error("hello") == ("refusal", f"there are {MOST_VIEWERS} viewers already, which is the most")
+    tabs[0].close()
+    studio.open()
+
+
+# ---------------------------------------------------------------------- roles and control
+
+
+def test_roles_may_what_their_tokens_say() -> None:
+    studio = Studio(tokens=True)
+    viewer, operator = studio.open(token=VIEWER), studio.open(token=OPERATOR)
+    assert viewer.ok("read", points=["table.M1.position"])[0]["value"] == 0.0
+    code, message = viewer.error("enable", machine="table", axis=1)
+    assert (code, message) == ("refusal", "enable is for the role operator; hall has the role viewer")
+    assert viewer.ok("stop", machine="table") is None
+    operator.ok("enable", machine="table", axis=1)
+    assert operator.error("fault", fault="crc nth=3")[1] == "fault is for the role engineer; piotr has the role operator"
+    assert operator.error("audit")[0] == "refusal"
+    assert "fault" not in operator.messages[0]["hello"]["may"]
+    assert "move" not in viewer.messages[0]["hello"]["may"]
+
+
+def test_two_viewers_see_the_same_and_hand_control_over() -> None:
+    studio = Studio()
+    anna, piotr = studio.open("Anna"), studio.open("Piotr")
+    anna.ok("enable", machine="table", axis=1)
+    for tab in (anna, piotr):
+        tab.read()
+        assert tab.newest("control") == {"viewer": 1, "name": "Anna"}
+        assert tab.newest("viewers") == 2 if tab is anna else True
+    code, message = piotr.error("move", machine="table", axis=1, to=5)
+    assert (code, message) == (
+        "refusal",
+        "move needs control, which Anna (viewer 1) holds: take_control with over = true takes it",
+    )
+    assert piotr.error("take_control")[0] == "refusal"
+    piotr.ok("take_control", over=True)
+    piotr.ok("move", machine="table", axis=1, to=5)
+    assert anna.error("move", machine="table", axis=1, to=0)[0] == "refusal"
+    anna.ok("stop", machine="table", axis=1)
+    piotr.close()
+    anna.read()
+    assert anna.newest("control") is None
+    assert anna.newest("viewers") == 1
+    anna.ok("move", machine="table", axis=1, to=0)
+
+
+def test_a_refused_act_takes_no_control() -> None:
+    studio = Studio()
+    tab = studio.open()
+    assert tab.error("enable", machine="nowhere", axis=1)[0] == "misuse"
+    assert studio.hub.control.holder is None
+
+
+def test_the_audit_log_has_who_did_what_with_which_outcome() -> None:
+    studio = Studio(tokens=True)
+    anna, hall = studio.open(token=ENGINEER), studio.open(token=VIEWER)
+    anna.ok("enable", machine="table", axis=1)
+    anna.error("move", machine="table", axis=9, to=1)
+    anna.ok("read", points=["time"])
+    hall.error("move", machine="table", axis=1, to=1)
+    hall.ok("stop", machine="table")
+    entries = [(one["viewer"], one["do"], one["outcome"]) for one in anna.ok("audit")]
+    assert entries == [
+        ("anna (viewer 1)", "enable", "done"),
+        ("anna (viewer 1)", "move", "misuse"),
+        ("hall (viewer 2)", "move", "refusal"),
+        ("hall (viewer 2)", "stop", "done"),
+    ]
+
+
+# ---------------------------------------------------------------------- jogs
+
+
+def jogging(studio: Studio, tab: Tab, velocity: float = 40.0, **where: object) -> dict[str, Any]:
+    tab.ok("enable", machine="table", axis=1)
+    studio.run(100)
+    return tab.ok("jog", **{"machine": "table", "axis": 1, **where}, velocity=velocity)
+
+
+def test_a_jog_goes_on_while_it_is_renewed_and_stands_in_time_afterwards() -> None:
+    studio = Studio()
+    tab = studio.open()
+    lease = jogging(studio, tab)
+    assert 160 <= lease["lasts_ms"] <= 250
+    for _ in range(40):
+        studio.run(80)
+        assert tab.ok("renew", lease=lease["lease"]) == lease
+    assert studio.value("table.M1.velocity") == 40.0
+    studio.run(300)
+    assert studio.value("table.M1.velocity") == 0.0
+    tab.read()
+    assert tab.newest("leases") == []
+    assert tab.error("renew", lease=lease["lease"])[0] == "refusal"
+
+
+@pytest.mark.parametrize("ends", ["close", "stop", "stop_all", "let_go", "taken over", "release_control", "stop of another"])
+def test_what_ends_a_jog(ends: str) -> None:
+    studio = Studio()
+    tab, other = studio.open(), studio.open()
+    lease = jogging(studio, tab)
+    studio.run(80)
+    other.read()
+    assert other.newest("leases") == [{"lease": 1, "viewer": 1, "machine": "table", "axis": 1, "velocity": 40.0}]
+    match ends:
+        case "close":
+            tab.close()
+        case "stop":
+            tab.ok("stop", machine="table", axis=1)
+        case "stop_all" | "release_control":
+            tab.ok(ends)
+        case "let_go":
+            tab.ok("let_go", lease=lease["lease"])
+        case "taken over":
+            other.ok("take_control", over=True)
+        case "stop of another":
+            other.ok("stop", machine="table")
+    other.read()
+    assert other.newest("leases") == []
+    studio.run(300)
+    assert studio.value("table.M1.velocity") == 0.0
+    assert studio.value("table.M1_VMAX") == 40.0
+    if ends != "close":
+        assert tab.error("renew", lease=lease["lease"])[0] == "refusal"
+        tab.ok("let_go", lease=lease["lease"])  # what has ended may be let go
+
+
+def test_a_lease_is_its_viewers_alone() -> None:
+    studio = Studio()
+    tab, other = studio.open(), studio.open()
+    lease = jogging(studio, tab)["lease"]
+    assert other.error("renew", lease=lease)[0] == "refusal"
+    assert other.error("let_go", lease=lease) == ("refusal", "lease 1 has ended, or is another viewer's")
+    assert tab.ok("renew", lease=lease)["lease"] == lease
+
+
+def test_a_second_jog_of_an_axis_replaces_the_first() -> None:
+    studio = Studio()
+    tab = studio.open()
+    first = jogging(studio, tab, 10.0)
+    studio.run(80)
+    second = tab.ok("jog", machine="table", axis=1, velocity=-30.0)
+    assert tab.error("renew", lease=first["lease"])[0] == "refusal"
+    for _ in range(10):
+        studio.run(80)
+        tab.ok("renew", lease=second["lease"])
+    assert studio.value("table.M1.velocity") == -30.0
+    tab.ok("let_go", lease=second["lease"])
+    studio.run(300)
+    assert studio.value("table.M1_VMAX") == 40.0
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 2.0, 5.0])
+def test_a_lease_lasts_less_where_time_goes_fast(speed: float) -> None:
+    studio = Studio()
+    studio.speed = speed
+    tab = studio.open()
+    lease = jogging(studio, tab)
+    for _ in range(60):
+        studio.run(lease["lasts_ms"] / 3)
+        tab.ok("renew", lease=lease["lease"])
+    studio.run(300 / speed + 50)
+    assert studio.value("table.M1.velocity") == 0.0
+
+
+def test_where_time_goes_too_fast_a_jog_is_refused() -> None:
+    studio = Studio()
+    tab = studio.open()
+    studio.speed = 10.0
+    assert tab.error("jog", machine="table", axis=1, velocity=5)[1].startswith("time goes too fast for a jog (10 times)")
+
+
+def test_a_chip_is_jogged_too() -> None:
+    studio = Studio()
+    tab = studio.open()
+    lease = tab.ok("jog", machine="drum", axis=1, velocity=64 * 640)
+    for _ in range(10):
+        studio.run(50)
+        tab.ok("renew", lease=lease["lease"])
+    tab.close()
+    studio.run(300)
+    assert studio.value("drum.velocity") == 0.0
+    assert studio.value("drum.position") > 64 * 100
+
+
+# ---------------------------------------------------------------------- values and events
+
+
+def test_values_come_when_they_have_changed_and_not_more_often_than_asked() -> None:
+    studio = Studio()
+    tab = studio.open()
+    watch = tab.ok("watch", points=["table.M1.position", "table.M2.position", "drum.counter"], rate=10)
+    assert watch["points"][0] == {"point": "table.M1.position", "unit": "mm"}
+    (first,) = tab.read()
+    assert first["values"] == {"1": [[0, 0.0], [1, 0.0], [2, 0.0]]}
+    studio.run(1000)
+    assert "values" not in kinds(tab.read())
+    tab.ok("enable", machine="table", axis=1)
+    tab.ok("move", machine="table", axis=1, to=100)
+    found = []
+    for _ in range(100):
+        studio.run(10)
+        found += [one for one in tab.read() if "values" in one]
+    assert 8 <= len(found) <= 11
+    assert all([index for index, _ in one["values"]["1"]] == [0] for one in found)
+    assert found[-1]["values"]["1"][0][1] == pytest.approx(studio.value("table.M1.position"), abs=5)
+    tab.ok("unwatch", watch=watch["watch"])
+    assert tab.error("unwatch", watch=watch["watch"]) == ("misuse", "unwatch: no watch 1; there are none")
+    studio.run(500)
+    assert "values" not in kinds(tab.read())
+
+
+def test_points_are_read_once_for_all_viewers(monkeypatch: pytest.MonkeyPatch) -> None:
+    studio = Studio()
+    tabs = [studio.open() for _ in range(20)]
+    for n, tab in enumerate(tabs):
+        tab.ok("watch", points=["table.M1.position", "time"] if n % 2 else ["time"], rate=30)
+    read: list[tuple[str, ...]] = []
+    actual = studio.subject.read
+    monkeypatch.setattr(studio.subject, "read", lambda *points: (read.append(points), actual(*points))[1])
+    studio.run(1000)
+    assert 25 <= len(read) <= 31
+    assert {tuple(sorted(points)) for points in read} == {("table.M1.position", "time")}
+    assert all(tab.read()[-1]["values"] for tab in tabs)
+
+
+def test_a_wrong_point_is_named() -> None:
+    code, message = Studio().open().error("watch", points=["table.M1.position", "table.M1.colour"])
+    assert code == "misuse"
+    assert "colour" in message
+
+
+def test_events_come_once_however_many_follows_want_them() -> None:
+    studio = Studio()
+    tab = studio.open()
+    assert len(tab.ok("follow", id="a", kinds=["plan"])["plans"]) == 5
+    tab.ok("follow", id="b", kinds=["plan", "edge"], machines=["table"])
+    tab.ok("enable", machine="table", axis=1)
+    tab.ok("move", machine="table", axis=1, to=1)
+    studio.run(100)
+    (batch,) = [one for one in tab.read() if "events" in one]
+    assert batch["missed"] == 0
+    numbers = [event["number"] for event in batch["events"]]
+    assert numbers == sorted(set(numbers))
+    assert {event["kind"] for event in batch["events"]} == {"plan", "edge"}
+    tab.ok("unfollow", follow="b")
+    tab.ok("set", levels={"table.IN3": 1})
+    tab.ok("unfollow", follow="a")
+    tab.ok("move", machine="table", axis=1, to=0)
+    studio.run(100)
+    assert "events" not in kinds(tab.read())
+    assert tab.error("unfollow", follow="a")[0] == "misuse"
+
+
+def test_what_waits_is_not_lost_when_another_follow_begins() -> None:
+    studio = Studio()
+    tab = studio.open()
+    tab.ok("follow", id="a", kinds=["edge"])
+    tab.ok("set", levels={"table.IN3": 1})
+    tab.ok("follow", id="b", kinds=["note"])
+    tab.ok("note", text="now")
+    studio.run(100)
+    (batch,) = [one for one in tab.read() if "events" in one]
+    assert [event["kind"] for event in batch["events"]] == ["edge", "note"]
+
+
+def test_a_slow_reader_loses_the_oldest_events_and_is_told_how_many() -> None:
+    studio = Studio()
+    slow, quick = studio.open(), studio.open()
+    for tab in (slow, quick):
+        tab.ok("follow", id="a", kinds=["note"], bound=100)
+    seen: list[str] = []
+    for n in range(1000):
+        studio.world.outside(sessions_note(n))
+        if n % 50 == 0:
+            studio.run(40)
+            seen += [event["note"] for one in quick.read() if "events" in one for event in one["events"]]
+    studio.run(40)
+    (batch,) = [one for one in slow.read() if "events" in one]
+    assert batch["missed"] == 900
+    assert [event["note"] for event in batch["events"]] == [str(n) for n in range(900, 1000)]
+    seen += [event["note"] for one in quick.read() if "events" in one for event in one["events"]]
+    assert seen == [str(n) for n in range(1000)]
+
+
+def sessions_note(n: int) -> Any:
+    from steptwin.world.script import Note
+
+    return Note(str(n))
+
+
+def test_two_streams_of_frames_and_plans_do_not_mix() -> None:
+    studio = Studio()
+    frames, plans = studio.open(), studio.open()
+    frames.ok("follow", id=1, kinds=["frame"])
+    plans.ok("follow", id=1, kinds=["plan"])
+    plans.ok("enable", machine="table", axis=1)
+    plans.ok("move", machine="table", axis=1, to=1)
+    studio.run(100)
+    assert {event["kind"] for one in frames.read() if "events" in one for event in one["events"]} == {"frame"}
+    assert {event["kind"] for one in plans.read() if "events" in one for event in one["events"]} == {"plan"}
+
+
+def test_the_clock_comes_once_a_second_and_when_time_goes_otherwise() -> None:
+    studio = Studio()
+    tab = studio.open()
+    studio.run(50)
+    tab.read()
+    studio.run(2900)
+    studio.speed = 2.0
+    studio.run(100)
+    clocks = [one["clock"] for one in tab.read() if "clock" in one]
+    assert clocks == [{"time_ns": str(clocks[0]["time_ns"]), "running": True, "speed": 2.0}]  # the newest alone
+    assert int(clocks[0]["time_ns"]) > 2900 * MILLISECOND
+
+
+# ---------------------------------------------------------------------- whatever comes
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=12,
+)
+STUDIO = Studio()
+FIELDS = st.sampled_from(["machine", "axis", "to", "points", "lease", "x"])
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(st.sampled_from([*ALL, "", "jogg"]), st.dictionaries(FIELDS, JSON))
+def test_whatever_the_fields_are_there_is_one_answer_and_nothing_breaks(name: str, fields: dict[str, Any]) -> None:
+    entered = Tab(STUDIO)
+    entered.session.receive('{"do": "hello"}', STUDIO.now)
+    for one in (Tab(STUDIO), entered):
+        answer = json.loads(one.session.receive(json.dumps({"do": name, **fields}), STUDIO.now))
+        check_message(answer)
+        one.close()
+    assert STUDIO.errors == []
+
+
+@settings(deadline=None)
+@given(st.text() | st.binary().map(lambda data: data.decode("latin-1")))
+def test_whatever_the_text_is_there_is_one_answer(text: str) -> None:
+    tab = Tab(STUDIO)
+    check_message(json.loads(tab.session.receive(text, STUDIO.now)))
+    assert STUDIO.errors == []
+
+
+HOSTILE = [
+    "", "null", "[]", "[" * 60_000, '{"do": "hello", ' * 1000, '{"do": 5}', "x" * 100_000,
+    '{"do":"read","points":' + "[" * 30_000, '{"do": "hello", "id": {}}', '{"do": "hello", "version": true}', '{"do": "hello", "token": "' + "a" * 60_000 + '"}', "\ud800",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=lambda text: ascii(text[:16]))
+def test_hostile_messages_are_answered_with_an_error(text: str) -> None:
+    tab = Tab(Studio())
+    answer = json.loads(tab.session.receive(text, 0))
+    assert answer["error"]["code"] == "misuse"
+    assert len(answer["error"]["message"]) < 3000
+
+
+def test_too_many_requests_are_refused_but_stops_are_done() -> None:
+    studio = Studio()
+    tab = studio.open()
+    outcomes = [tab.ask("time").get("error", {}).get("code", "ok") for _ in range(1100)]
+    assert outcomes.count("ok") == int(sessions.BURST) - 1
+    assert outcomes[-1] == "refusal"
+    assert tab.ok("stop", machine="table") is None
+    studio.run(1000)
+    tab.ok("time")
+
+
+@pytest.mark.soak
+def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
+    """10^5 messages of a viewer that watches, follows, jogs and reads, and one that never reads."""
+    studio = Studio()
+    tab, silent = studio.open(), studio.open()
+    for one in (tab, silent):
+        one.ok("follow", id=1, bound=100)
+        one.ok("watch", points=["table.M1.position", "time"], rate=30)
+    tab.ok("enable", machine="table", axis=1)
+
+    def busy(times: int) -> None:
+        for n in range(times):
+            tab.ok("move", machine="table", axis=1, to=n % 50)
+            watch = tab.ok("watch", points=[f"table.M{n % 4 + 1}.position"])["watch"]
+            tab.ok("follow", id="x", kinds=["edge"])
+            studio.run(20)
+            tab.read()
+            tab.messages.clear()
+            tab.ok("unfollow", follow="x")
+            tab.ok("unwatch", watch=watch)
+            visitor = studio.open()
+            visitor.ok("follow", id=n, kinds=["plan"])
+            visitor.close()
+
+    studio.world.stop_recording()
+    busy(20)
+    gc.collect()
+    before = len(gc.get_objects())
+    busy(scaled(100_000) // 8)
+    gc.collect()
+    # The audit log has room for 10 000 entries; the rest is as it was.
+    entries = len(studio.hub.around.audit.last(10**6))
+    assert len(gc.get_objects()) - before < 6 * entries + 2000
+    assert studio.errors == []
+
+
+# ---------------------------------------------------------------------- without a connection
+
+
+def rest(session: Session, studio: Studio, name: str, **fields: object) -> Any:
+    return session.answer(json.dumps({"do": name, **fields}), studio.now)
+
+
+def test_who_asks_over_rest_needs_no_hello_and_has_no_stream() -> None:
+    studio = Studio()
+    session = studio.rest()
+    assert rest(session, studio, "enable", machine="table", axis=1)["ok"] is None
+    assert studio.hub.control.holder is None  # it acted while nobody held control, and holds none
+    error = rest(session, studio, "watch", points=["time"])["error"]
+    assert error == {"code": "refusal", "message": "watch is about a connection: ask it over the WebSocket"}
+    assert session.take(studio.now) == []
+
+
+def test_control_taken_over_rest_passes_when_nothing_is_asked() -> None:
+    studio = Studio()
+    session, tab = studio.rest(), studio.open()
+    rest(session, studio, "take_control")
+    assert tab.error("enable", machine="table", axis=1)[0] == "refusal"
+    studio.run(59_000)
+    assert tab.error("enable", machine="table", axis=1)[0] == "refusal"
+    studio.run(2_000)
+    tab.ok("enable", machine="table", axis=1)
+
+
+def test_a_role_holds_over_rest_too() -> None:
+    studio = Studio()
+    assert rest(studio.rest(Role.VIEWER), studio, "enable", machine="table", axis=1)["error"]["code"] == "refusal"
+    assert rest(studio.rest(Role.VIEWER), studio, "stop_all")["ok"]["failed"] == {}
