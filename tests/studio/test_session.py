@@ -428,8 +428,9 @@ def test_whatever_the_text_is_there_is_one_answer(text: str) -> None:
 
 
 HOSTILE = [
-    "", "null", "[]", "[" * 60_000, '{"do": "hello", ' * 1000, '{"do": 5}', "x" * 100_000,
-    '{"do":"read","points":' + "[" * 30_000, '{"do": "hello", "id": {}}', '{"do": "hello", "version": true}', '{"do": "hello", "token": "' + "a" * 60_000 + '"}', "\ud800",
+    "", "null", "[]", "[" * 60_000, '{"do": "hello", ' * 1000, '{"do": 5}', "x" * 100_000, "\ud800",
+    '{"do":"read","points":' + "[" * 30_000, '{"do": "hello", "id": {}}', '{"do": "hello", "version": true}',
+    '{"do": "hello", "token": "' + "a" * 60_000 + '"}',
 ]  # fmt: skip
 
 
