@@ -69,6 +69,7 @@ def test_examples_of_the_manual_are_clean(manual_examples: dict[int, str], numbe
 
 
 def test_examples_are_refused_where_the_manual_says_so(manual_examples: dict[int, str]) -> None:
+    assert codes("\\", E1) == codes("\\\n\\", E1) == []
     assert "M134" in codes(manual_examples[1], E1)  # reset cannot be sent together with other commands
     assert "M113" in codes(manual_examples[5], A, "two")  # B8 is there with Step & Direction and Dual DAC only
     assert "M110" in codes(manual_examples[6], E1)  # E types have no address 0
@@ -220,6 +221,56 @@ def test_g_counts_from_a_counter_below_0_only_where_the_position_is_known() -> N
     assert codes("B64\nR\n)1\nG640") == []
     assert codes("B64\nR\n=640\nG640") == []
     assert codes("B64\nR\nC100\nG640") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        # Back from a subroutine below 0.
+        ("[\n'1\ng640\nr\nj2\n@1\nb64\nr\n.\n@2\n]", ["M221"]),
+        # Two positions below 0 at one G.
+        ("[\nb64\nr\ni1h2\nr\n@2\ng640\nr\n]", ["M221"]),
+        # There and back: each turn of the loop begins with its D.
+        ("L2\nd\nr\nE\ng640", []),
+        ("L3\nd\nr\nE\ng640", ["M221"]),
+    ],
+)
+def test_g_counts_from_what_all_paths_lead_to(text: str, found: list[str]) -> None:
+    assert codes(text, B) == found
+
+
+def test_h_leads_to_0_of_what_the_counter_shows() -> None:
+    """The counter shows 2^24 - 64, and the way to 0 is as long: after it G begins one round of 24 bits lower."""
+    found = check("=64\nb128\nr\nh\nr\ng64", B).diagnostics
+    assert [(d.code, d.message, d.hint.partition(";")[0]) for d in found if d.hint is not None] == [
+        ("M221", "at position -64 the counter shows 16 777 152", "the move would be -16 777 152"),
+        ("M221", "at position -16 777 216 the counter shows 0", "the move would be 64"),
+    ]
+
+
+@pytest.mark.parametrize("function", ["t40\n?16\nc\nc1", "t46\n?16\nc\n+5", "t58\n?16\nc\n+9"])
+def test_a_function_that_may_have_been_switched_off_is_not_judged(function: str) -> None:
+    assert codes(function, B) == []
+    assert codes(function.replace("?16\nc\n", ""), B) != []
+
+
+def test_what_follows_a_lone_dot_is_looked_at() -> None:
+    assert codes(".\nm2\nr", B) == ["M127", "M112"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("?10", "? 10 is out of range", "no line: the count in 10 is 0; "),
+        ("?221", "? 221 is out of range", "221 is line 22; "),
+        ("!203", "! 203 is out of range", "203 is lines 20 to 22; "),
+    ],
+)
+def test_a_number_that_names_no_lines_is_explained(text: str, message: str, hint: str) -> None:
+    first, *_ = check(text, B).diagnostics
+    assert (first.code, first.message) == ("M110", message)
+    assert first.hint is not None
+    assert first.hint.startswith(hint)
 
 
 def test_m_14_both_operand_functions() -> None:

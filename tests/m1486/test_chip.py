@@ -40,6 +40,38 @@ def test_defaults(v: Variant) -> None:
         assert chip.is_idle()
 
 
+@pytest.mark.parametrize(
+    ("lines", "idle"),
+    [
+        (["u20"], True),
+        (["w5"], False),
+        (["o4"], False),
+        (["f64000", "r"], False),
+        (["c51", "k"], False),
+        (["[", "f64"], True),
+    ],
+)
+def test_a_chip_is_idle_when_nothing_goes_on_and_nothing_waits(lines: list[str], idle: bool) -> None:
+    bench = Bench("B")
+    bench.pin(B4=0)
+    bench.send(*lines)
+    bench.run(ms=3)
+    assert bench.chip.is_idle() is idle
+
+
+def test_a_chip_is_not_idle_while_its_eeprom_is_written_or_characters_arrive() -> None:
+    bench = Bench("E1", address=1)
+    bench.send("u20")
+    assert not bench.chip.is_idle()
+    bench.run(0.6)
+    assert bench.chip.is_idle()
+    timed = Bench("B", is_timed=True)
+    timed.raw(b"\n")
+    assert not timed.chip.is_idle()
+    timed.run(0.1)
+    assert timed.chip.is_idle()
+
+
 def test_reset_sets_defaults_at_once_on_types_with_ram() -> None:
     bench = Bench("B", address=3)
     bench.do("v2000", "f64", "r", ":7", "t80", "t40", "m8", "c2", ">1", "g+")
@@ -253,6 +285,21 @@ def test_rst_that_is_too_short_or_with_sd_low_does_not_end_shutdown() -> None:
     bench.pin(RST=0)
     bench.run(1.0)
     assert bench.chip.is_shut_down
+
+
+def test_rst_that_was_high_before_does_not_end_shutdown() -> None:
+    """It is to be held high for 10 ms from then on (chapter VI, SD)."""
+    bench = Bench("B", address=3)
+    bench.pin(RST=1)
+    bench.run(1)
+    bench.pin(SD=0)
+    bench.pin(SD=1)
+    bench.run(1)
+    assert bench.chip.is_shut_down
+    bench.pin(RST=0)
+    bench.pin(RST=1)
+    bench.run(ms=10)
+    assert not bench.chip.is_shut_down
 
 
 def test_shutdown_stops_the_motor() -> None:

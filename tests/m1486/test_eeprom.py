@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from m1486_rig import Bench
 
 from steptwin.errors import Misuse
 from steptwin.m1486.eeprom import image_of, pack, unpack
@@ -26,6 +27,15 @@ def test_what_was_packed_is_unpacked(code: bytes, labels: dict[int, int]) -> Non
 def test_a_label_beyond_byte_255() -> None:
     image = StoredFile(bytes(0x180), {1: 0x17F})
     assert unpack(pack(image), E2) == image
+
+
+def test_the_file_that_was_stored_last_runs_at_power_up() -> None:
+    bench = Bench("E1", address=1)
+    for command, answer in (("u20", b"\x45"), ("u15", b"\x02")):
+        bench.file(command)
+        assert bench.run(1) == answer
+        bench.chip.power_cycle(bench.now)
+        assert bench.run(1) == answer
 
 
 def test_nothing_is_no_file() -> None:

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from m1486_rig import Bench
 
+from steptwin.m1486.drive import MotionMode
 from steptwin.m1486.lines import DUAL_DAC, SEEK_ENDS_LOW, STEP_DIRECTION, TWO_DACS
 from steptwin.machine import SECOND
 from steptwin.motion.pulses import step_times
@@ -484,6 +485,20 @@ def test_there_is_no_jog_during_a_move_or_a_seek() -> None:
     bench.pin(JOG=0)
     bench.pin(B5=1)
     assert bench.true == 20 * STEP
+
+
+@pytest.mark.parametrize(("line", "way"), [("r", 640), ("(1", -640)])
+def test_a_move_begins_after_the_jog_step_that_is_being_made(line: str, way: int) -> None:
+    bench = Bench()
+    bench.do("m8", "f640", "s80", "c52")
+    bench.pin(JOG=0)
+    bench.send(line)
+    assert bench.chip.drive.motion is MotionMode.JOG
+    bench.run(ms=126)
+    bench.pin(B1=0)
+    bench.finish()
+    assert bench.wrong == []
+    assert bench.true == bench.sum_of_pulses() == pytest.approx(8 + way, abs=16)
 
 
 # ---------------------------------------------------------------------- what shows the motion

@@ -145,6 +145,18 @@ def test_a_second_file_waits_in_the_buffer_while_the_first_moves_the_motor() -> 
     assert bench.finish() == b"\x41\x41"
 
 
+def test_a_second_file_waits_where_it_would_overwrite_the_first() -> None:
+    """M-12: the memory of an A is a ring of 108 bytes; a file of 84 is not done yet when one of 60 comes."""
+    bench = Bench("A")
+    bench.file("w1000", *["u20"] * 40)
+    answers = b""
+    for line in ("[", *["u15"] * 30, "]"):
+        answers += bench.send(line)
+        while bench.chip.receiver.is_stalled:
+            answers += bench.run(ms=1)
+    assert answers + bench.finish() == b"\x41" * 40 + b"\x02" * 30
+
+
 def test_a_second_file_is_stored_while_the_first_waits() -> None:
     bench = Bench("A")
     bench.file("w1000", "u15")

@@ -249,7 +249,6 @@ class ChipDrive(Stateful):
     def finish(self) -> None:
         """The motion has ended."""
         self.motion = MotionMode.REST
-        self.is_stopping = False
 
     def _start(self, motion: MotionMode, train: StepTrain) -> None:
         self.motion = motion

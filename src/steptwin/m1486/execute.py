@@ -34,7 +34,8 @@ def compile_command(chip: CommandHost, command: Command, place: int, following: 
     if isinstance(command.argument, JumpCondition):
         return CompiledCommand(*flow_effects.condition(chip, command.argument, following), is_linked=True)
     row = _MAKERS[spec.name]
-    return CompiledCommand(row.make(chip, command.argument or 0, place, following), row.computes, row.is_linked)
+    effect = row.make(chip, command.argument or 0, place, following)
+    return CompiledCommand(effect, computes=row.computes, is_linked=row.is_linked)
 
 
 def _with_variable(chip: CommandHost, key: str, place: int, following: int) -> Effect:

@@ -299,7 +299,7 @@ class ProgramExecution(Stateful):
         """Do the command before which a hook has halted the program, and go on."""
         if self.is_halted:
             self.is_halted = False
-            self._do(self._compiled.get(self.pc) or self._compile(self.pc), now)
+            self._do(self._compile(self.pc), now)
 
 
 def _no_command(now: Nanos) -> NoReturn:

@@ -100,16 +100,7 @@ class Receiver(Stateful):
         self._buffer: deque[int] = deque()
         #: Whole lines in the buffer.
         self._lines = 0
-        # Of the line that is arriving: its first characters, in capitals; how many of it are in the buffer; whether a beginning
-        # that needed no room is missing there, and how many characters of that have no answer yet; whether characters were
-        # lost; whether it was longer than the buffer, so that its rest is no command.
-        self._seen = ""
-        self._seen_stored = 0
-        self._in_comment = False
-        self._is_torn = False
-        self._unanswered = 0
-        self._has_lost = False
-        self._skips_line = False
+        self._begin_line()
         self.is_listening = True
         #: Until when the EEPROM is being written or erased; nothing is compressed meanwhile.
         self.busy_until: Nanos | None = None
@@ -220,6 +211,9 @@ class Receiver(Stateful):
         self.compress(now)
 
     def _begin_line(self) -> None:
+        # Of the line that is arriving: its first characters, in capitals; how many of it are in the buffer; whether a beginning
+        # that needed no room is missing there, and how many characters of that have no answer yet; whether characters were
+        # lost; whether it was longer than the buffer, so that its rest is no command.
         self._seen = ""
         self._seen_stored = 0
         self._in_comment = False

@@ -1,0 +1,29 @@
+"""Data sheets and tables as lines of text, for golden files that are reviewed once against the manuals."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from typing import Any
+
+from steptwin.datasheet import Datasheet, plain
+
+
+def line(item: Any) -> str:
+    """Every field of a row that is not empty, in the order of its definition."""
+    return json.dumps(_filled(plain(item)), ensure_ascii=False, default=str)
+
+
+def _filled(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _filled(one) for name, one in value.items() if one is not False and one not in ("", [], {}, None)}
+    return [_filled(one) for one in value] if isinstance(value, list) else value
+
+
+def sheet_lines(sheet: Datasheet) -> list[str]:
+    found = []
+    for field in fields(sheet):
+        value = getattr(sheet, field.name)
+        rows = value if isinstance(value, tuple) else (value,)
+        found += [f"{field.name}: {line(row)}" for row in rows]
+    return found
