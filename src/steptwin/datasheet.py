@@ -63,6 +63,8 @@ class Pin:
     is_analog: bool = False
     unit: str = ""
     limits: Limits = Limits(0, 1)
+    is_active_low: bool = False
+    """Whether 0 is the level that means something: of lines that rest high."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,12 +123,14 @@ class CommandDescription:
 
 
 class FactType(enum.Enum):
-    """Of a field of an event."""
+    """Of a field of an event, or of a detail of the state."""
 
     WHOLE = "whole number"
     NUMBER = "number"
     TRUTH = "true or false"
     TEXT = "text"
+    WHOLES = "whole numbers"
+    NAMED = "whole numbers by name"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,6 +153,16 @@ class EventDescription:
     facts: tuple[FactDescription, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Detail:
+    """A fact of the present state that only this kind of controller has."""
+
+    name: str
+    meaning: str
+    type: FactType
+    unit: str = ""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Datasheet:
     kind: str
@@ -161,6 +175,8 @@ class Datasheet:
     points: tuple[Point, ...]
     commands: tuple[CommandDescription, ...]
     events: tuple[EventDescription, ...]
+    details: tuple[Detail, ...] = ()
+    """Of its state (`steptwin.controllerstate`)."""
 
     def point(self, path: str) -> Point:
         """Raises `KeyError` for a point that is not there."""
@@ -189,6 +205,7 @@ def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
         "points": tuple(map(_read_point, data["points"])),
         "commands": tuple(map(_read_command, data["commands"])),
         "events": tuple(map(_read_event, data["events"])),
+        "details": tuple(Detail(one["name"], one["meaning"], FactType(one["type"]), one["unit"]) for one in data["details"]),
     }
     return Datasheet(**{**data, **lists})
 

@@ -108,12 +108,12 @@ def test_a_jog_that_is_killed_ends_by_itself_and_the_position_is_right(serve_m14
     twin = serve_m1486("--variant", "B")
     arguments = [STEPTWIN, "jog", "1=100", "--seconds", "60", "-d", f"tcp://127.0.0.1:{twin.tcp_port},kind=m1486"]
     with subprocess.Popen(arguments, stderr=subprocess.DEVNULL) as command:
-        until(lambda: twin.state()["motion"]["true_position"] > 0, "the motor has moved")
+        until(lambda: twin.state()["axes"][0]["position"] > 0, "the motor has moved")
         command.kill()
-    until(lambda: twin.state()["motion"]["is"] == "at rest", "the move has ended", seconds=5.0)
-    motion = twin.state()["motion"]
-    assert motion["position_valid"]
-    assert motion["position"] == motion["true_position"]
+    until(lambda: twin.state()["axes"][0]["status"]["text"] == "at rest", "the move has ended", seconds=5.0)
+    state = twin.state()
+    assert state["details"]["counter_valid"]
+    assert state["details"]["counter"] == state["axes"][0]["position"]
 
 
 def test_an_e_type_is_not_jogged(serve_m1486: Callable[..., Any]) -> None:

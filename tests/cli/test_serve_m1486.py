@@ -99,8 +99,10 @@ def test_a_hand_at_the_chips(serve_m1486: Serve) -> None:
 
     assert twin.command("power-cycle").returncode == 0  # of all chips of the line
     lines = twin.command("state", "--device", "m1486.0").stdout.splitlines()
-    assert lines[0].startswith("M1486B at address 0, 4800 bit/s, ")
-    assert lines[1:3] == ["program  has nothing to do", "memory   0 of 2032 bits, input buffer 0 of 32 characters"]
+    assert lines[0].startswith("M1486 B, ")
+    assert lines[1] == "program has nothing to do"
+    shown = dict(line.split(maxsplit=1) for line in lines[5:])
+    assert [shown[name] for name in ("address", "baud", "memory_used", "flags_on")] == ["0", "4800 bit/s", "0 bit", "none"]
     refused = twin.command("pin", "B1=0")
     there = "controllers are chip0, chipA; buttons are none"
     assert (refused.returncode, refused.stderr) == (2, f"steptwin: B1: give a pin as CONTROLLER.PIN; {there}\n")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from steptwin.commands.run_world import WorldRun, run
 from steptwin.files.world import World
-from steptwin.words.mic488_state import state_of
+from steptwin.mic488.present import state_of
 
 WORLD = """\
 [world]
@@ -64,7 +64,7 @@ def test_the_state_has_the_variables_of_a_program(tmp_path: Path) -> None:
     for moment, value in ((1_500_000, 0.0), (2_500_000, 2.5), (1_000_000_000, 2.5)):
         world.advance(moment)
         world.touch("table")
-        assert state_of(device, moment)["program"]["variables"] == {"COUNT": value}  # type: ignore[index]
+        assert state_of(device, moment).program.variables == {"COUNT": value}
     world.advance(3_000_000_000)
     world.touch("table")
-    assert state_of(device, world.now)["program"]["variables"] == {}  # type: ignore[index]
+    assert state_of(device, world.now).program.variables == {}

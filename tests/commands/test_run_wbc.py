@@ -368,7 +368,7 @@ def test_json_says_the_same(play: Play) -> None:
     }
     assert data["state"]["program"]["line"] == 5
     assert data["state"]["axes"][0]["position"] == 50.0
-    assert data["state"]["user_registers"] == {"7": 3}
+    assert data["state"]["details"]["user_registers"] == {"7": 3}
     assert [(e["code"], e["line"], e["statement"]) for e in data["events"]] == [
         ("axis", 1, "M1 = ON"),
         ("axis", 2, "PABS M1 50"),

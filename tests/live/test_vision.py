@@ -8,12 +8,13 @@ from functools import partial
 import pytest
 from mic488_rig import loaded
 
+from steptwin.controllerstate import ProgramActivity, StateProgram
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort
 from steptwin.machine import MILLISECOND, Port
+from steptwin.mic488.present import state_of
 from steptwin.mic488.vision import uses_vision
 from steptwin.wire.crc import crc16
-from steptwin.words.mic488_state import state_of
 from steptwin.world.small import LINE, Whole, mic488_world
 
 #: Copies each new record, with the number of records before it in $I0.
@@ -103,15 +104,14 @@ def test_the_state_tells_where_a_program_is() -> None:
     live.advance(50 * MILLISECOND)
     live.world.settle_all()
     device = live.world.mic488["mic488"].device
-    shown = state_of(device, live.now)["program"]
-    assert shown == {
-        "state": "running",
-        "program_bank": 0,
-        "position_bank": 0,
-        "file": "pick.prg",
-        "line": 2,
-        "text": "WAIT VisionNew = 1",
-        "variables": {},
-    }
+    assert state_of(device, live.now).program == StateProgram(
+        state=ProgramActivity.RUNNING,
+        text="running at line 2: WAIT VisionNew = 1",
+        file="pick.prg",
+        line=2,
+        statement="WAIT VisionNew = 1",
+        variables={},
+    )
     device.program.command(0, live.now)
-    assert "line" not in state_of(device, live.now)["program"]  # type: ignore[operator]
+    ended = state_of(device, live.now).program
+    assert (ended.state, ended.line, ended.statement) == (ProgramActivity.STOPPED, None, None)

@@ -18,6 +18,8 @@ TYPES: Mapping[FactType, tuple[type, ...]] = {
     FactType.NUMBER: (int, float),
     FactType.TRUTH: (bool,),
     FactType.TEXT: (str,),
+    FactType.WHOLES: (tuple,),
+    FactType.NAMED: (dict,),
 }
 
 

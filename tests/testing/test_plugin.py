@@ -260,6 +260,8 @@ def test_an_m1486(run: Run, how: str) -> None:
             assert not m1486.is_moving
             m1486.set_pin("B5", 0)
             assert m1486.pins["B5"] == 0
+            assert m1486.state.pins["B5"] == 0
+            assert m1486.state.details["address"] == "3"
             m1486.power_cycle()
             assert m1486.call(lambda chip, now: chip.drive.counter_u(now)) == 0
     """).assert_outcomes(passed=1)

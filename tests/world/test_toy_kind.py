@@ -128,7 +128,9 @@ def test_a_subject_describes_it_and_shows_its_state() -> None:
     (part,) = subject.description.machines
     assert (part.datasheet.kind, part.line, part.points) == ("toy", "bus", ("t.STOP", "t.BUSY", "t.position"))
     assert subject.do(Describe()).value["datasheets"][0]["axes"][0]["unit"] == "pulse"
-    assert subject.do(State("t")).value == {"controller": "toy", "position": 0, "pins": {"STOP": 0.0, "BUSY": 0.0}}
+    state = subject.do(State("t")).value
+    assert (state["kind"], state["axes"][0]["position"], state["pins"]) == ("toy", 0, {"STOP": 0.0, "BUSY": 0.0})
+    assert state["details"] == {"commands": 0}
     assert subject.do(ReadPins("t")).value == {"t.STOP": 0.0, "t.BUSY": 0.0}
 
 

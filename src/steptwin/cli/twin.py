@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from steptwin.cli import completion
-from steptwin.cli.device import shown
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
+    from steptwin.datasheet import Datasheet
     from steptwin.live.remote import RemoteSubject
     from steptwin.subject.commands import Command
 
@@ -54,6 +54,10 @@ class Selected:
         if len(self.shown) != 1:
             raise Misuse(f"several controllers: name one, --device TWIN.CONTROLLER: {', '.join(self.controllers)}")
         return self.shown[0]
+
+    def sheet(self, name: str) -> Datasheet:
+        """The data sheet of the controller called ``name``."""
+        return next(part.datasheet for part in self.subject.description.machines if part.name == name)
 
     def called(self, name: str) -> str:
         """The controller called ``name``, in capitals or not. Raises `Misuse`."""
@@ -186,56 +190,15 @@ def state(twin: Twin = None, json: Json = False) -> None:
     from steptwin.subject.commands import State
 
     with selected(twin) as there:
-        found = there.do(State(there.one()))
+        name = there.one()
+        found = there.do(State(name))
     if json:
         _print_json(found)
         return
-    if found.get("controller") == "M1486":
-        typer.echo("\n".join(_m1486_lines(found)))
-        return
-    if "firmware" not in found:  # of a kind of one's own
-        typer.echo("\n".join(f"{name} {value}" for name, value in found.items()))
-        return
-    typer.echo(
-        f"firmware {found['firmware']}, {found['time_s']:.1f} s after power-on, program {_program_words(found['program'])}"
-    )
-    for axis in found["axes"]:
-        unit_name = axis["unit"]
-        typer.echo(
-            f"M{axis['axis']}  {axis['position']:>12.4f} {unit_name}  {axis['velocity']:>10.3f} {unit_name}/s  "
-            f"{axis['status']} {axis['status_text']}"
-        )
-    on = [name for name, value in found["pins"].items() if value and not name.startswith("AIN")]
-    typer.echo("\n".join([f"on: {', '.join(on) or 'nothing'}", *_variables(found["program"])]))
+    from steptwin.commands.state_text import lines
+    from steptwin.controllerstate import read_state
 
-
-def _program_words(program: dict[str, Any]) -> str:
-    return f"{program['state']} at line {program['line']}: {program['text']}" if "line" in program else program["state"]
-
-
-def _variables(program: dict[str, Any]) -> list[str]:
-    named = [f"{name} = {shown(value)}" for name, value in program["variables"].items()]
-    return [f"variables: {', '.join(named)}"] if named else []
-
-
-def _m1486_lines(shown: dict[str, Any]) -> list[str]:
-    program, motion, buffer = shown["program"], shown["motion"], shown["input_buffer"]
-    where = f"{motion['position']}{'' if motion['position_valid'] else ' (not valid)'}, true {motion['true_position']}"
-    room = f"input buffer {buffer['waiting']} of {buffer['size']} characters"
-    low = [name for name, value in shown["pins"].items() if not value]
-    return [
-        f"M1486{shown['variant']} at address {shown['address']}, {shown['baud']} bit/s, {shown['time_s']:.1f} s after power-on",
-        f"program  {program['does']}{'' if program['next'] is None else ', next: ' + program['next']}",
-        f"memory   {program['memory_bits']} of {program['memory_size_bits']} bits, {room}",
-        f"position {where}, {motion['velocity']:.1f} step/s, {motion['is']}",
-        "settings " + " ".join(f"{name}{shown['settings'][name]}" for name in "SAPVMQN"),
-        f"variable {shown['variable']}, flags on: {_numbers(shown['flags_on'])}, functions on: {_numbers(shown['functions_on'])}",
-        f"low      {', '.join(low) or 'nothing'}",
-    ]
-
-
-def _numbers(numbers: list[int]) -> str:
-    return " ".join(map(str, numbers)) or "none"
+    typer.echo("\n".join(lines(read_state(found), there.sheet(name))))
 
 
 def _print_json(value: object) -> None:

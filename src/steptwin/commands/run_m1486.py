@@ -31,10 +31,10 @@ from steptwin.m1486.events import M1486Event
 from steptwin.m1486.lines import interface
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import refuse_taken, settable_pin
+from steptwin.m1486.present import program_words, velocity
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.machine import SECOND, Nanos
 from steptwin.wire.slave import FrameDirection
-from steptwin.words.m1486_state import program_words, velocity
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.small import InputChange, Whole, chip_name, m1486_world
 from steptwin.world.trace import TraceRecord

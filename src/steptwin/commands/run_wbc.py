@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from steptwin.commands.descriptions import Named, print_world
 from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, changes_of, limit_of, run_on, world_of, write
 from steptwin.commands.program_watch import ProgramEvent, ProgramWatch
 from steptwin.commands.travels import Placed, Travel, place_switches
+from steptwin.datasheet import plain
 from steptwin.diagnostics import Severity, render, visible
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
@@ -31,13 +32,13 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.homing import Homing
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
+from steptwin.mic488.present import place_of, state_of
 from steptwin.mic488.program import RUNNING
 from steptwin.mic488.status import AxisStatus, ProgramState
 from steptwin.wbc.dialect import DEFAULT, dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.real import real_text
 from steptwin.wbc.usage import homing_sides
-from steptwin.words.mic488_state import place_of, state_of
 from steptwin.world.overrides import NO_OVERRIDES
 from steptwin.world.small import Whole, mic488_world
 from steptwin.world.trace import TraceRecord
@@ -254,13 +255,12 @@ def _say_lines(ran: Ran, say: Print) -> None:
     say(_ending(watch, outcome.ending))
     for text in ran.missing:
         say(f"  {text}")
-    shown: Any = state_of(watch.device, outcome.ending.at)
-    for axis in shown["axes"]:
-        if axis["enabled"] or axis["position_pulses"]:
-            unit = axis["unit"]
-            speed = f", {real_text(axis['velocity'])} {unit}/s" if axis["velocity"] else ""
-            say(f"  M{axis['axis']} at {real_text(axis['position'])} {unit}{speed}, {axis['status_text']}")
-    on = [name for name, level in shown["pins"].items() if level and not name.startswith("AIN")]
+    shown = state_of(watch.device, outcome.ending.at)
+    for axis in shown.axes:
+        if axis.enabled or axis.position:
+            speed = f", {real_text(axis.velocity)} {axis.unit}/s" if axis.velocity else ""
+            say(f"  {axis.name} at {real_text(axis.position or 0.0)} {axis.unit}{speed}, {axis.status.text}")
+    on = [name for name, level in shown.pins.items() if level and not name.startswith("AIN")]
     say(f"  on: {', '.join(on) or 'nothing'}")
     say(str(outcome))
 
@@ -307,7 +307,7 @@ def _data(ran: Ran, *, wrong: bool) -> dict[str, object]:
         "ratio": outcome.ratio,
         "assumed": list(ran.given.placed.assumed),
         "missing_switches": ran.missing,
-        "state": state_of(watch.device, outcome.ending.at),
+        "state": plain(state_of(watch.device, outcome.ending.at)),
         "events": [_event_data(watch, happening) for happening in watch.happened],
     }
 

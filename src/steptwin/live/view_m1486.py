@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from rich.text import Text
 
 from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.details import flags_on, functions_on, next_command, used_bits
 from steptwin.m1486.lines import LINES
+from steptwin.m1486.present import program_words, velocity
 from steptwin.machine import SECOND, Nanos
-from steptwin.words.m1486_state import flags_on, functions_on, next_command, program_words, used_bits, velocity
 
 
 def chip_lines(name: str, chip: M1486Chip, now: Nanos) -> list[Text]:

@@ -11,9 +11,9 @@ from rich.text import Text
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.present import place_of
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus, ControllerStatus
-from steptwin.words.mic488_state import place_of
 
 _STYLES = {
     AxisStatus.OFF: "dim",

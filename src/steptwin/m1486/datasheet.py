@@ -17,6 +17,7 @@ from steptwin.datasheet import (
 )
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec
+from steptwin.m1486.details import DETAILS
 from steptwin.m1486.events import EVENTS
 from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS
 from steptwin.m1486.points import POINTS, UNIT
@@ -25,6 +26,7 @@ from steptwin.m1486.variants import Variant
 MOTION_SECTION = "VII.2"
 STARTS = frozenset({"R", ")", "("})
 """Commands that start a motion; the others of their section set what the next one does."""
+ACTIVE_LOW = frozenset({"JOG", "LIMIT", "SD", "S&D", "DUAL", "BOOST"})
 AXES = (AxisDescription(number=1, name="M1", unit=UNIT, pulses_per_unit=1.0),)
 
 
@@ -43,16 +45,17 @@ def datasheet_of(variant: Variant) -> Datasheet:
         points=tuple(POINTS.values()),
         commands=tuple(_command(spec, variant) for spec in TABLE),
         events=tuple(EVENTS.values()),
+        details=tuple(row.detail for row in DETAILS),
     )
 
 
 def _pins() -> Iterator[Pin]:
     for name in LINE_PINS:
-        yield Pin(name=name, direction=PinDirection.BOTH)
+        yield Pin(name=name, direction=PinDirection.BOTH, is_active_low=True)
     for name in CONTROL_PINS:
-        yield Pin(name=name, direction=PinDirection.INPUT)
+        yield Pin(name=name, direction=PinDirection.INPUT, is_active_low=name in ACTIVE_LOW)
     for name in OUTPUT_PINS:
-        yield Pin(name=name, direction=PinDirection.OUTPUT)
+        yield Pin(name=name, direction=PinDirection.OUTPUT, is_active_low=name in ACTIVE_LOW)
 
 
 def _command(spec: CommandSpec, variant: Variant) -> CommandDescription:

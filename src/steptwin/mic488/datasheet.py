@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from steptwin.datasheet import Argument, AxisDescription, CommandDescription, Datasheet, Limits, Pin, PinDirection, PointEffect
 from steptwin.mic488.core import ANALOG_PINS, ENABLE_PINS, INPUT_PINS, OUTPUT_PINS
+from steptwin.mic488.details import DETAILS
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.events import EVENTS
 from steptwin.mic488.points import EFFECTS, limits, points, unit_of
@@ -40,6 +41,7 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
         points=tuple(points(registers, units)),
         commands=tuple(_commands(registers, units)),
         events=tuple(EVENTS.values()),
+        details=tuple(row.detail for row in DETAILS),
     )
 
 

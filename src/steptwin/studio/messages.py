@@ -80,7 +80,7 @@ _ROWS = (
                 "description": {"$ref": "#/$defs/(description)"},
                 "state": {
                     "type": "object",
-                    "additionalProperties": {"type": "object"},
+                    "additionalProperties": {"$ref": "#/$defs/(state)"},
                     "description": "By machine, as the answer to state; empty for a device.",
                 },
                 "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},

@@ -64,7 +64,7 @@ class ReadPins:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Everything about a machine, in words and numbers."""
+    """The present state of a machine: status, program, axes, pins, details (`steptwin.controllerstate`)."""
 
     machine: str
 
@@ -222,7 +222,7 @@ _ROWS = (
         '{"MACHINE.PIN": LEVEL, ...}',
         (Field("machine", TEXT, "The name of a machine; all of them without.", None),),
     ),
-    CommandRow("state", State, "Everything about a machine.", "an object by the kind of the machine", (_MACHINE,)),
+    CommandRow("state", State, "The present state of a machine.", "the state, alike for all kinds", (_MACHINE,)),
     CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (_MACHINE,)),
     CommandRow("faults", ListFaults, "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)"),
     CommandRow("time", Time, "The present moment, and how time goes.", "world, time_ns, time_s, paused, speed, stopped"),

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import get_type_hints
 
+from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import Datasheet
 from steptwin.subject.commands import COMMANDS, VERSION, CommandRow
 from steptwin.subject.contract import Description
@@ -89,7 +90,7 @@ def schema() -> dict[str, object]:
 
 def definitions() -> dict[str, dict[str, object]]:
     """Of what is sent, by the names under which schemas of messages refer to it."""
-    return {"(answer)": _answer(), "(event)": _event(), "(description)": _description()}
+    return {"(answer)": _answer(), "(event)": _event(), "(description)": _description(), "(state)": _state()}
 
 
 def _request(row: CommandRow) -> dict[str, object]:
@@ -176,6 +177,11 @@ def _description() -> dict[str, object]:
     hints = get_type_hints(Description)
     rest = {field.name: shape(hints[field.name]) for field in fields(Description) if field.name not in own}
     return {**members({**rest, **own}), "description": "What there is. It does not change."}
+
+
+def _state() -> dict[str, object]:
+    """The answer to ``state``."""
+    return {**shape(ControllerState), "description": "What is not known is null. The data sheet describes the details."}
 
 
 def text() -> str:

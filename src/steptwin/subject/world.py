@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import Any, get_args
 
+from steptwin.datasheet import plain
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
 from steptwin.subject import commands as command
@@ -154,7 +155,7 @@ class WorldSubject:
     def _state(self, wanted: command.State) -> object:
         machine = self.world.machine(wanted.machine)
         self.world.touch(wanted.machine)
-        return self.world.kind(wanted.machine).state(machine, self.world.now)
+        return plain(self.world.kind(wanted.machine).state(machine, self.world.now))
 
     def _encoders(self, wanted: command.Encoders) -> object:
         encoders = self.world.encoders(wanted.machine)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 import pytest
 
+from steptwin.controllerstate import ControllerState, read_state
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
@@ -191,6 +192,12 @@ class LineRig(Rig):
         __tracebackhide__ = True
         live = self._live or self.twin_only(what)
         return self._on(what, lambda _: live.subject.do(wanted).value)
+
+    @property
+    def state(self) -> ControllerState:
+        """Its status, program, axes, pins and details at present. The twin's."""
+        __tracebackhide__ = True
+        return read_state(self._do("state", command.State(self._machine)))
 
     @property
     def pins(self) -> Mapping[str, float]:

@@ -21,6 +21,7 @@ from steptwin.world.scale import DriveScale
 from steptwin.world.spec import AxisSpec, ControllerSpec, LineSpec, WorldSpec
 
 if TYPE_CHECKING:
+    from steptwin.controllerstate import ControllerState
     from steptwin.datasheet import Datasheet
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
@@ -184,8 +185,8 @@ class ControllerKind(Generic[S, M, V]):
     machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""
     held_jog: Callable[[M, str | None, Jog], HeldJog] | None = None
     """A jog that lasts only while it is extended; arguments and exceptions as those of ``control``."""
-    state: Callable[[M, Nanos], dict[str, object]]
-    """Its present state as plain data; the machine is at that moment."""
+    state: Callable[[M, Nanos], ControllerState]
+    """Its present state; the machine is at that moment."""
     statement: Callable[[M], str | None] = lambda machine: None
     """The statement that its program is at, while one runs or is paused, as text."""
     view: Callable[[Plant, str, M], V]

@@ -12,6 +12,7 @@ from steptwin.world import script as do
 from steptwin.world.actions import Bytes
 
 if TYPE_CHECKING:
+    from steptwin.controllerstate import ControllerState
     from steptwin.world.build import Fitted
     from steptwin.world.plant import Plant
 
@@ -53,6 +54,12 @@ class MachineView:
 
     def _touch(self) -> None:
         self._plant.touch(self.name)
+
+    @property
+    def state(self) -> ControllerState:
+        """Status, program, axes, pins and details."""
+        self._touch()
+        return self._plant.kind(self.name).state(self._plant.machines[self.name], self._plant.now)
 
     @property
     def pins(self) -> Mapping[str, float]:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from steptwin.datasheet import Access, AxisDescription, Datasheet, Pin, PinDirection, Point, PointEffect
+from steptwin.controllerstate import ControllerState, StateAxis, StateProgram, StateStatus
+from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactType, Pin, PinDirection, Point, PointEffect
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import MachineEvent, Nanos
+from steptwin.machine import SECOND, MachineEvent, Nanos
 from steptwin.points import LivePoint, turns_of
 from steptwin.wire.slave import FrameDirection as Way
 from steptwin.words.frames import FrameLine
@@ -101,8 +102,28 @@ def _body(toy: Toy, service: Service, shafts: Mapping[int, AxisLoad]) -> ToyBody
     return ToyBody(shafts.values())
 
 
-def _state(toy: Toy, now: Nanos) -> dict[str, object]:
-    return {"controller": "toy", "position": toy.axis.plan.count(now), "pins": dict(toy.pins())}
+def _state(toy: Toy, now: Nanos) -> ControllerState:
+    axis = StateAxis(
+        number=1,
+        name="M1",
+        unit="pulse",
+        position=_position(toy, now),
+        velocity=toy.axis.plan.velocity(now),
+        moving=toy.is_busy,
+        enabled=None,
+        encoder=None,
+        status=StateStatus(text="busy" if toy.is_busy else "at rest"),
+    )
+    return ControllerState(
+        kind="toy",
+        variant="",
+        time_s=now / SECOND,
+        status=StateStatus(text="off" if toy.is_off else "ok"),
+        program=StateProgram(state=None, text="none", variables={}),
+        axes=(axis,),
+        pins=dict(toy.pins()),
+        details={"commands": toy.taken},
+    )
 
 
 def _lanes(toy: Toy) -> Mapping[str, AxisLane]:
@@ -128,6 +149,7 @@ DATASHEET = Datasheet(
     points=(POSITION,),
     commands=(),
     events=(),
+    details=(Detail("commands", "Commands that it has taken", FactType.WHOLE),),
 )
 
 

@@ -84,7 +84,7 @@ class ToyAxis(Stateful):
 class Toy(Bare):
     """BUSY is high while the axis moves; STOP high stops it with a ramp and keeps it from starting."""
 
-    __slots__ = ("axis", "is_busy", "is_off", "stop")
+    __slots__ = ("axis", "is_busy", "is_off", "stop", "taken")
 
     def __init__(self) -> None:
         super().__init__()
@@ -92,6 +92,7 @@ class Toy(Bare):
         self.is_busy = False
         self.is_off = False
         self.stop = False
+        self.taken = 0
 
     @property
     def axes(self) -> tuple[ToyAxis]:
@@ -132,6 +133,7 @@ class Toy(Bare):
     def execute(self, command: bytes, now: Nanos) -> bytes:
         """``M`` n moves by n·`STEP_P` pulses, ``H`` 0 halts, ``P`` 0 asks for the position in `STEP_P`; refused: ``E``."""
         self.advance(now)
+        self.taken += 1
         letter, number = command[:1], int.from_bytes(command[1:], signed=True)
         if letter == b"M" and not (self.is_busy or self.stop or self.is_off):
             there = self.axis.plan.count(now)

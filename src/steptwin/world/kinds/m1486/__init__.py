@@ -7,9 +7,9 @@ from collections.abc import Callable
 from steptwin.m1486 import datasheet, points
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, refuse_taken, settable_pin
+from steptwin.m1486.present import state_of
 from steptwin.m1486.variants import Store, variant
 from steptwin.machine import MachineEvent
-from steptwin.words.m1486_state import state_of
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, Terminals
 from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line, table
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog

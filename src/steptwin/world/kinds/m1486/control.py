@@ -9,9 +9,9 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.points import UNIT
+from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import Command
-from steptwin.words.m1486_state import program_words
 from steptwin.world import script as do
 from steptwin.world.control import ControllerCommand, Jog, Move, StopAxes
 

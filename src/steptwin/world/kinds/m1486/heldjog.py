@@ -10,12 +10,12 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.drive import speed_curve
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.points import UNIT
+from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import Command
 from steptwin.m1486.variants import Store
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.motion.ramps import plan_distance
-from steptwin.words.m1486_state import program_words
 from steptwin.world import script as do
 from steptwin.world.control import Jog
 from steptwin.world.heldjog import STOP_NS, Given

@@ -8,10 +8,10 @@ from steptwin.machine import MachineEvent, Nanos
 from steptwin.mic488 import datasheet, points
 from steptwin.mic488.core import ANALOG_PINS, ENABLE_PINS, INPUT_PINS, OUTPUT_PINS, check_pin
 from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.present import empty_banks, state_of, statement_of
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.status import ProgramState
 from steptwin.mic488.vision import VisionRecord
-from steptwin.words.mic488_state import empty_banks, state_of, statement_of
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Terminals, Vision
 from steptwin.world.kinds.mic488 import axes, build, control, faults, line, table
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog

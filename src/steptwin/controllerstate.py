@@ -1,0 +1,133 @@
+"""The present state of one controller: one shape for all kinds. What is not known is None.
+
+`steptwin.datasheet.plain` makes JSON of it, `read_state` reads that. The data sheet has what does not change: title, units, pins,
+and what each of the ``details`` means.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from steptwin.datasheet import Detail
+from steptwin.machine import Nanos
+
+M = TypeVar("M")
+DetailValue: TypeAlias = bool | int | float | str | tuple[int, ...] | Mapping[str, int] | None
+"""As the type of its `Detail` says."""
+
+
+class StatusLevel(enum.Enum):
+    OK = "ok"
+    WARNING = "warning"
+    """It does not do what it was commanded to: at a limit, shut down, program halted."""
+    ERROR = "error"
+
+
+class ProgramActivity(enum.Enum):
+    STOPPED = "stopped"
+    RUNNING = "running"
+    WAITING = "waiting"
+    """For a moment, an input, or the end of a motion."""
+    PAUSED = "paused"
+    """It can go on where it is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateStatus:
+    """What a controller or an axis reports of itself."""
+
+    code: int | None = None
+    """The number that it shows; None where it has no numbers."""
+    text: str
+    level: StatusLevel = StatusLevel.OK
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateProgram:
+    """The program that is executed at present, or was last."""
+
+    state: ProgramActivity | None
+    text: str
+    """The same in words, with what it waits for, or why it was stopped."""
+    file: str | None = None
+    """None where the source is not known."""
+    line: int | None = None
+    """In the source, from 1."""
+    statement: str | None = None
+    """The one that is executed or comes next."""
+    variables: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateAxis:
+    """``number``, ``name`` and ``unit`` are those of the data sheet."""
+
+    number: int
+    name: str
+    unit: str
+    position: float | None
+    """In ``unit``, at this moment of a motion, too."""
+    velocity: float | None
+    """In ``unit`` per second."""
+    moving: bool | None
+    enabled: bool | None
+    """Whether its drive is on; None where the controller does not switch it."""
+    encoder: int | None
+    """Counts; None without an encoder."""
+    status: StateStatus
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerState:
+    kind: str
+    """The name of the kind of controller, as in its data sheet."""
+    variant: str
+    time_s: float | None
+    """Of its clock, which begins at 0."""
+    status: StateStatus
+    program: StateProgram
+    axes: tuple[StateAxis, ...]
+    pins: Mapping[str, float | None]
+    """Levels: 0, 1, volts."""
+    details: Mapping[str, DetailValue]
+    """What only this kind has, by the names of ``details`` in its data sheet."""
+
+
+@dataclass(frozen=True, slots=True)
+class DetailRow(Generic[M]):
+    """A detail of a kind of controller, and how it is read at the present moment of the machine."""
+
+    detail: Detail
+    read: Callable[[M, Nanos], DetailValue]
+
+
+def details_of(rows: Iterable[DetailRow[M]], machine: M, now: Nanos) -> dict[str, DetailValue]:
+    return {row.detail.name: row.read(machine, now) for row in rows}
+
+
+def read_state(data: Mapping[str, Any]) -> ControllerState:
+    """The state in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what is none."""
+    lists: dict[str, Any] = {
+        "status": _read_status(data["status"]),
+        "program": _read_program(data["program"]),
+        "axes": tuple(map(_read_axis, data["axes"])),
+        "details": {name: tuple(value) if isinstance(value, list) else value for name, value in data["details"].items()},
+    }
+    return ControllerState(**{**data, **lists})
+
+
+def _read_status(data: Mapping[str, Any]) -> StateStatus:
+    return StateStatus(code=data["code"], text=data["text"], level=StatusLevel(data["level"]))
+
+
+def _read_program(data: Mapping[str, Any]) -> StateProgram:
+    read: dict[str, Any] = {"state": None if data["state"] is None else ProgramActivity(data["state"])}
+    return StateProgram(**{**data, **read})
+
+
+def _read_axis(data: Mapping[str, Any]) -> StateAxis:
+    read: dict[str, Any] = {"status": _read_status(data["status"])}
+    return StateAxis(**{**data, **read})

@@ -1,0 +1,102 @@
+"""What the state of an M1486 has besides what that of every controller has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from steptwin.controllerstate import DetailRow, DetailValue
+from steptwin.datasheet import Detail, FactType
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.commands import TABLE
+from steptwin.m1486.drive import ChipDrive
+from steptwin.m1486.encoding import decode
+from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
+from steptwin.m1486.points import UNIT
+from steptwin.m1486.registers import GENERAL
+from steptwin.m1486.syntax import Command
+from steptwin.machine import Nanos
+
+
+def next_command(chip: M1486Chip) -> Command | None:
+    """The command the program stands before, None at the end of what is stored."""
+    if chip.program.is_at_end or chip.program.pc == chip.memory.end:
+        return None
+    stored = decode(chip.memory.fetch(chip.program.pc))
+    return None if stored is None else stored.command
+
+
+def used_bits(chip: M1486Chip) -> int:
+    """Command memory written since the program's beginning; all of it once the ring has come round (M-12)."""
+    memory = chip.memory
+    return 8 * (memory.size if memory.begin is None else memory.age(memory.begin))
+
+
+def functions_on(chip: M1486Chip) -> list[int]:
+    return [number for number in FUNCTIONS if chip.unit.on(number)]
+
+
+def flags_on(chip: M1486Chip) -> list[int]:
+    flags = [number for number, on in zip(USER_FLAGS, chip.unit.flags, strict=True) if on]
+    return [*flags, CARRY] if chip.unit.carry else flags
+
+
+_SETTINGS: dict[str, Callable[[ChipDrive], int]] = {
+    "S": lambda drive: drive.start_stop,
+    "A": lambda drive: drive.acceleration,
+    "P": lambda drive: drive.profile_speed,
+    "V": lambda drive: drive.velocity,
+    "M": lambda drive: drive.microstep,
+    "Q": lambda drive: drive.qualification,
+    "N": lambda drive: drive.characteristic,
+}
+"""By the command that makes it."""
+_TEXT, _WHOLE, _TRUTH = FactType.TEXT, FactType.WHOLE, FactType.TRUTH
+
+
+def _rows() -> Iterator[DetailRow[M1486Chip]]:
+    def row(
+        name: str, meaning: str, kind: FactType, read: Callable[[M1486Chip, Nanos], DetailValue], unit: str = ""
+    ) -> DetailRow[M1486Chip]:
+        return DetailRow(Detail(name, meaning, kind, unit), read)
+
+    yield row("address", "Address on its line, hexadecimal", _TEXT, lambda chip, now: f"{chip.address:X}")
+    yield row("interface", "Driver interface", _TEXT, lambda chip, now: chip.interface.name)
+    yield row("baud", "Rate of its line", _WHOLE, lambda chip, now: chip.uart.baud, "bit/s")
+    yield row("listens", "Whether it was addressed last", _TRUTH, lambda chip, now: chip.receiver.is_listening)
+    yield row("memory_used", "Command memory that is used", _WHOLE, lambda chip, now: used_bits(chip), "bit")
+    yield row("memory_size", "Command memory", _WHOLE, lambda chip, now: chip.variant.memory_bits, "bit")
+    yield row("stored", "File in the EEPROM", _WHOLE, lambda chip, now: len(chip.image), "byte")
+    yield row("input_waiting", "Characters in the input buffer", _WHOLE, lambda chip, now: chip.receiver.waiting)
+    yield row("input_size", "Characters it has room for", _WHOLE, lambda chip, now: chip.receiver.waiting + chip.receiver.free)
+    yield row("counter", "Position counter, 24 bits", _WHOLE, lambda chip, now: chip.drive.counter_u(now), UNIT)
+    yield row("counter_valid", "Whether the counter shows the position (M-16)", _TRUTH, lambda chip, now: chip.drive.is_valid)
+    for spec in TABLE:
+        if spec.key in _SETTINGS:
+            yield row(spec.key, spec.name, _WHOLE, _setting(_SETTINGS[spec.key]), spec.unit)
+    yield row("next_distance", "Distance of the next move; null without end", FactType.WHOLE, _next_distance, UNIT)
+    yield row("next_direction", "Direction of the next move: 1 or -1", _WHOLE, _next_direction)
+    yield row("variable", "Internal variable, 24 bits", _WHOLE, lambda chip, now: chip.unit.variable)
+    yield row("remainder", "Remainder of the last division", _WHOLE, lambda chip, now: chip.unit.remainder)
+    yield row(
+        "registers",
+        "General purpose registers",
+        FactType.NAMED,
+        lambda chip, now: {str(number): chip.memory.register(number) for number in GENERAL},
+    )
+    yield row("flags_on", "Flags that are set", FactType.WHOLES, lambda chip, now: tuple(flags_on(chip)))
+    yield row("functions_on", "Functions that are on", FactType.WHOLES, lambda chip, now: tuple(functions_on(chip)))
+
+
+def _setting(read: Callable[[ChipDrive], int]) -> Callable[[M1486Chip, Nanos], int]:
+    return lambda chip, now: read(chip.drive)
+
+
+def _next_distance(chip: M1486Chip, now: Nanos) -> int | None:
+    return None if chip.drive.endless else chip.drive.distance_u
+
+
+def _next_direction(chip: M1486Chip, now: Nanos) -> int:
+    return chip.drive.endless or (1 if chip.drive.distance_u >= 0 else -1)
+
+
+DETAILS: tuple[DetailRow[M1486Chip], ...] = tuple(_rows())

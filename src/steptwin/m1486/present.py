@@ -1,0 +1,99 @@
+"""The present state of an M1486, and what its program does in words."""
+
+from __future__ import annotations
+
+from steptwin.controllerstate import (
+    ControllerState,
+    ProgramActivity,
+    StateAxis,
+    StateProgram,
+    StateStatus,
+    StatusLevel,
+    details_of,
+)
+from steptwin.datasheet import AxisDescription
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.datasheet import datasheet
+from steptwin.m1486.details import DETAILS, next_command
+from steptwin.m1486.drive import MotionMode
+from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.program import WaitReason
+from steptwin.machine import SECOND, Nanos
+
+_MOTIONS = {MotionMode.MOVE: "move", MotionMode.ENDLESS: "endless move", MotionMode.SEEK: "seek"}
+
+
+def program_words(chip: M1486Chip, now: Nanos) -> str:
+    """What the program of a chip does."""
+    program = chip.program
+    if chip.is_shut_down:
+        return "shut down"
+    if program.is_killed:
+        return "stopped by Kill (C75 lets it go on)"
+    if program.is_limited:
+        return "stopped by LIMIT"
+    if program.is_halted:
+        return "halted"
+    if program.waiting is WaitReason.MOTION:
+        return f"waits for the end of the {_MOTIONS.get(chip.drive.motion, 'motion')}"
+    if program.waiting is WaitReason.LINE:
+        return f"waits until B{program.line} is {'high' if program.line_level else 'low'}"
+    if program.ready - now > program.statement_ns:
+        return f"waits {(program.ready - now) / SECOND:.3f} s more"
+    return "has nothing to do" if program.is_at_end else "runs"
+
+
+def velocity(chip: M1486Chip, now: Nanos) -> float:
+    """Commanded velocity in full steps per second."""
+    return 0.0 if chip.drive.motion is MotionMode.REST else chip.drive.profile.velocity(now) / FULL_STEP
+
+
+def state_of(chip: M1486Chip, now: Nanos) -> ControllerState:
+    """The position is where the pulses given so far have led, as the point ``position``; `details` have the counter."""
+    sheet = datasheet(chip)
+    is_stopped = chip.is_shut_down or chip.program.is_held
+    words = program_words(chip, now)
+    return ControllerState(
+        kind=sheet.kind,
+        variant=sheet.variant,
+        time_s=now / SECOND,
+        status=StateStatus(text=words, level=StatusLevel.WARNING) if is_stopped else StateStatus(text="ok"),
+        program=_program(chip, words, now),
+        axes=tuple(_axis(chip, described, now) for described in sheet.axes),
+        pins=dict(chip.pins()),
+        details=details_of(DETAILS, chip, now),
+    )
+
+
+def _program(chip: M1486Chip, words: str, now: Nanos) -> StateProgram:
+    following = next_command(chip)
+    return StateProgram(
+        state=_activity(chip, now), text=words, statement=None if following is None else str(following), variables={}
+    )
+
+
+def _activity(chip: M1486Chip, now: Nanos) -> ProgramActivity:
+    program = chip.program
+    if chip.is_shut_down:
+        return ProgramActivity.STOPPED
+    if program.is_held:
+        return ProgramActivity.PAUSED
+    if program.waiting is not WaitReason.NOTHING or program.ready - now > program.statement_ns:
+        return ProgramActivity.WAITING
+    return ProgramActivity.STOPPED if program.is_at_end else ProgramActivity.RUNNING
+
+
+def _axis(chip: M1486Chip, described: AxisDescription, now: Nanos) -> StateAxis:
+    """A chip does not switch its drive: whether that is on is not known."""
+    drive = chip.drive
+    return StateAxis(
+        number=described.number,
+        name=described.name,
+        unit=described.unit,
+        position=float(drive.true_u(now)),
+        velocity=velocity(chip, now) * FULL_STEP,
+        moving=drive.motion is not MotionMode.REST,
+        enabled=None,
+        encoder=None,
+        status=StateStatus(text=drive.motion.value),
+    )

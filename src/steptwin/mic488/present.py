@@ -1,0 +1,133 @@
+"""The present state of a MIC488, and the place in its program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from steptwin.controllerstate import (
+    ControllerState,
+    ProgramActivity,
+    StateAxis,
+    StateProgram,
+    StateStatus,
+    StatusLevel,
+    details_of,
+)
+from steptwin.datasheet import AxisDescription
+from steptwin.diagnostics import visible
+from steptwin.machine import SECOND, Nanos
+from steptwin.mic488.axis import Axis
+from steptwin.mic488.datasheet import datasheet
+from steptwin.mic488.details import DETAILS
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
+from steptwin.mic488.status import AxisStatus, ControllerStatus, ProgramState
+
+_ACTIVITIES: Mapping[ProgramState, ProgramActivity] = {
+    ProgramState.STOPPED: ProgramActivity.STOPPED,
+    ProgramState.RUNNING: ProgramActivity.RUNNING,
+    ProgramState.PAUSED: ProgramActivity.PAUSED,
+}
+_LEVELS: Mapping[int, StatusLevel] = {
+    AxisStatus.ERROR: StatusLevel.ERROR,
+    AxisStatus.LIMIT_L: StatusLevel.WARNING,
+    AxisStatus.LIMIT_R: StatusLevel.WARNING,
+}
+
+
+class StatementPlace(NamedTuple):
+    """A statement of a program's text."""
+
+    file: str
+    line: int
+    text: str
+
+
+def place_of(device: Mic488Device) -> StatementPlace | None:
+    """The statement that the running or paused program is at; None when there is none."""
+    running, span = device.program.running, device.program.statement(device.now)
+    if running is None or span is None:
+        return None
+    source = running.source
+    return StatementPlace(
+        source.name, source.position(span.start)[0], visible(source.text[span.start : span.end].strip()) or "its end"
+    )
+
+
+def statement_of(device: Mic488Device) -> str | None:
+    """The same in words: line and text."""
+    place = place_of(device)
+    return None if place is None else f"line {place.line}: {place.text}"
+
+
+def empty_banks(name: str, device: Mic488Device) -> list[str]:
+    """A configuration that starts a program nobody gave lights ERR at power-on, as on the device: why, and what to do."""
+    bank, table = device.config.program.prog_bank, device.config.program.pos_bank
+    if not device.config.program.activate:
+        return []
+    begin = f"ERR of {name} is on: Activate=1 starts program bank {bank} at power-on"
+    program = device.program.programs.get(bank)
+    if program is None:
+        return [f"{begin}, which is empty (--program {bank}=FILE, or programs = {{ {bank} = 'FILE' }})"]
+    if program.uses_positions and table not in device.program.positions:
+        where = f"(--positions {table}=FILE, or positions = {{ {table} = 'FILE' }})"
+        return [f"{begin} with position bank {table}, which is empty {where}"]
+    return []
+
+
+def state_of(device: Mic488Device, now: Nanos) -> ControllerState:
+    """Positions in configured units; user registers that are 0 are left out."""
+    status, sheet = device.status(), datasheet(device)
+    return ControllerState(
+        kind=sheet.kind,
+        variant=sheet.variant,
+        time_s=now / SECOND,
+        status=StateStatus(
+            code=int(status),
+            text=CONTROLLER_STATUS_TEXTS[status],
+            level=StatusLevel.OK if status is ControllerStatus.OK else StatusLevel.ERROR,
+        ),
+        program=_program(device, now),
+        axes=tuple(_axis(axis, described, now) for axis, described in zip(device.axes, sheet.axes, strict=True)),
+        pins=dict(device.pins()),
+        details=details_of(DETAILS, device, now),
+    )
+
+
+def _program(device: Mic488Device, now: Nanos) -> StateProgram:
+    place, fault = place_of(device), device.program.fault
+    activity = _ACTIVITIES[device.program.state]
+    text = activity.value
+    if place is not None:
+        text += f" at line {place.line}: {place.text}"
+    elif fault is not None:
+        text += f" by an error: {fault.text}"
+    return StateProgram(
+        state=activity,
+        text=text,
+        file=None if place is None else place.file,
+        line=None if place is None else place.line,
+        statement=None if place is None else place.text,
+        variables=device.program.variables(now),
+    )
+
+
+def _axis(axis: Axis, described: AxisDescription, now: Nanos) -> StateAxis:
+    return StateAxis(
+        number=axis.number,
+        name=described.name,
+        unit=described.unit,
+        position=axis.coordinate_p(now) / axis.gear,
+        velocity=axis.profile.velocity(now) / axis.gear,
+        moving=axis.profile.moving(now),
+        enabled=axis.enabled,
+        encoder=axis.encoder_counts(now),
+        status=axis_status(axis.status),
+    )
+
+
+def axis_status(code: int) -> StateStatus:
+    """What a register Mx_STATUS says."""
+    text = AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
+    return StateStatus(code=int(code), text=text, level=_LEVELS.get(code, StatusLevel.OK))
