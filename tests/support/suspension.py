@@ -1,6 +1,6 @@
 """A process that is suspended once, at any of the points where it reads the clock, sends, receives or sleeps.
 
-The twin goes on meanwhile. `Suspension` is put between a driver's line and a wire of `host_rig` or `chip_rig`.
+The twin goes on meanwhile. `Suspension` is put between a driver's line and a wire of `line_rig`.
 """
 
 from __future__ import annotations
@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-from chip_rig import ChipWire
-from host_rig import MemoryChannel, MemoryEndpoint, MemoryTransport, Wire, run_virtual
+from line_rig import MemoryChannel, MemoryEndpoint, MemoryTransport, VirtualWire, run_virtual
 
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
@@ -25,7 +24,7 @@ AT_THE_LAST_MOMENT = ("before writing", "after the clock")
 class Suspension:
     """The process is suspended at point ``at``, for ``away_s``; None: never. ``count`` tells how many points there were."""
 
-    def __init__(self, wire: Wire | ChipWire, away_s: float = AWAY_S) -> None:
+    def __init__(self, wire: VirtualWire, away_s: float = AWAY_S) -> None:
         self.wire = wire
         self.away_s = away_s
         self.count = 0
@@ -66,7 +65,7 @@ class Suspension:
     # ------------------------------------------------------------------ lines
 
     def thread(self, line: ThreadLine[Any, Any]) -> ThreadLine[Any, Any]:
-        wire: Any = self.wire
+        wire = self.wire
         line.now = self.around("the clock", wire.clock)
         line._sleeping = self.around("sleeping", wire.sleep)
         line._endpoint = _Endpoint(self)
@@ -79,7 +78,7 @@ class Suspension:
 
     def run(self, main: Coroutine[Any, Any, T]) -> T:
         """Run a coroutine in the time of the wire, which the suspension moves too."""
-        wire: Any = self.wire
+        wire = self.wire
 
         async def body() -> T:
             import asyncio
@@ -87,11 +86,11 @@ class Suspension:
             loop: Any = asyncio.get_running_loop()
 
             def elapse(seconds: float) -> None:
-                end = max(wire.now, round(loop.elapsed * SECOND)) + round(seconds * SECOND)
+                end = max(wire.now, loop.now_ns) + round(seconds * SECOND)
                 arrived: list[bytes] = []
                 while pieces := wire.run(end):
                     arrived += pieces
-                loop.elapsed = end / SECOND
+                loop.now_ns = end
                 for piece in arrived:
                     wire.inject(piece)
 
@@ -103,8 +102,7 @@ class Suspension:
 
 class _Endpoint(MemoryEndpoint):
     def __init__(self, suspension: Suspension) -> None:
-        wire: Any = suspension.wire
-        super().__init__(wire)
+        super().__init__(suspension.wire)
         self._suspension = suspension
 
     def open(self) -> MemoryChannel:

@@ -21,6 +21,8 @@ class _Selector(selectors.DefaultSelector):
         ready = super().select(0)
         if ready or timeout == 0:
             return ready
+        if timeout is None and self.loop.is_alone:
+            raise RuntimeError("nothing will ever happen in this loop any more")
         if timeout is None:
             return super().select(5.0)  # nothing is planned: something outside has to happen
         self.loop.now_ns += max(round(timeout * 1e9), 1)
@@ -30,10 +32,12 @@ class _Selector(selectors.DefaultSelector):
 class VirtualLoop(asyncio.SelectorEventLoop):
     now_ns: int
 
-    def __init__(self) -> None:
+    def __init__(self, now_ns: int = 0, *, is_alone: bool = False) -> None:
+        """``is_alone``: nothing outside can make anything happen."""
         selector = _Selector()
         selector.loop = self
-        self.now_ns = 0
+        self.now_ns = now_ns
+        self.is_alone = is_alone
         super().__init__(selector)
 
     def time(self) -> float:

@@ -7,10 +7,10 @@ from itertools import pairwise
 from math import floor
 
 import pytest
-from driven import changes
 from hypothesis import given
 from hypothesis import strategies as st
 from mic488_rig import controller
+from pulse_by_pulse import changes
 from toy import ToyAxis
 
 from steptwin.errors import Misuse

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from driven import changes, pulse_by_pulse
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from pulse_by_pulse import changes, pulse_by_pulse
 
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, plan_position

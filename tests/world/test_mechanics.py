@@ -5,10 +5,11 @@ from __future__ import annotations
 from textwrap import dedent
 
 import pytest
-from driven import Driven, pulse_by_pulse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mic488_rig import controller
+from pulse_by_pulse import pulse_by_pulse
+from toy import Driven
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World

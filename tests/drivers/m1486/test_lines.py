@@ -7,7 +7,8 @@ import threading
 from collections.abc import Callable
 
 import pytest
-from chip_rig import ChipWire, Fault, chip_line, chip_task_line, run_in
+from chip_rig import ChipWire, Fault, chip_line, chip_task_line
+from line_rig import run_virtual
 
 from steptwin.drivers import Overtaken
 from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, NoEcho, PositionUnknown, Restarted
@@ -77,7 +78,7 @@ def test_tasks_move_two_chips_at_the_same_time() -> None:
         await line.close()
 
     begin = wire.now
-    run_in(wire, main())
+    run_virtual(wire, main())
     assert both[0]
     assert wire.now - begin < 2 * 2.2 * SECOND
     assert (wire.true(0), wire.true(7)) == (128_000, 128_000)
@@ -108,7 +109,7 @@ def test_a_stop_goes_before_a_wait_that_keeps_the_line() -> None:
         assert await other.position() == wire.true(7) / 64
         await line.close()
 
-    run_in(wire, main())
+    run_virtual(wire, main())
 
 
 def test_a_move_that_waits_for_the_line_is_not_begun_after_a_stop() -> None:
@@ -126,7 +127,7 @@ def test_a_move_that_waits_for_the_line_is_not_begun_after_a_stop() -> None:
             await moving
         await line.close()
 
-    run_in(wire, main())
+    run_virtual(wire, main())
     assert wire.true(7) == 0
 
 
@@ -230,7 +231,7 @@ def test_tasks_that_wait_for_their_chips_are_told_why_each_ended() -> None:
         await asyncio.gather(use(0), use(7), ask())
         await line.close()
 
-    run_in(wire, main())
+    run_virtual(wire, main())
     assert (ends[0].reason, ends[7].reason) == (ChipReason.TARGET, ChipReason.EARLY)
     assert asked[0] > 5
 
@@ -256,7 +257,7 @@ def test_the_end_of_a_block_is_heard_while_the_end_of_a_move_is_watched(after: f
         moved, done = await asyncio.gather(wait(), block())
         return moved, done
 
-    assert run_in(wire, main()) == (ChipReason.TARGET, ChipReason.DONE)
+    assert run_virtual(wire, main()) == (ChipReason.TARGET, ChipReason.DONE)
 
 
 def test_a_chip_that_is_late_or_stopped_does_not_hold_up_the_others() -> None:
@@ -354,5 +355,5 @@ def test_waiting_for_the_line_is_no_suspension() -> None:
         assert (await two.wait()).ok
         assert (await block).ok
 
-    run_in(wire, main())
+    run_virtual(wire, main())
     assert (wire.true(0), wire.true(7)) == (640, 640)

@@ -7,6 +7,6 @@ controller of it, for worlds.
 
 from toy.faults import ToyBody
 from toy.line import ToyLine, ToyPort
-from toy.machine import ACCELERATION_P, STEP_P, VELOCITY_P, Bare, Toy, ToyAxis
+from toy.machine import ACCELERATION_P, STEP_P, VELOCITY_P, Bare, Driven, Toy, ToyAxis
 
-__all__ = ["ACCELERATION_P", "STEP_P", "VELOCITY_P", "Bare", "Toy", "ToyAxis", "ToyBody", "ToyLine", "ToyPort"]
+__all__ = ["ACCELERATION_P", "STEP_P", "VELOCITY_P", "Bare", "Driven", "Toy", "ToyAxis", "ToyBody", "ToyLine", "ToyPort"]

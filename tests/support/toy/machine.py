@@ -81,6 +81,24 @@ class ToyAxis(Stateful):
         self.revision += 1
 
 
+class Driven(Bare):
+    """A machine whose only axis goes where the test says."""
+
+    __slots__ = ("axis",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.axis = ToyAxis()
+
+    @property
+    def axes(self) -> tuple[ToyAxis]:
+        return (self.axis,)
+
+    def go(self, target: int, now: Nanos) -> None:
+        self.axis.follow(plan_position(MotionState.of(self.axis.plan, now), target, 500.0, 500.0, 200.0))
+        self.changed()
+
+
 class Toy(Bare):
     """BUSY is high while the axis moves; STOP high stops it with a ramp and keeps it from starting."""
 

@@ -1,31 +1,10 @@
-"""A machine with one axis, for tests of what it drives, and where its mechanics are pulse by pulse."""
+"""Where mechanics are pulse by pulse: an independent way to the courses that `steptwin.world.course` has in closed form."""
 
 from __future__ import annotations
 
-from toy import Bare, ToyAxis
-
 from steptwin.machine import Nanos
-from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import Plan
 from steptwin.world.course import Build, Standing
-
-
-class Driven(Bare):
-    """A machine whose only axis goes where the test says."""
-
-    __slots__ = ("axis",)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.axis = ToyAxis()
-
-    @property
-    def axes(self) -> tuple[ToyAxis]:
-        return (self.axis,)
-
-    def go(self, target: int, now: Nanos) -> None:
-        self.axis.follow(plan_position(MotionState.of(self.axis.plan, now), target, 500.0, 500.0, 200.0))
-        self.changed()
 
 
 def changes(plan: Plan, after: Nanos, until: Nanos) -> list[tuple[Nanos, int]]:
