@@ -11,16 +11,22 @@ PYTHON_ID := $(shell $(PYTHON) -c 'import sys; print("%d.%d.%d" % sys.version_in
 PYTHON_STAMP := .venv/.python-$(PYTHON_ID)
 RUN_STAMP := .venv/.ready-run
 DEV_STAMP := .venv/.ready-dev
+NODE_STAMP := .venv/.ready-node
+WEB := $(BIN)/python studio-web/build.py
+
+# The page of the studio, and what it is made of.
+PAGE := src/steptwin/studio/page/index.html
+PAGE_SOURCES := $(shell find studio-web -type f -not -path '*/node_modules/*' -not -path '*/__pycache__/*')
 
 # uv takes the interpreter it is given and what the lock files name, whatever project or environment surrounds it.
 export UV_PYTHON_DOWNLOADS := never
 unexport VIRTUAL_ENV PYTHONPATH PYTHONHOME
 INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 
-PEER_PACKAGES := mbpoll libmodbus-dev gcc libc6-dev pkg-config make ser2net
+PEER_PACKAGES := chromium mbpoll libmodbus-dev gcc libc6-dev pkg-config make ser2net
 
 .DEFAULT_GOAL := help
-.PHONY: help run test soak extras lint format types imports bench mutants docs peers lock clean
+.PHONY: help run test soak extras page lint format types imports bench mutants docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -28,24 +34,29 @@ help:  ## Show the targets
 run: $(RUN_STAMP)  ## Start a virtual MIC488 with home switches (ARGS="--firmware 1.23 ...")
 	@exec $(BIN)/steptwin serve mic488 --demo $(ARGS)
 
-test: $(DEV_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
+test: $(DEV_STAMP) $(PAGE)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto $(ARGS)
 
 soak: $(DEV_STAMP)  ## Run the soak tests at full length (STEPTWIN_SOAK=0.1 for a tenth)
 	STEPTWIN_SOAK=$${STEPTWIN_SOAK:-1} $(BIN)/pytest -n auto -m soak tests/soak $(ARGS)
 
+page: $(PAGE)  ## Build the page of the studio
+
 extras: $(DEV_STAMP)  ## Install what pictures, other exports, the monitor and the editor server need (as the tests do)
 
-lint: $(DEV_STAMP)  ## Check style and formatting
+lint: $(DEV_STAMP) $(NODE_STAMP)  ## Check style and formatting
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	@$(WEB) lint
 
-format: $(DEV_STAMP)  ## Repair style and formatting
+format: $(DEV_STAMP) $(NODE_STAMP)  ## Repair style and formatting
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+	@$(WEB) format
 
-types: $(DEV_STAMP)  ## Check the types
+types: $(DEV_STAMP) $(NODE_STAMP)  ## Check the types
 	$(BIN)/pyrefly check
+	@$(WEB) types
 
 imports: $(DEV_STAMP)  ## Check that imports go down only and that pure packages are pure
 	$(BIN)/lint-imports --no-logo
@@ -74,6 +85,7 @@ peers:  ## Install the system packages the tests talk to (Debian)
 
 lock: $(UV)  ## Pin the dependencies anew (ARGS="--upgrade" takes newer ones)
 	$(COMPILE) requirements/tools.in -o requirements/tools.txt
+	$(COMPILE) requirements/node.in -o requirements/node.txt
 	$(COMPILE) pyproject.toml --extra lsp --extra studio --group build -o requirements/run.txt
 	$(COMPILE) pyproject.toml --all-extras --group build --group dev -c requirements/run.txt -o requirements/dev.txt
 
@@ -81,7 +93,7 @@ COMPILE := env -u UV_FIND_LINKS -u PIP_FIND_LINKS UV_CUSTOM_COMPILE_COMMAND="mak
   $(UV) pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest --generate-hashes --no-annotate $(ARGS)
 
 clean:  ## Remove everything that was built, downloaded or cached here
-	rm -rf .venv .tools build dist .pytest_cache .hypothesis .ruff_cache .import_linter_cache
+	rm -rf .venv .tools build dist studio-web/node_modules src/steptwin/studio/page .pytest_cache .hypothesis .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 NEED_PYTHON := [ -n "$(PYTHON_ID)" ] || { \
@@ -107,6 +119,16 @@ $(RUN_STAMP): $(PYTHON_STAMP) requirements/run.txt pyproject.toml
 	@echo "installing steptwin"
 	@$(INSTALL) --require-hashes -r requirements/run.txt
 	@$(INSTALL) --no-build-isolation --no-deps --editable .
+	@touch $@
+
+# The machine's node where it is new enough; otherwise one from a wheel.
+$(NODE_STAMP): $(PYTHON_STAMP) requirements/node.txt
+	@$(WEB) node || { echo "installing node"; $(INSTALL) --require-hashes -r requirements/node.txt; }
+	@touch $@
+
+$(PAGE): $(NODE_STAMP) $(PAGE_SOURCES)
+	@echo "building the page of the studio"
+	@$(WEB) build
 	@touch $@
 
 $(DEV_STAMP): $(RUN_STAMP) requirements/dev.txt

@@ -1,0 +1,16 @@
+"""Where the page of the studio is: a folder of files in the package, built by ``make page`` (``studio-web/README.md``)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from steptwin.errors import Refusal
+
+PAGE = Path(__file__).with_name("page")
+
+
+def find_page() -> Path:
+    """The folder with ``index.html``. Raises `Refusal` where it has not been built, as in a clone at first."""
+    if not (PAGE / "index.html").is_file():
+        raise Refusal("the page of the studio has not been built: 'make page' in the clone builds it; a wheel contains it")
+    return PAGE

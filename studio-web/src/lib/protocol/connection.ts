@@ -1,0 +1,194 @@
+import type { OpenLink, Link } from "./link";
+import type { Answer, HelloMessage, Pushed, Requests } from "./types";
+
+export type Hello = HelloMessage["hello"];
+export type RequestName = keyof Requests;
+export type Fields<N extends RequestName> = Omit<Requests[N]["request"], "do" | "id" | "version">;
+export type ErrorCode = NonNullable<Answer["error"]>["code"] | "closed" | "timeout";
+
+/** A request that was not done. The message is the server's own, which names value, permitted range and place. */
+export class RequestError extends Error {
+  constructor(
+    readonly code: ErrorCode,
+    message: string,
+  ) {
+    super(message);
+  }
+}
+
+export interface ConnectionEvents {
+  /** The whole state: after connecting, and after a gap. */
+  hello(hello: Hello): void;
+  /** What was pushed since the last call, without hello and without gaps. */
+  pushed(messages: readonly Pushed[]): void;
+  state(state: ConnectionState, why: string): void;
+}
+
+/** `silent`: the connection is there, and nothing comes over it. `refused`: hello was answered with an error. */
+export type ConnectionState = "connecting" | "open" | "silent" | "refused";
+
+export interface Timers {
+  set(call: () => void, ms: number): number;
+  clear(timer: number): void;
+}
+
+const BACK_OFF_MS = [100, 250, 500, 1000, 2000, 4000];
+const ANSWER_MS = 5000;
+/** The clock comes once a second. */
+const SILENT_MS = 2500;
+const GIVE_UP_MS = 8000;
+
+interface Waiting {
+  done(value: unknown): void;
+  failed(error: RequestError): void;
+  timer: number;
+}
+
+/** The connection of the page: requests as promises, hello, numbered messages, reconnection with back-off. */
+export class Connection {
+  private link: Link | null = null;
+  private isOpen = false;
+  private seq: number | null = null;
+  private resyncs = false;
+  private nextId = 1;
+  private readonly waiting = new Map<number, Waiting>();
+  private attempts = 0;
+  private watchdog = 0;
+  private stateNow: ConnectionState = "connecting";
+
+  constructor(
+    private readonly url: string,
+    private readonly greeting: () => Fields<"hello">,
+    private readonly events: ConnectionEvents,
+    private readonly openLink: OpenLink,
+    private readonly timers: Timers,
+  ) {}
+
+  open(): void {
+    this.link = this.openLink(this.url, {
+      opened: () => this.opened(),
+      messages: (messages) => this.received(messages),
+      closed: () => this.closed(),
+    });
+  }
+
+  /** Done when the answer is there; rejected with a `RequestError`. `id` is one from `newId`, for requests that are referred to. */
+  request<N extends RequestName>(
+    name: N,
+    fields: Fields<N>,
+    within_ms: number = ANSWER_MS,
+    id: number = this.newId(),
+  ): Promise<Requests[N]["answer"]> {
+    if (!this.isOpen || this.link === null) {
+      return Promise.reject(new RequestError("closed", "the studio is not connected"));
+    }
+    const promise = new Promise<unknown>((done, failed) => {
+      const timer = this.timers.set(() => {
+        this.waiting.delete(id);
+        failed(new RequestError("timeout", `${name}: no answer within ${within_ms / 1000} s`));
+      }, within_ms);
+      this.waiting.set(id, { done, failed, timer });
+    });
+    this.link.send(JSON.stringify({ do: name, ...fields, id }));
+    return promise as Promise<Requests[N]["answer"]>;
+  }
+
+  newId(): number {
+    return this.nextId++;
+  }
+
+  private opened(): void {
+    this.isOpen = true;
+    this.seq = null;
+    this.resyncs = false;
+    this.watch();
+    this.request("hello", this.greeting()).catch((error: RequestError) => {
+      if (error.code !== "closed") this.enter("refused", error.message);
+    });
+  }
+
+  private closed(): void {
+    this.isOpen = false;
+    this.link = null;
+    this.timers.clear(this.watchdog);
+    const error = new RequestError(
+      "closed",
+      "the connection was lost before the answer came; whether it was done is not known",
+    );
+    for (const [id, waiting] of this.waiting) this.reject(id, waiting, error);
+    this.enter("connecting");
+    const wait = BACK_OFF_MS[Math.min(this.attempts++, BACK_OFF_MS.length - 1)] as number;
+    this.timers.set(() => this.open(), wait);
+  }
+
+  private reject(id: number, waiting: Waiting, error: RequestError): void {
+    this.waiting.delete(id);
+    this.timers.clear(waiting.timer);
+    waiting.failed(error);
+  }
+
+  private received(messages: readonly unknown[]): void {
+    this.watch();
+    let news: Pushed[] = [];
+    for (const message of messages as readonly (Answer | Pushed)[]) {
+      if (!("seq" in message)) {
+        this.answered(message);
+      } else if ("hello" in message) {
+        news = [];
+        this.greeted(message);
+      } else if (this.inOrder(message.seq)) {
+        news.push(message);
+      }
+    }
+    if (news.length) this.events.pushed(news);
+  }
+
+  private greeted(message: HelloMessage): void {
+    this.seq = message.seq;
+    this.resyncs = false;
+    this.attempts = 0;
+    this.events.hello(message.hello);
+    this.enter("open");
+  }
+
+  /** Whether a message is the next one. After a gap nothing is, until the whole state has come. */
+  private inOrder(seq: number): boolean {
+    if (this.seq === null || this.resyncs) return false;
+    if (seq === this.seq + 1) {
+      this.seq = seq;
+      return true;
+    }
+    this.resyncs = true;
+    this.request("resync", {}).catch(() => this.link?.close());
+    return false;
+  }
+
+  private answered(answer: Answer): void {
+    const waiting = this.waiting.get(answer.id as number);
+    if (waiting === undefined) return;
+    this.waiting.delete(answer.id as number);
+    this.timers.clear(waiting.timer);
+    if (answer.error) waiting.failed(new RequestError(answer.error.code, answer.error.message));
+    else waiting.done(answer.ok);
+  }
+
+  private watch(): void {
+    this.timers.clear(this.watchdog);
+    if (this.stateNow === "silent") this.enter("open");
+    this.watchdog = this.timers.set(() => {
+      if (this.stateNow === "open") this.enter("silent");
+      this.watchdog = this.timers.set(() => this.link?.close(), GIVE_UP_MS - SILENT_MS);
+    }, SILENT_MS);
+  }
+
+  private enter(state: ConnectionState, why = ""): void {
+    if (state === this.stateNow) return;
+    this.stateNow = state;
+    this.events.state(state, why);
+  }
+}
+
+export const browserTimers: Timers = {
+  set: (call, ms) => window.setTimeout(call, ms),
+  clear: (timer) => window.clearTimeout(timer),
+};

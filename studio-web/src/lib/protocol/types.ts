@@ -1,0 +1,1042 @@
+// Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
+
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | AuditRequest;
+
+/** Every request has exactly one. */
+export type Answer = {
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  ok?: unknown;
+  /** Commands and events are numbered together. */
+  number?: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns?: string;
+  error?: {
+    code: "misuse" | "refusal" | "failure" | "internal";
+    message: string;
+  };
+};
+
+export type SubjectEvent = {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "plan";
+  axis: string;
+  /** Numbers for the position at any moment; docs/control.md has the formulas. */
+  plan: {
+    /** Virtual time, as decimal text [ns] */
+    start_ns: string;
+    base: number;
+    final: number;
+    segments: ((number | null)[] | {
+      end_s: number | null;
+      direction: number;
+      way: (number | null)[];
+      course: (number | null)[];
+      half: number;
+      end_p: number;
+    })[];
+    microstepping?: (number | null)[];
+    divisions?: number[][];
+  };
+  origin: number | null;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "coordinate";
+  axis: string;
+  origin: number;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "sample";
+  axis: string;
+  position: number;
+  unit: string;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "load";
+  axis: string;
+  pieces: {
+    /** Virtual time, as decimal text [ns] */
+    time_ns: string;
+    follows: boolean;
+    pulses: number;
+  }[];
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "edge";
+  pin: string;
+  level: number;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "frame";
+  client: string;
+  direction: "in" | "out";
+  /** Hexadecimal. */
+  data: string;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "statement";
+  program: string;
+  line: number;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "status";
+  code: string;
+  axis: string | null;
+  facts: Record<string, unknown>;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "note";
+  note: string;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "report";
+  code: string;
+  what: string;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "button";
+  button: string;
+  pressed: boolean;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "input";
+  what: string;
+  value: unknown;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "fault";
+  fault: string;
+  words: string;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "pace";
+  paused: boolean;
+  speed: number | "max" | null;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+};
+
+/** What there is. It does not change. */
+export type Description = {
+  name: string;
+  axes: {
+    name: string;
+    machine: string;
+    axis: string;
+    unit: string;
+    points: string[];
+  }[];
+  buttons: string[];
+  lines: ({
+    name: string;
+    kind: string;
+    baud: number | null;
+  })[];
+  commands: string[];
+  version: number;
+  machines: ({
+    name: string;
+    /** Index of its data sheet. */
+    datasheet: number;
+    line: string | null;
+    /** Slave address, or address of a chip. */
+    unit: number | null;
+    /** Which of enable, move, home, jog, stop, program it takes. */
+    controls: string[];
+  })[];
+  datasheets: ({
+    kind: string;
+    title: string;
+    variant: string;
+    axes: ({
+      number: number;
+      name: string;
+      unit: string;
+      pulses_per_unit: number | null;
+    })[];
+    pins: ({
+      name: string;
+      direction: "input" | "output" | "input and output";
+      is_analog: boolean;
+      unit: string;
+      limits: {
+        low: number | null;
+        high: number | null;
+        is_low_excluded: boolean;
+      };
+    })[];
+    points: ({
+      path: string;
+      meaning: string;
+      type: string;
+      unit: string;
+      limits: {
+        low: number | null;
+        high: number | null;
+        is_low_excluded: boolean;
+      } | null;
+      values: Record<string, string>;
+      access: "r" | "w" | "rw";
+      effect: "none" | "parameter" | "acts" | "moves";
+      addresses: ({
+        space: string;
+        place: number | string;
+        words: number;
+        type: string;
+      })[];
+      source: string;
+    })[];
+    commands: ({
+      name: string;
+      code: string;
+      meaning: string;
+      arguments: ({
+        name: string;
+        type: string;
+        unit: string;
+        limits: {
+          low: number | null;
+          high: number | null;
+          is_low_excluded: boolean;
+        } | null;
+        values: number[];
+      })[];
+      effect: "none" | "parameter" | "acts" | "moves";
+      source: string;
+    })[];
+    events: ({
+      code: string;
+      meaning: string;
+      facts: ({
+        name: string;
+        type: "whole number" | "number" | "true or false" | "text";
+        unit: string;
+        is_optional: boolean;
+      })[];
+    })[];
+  })[];
+};
+
+/** What there is. Answer: version, name, machines with the numbers of their datasheets, axes, buttons, lines, commands. */
+export type DescribeRequest = {
+  do: "describe";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** The present values of points. Answer: a list of point, value, unit, quality ('good', or 'unknown' with value null). */
+export type ReadRequest = {
+  do: "read";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Points, such as table.M1.position, table.IN3, x.position, time. */
+  points: string[];
+};
+
+/** The levels of all pins: 0, 1, volts. Answer: {"MACHINE.PIN": LEVEL, ...}. */
+export type PinsRequest = {
+  do: "pins";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine; all of them without. */
+  machine?: string | null;
+};
+
+/** Everything about a machine. Answer: an object by the kind of the machine. */
+export type StateRequest = {
+  do: "state";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+};
+
+/** The encoders of a machine. Answer: a list of axis, counts, turned_by. */
+export type EncodersRequest = {
+  do: "encoders";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+};
+
+/** The faults that are set. Answer: a list of name, fault, seen (occasions), happened (how often). */
+export type FaultsRequest = {
+  do: "faults";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** The present moment, and how time goes. Answer: world, time_ns, time_s, paused, speed, stopped. */
+export type TimeRequest = {
+  do: "time";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Where programs can connect. Answer: a list of kind, protocol and the address. */
+export type EndPointsRequest = {
+  do: "end_points";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Events from now on, as messages with the id of this request. Answer: plans: the present plan of every axis that is followed, as events. */
+export type FollowRequest = {
+  do: "follow";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Kinds of events; all but frames without. */
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace")[] | null;
+  /** Names of machines, lines, or 'world'; all without. */
+  machines?: string[] | null;
+  /** Numbers of axes as text; events of other axes are left out. */
+  axes?: string[] | null;
+  /** Events that wait to be sent; beyond it the oldest are dropped and counted. */
+  bound?: number | null;
+};
+
+/** No more events. Answer: null. */
+export type UnfollowRequest = {
+  do: "unfollow";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The id of the request. */
+  follow: string | number;
+};
+
+/** Inputs take levels, all of them or none. Answer: null. */
+export type SetRequest = {
+  do: "set";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** 0, 1, volts. */
+  levels: Record<string, number | boolean>;
+};
+
+/** Press a button. Answer: null. */
+export type PressRequest = {
+  do: "press";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a button. */
+  button: string;
+  /** How long; until it is released without. [ns] */
+  for_ns?: string | number | null;
+};
+
+/** Release a button. Answer: null. */
+export type ReleaseRequest = {
+  do: "release";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a button. */
+  button: string;
+};
+
+/** Registers of a MIC488 take values, as a master writes them. Answer: null. */
+export type WriteRequest = {
+  do: "write";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Registers by MACHINE.REGISTER. [units of the data sheet] */
+  values: Record<string, number | boolean>;
+};
+
+/** Characters go to a line. Answer: null. */
+export type SendRequest = {
+  do: "send";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a line. */
+  line: string;
+  /** Characters, one byte each. */
+  text: string;
+};
+
+/** A Modbus request on a line. Answer: pdu: that of the answer, null where it has not come at once; a frame event has it then. */
+export type RequestRequest = {
+  do: "request";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a line. */
+  line: string;
+  /** The slave address. */
+  unit: number;
+  /** Function code and data. */
+  pdu: string;
+  /** How long the answer is waited for. [ns] */
+  within_ns?: string | number | null;
+};
+
+/** Switch a machine off and on again. Answer: null. */
+export type PowerCycleRequest = {
+  do: "power_cycle";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+};
+
+/** Turn the encoder shaft of an axis of a MIC488. Answer: null. */
+export type TurnRequest = {
+  do: "turn";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+  /** By how much. [encoder counts] */
+  counts: number;
+};
+
+/** What turns the encoder shaft of an axis of a MIC488. Answer: null. */
+export type CoupleRequest = {
+  do: "couple";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+  /** What turns it. */
+  to: "drive" | "free" | "blocked";
+};
+
+/** Something goes wrong from now on. Answer: name. */
+export type FaultRequest = {
+  do: "fault";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Which. */
+  fault: string;
+};
+
+/** Remove a fault. Answer: null. */
+export type ClearFaultRequest = {
+  do: "clear_fault";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a fault. */
+  name: string;
+};
+
+/** A condition must hold; else that is reported. Answer: holds. */
+export type ExpectRequest = {
+  do: "expect";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Which. */
+  condition: string;
+};
+
+/** A text for the record. Answer: null. */
+export type NoteRequest = {
+  do: "note";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The text. */
+  text: string;
+};
+
+/** A record of a vision system comes to a MIC488. Answer: null. */
+export type SeeRequest = {
+  do: "see";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of the record. */
+  number: number;
+  /** The x of the record. */
+  x: number;
+  /** The y of the record. */
+  y: number;
+  /** The angle of the record. */
+  angle: number;
+};
+
+/** Switch a drive on or off. Answer: null. */
+export type EnableRequest = {
+  do: "enable";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+  /** Whether it is to be on. */
+  on?: boolean | null;
+};
+
+/** Begin to move. Answer: null. */
+export type MoveRequest = {
+  do: "move";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+  /** To this position. [units of the data sheet] */
+  to?: number | null;
+  /** By this distance. [units of the data sheet] */
+  by?: number | null;
+};
+
+/** Begin to home. Answer: null. */
+export type HomeRequest = {
+  do: "home";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+  /** Its sign chooses the switch. [units of the data sheet/s] */
+  velocity: number;
+};
+
+/** Begin to move without end. A lease, which has to be renewed. */
+export type JogRequest = {
+  do: "jog";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+  /** Velocity with its sign. [units of the data sheet/s] */
+  velocity: number;
+};
+
+/** Stop as fast as the controller does: a MIC488 without ramp, an M1486 with it (Kill). Answer: null. */
+export type StopRequest = {
+  do: "stop";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis; all without. */
+  axis?: number | null;
+};
+
+/** Start, pause or stop the program of a machine. Answer: null. */
+export type ProgramRequest = {
+  do: "program";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** What to do. */
+  action: "start" | "pause" | "stop";
+};
+
+/** Time stands. Answer: as time. */
+export type PauseRequest = {
+  do: "pause";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Time goes on. Answer: as time. */
+export type ResumeRequest = {
+  do: "resume";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Virtual seconds in a second. */
+  speed?: number | "max" | null;
+};
+
+/** Time goes on for a duration, to a moment, or to the next thing that happens by itself, and stands then. Answer: as time; events, missed, came (whether the condition ended it), idle, statements; to_ns where a request has to go on. */
+export type StepRequest = {
+  do: "step";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** How long. [ns] */
+  for_ns?: string | number | null;
+  /** To which moment. [ns] */
+  to_ns?: string | number | null;
+  /** A condition that ends it. */
+  until?: string | null;
+};
+
+/** Write the session, or the last records, to a file. Answer: as time; file, inputs, digest, or files, records for the last records. */
+export type SaveRequest = {
+  do: "save";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Absolute path. */
+  file: string;
+};
+
+/** The first request of a connection. Its answer is followed by the whole state. */
+export type HelloRequest = {
+  do: "hello";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Where the studio asks for one. */
+  token?: string | null;
+  /** What others see. */
+  name?: string | null;
+  /** Language of the page, such as en or pl. */
+  lang?: string | null;
+};
+
+/** The whole state once more, with seq 0. */
+export type ResyncRequest = {
+  do: "resync";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Values of points, sent whenever they have changed. */
+export type WatchRequest = {
+  do: "watch";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Points, as for read. */
+  points: string[];
+  /** At most this often. [1/s] */
+  rate?: number | null;
+};
+
+/** No more values. */
+export type UnwatchRequest = {
+  do: "unwatch";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The number in the answer to watch. */
+  watch: number;
+};
+
+/** Hold control. Whoever acts while nobody holds it takes it, too. */
+export type TakeControlRequest = {
+  do: "take_control";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Also from a viewer who holds it. */
+  over?: boolean | null;
+};
+
+/** Hold control no more; jogs of this viewer end. */
+export type ReleaseControlRequest = {
+  do: "release_control";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** A jog goes on for as long as its lease lasts from now. */
+export type RenewRequest = {
+  do: "renew";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The number in the answer to jog. */
+  lease: number;
+};
+
+/** A jog ends: its axis stops with its ramp. */
+export type LetGoRequest = {
+  do: "let_go";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The number in the answer to jog. */
+  lease: number;
+};
+
+/** Stop every axis as stop does, and every program that runs. Needs no control. */
+export type StopAllRequest = {
+  do: "stop_all";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Who did what, the newest last. */
+export type AuditRequest = {
+  do: "audit";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Entries. */
+  most?: number | null;
+};
+
+export type JogAnswer = {
+  lease: number;
+  /** Renew it in a third of this. [ms] */
+  lasts_ms: number;
+};
+
+export type HelloAnswer = {
+  viewer: number;
+  name: string;
+  role: "viewer" | "operator" | "engineer";
+};
+
+export type ResyncAnswer = null;
+
+export type WatchAnswer = {
+  watch: number;
+  /** In the order of their indices. */
+  points: {
+    point: string;
+    unit: string;
+  }[];
+};
+
+export type UnwatchAnswer = null;
+
+export type TakeControlAnswer = null;
+
+export type ReleaseControlAnswer = null;
+
+export type RenewAnswer = {
+  lease: number;
+  /** Renew it in a third of this. [ms] */
+  lasts_ms: number;
+};
+
+export type LetGoAnswer = null;
+
+export type StopAllAnswer = {
+  machines: string[];
+  /** Why, by machine. */
+  failed: Record<string, string>;
+};
+
+export type AuditAnswer = ({
+  /** Wall clock, ISO 8601. */
+  at: string;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  viewer: string;
+  role: "viewer" | "operator" | "engineer";
+  do: string;
+  fields: Record<string, unknown>;
+  outcome: "done" | "misuse" | "refusal" | "failure" | "internal";
+})[];
+
+/** The whole state, after hello and resync. */
+export type HelloMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  hello: {
+    version: 1;
+    /** Version of steptwin. */
+    program: string;
+    /** Number of this viewer. */
+    viewer: number;
+    name: string;
+    role: "viewer" | "operator" | "engineer";
+    /** Names of requests that can be done here by this role. */
+    may: string[];
+    control: {
+      viewer: number;
+      name: string;
+    } | null;
+    /** How many there are. */
+    viewers: number;
+    leases: {
+      lease: number;
+      viewer: number;
+      machine: string;
+      axis: number;
+      /** [units of the data sheet/s] */
+      velocity: number;
+    }[];
+    /** Events with greater numbers are news. */
+    number: number;
+    /** Virtual time, as decimal text [ns] */
+    time_ns: string;
+    pace: {
+      running: boolean;
+      /** Virtual seconds in a second; the one at which time will go on where it stands. */
+      speed: number | "max";
+    };
+    /** Whether it is a twin; a device gives samples, not plans. */
+    virtual: boolean;
+    description: Description;
+    /** By machine, as the answer to state; empty for a device. */
+    state: Record<string, Record<string, unknown>>;
+    /** As the answer to faults. */
+    faults: Record<string, unknown>[];
+    /** Present plans of all axes. */
+    plans: SubjectEvent[];
+  };
+};
+
+/** What has happened, of what is followed; each event once. */
+export type EventsMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  /** Events before these that were dropped. */
+  missed: number;
+  events: SubjectEvent[];
+};
+
+/** By the number of a watch as text: [index, value] of the points that have changed; null for unknown. */
+export type ValuesMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  values: Record<string, ([number, number | null])[]>;
+};
+
+/** The present moment: once a second, and whenever time stands or goes on. */
+export type ClockMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  clock: {
+    /** Virtual time, as decimal text [ns] */
+    time_ns: string;
+    running: boolean;
+    /** Virtual seconds in a second; the one at which time will go on where it stands. */
+    speed: number | "max";
+  };
+};
+
+/** Who holds control from now on. */
+export type ControlMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  control: {
+    viewer: number;
+    name: string;
+  } | null;
+};
+
+/** How many viewers there are now. */
+export type ViewersMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  viewers: number;
+};
+
+/** The jogs that are held now. */
+export type LeasesMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  leases: {
+    lease: number;
+    viewer: number;
+    machine: string;
+    axis: number;
+    /** [units of the data sheet/s] */
+    velocity: number;
+  }[];
+};
+
+/** The connection to the device is lost, and why; null when it is there again. */
+export type LostMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  lost: string | null;
+};
+
+/** What is sent without being asked for. */
+export type Pushed = HelloMessage | EventsMessage | ValuesMessage | ClockMessage | ControlMessage | ViewersMessage | LeasesMessage | LostMessage;
+
+/** Requests and the types of their answers, by name. */
+export interface Requests {
+  describe: { request: DescribeRequest; answer: unknown };
+  read: { request: ReadRequest; answer: unknown };
+  pins: { request: PinsRequest; answer: unknown };
+  state: { request: StateRequest; answer: unknown };
+  encoders: { request: EncodersRequest; answer: unknown };
+  faults: { request: FaultsRequest; answer: unknown };
+  time: { request: TimeRequest; answer: unknown };
+  end_points: { request: EndPointsRequest; answer: unknown };
+  follow: { request: FollowRequest; answer: unknown };
+  unfollow: { request: UnfollowRequest; answer: unknown };
+  set: { request: SetRequest; answer: unknown };
+  press: { request: PressRequest; answer: unknown };
+  release: { request: ReleaseRequest; answer: unknown };
+  write: { request: WriteRequest; answer: unknown };
+  send: { request: SendRequest; answer: unknown };
+  request: { request: RequestRequest; answer: unknown };
+  power_cycle: { request: PowerCycleRequest; answer: unknown };
+  turn: { request: TurnRequest; answer: unknown };
+  couple: { request: CoupleRequest; answer: unknown };
+  fault: { request: FaultRequest; answer: unknown };
+  clear_fault: { request: ClearFaultRequest; answer: unknown };
+  expect: { request: ExpectRequest; answer: unknown };
+  note: { request: NoteRequest; answer: unknown };
+  see: { request: SeeRequest; answer: unknown };
+  enable: { request: EnableRequest; answer: unknown };
+  move: { request: MoveRequest; answer: unknown };
+  home: { request: HomeRequest; answer: unknown };
+  jog: { request: JogRequest; answer: JogAnswer };
+  stop: { request: StopRequest; answer: unknown };
+  program: { request: ProgramRequest; answer: unknown };
+  pause: { request: PauseRequest; answer: unknown };
+  resume: { request: ResumeRequest; answer: unknown };
+  step: { request: StepRequest; answer: unknown };
+  save: { request: SaveRequest; answer: unknown };
+  hello: { request: HelloRequest; answer: HelloAnswer };
+  resync: { request: ResyncRequest; answer: ResyncAnswer };
+  watch: { request: WatchRequest; answer: WatchAnswer };
+  unwatch: { request: UnwatchRequest; answer: UnwatchAnswer };
+  take_control: { request: TakeControlRequest; answer: TakeControlAnswer };
+  release_control: { request: ReleaseControlRequest; answer: ReleaseControlAnswer };
+  renew: { request: RenewRequest; answer: RenewAnswer };
+  let_go: { request: LetGoRequest; answer: LetGoAnswer };
+  stop_all: { request: StopAllRequest; answer: StopAllAnswer };
+  audit: { request: AuditRequest; answer: AuditAnswer };
+}

@@ -1,0 +1,18 @@
+import { language } from "../../text";
+import type { Fields } from "../protocol/connection";
+
+const TOKEN = "steptwin.token";
+
+/** The first request. The token comes in the address after #token= once, and is kept for this tab. */
+export function greetingOf(): Fields<"hello"> {
+  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  if (given !== null) {
+    sessionStorage.setItem(TOKEN, given);
+    history.replaceState(null, "", location.pathname);
+  }
+  return { token: sessionStorage.getItem(TOKEN), lang: language() };
+}
+
+export function giveToken(token: string): void {
+  sessionStorage.setItem(TOKEN, token);
+}

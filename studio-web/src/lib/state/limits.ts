@@ -1,0 +1,26 @@
+import { t } from "../../text";
+import type { Point } from "./model";
+import { readNumber, shortNumber } from "./numbers";
+
+export type Limits = NonNullable<Point["limits"]>;
+
+export function rangeWords({ low, high, is_low_excluded }: Limits): string {
+  if (low !== null && high !== null) return t("rangeBetween", { low: shortNumber(low), high: shortNumber(high) });
+  if (low !== null) return t(is_low_excluded ? "rangeAbove" : "rangeFrom", { low: shortNumber(low) });
+  return high === null ? "" : t("rangeTo", { high: shortNumber(high) });
+}
+
+export function isWithin(value: number, { low, high, is_low_excluded }: Limits): boolean {
+  if (low !== null && (is_low_excluded ? value <= low : value < low)) return false;
+  return high === null || value <= high;
+}
+
+/** The number in a text, or why it cannot be taken. */
+export function checkedNumber(text: string, limits: Limits | null): { value: number } | { wrong: string } {
+  const value = readNumber(text);
+  if (value === null) return { wrong: t("notANumber", { text: text.trim() || "“”" }) };
+  if (limits !== null && !isWithin(value, limits)) {
+    return { wrong: t("outOfRange", { value: shortNumber(value), range: rangeWords(limits) }) };
+  }
+  return { value };
+}

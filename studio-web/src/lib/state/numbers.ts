@@ -1,0 +1,25 @@
+/** A number as the page shows it: a true minus, so many digits after the point. */
+export function shownNumber(value: number | null | undefined, decimals: number): string {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  const text = value.toFixed(decimals);
+  return /^-[0.]+$/.test(text) ? text.slice(1) : text.replace("-", "−");
+}
+
+/** As few digits as tell it. */
+export function shortNumber(value: number | null | undefined): string {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  return String(Number(value.toPrecision(7))).replace("-", "−");
+}
+
+/** What somebody typed: point or comma, either minus. Null where it is no number. */
+export function readNumber(text: string): number | null {
+  const plain = text.trim().replace(",", ".").replace("−", "-");
+  return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : null;
+}
+
+export function shownTime(time_ns: bigint, decimals = 3): string {
+  const scale = 10n ** BigInt(9 - decimals);
+  const parts = time_ns / scale;
+  const digits = String(parts).padStart(decimals + 1, "0");
+  return `${digits.slice(0, -decimals)}.${digits.slice(-decimals)}`;
+}

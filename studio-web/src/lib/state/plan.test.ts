@@ -1,0 +1,30 @@
+import { readFileSync } from "node:fs";
+import { expect, test } from "vitest";
+import { Course, type Plan } from "./plan";
+
+interface Vectors {
+  plans: { name: string; plan: Plan; at: [string, number, number][] }[];
+}
+
+const file = new URL("../../../../tests/motion/plan_vectors.json", import.meta.url);
+const vectors = JSON.parse(readFileSync(file, "utf-8")) as Vectors;
+
+test("there are vectors", () => expect(vectors.plans.length).toBeGreaterThan(3));
+
+for (const { name, plan, at } of vectors.plans) {
+  test(`positions and velocities: ${name}`, () => {
+    const course = new Course(plan);
+    for (const [time_ns, position, velocity] of at) {
+      const motion = course.at(BigInt(time_ns));
+      expect(motion.position).toBeCloseTo(position, 6);
+      expect(motion.velocity).toBeCloseTo(velocity, 5);
+    }
+  });
+}
+
+test("it moves from its start to its end", () => {
+  const course = new Course({ start_ns: "1000000000", base: 0, final: 10, segments: [[0.5, 0, 0, 20, 0, 0, 1]] });
+  expect(course.isMoving(1_499_999_999n)).toBe(true);
+  expect(course.isMoving(1_500_000_000n)).toBe(false);
+  expect(course.at(0n)).toEqual({ position: 0, velocity: 20 });
+});

@@ -1,0 +1,81 @@
+/** Position and velocity from a plan, as docs/control.md has the formulas. */
+
+export interface Plan {
+  start_ns: string;
+  base: number;
+  final: number;
+  segments: readonly unknown[];
+}
+
+/** Pulses and pulses/s. */
+export interface Motion {
+  position: number;
+  velocity: number;
+}
+
+/** [end, anchor, c0, c1, c2, c3, direction]; the end in seconds after the start, null where there is none. */
+type Polynomial = readonly [number | null, number, number, number, number, number, number];
+
+interface Arc {
+  end_s: number | null;
+  way: Polynomial;
+  /** Centre and radius in pulses, angle and turn in quarter turns. */
+  course: readonly [number, number, number, number];
+}
+
+type Segment = Polynomial | Arc;
+
+const QUARTER = Math.PI / 2;
+const isArc = (segment: Segment): segment is Arc => !Array.isArray(segment);
+const endOf = (segment: Segment): number | null => (isArc(segment) ? segment.end_s : segment[0]);
+
+function along([, anchor, c0, c1, c2, c3]: Polynomial, t: number): Motion {
+  const u = t - anchor;
+  return { position: c0 + u * (c1 + u * (c2 + u * c3)), velocity: c1 + u * (2 * c2 + u * 3 * c3) };
+}
+
+function onArc({ way, course: [centre, radius, angle, turn] }: Arc, t: number): Motion {
+  const w = along(way, t);
+  const phi = (angle + turn * w.position) * QUARTER;
+  return {
+    position: centre + radius * Math.cos(phi),
+    velocity: -radius * Math.sin(phi) * turn * QUARTER * w.velocity,
+  };
+}
+
+/** A plan made ready to be asked very often. */
+export class Course {
+  readonly start_ns: bigint;
+  /** When it stands again; null where it never does. */
+  readonly end_ns: bigint | null;
+  private readonly segments: readonly Segment[];
+
+  constructor(private readonly plan: Plan) {
+    this.start_ns = BigInt(plan.start_ns);
+    this.segments = plan.segments as readonly Segment[];
+    const last = this.segments.at(-1);
+    const end = last === undefined ? 0 : endOf(last);
+    this.end_ns = end === null ? null : this.start_ns + BigInt(Math.ceil(end * 1e9));
+  }
+
+  at(now_ns: bigint): Motion {
+    return this.atSeconds(Number(now_ns - this.start_ns) / 1e9);
+  }
+
+  /** `t` in seconds after the start; before it, as at the start. */
+  atSeconds(t: number): Motion {
+    const { base, final } = this.plan;
+    const from = Math.max(t, 0);
+    for (const segment of this.segments) {
+      const end = endOf(segment);
+      if (end !== null && from >= end) continue;
+      const motion = isArc(segment) ? onArc(segment, from) : along(segment, from);
+      return { position: base + motion.position, velocity: motion.velocity };
+    }
+    return { position: base + final, velocity: 0 };
+  }
+
+  isMoving(now_ns: bigint): boolean {
+    return this.segments.length > 0 && (this.end_ns === null || now_ns < this.end_ns);
+  }
+}

@@ -1,0 +1,264 @@
+import {
+  Connection,
+  RequestError,
+  browserTimers,
+  type ConnectionState,
+  type Fields,
+  type Hello,
+  type RequestName,
+} from "../protocol/connection";
+import { openInWorker } from "../protocol/link";
+import type { Pushed, Requests, SubjectEvent } from "../protocol/types";
+import { AxisState } from "./axis.svelte";
+import { WorldClock, type Pace } from "./clock";
+import { EventLog } from "./events.svelte";
+import { modelOf, type AxisModel, type MachineModel, type Model } from "./model";
+import { Pins } from "./pins.svelte";
+import { Watches, type Watch } from "./watch.svelte";
+
+export type EventKind = SubjectEvent["kind"];
+
+const EMPTY: Model = { name: "", machines: [], lines: [], buttons: [], commands: new Set() };
+/** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */
+const FOLLOWED: readonly EventKind[] = [
+  "plan",
+  "coordinate",
+  "sample",
+  "load",
+  "edge",
+  "status",
+  "note",
+  "report",
+  "button",
+  "input",
+  "fault",
+  "pace",
+];
+/** Events that may wait for this page. */
+const EVENTS_BOUND = 10_000;
+
+interface Following {
+  kinds: readonly EventKind[];
+  /** Of the request; another one after a reconnection. */
+  id: number;
+}
+
+export type Holder = Hello["control"];
+export type Listener = (events: readonly SubjectEvent[]) => void;
+
+export interface Notice {
+  text: string;
+  kind: "error" | "done";
+}
+
+const NOTICE_MS = 8000;
+
+/** What the page knows of the studio, and what it asks of it. */
+export class Studio {
+  link = $state<ConnectionState>("connecting");
+  /** Why the studio did not accept this page. */
+  refusal = $state("");
+  hello = $state.raw<Hello | null>(null);
+  model = $state.raw<Model>(EMPTY);
+  control = $state.raw<Holder>(null);
+  viewers = $state(0);
+  leases = $state.raw<Hello["leases"]>([]);
+  /** Why the device does not answer. */
+  lost = $state<string | null>(null);
+  pace = $state.raw<Pace>({ running: false, speed: 1 });
+  notice = $state.raw<Notice | null>(null);
+  /** Counts stops from this page, for who shows them. */
+  stops = $state(0);
+
+  readonly clock = new WorldClock();
+  readonly log = new EventLog();
+  readonly pins = new Pins();
+  /** By `table.M1`. */
+  axes = $state.raw<ReadonlyMap<string, AxisState>>(new Map());
+  private readonly watches = new Watches((name, fields) => this.ask(name, fields));
+  private readonly listeners = new Set<Listener>();
+  private readonly followings = new Set<Following>();
+  private readonly connection: Connection;
+  private noticeTimer = 0;
+
+  constructor(url: string, greeting: () => Fields<"hello">) {
+    const events = {
+      hello: (hello: Hello) => this.greeted(hello),
+      pushed: (messages: readonly Pushed[]) => messages.forEach((message) => this.pushed(message)),
+      state: (state: ConnectionState, why: string) => {
+        this.link = state;
+        this.refusal = why;
+      },
+    };
+    this.connection = new Connection(url, greeting, events, openInWorker, browserTimers);
+  }
+
+  open(): void {
+    this.follow(FOLLOWED);
+    this.connection.open();
+  }
+
+  /** Virtual time, now. [ns] */
+  now(): bigint {
+    return this.clock.now(performance.now());
+  }
+
+  get isVirtual(): boolean {
+    return this.hello?.virtual ?? true;
+  }
+
+  get hasControl(): boolean {
+    return this.control !== null && this.control.viewer === this.hello?.viewer;
+  }
+
+  /** Whether the role of this viewer permits a request, and the studio can do it here. */
+  may(name: RequestName): boolean {
+    return this.hello?.may.includes(name) ?? false;
+  }
+
+  machine(name: string): MachineModel | undefined {
+    return this.model.machines.find((machine) => machine.name === name);
+  }
+
+  axis(model: AxisModel): AxisState {
+    return this.axes.get(model.id) as AxisState;
+  }
+
+  ask<N extends RequestName>(name: N, fields: Fields<N>, within_ms?: number): Promise<Requests[N]["answer"]> {
+    return this.connection.request(name, fields, within_ms);
+  }
+
+  /** A request of the user: an error is shown. Gives whether it was done. */
+  async act<N extends RequestName>(name: N, fields: Fields<N>): Promise<boolean> {
+    try {
+      await this.ask(name, fields);
+      return true;
+    } catch (error) {
+      this.report(error);
+      return false;
+    }
+  }
+
+  report(error: unknown): void {
+    this.show({ text: error instanceof RequestError ? error.message : String(error), kind: "error" });
+  }
+
+  show(notice: Notice): void {
+    this.notice = notice;
+    clearTimeout(this.noticeTimer);
+    this.noticeTimer = window.setTimeout(() => (this.notice = null), NOTICE_MS);
+  }
+
+  /** Nobody needs control for it, and every role may. */
+  stopAll(): void {
+    this.stops++;
+    this.ask("stop_all", {}).then(
+      ({ failed }) => {
+        const reasons = Object.entries(failed);
+        if (reasons.length)
+          this.show({ text: reasons.map(([name, why]) => `${name}: ${why}`).join("; "), kind: "error" });
+      },
+      (error: unknown) => this.report(error),
+    );
+  }
+
+  /** Values of points for as long as something shows them; gives what ends it. */
+  watch(points: readonly string[], rate?: number): [Watch, () => void] {
+    return this.watches.add(points, rate);
+  }
+
+  /** Events as they come, those of further kinds such as frames too; gives what ends it. */
+  listen(kinds: readonly EventKind[], listener: Listener): () => void {
+    this.listeners.add(listener);
+    const more = kinds.filter((kind) => !FOLLOWED.includes(kind));
+    const end = more.length ? this.follow(more) : () => undefined;
+    return () => {
+      this.listeners.delete(listener);
+      end();
+    };
+  }
+
+  private greeted(hello: Hello): void {
+    const isNew = this.hello === null || this.hello.description.name !== hello.description.name;
+    this.hello = hello;
+    this.control = hello.control;
+    this.viewers = hello.viewers;
+    this.leases = hello.leases;
+    this.tellClock(BigInt(hello.time_ns), hello.pace, true);
+    if (isNew || JSON.stringify(hello.description) !== this.description) this.describe(hello);
+    for (const event of hello.plans) this.toAxis(event);
+    this.pins.reset(hello.state);
+    if (!hello.virtual) this.askPins();
+    for (const following of this.followings) this.beginFollowing(following);
+    this.watches.renew();
+  }
+
+  private description = "";
+
+  private describe(hello: Hello): void {
+    this.description = JSON.stringify(hello.description);
+    this.model = modelOf(hello.description);
+    const axes = this.model.machines.flatMap((machine) => machine.axes);
+    this.axes = new Map(axes.map((axis) => [axis.id, new AxisState(axis)]));
+  }
+
+  private askPins(): void {
+    this.ask("pins", {}).then(
+      (levels) => this.pins.take(levels as Record<string, number>),
+      () => undefined,
+    );
+  }
+
+  /** Asks for kinds of events, again after each reconnection; gives what ends it. */
+  private follow(kinds: readonly EventKind[]): () => void {
+    const following: Following = { kinds, id: 0 };
+    this.followings.add(following);
+    if (this.hello !== null) this.beginFollowing(following);
+    return () => {
+      this.followings.delete(following);
+      this.ask("unfollow", { follow: following.id }).catch(() => undefined);
+    };
+  }
+
+  private beginFollowing(following: Following): void {
+    following.id = this.connection.newId();
+    this.connection
+      .request("follow", { kinds: [...following.kinds], bound: EVENTS_BOUND }, undefined, following.id)
+      .catch((error: unknown) => this.report(error));
+  }
+
+  private pushed(message: Pushed): void {
+    if ("events" in message) this.happened(message.events, message.missed, BigInt(message.time_ns));
+    else if ("values" in message) this.watches.take(message.values);
+    else if ("clock" in message) this.tellClock(BigInt(message.clock.time_ns), message.clock, false);
+    else if ("control" in message) this.control = message.control;
+    else if ("viewers" in message) this.viewers = message.viewers;
+    else if ("leases" in message) this.leases = message.leases;
+    else if ("lost" in message) this.lost = message.lost;
+  }
+
+  private tellClock(time_ns: bigint, pace: Pace, isWhole: boolean): void {
+    const now_ms = performance.now();
+    if (isWhole) this.clock.reset(time_ns, pace, now_ms);
+    else this.clock.tell(time_ns, pace, now_ms);
+    this.pace = { running: pace.running, speed: pace.speed };
+  }
+
+  private happened(events: readonly SubjectEvent[], missed: number, time_ns: bigint): void {
+    this.log.missed += missed;
+    this.clock.atLeast(time_ns, performance.now());
+    for (const event of events) {
+      this.toAxis(event);
+      if (event.kind === "edge") this.pins.take({ [`${event.machine}.${event.pin}`]: event.level });
+    }
+    this.log.take(events);
+    for (const listener of this.listeners) listener(events);
+  }
+
+  private toAxis(event: SubjectEvent): void {
+    if (event.kind !== "plan" && event.kind !== "coordinate" && event.kind !== "sample") return;
+    const machine = this.machine(event.machine);
+    const model = machine?.axes.find(({ number }) => String(number) === event.axis);
+    if (model !== undefined) this.axis(model).take(event);
+  }
+}

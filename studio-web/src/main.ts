@@ -1,0 +1,10 @@
+import { mount } from "svelte";
+import App from "./App.svelte";
+import "./app.css";
+import "./fonts.css";
+import { restoreTheme } from "./lib/state/theme.svelte";
+import { restoreLanguage } from "./text";
+
+restoreLanguage();
+restoreTheme();
+mount(App, { target: document.getElementById("app") as HTMLElement });

@@ -1,0 +1,71 @@
+import { HeldJog } from "../../lib/state/jog";
+import { keep, restore } from "../../lib/state/kept";
+import type { AxisModel } from "../../lib/state/model";
+import type { Studio } from "../../lib/state/studio.svelte";
+import type { Watch } from "../../lib/state/watch.svelte";
+
+const VERSION = 1;
+const FIRST_PERCENT = 25;
+/** Where no point has the greatest velocity of an axis. [pulses/s] */
+const USUAL_PULSES = 64_000;
+
+const isPercent = (value: unknown): value is number => typeof value === "number" && value >= 1 && value <= 100;
+const isTexts = (value: unknown): value is Record<string, string> =>
+  typeof value === "object" && value !== null && Object.values(value).every((text) => typeof text === "string");
+
+/** Jogs of the page: one for each axis at most, all at the chosen speed. */
+export class Jogging {
+  percent = $state(restore("jog.percent", VERSION, isPercent) ?? FIRST_PERCENT);
+  /** Full velocities that were typed, by axis. */
+  full = $state<Record<string, string>>(restore("jog.full", VERSION, isTexts) ?? {});
+  private readonly held = new Map<string, HeldJog>();
+
+  constructor(
+    private readonly studio: Studio,
+    private readonly watch: () => Watch | null,
+  ) {}
+
+  choosePercent(percent: number): void {
+    this.percent = percent;
+    keep("jog.percent", VERSION, percent);
+  }
+
+  chooseFull(axis: AxisModel, text: string): void {
+    this.full[axis.id] = text;
+    keep("jog.full", VERSION, this.full);
+  }
+
+  /** Velocity at 100 %: what was typed, else the greatest of the axis. [units/s] */
+  fullOf(axis: AxisModel): number {
+    const typed = Number(this.full[axis.id]);
+    if (typed > 0) return typed;
+    return this.watch()?.get(axis.fastest) ?? USUAL_PULSES / (axis.pulses_per_unit ?? 1);
+  }
+
+  begin(axis: AxisModel, sign: number, percent = this.percent): void {
+    this.end(axis);
+    const velocity = (sign * this.fullOf(axis) * percent) / 100;
+    const fields = { machine: axis.machine, axis: axis.number, velocity };
+    const jog = HeldJog.begin(
+      (name, given, within) => this.studio.ask(name, given, within),
+      fields,
+      (error) => this.failed(axis, error),
+    );
+    this.held.set(axis.id, jog);
+  }
+
+  end(axis: AxisModel): void {
+    this.held.get(axis.id)?.end();
+    this.held.delete(axis.id);
+  }
+
+  endAll(): void {
+    for (const jog of this.held.values()) jog.end();
+    this.held.clear();
+  }
+
+  private failed(axis: AxisModel, error: unknown): void {
+    this.held.delete(axis.id);
+    this.studio.report(error);
+  }
+}

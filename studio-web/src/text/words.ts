@@ -1,0 +1,36 @@
+import { language } from "./texts.svelte";
+
+/** Words of data sheets, which are English, in Polish: values of enumerations, and names of types. What is not here stays as it is. */
+export const POLISH: Readonly<Record<string, string>> = {
+  ok: "w porządku",
+  "drive position error": "błąd pozycji napędu",
+  "program error": "błąd programu",
+  "Modbus master communication error": "błąd komunikacji Modbus master",
+  STOP: "STOP",
+  START: "START",
+  PAUSE: "PAUZA",
+  off: "wyłączony",
+  "on at rest": "włączony, postój",
+  "velocity mode": "tryb prędkości",
+  "moving to position": "jedzie do pozycji",
+  "position reached": "pozycja osiągnięta",
+  "position error": "błąd pozycji",
+  homing: "bazowanie",
+  "position correction": "korekcja pozycji",
+  "stopped at limit L": "zatrzymany na krańcówce L",
+  "stopped at limit R": "zatrzymany na krańcówce P",
+  REAL: "REAL",
+  DINT: "DINT",
+  DIRECT: "DIRECT",
+  TRIGGER: "TRIGGER",
+  microstep: "mikrokrok",
+  "microstep/s": "mikrokrok/s",
+  "holding register": "rejestr",
+  coil: "cewka",
+  input: "wejście",
+  command: "polecenie",
+};
+
+export function inWords(words: string): string {
+  return language() === "pl" ? (POLISH[words] ?? words) : words;
+}

