@@ -1,7 +1,7 @@
 """M1486 chips at the other end of a line in virtual time, for tests of drivers (`line_rig`).
 
-`ChipWire` carries characters, `Fault`s are put on it by direction and number; `chip_line` and `chip_task_line` are lines in its time
-for threads and tasks.
+`ChipWire` carries characters, `Fault`s are put on it by direction and number; `chip_line` and `chip_task_line` are lines in its
+time for threads and tasks.
 """
 
 from __future__ import annotations
