@@ -41,5 +41,5 @@ def test_the_longest_is_a_leap_year() -> None:
 
 @pytest.mark.parametrize("value", ["", "ms", "5 parsec", "-1 s", "1.", True, None, [1], -1e-5, float("inf"), float("nan")])
 def test_what_is_no_duration_is_misuse(value: object) -> None:
-    with pytest.raises(Misuse, match=r"is no time: expected a number with us, ms, s, min, h, such as '90 s' or '500 ms'$"):
+    with pytest.raises(Misuse, match=r"is not a time: expected a number with us, ms, s, min, h, such as '90 s' or '500 ms'$"):
         duration(value)

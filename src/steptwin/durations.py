@@ -22,7 +22,7 @@ def duration(value: object) -> Nanos:
     match = _DURATION.match(text.strip().lower()) if isinstance(text, str) else None
     unit = UNITS.get(match[2] or "s") if match else None
     if match is None or unit is None:
-        raise Misuse(f"{value!r} is no time: expected a number with {', '.join(UNITS)}, such as '90 s' or '500 ms'")
+        raise Misuse(f"{value!r} is not a time: expected a number with {', '.join(UNITS)}, such as '90 s' or '500 ms'")
     found = int(Decimal(match[1]) * unit)
     if found > LONGEST_NS:
         raise Misuse(f"{value!r} is too long: permitted are 0 to {LONGEST_NS // UNITS['h']} h")

@@ -37,7 +37,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def open_regular(path: Path, most: int | None = None) -> IO[bytes]:
-    """A regular file opened for reading. Raises `Misuse` for what cannot be read, is no regular file or has more bytes."""
+    """A regular file opened for reading. Raises `Misuse` for what cannot be read, is not a regular file or has more bytes."""
     try:
         # Opening a pipe would wait for a program that writes into it.
         handle = os.open(path, READ_FLAGS)

@@ -30,7 +30,7 @@ class LivePoint:
     version: Callable[[], object] | None = None
     """Another one whenever ``turns`` may be others; None where that cannot be told."""
     is_kept: bool = False
-    """Whether a write only keeps the value, which is no event of the controller."""
+    """Whether a write only keeps the value, which is not an event of the controller."""
 
 
 def turns_of(profile: Callable[[], Profile]) -> Turns:

@@ -1,6 +1,6 @@
 """Plain state that can be copied out of a machine and put back: snapshots.
 
-A machine and its parts keep their state in slots. What is no state - configuration, hooks, the machine a part belongs to -
+A machine and its parts keep their state in slots. What is not a state - configuration, hooks, the machine a part belongs to -
 is named in ``FIXED``; everything else is copied, so that a new attribute cannot be forgotten.
 """
 

@@ -13,7 +13,7 @@ _WITHOUT_MARK = ("utf-8", "cp1250", "latin-1")
 _MARKS = ((b"\xef\xbb\xbf", _WITHOUT_MARK), (b"\xff\xfe", ("utf-16-le",)), (b"\xfe\xff", ("utf-16-be",)))
 # DOS editors end a text with Ctrl-Z and may fill the last block with more of them.
 _DOS_END = re.compile("\x1a+[\\s\x1a]*\\Z")
-# ESC, BS and the like occur in texts by accident. A file with many of them is no text.
+# ESC, BS and the like occur in texts by accident. A file with many of them is not text.
 _CONTROL = re.compile("[\x01-\x06\x0e-\x1f\x7f]")
 _CONTROLS_PER_TEXT = 0.01
 

@@ -48,7 +48,7 @@ def test_what_an_address_stands_for(text: str, expected: list[str] | None) -> No
         ("xx:5", "'xx:5': expected ADDRESS, or hr:, co: or di: before it"),
         ("co:5:real", "expected ADDRESS"),
         ("hr:5:float", "expected ADDRESS"),
-        ("hr:0-2:real", "a REAL takes 2 registers, 3 are no multiple of it"),
+        ("hr:0-2:real", "a REAL takes 2 registers, 3 are not a multiple of it"),
         ("hr:65535:real", "a REAL takes 2 registers, and 65535 is the last address"),
         ("hr:0-60000", "at most 1000 values at once"),
     ],

@@ -55,17 +55,17 @@ def test_a_chip_from_the_command_line(serve_m1486: Callable[..., Any], tmp_path:
     assert "52" not in values["FUNCTIONS"]["value"]
     assert run("move", "1=40") == "chip 7: target reached at 40 step\n"
     assert "'7=40': an M1486 has one axis: expected 1=NUMBER" in run("move", "7=40", code=2)
-    assert "'1=40 2=3': '40 2=3' is no number" in run("move", "1=40", "2=3", code=2)
+    assert "'1=40 2=3': '40 2=3' is not a number" in run("move", "1=40", "2=3", code=2)
     assert "a time to wait of -1 s is outside" in run("move", "1=40", "--timeout", "-1", code=2)
     assert run("watch", "position", "--count", "1").splitlines()[1].split()[1] == "40"
-    assert "is no value of an M1486: there are POSITION" in run("get", "M1_POS_ACT", code=2)
+    assert "is not a value of an M1486: permitted are POSITION" in run("get", "M1_POS_ACT", code=2)
     assert "an M1486 has info, get, set" in run("enable", "1", code=2)
     assert "velocity = 30000: M1486B takes 16 to 20 000 step/s" in run("set", "V=30000", code=2)
 
     program = tmp_path / "toandfro.m1486"
     program.write_text(PROGRAM)
     assert run("send", str(program)) == (
-        f"{program} is in the M1486B and has been started by its ]: the motor may move; 'steptwin stop --program' ends it\n"
+        f"{program} is in the M1486B and was started by its ]: the motor may move; 'steptwin stop --program' ends it\n"
     )
     assert "does not answer yet" in run("info", code=1, place=f"{device},variant=B,timeout=0.2")
     run("stop", "--program")
@@ -84,7 +84,7 @@ def test_homing_seeking_and_jogging(serve_m1486: Callable[..., Any]) -> None:
 
     run("move", "1=40")
     late = twin.command("home", "1=-B3", "--timeout", "0.5", "--device", "m1486")
-    assert (late.returncode, late.stderr) == (1, "stopped, because the time is over\n")
+    assert (late.returncode, late.stderr) == (1, "stopped: timeout\n")
     run("pin", "B3=0")
     assert run("seek", "1=+B3").startswith("chip F: line reached at ")
     assert run("home", "1=-B3") == "chip F: line reached at 0 step\n"
@@ -94,7 +94,7 @@ def test_homing_seeking_and_jogging(serve_m1486: Callable[..., Any]) -> None:
     assert 20 <= jogged["position"] <= 100
     assert run("get", "POSITION").split()[1] == f"{jogged['position']:g}"
     for arguments, message in (
-        (("home", "1=-20", "--no-wait"), "--no-wait: to home an M1486 is to seek a line"),
+        (("home", "1=-20", "--no-wait"), "--no-wait is not possible for an M1486: the command sets"),
         (("home", "1=B3"), "expected the direction and the line of an M1486, such as 1=-B8 or 1=+B8"),
         (("home", "2=-B3"), "an M1486 has one axis: expected 1=-B8"),
         (("seek", "1=+B22"), "the line to seek = 22: M1486B takes 1 to 21"),
@@ -137,7 +137,7 @@ def test_a_program_for_several_chips(serve_m1486: Callable[..., Any], tmp_path: 
         done = twin.command("send", str(program), "-d", f"{twin.pty},{address}")
         return done.returncode, done.stdout or done.stderr
 
-    started = " and has been started by its ]: the motor may move; 'steptwin stop --program' ends it"
+    started = " and was started by its ]: the motor may move; 'steptwin stop --program' ends it"
     assert sent("x0\n[\nf640\nr\n]\nx7\n[\nb64\nr\n]\n", "kind=m1486") == (
         0,
         f"{program} is in chips 0, 7 (M1486B){started}\n",

@@ -119,7 +119,7 @@ def test_a_command_that_was_suspended_before_a_motion_does_not_move(monkeypatch:
         time[0] += 15.0
         held_up.check()
     time[0] += 3600.0
-    with pytest.raises(Refusal, match="not moved: the command was suspended, or held up by the line, for 3600 s; give it again"):
+    with pytest.raises(Refusal, match="not moved: the command was suspended, or delayed by the line, for 3600 s; repeat it"):
         held_up.check()
 
 
@@ -163,9 +163,9 @@ MISTAKES: list[tuple[list[str], int, str]] = [
     (["get", "hr:10020:float"], 2, "expected ADDRESS"),
     (["get", "X*"], 2, "'X*' matches no register"),
     (["set", "M1_ACC"], 2, "expected NAME=VALUE"),
-    (["set", "M1_ACC=much"], 2, "'much' is no number"),
+    (["set", "M1_ACC=much"], 2, "'much' is not a number"),
     (["set", "IN3=1"], 2, "IN3 can only be read"),
-    (["move", "5=1"], 2, "'5' is no axis"),
+    (["move", "5=1"], 2, "'5' is not an axis"),
     (["move", "1=1", "M1=2"], 2, "M1 is given twice"),
     (["move", "1"], 2, "expected AXIS=NUMBER"),
     (["move", "1=5"], 1, "M1 of unit 1 is switched off: enable it first"),
@@ -240,7 +240,7 @@ def test_addresses() -> None:
 
 @pytest.mark.parametrize("text", ["", ",unit=1", "x,units=1", "x,unit=", "x,unit=a", "x,unit=1,unit=2", "x,unit"])
 def test_what_is_no_address(text: str) -> None:
-    with pytest.raises(Misuse, match=r"has no address|is none of|is no number"):
+    with pytest.raises(Misuse, match=r"has no address|is none of|is not a number"):
         parse_device(text)
 
 
@@ -327,7 +327,7 @@ def test_recording_and_comparing(twin: Any, shell: Shell, tmp_path: Path) -> Non
     kept = Path(one).read_text()
     session.write_text("get M1_ACC\nset M1_ACC=abc\n")
     shell("record", str(session), "-o", one)
-    assert (shell.code, shell.errors) == (2, f"steptwin: {session}: line 2: 'set M1_ACC=abc': 'abc' is no number\n")
+    assert (shell.code, shell.errors) == (2, f"steptwin: {session}: line 2: 'set M1_ACC=abc': 'abc' is not a number\n")
     shell("set", "M1_STOP=on", "M2_ACC=-1")
     assert (shell.code, "M2_ACC = -1 u/s²: permitted > 0" in shell.errors) == (2, True)
     assert shell("get", "M1_VEL_ACT").split()[1] == "5"

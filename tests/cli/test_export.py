@@ -62,7 +62,7 @@ def test_a_directory_is_its_trace(run: Run, trace: Path) -> None:
     ("arguments", "message"),
     [
         ([], "nothing to write: name formats with --to (html, png,"),
-        (["--to", "html", "--from", "soon"], "--from: 'soon' is no time"),
+        (["--to", "html", "--from", "soon"], "--from: 'soon' is not a time"),
         (["--to", "csv", "--machine", "b"], "no machine 'b' in the trace: there are a"),
     ],
 )

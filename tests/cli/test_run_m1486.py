@@ -73,7 +73,7 @@ def test_a_run_that_is_ended_says_where_it_stands(run: Run) -> None:
     assert result.stdout.splitlines()[1:-1] == [
         "position 27840, true position 27840 (435 full steps), endless at 1000.0 step/s",
         "  waits for the end of the endless move",
-        "ended by the limit of time: --for takes a longer one",
+        "ended at the time limit; --for sets a longer one",
     ]
     result = run("c1\nz3\n", "--until", "idle")
     assert result.stdout.splitlines()[2:4] == [
@@ -158,7 +158,7 @@ def test_a_trace_can_be_read_back(run: Run, tmp_path: Path) -> None:
     [
         (["--variant", "D"], "no M1486 variant is called 'D'"),
         (["--until", "dark"], "--until dark: permitted is 'idle'"),
-        (["--for", "soon"], "--for: 'soon' is no time: expected a number with"),
+        (["--for", "soon"], "--for: 'soon' is not a time: expected a number with"),
         (["--for", "0"], "--for 0: must be more than 0"),
         (["--input", "B3"], "--input B3: expected PIN=VALUE@TIME"),
         (["--input", "B22=0@1s"], "no input pin 'B22'"),
@@ -182,7 +182,7 @@ def test_wrong_use_is_said(run: Run, options: list[str], text: str) -> None:
 def test_an_e_type_that_is_typed_to_because_of_an_error_says_how_slowly(run: Run) -> None:
     result = run("[\nf640\nv99999\n]\n", "--variant", "E1")
     assert result.exit_code == 1
-    assert "the chip sees this, with 1 error in it, typed at 0.5 s a command:" in result.stderr
+    assert "executed as follows, with 1 error, typed at 0.5 s a command:" in result.stderr
 
 
 def test_an_input_of_one_of_several_chips_is_named(run: Run) -> None:

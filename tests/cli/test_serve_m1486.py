@@ -137,7 +137,7 @@ def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None
     [
         ({"variant": "D"}, "no M1486 variant is called 'D'; there are A, B, C, E1, E2"),
         ({"variant": "B", "baud": 9600}, "9600 bit/s: M1486B has 300, 1200, 2400, 4800"),
-        ({"chain": "0,G"}, "--chain 0,G: 'G' is no address"),
+        ({"chain": "0,G"}, "--chain 0,G: 'G' is not an address"),
         ({"variant": "E1", "chain": "0"}, "address 0: M1486E1 takes 1 to F"),
         ({"interface": "dac"}, "no driver interface is called 'dac'; there are sd, dual, two"),
         ({"line_timing": "fast"}, "--line-timing fast: permitted are 'real' and 'off'"),

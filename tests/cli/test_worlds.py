@@ -106,7 +106,7 @@ def test_a_session_goes_on_another_way(tmp_path: Path) -> None:
         (["s.json", "--seed", "3"], r"--seed: s\.json is a session, which goes on with its own"),
         (["s.json", "--from", "3s"], r"the session ends at 2 s, before 3 s"),
         (["s.json", "--input", "table.IN8=1@1s"], r"--input table\.IN8: at 1 s: this world is at 2 s already"),
-        ([str(FEEDER), "--from", "1s"], r"--from: .*feeder\.toml is no session; a description begins at 0 s"),
+        ([str(FEEDER), "--from", "1s"], r"--from: .*feeder\.toml is not a session; a description begins at 0 s"),
         ([str(FEEDER), "--seed", "-1"], r"seed -1: permitted are whole numbers from 0 to"),
         (["x.prg", "--seed", "0"], r"--seed is not for WBC programs"),
         (["x.m1486", "--from", "0s"], r"--from is not for M1486 programs"),

@@ -53,7 +53,7 @@ def test_a_refusal_is_a_result() -> None:
         ("get", "'get': no name"),
         ("get M1_STOP", "M1_STOP can only be written"),
         ("set M1_ACC", "expected set NAME=VALUE"),
-        ("set M1_ACC=x", "'set M1_ACC=x': 'x' is no number"),
+        ("set M1_ACC=x", "'set M1_ACC=x': 'x' is not a number"),
         ("set M1_ACC=-5", "M1_ACC = -5 u/s²: permitted > 0"),
         ("set M1_POS_ABS=nan", "M1_POS_ABS = nan"),
         ("set M1_STATUS=1", "M1_STATUS can only be read"),
@@ -75,7 +75,7 @@ def test_a_session_is_read_before_it_is_begun() -> None:
     for line in ("fly M1", "set M1_ACC=x", "set M1_ACC=0", "get M1_NONE", "raw 99"):
         with pytest.raises(Misuse, match=f"line 2: '{line}': "):
             steps_of(f"get M1_ACC\n{line}\n", register_map())
-    with pytest.raises(Misuse, match="there is no step: expected get NAME"):
+    with pytest.raises(Misuse, match="unknown step: expected get NAME"):
         steps_of("# nothing\n", register_map())
 
 
@@ -109,5 +109,5 @@ def test_two_recordings() -> None:
     "text", ["", "{}", "[" * 100_000, '{"format": "steptwin session 1"}\n{}', "x", '{"format": "steptwin session 1"}\nx']
 )
 def test_what_is_no_recording(text: str) -> None:
-    with pytest.raises(Misuse, match=r"a.json is no recording"):
+    with pytest.raises(Misuse, match=r"a.json is not a recording"):
         from_text(text, "a.json")

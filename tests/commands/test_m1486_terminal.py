@@ -127,7 +127,7 @@ def test_a_conversation() -> None:
 def test_what_is_no_byte_is_refused_and_the_rest_goes_on() -> None:
     wire = Wire(u1=b"\x05")
     terminal = ChipTerminal(wire, 4800, None, str)
-    with pytest.raises(Misuse, match=r"^'v€': '€' is no character of one byte$"):
+    with pytest.raises(Misuse, match=r"^'v€': '€' is not a single-byte character$"):
         terminal.type("v€")
     terminal.type("u1")
     assert terminal.settle(60.0) == 0
@@ -170,7 +170,7 @@ def test_what_waits_for_an_eeprom_is_not_typed_after_a_suspension() -> None:
     for line in ("f640", "r", "x7"):
         terminal.type(line)
     away[0] = 3600.0
-    with pytest.raises(LineFailure, match=r"\br: not typed, because the program was suspended for 3600 s"):
+    with pytest.raises(LineFailure, match=r"\br: not sent: the program was suspended for 3600 s"):
         terminal.settle(7200.0)
     terminal.type("k")
     terminal.settle(7200.0)

@@ -123,9 +123,9 @@ def test_an_interrupt_and_an_error(play: Play) -> None:
 @pytest.mark.parametrize(
     ("options", "ending", "seconds"),
     [
-        ({}, "ended by the limit of time (--for takes a longer one) in line 2: WAIT IN1 = ON", 60.0),
-        ({"limit": 1_500_000_000}, "ended by the limit of time (--for takes a longer one) in line 2: WAIT IN1 = ON", 1.5),
-        ({"until_idle": True}, "it waits for ever in line 2: WAIT IN1 = ON", 0.002),
+        ({}, "ended at the time limit (--for sets a longer one) in line 2: WAIT IN1 = ON", 60.0),
+        ({"limit": 1_500_000_000}, "ended at the time limit (--for sets a longer one) in line 2: WAIT IN1 = ON", 1.5),
+        ({"until_idle": True}, "the program waits for ever in line 2: WAIT IN1 = ON", 0.002),
         ({"until_idle": True, "inputs": parse_inputs("IN1=1@9s")}, "the program has ended", 9.021),
     ],
 )
@@ -164,7 +164,7 @@ def test_positions_are_of_the_moment_the_run_ended(play: Play) -> None:
     ran = play("M1 = ON\nVABS M1 10\nWAIT IN3 = 1\n", config="[Axis0]\nGear=10\nAcc=5\n", until_idle=True)
     # It runs up to 10 imp/s in 2 s from 0.002 s on; then nothing changes any more.
     assert ran.lines[3:6] == [
-        "it waits for ever in line 3: WAIT IN3 = 1, while M1 moves on",
+        "the program waits for ever in line 3: WAIT IN3 = 1, while M1 moves on",
         "  M1 at 10 imp, 10 imp/s, velocity mode",
         "  on: M1_EN",
     ]
@@ -196,13 +196,13 @@ def test_switches_are_assumed_where_the_program_homes_to(play: Play, homing: str
 @pytest.mark.parametrize(
     ("config", "travels", "missing"),
     [
-        (BOTH, [Travel(3, -5.0, None)], "  M3 homes to KR on IN3, which nothing switches: --travel M3=..HIGH"),
+        (BOTH, [Travel(3, -5.0, None)], "  M3 homes to KR on IN3, which nothing operates: --travel M3=..HIGH"),
         (BOTH.replace("InKR=2\n", ""), [], "  M3 homes to KR, for which the configuration has no input (InKR of [Axis2])"),
-        (BOTH.replace("HomeMode=0", "HomeMode=3"), [], "  M3 homes to a mechanical stop: a run without a world has none"),
+        (BOTH.replace("HomeMode=0", "HomeMode=3"), [], "  M3 homes to a mechanical stop, which only a world has"),
         (
             BOTH.replace("HomeMode=0", "HomeMode=4"),
             [],
-            "  M3 homes to channel C of its encoder on IN15, which nothing switches: --input IN15=1@TIME",
+            "  M3 homes to channel C of its encoder on IN15, which nothing operates: --input IN15=1@TIME",
         ),
     ],
     ids=["no switch", "no input", "stop", "index"],
@@ -299,7 +299,7 @@ def test_an_image_is_run_with_its_own_table(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("A;2;x;x;x\nB;3;x;x;x\n")
     ran = Ran(image(tmp_path / "a.wbc", "M1 = ON\nMOVEPTP 1\nWAITPOS\nWAIT IN1 = 1\n", "A;1;x;x;x\nB;7;x;x;x\n"), until_idle=True)
     assert "  M1 at 7 imp, position reached" in ran.lines
-    assert "it waits for ever in line 5: WAIT IN1 = 1" in ran.lines
+    assert "the program waits for ever in line 5: WAIT IN1 = 1" in ran.lines
 
 
 @pytest.mark.parametrize(
@@ -423,7 +423,7 @@ def test_pick_and_place_as_documented() -> None:
         ("$I10 = 1", "33"),
         ("OUT2 off", "34"),
     ]
-    assert "it waits for ever in line 24: WAIT partReady = ON" in ran.lines
+    assert "the program waits for ever in line 24: WAIT partReady = ON" in ran.lines
 
 
 def test_the_world_it_runs_in_is_printed_and_runs_alike(

@@ -27,7 +27,7 @@ CONFIG = "[Axis0]\nUnit=3\nGear=50\n[AIN0]\nID=9\n"
     [
         ({"baud": 38401}, r"--baud 38401: permitted are 9600, 19200, 38400, 57600, 115200 bit/s"),
         ({"demo": True, "config": Path("m.cfg")}, r"--demo and --config m\.cfg: the demo has a configuration of its own"),
-        ({"units": "1,x"}, r"--units 1,x: 'x' is no slave address; permitted are 1 to 247"),
+        ({"units": "1,x"}, r"--units 1,x: 'x' is not a slave address; permitted are 1 to 247"),
         ({"units": "1,1"}, r"--units 1,1: 1 is given twice"),
         ({"units": "1,2", "vision": "127.0.0.1:0"}, r"--vision is for a single unit"),
         ({"gap_ms": 0.0}, r"--gap 0: permitted are more than 0 and at most 10000 ms"),

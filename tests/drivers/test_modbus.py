@@ -333,7 +333,7 @@ def test_tcp_what_is_no_modbus_breaks_the_connection(tcp: Callable[..., TcpMaste
         master = tcp()
         if meanwhile:
             master.abandon(1)
-        with pytest.raises(LineLost, match=r"^tcp://h:502: what came is no Modbus TCP \(MBAP protocol"):
+        with pytest.raises(LineLost, match=r"^tcp://h:502: what came is not Modbus TCP \(MBAP protocol"):
             (master.stray if meanwhile else master.receive)(b"SSH-2.0-OpenSSH\r\n", 1)
         master.reset()
         assert master.receive(b"", 2) is None

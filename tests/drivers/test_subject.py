@@ -412,7 +412,7 @@ def test_characters_for_an_m1486_are_whole_commands_that_move_nothing(drum: Devi
         (command.ControlProgram("drum", "start"), Refusal, "an M1486 has no command to start its program"),
         (command.Jog("drum", 1, 0.0), Misuse, "the sign of the velocity is the direction"),
         (command.StopAxes("drum", 2), Misuse, "axis = 2: an M1486 has axis 1 only"),
-        (command.ReadPoints(("drum.B99",)), Misuse, "'B99' is no point of an M1486: there are position"),
+        (command.ReadPoints(("drum.B99",)), Misuse, "'B99' is not a point of an M1486: there are position"),
     ],
 )
 def test_what_an_m1486_does_not_do(drum: DeviceSubject, wanted: command.Command, kind: type[SteptwinError], message: str) -> None:

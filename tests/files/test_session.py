@@ -252,11 +252,11 @@ def test_another_run_has_another_digest() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "is no session of a world"),
-        ("[]", "is no session of a world"),
+        ("{", "is not a session of a world"),
+        ("[]", "is not a session of a world"),
         ('{"steptwin_session": 99}', "is a session of format 99: this version reads 1"),
-        ('{"steptwin_session": 1}', "is no session of a world: 'until_ns' is missing"),
-        ("[" * 100_000, "is no session of a world: it is nested too deeply"),
+        ('{"steptwin_session": 1}', "is not a session of a world: 'until_ns' is missing"),
+        ("[" * 100_000, "is not a session of a world: it is nested too deeply"),
     ],
 )
 def test_what_is_no_session_is_misuse(tmp_path: Path, text: str, message: str) -> None:
@@ -302,7 +302,7 @@ def test_a_damaged_session_is_misuse(tmp_path: Path, change: dict[str, Any], mes
     path.write_text(json.dumps(whole | {"world": "", "files": {}, "inputs": [put(levels=[["t", "IN1", 1]])]}))
     load(path)
     path.write_text(json.dumps(whole | {"world": "", "files": {}, "inputs": []} | change))
-    with pytest.raises(Misuse, match=rf"s\.json is no session of a world: .*{message}"):
+    with pytest.raises(Misuse, match=rf"s\.json is not a session of a world: .*{message}"):
         load(path)
 
 

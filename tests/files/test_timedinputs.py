@@ -29,7 +29,7 @@ def test_durations(text: str, nanoseconds: int) -> None:
 @pytest.mark.parametrize("text", ["", "s", "-1s", "1,5s", "1e3", "1.s", "2 days", "nan", "٣s"])
 def test_what_is_no_duration(text: str) -> None:
     permitted = "us, ms, s, min, h, such as '90 s' or '500 ms'"
-    with pytest.raises(Misuse, match=rf"^--for: '.*' is no time: expected a number with {permitted}$"):
+    with pytest.raises(Misuse, match=rf"^--for: '.*' is not a time: expected a number with {permitted}$"):
         parse_duration(text, "--for")
 
 
@@ -53,7 +53,7 @@ def test_inputs_come_in_the_order_of_their_times_and_else_as_written() -> None:
     [
         ("IN1=1@1s,IN3=1", "--input IN3=1: expected PIN=VALUE@TIME, such as IN3=1@2s or AIN1=4.2@500ms"),
         ("IN3=on@1s", "--input IN3=on@1s: expected PIN=VALUE@TIME"),
-        ("IN3=1@soon", "--input IN3=1@soon: 'soon' is no time: expected a number with us, ms"),
+        ("IN3=1@soon", "--input IN3=1@soon: 'soon' is not a time: expected a number with us, ms"),
     ],
 )
 def test_what_is_no_input(text: str, message: str) -> None:

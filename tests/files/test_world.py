@@ -43,7 +43,7 @@ def test_a_run_ends_at_a_moment_a_duration_or_a_condition() -> None:
     assert world.run(until=90, for_=1) is None
     assert world.run(until=90.5, for_=60) is None
     assert world.time == 90.5
-    for moment, message in ((90, r"until 90 s: this world is at 90\.5 s already"), (float("nan"), "nan is no time")):
+    for moment, message in ((90, r"until 90 s: this world is at 90\.5 s already"), (float("nan"), "nan is not a time")):
         with pytest.raises(Misuse, match=message):
             world.run(until=moment)
     with pytest.raises(Misuse, match="run needs until or for_"):

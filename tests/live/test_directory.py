@@ -22,7 +22,7 @@ def test_a_directory_that_is_none_or_somebody_elses(own_directory: Path, monkeyp
     elsewhere = own_directory.with_name("elsewhere")
     elsewhere.mkdir()
     own_directory.symlink_to(elsewhere)
-    with pytest.raises(Misuse, match="is no directory"):
+    with pytest.raises(Misuse, match="is not a directory"):
         private_directory(own_directory)
     monkeypatch.setattr(os, "getuid", lambda: 12345)
     with pytest.raises(Misuse, match="belongs to another user"):

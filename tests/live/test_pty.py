@@ -275,7 +275,7 @@ def refused(path: Path, text: str) -> None:
 def test_what_somebody_else_put_there_is_left_alone(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("precious")
-    refused(file, "exists and is no link to a pseudo terminal")
+    refused(file, "exists and is not a link to a pseudo terminal")
     assert file.read_text() == "precious"
 
     link = tmp_path / "link"
@@ -283,7 +283,7 @@ def test_what_somebody_else_put_there_is_left_alone(tmp_path: Path) -> None:
     refused(link, f"is somebody's link to {file}")
     assert link.readlink() == file
 
-    refused(tmp_path, "exists and is no link")
+    refused(tmp_path, "exists and is not a link")
 
 
 def test_the_link_of_another_program_to_a_living_pty_is_left_alone(tmp_path: Path) -> None:

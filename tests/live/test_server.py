@@ -114,7 +114,7 @@ def test_there_need_not_be_one(tmp_path: Path) -> None:
 def test_any_other_file_is_left_alone(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "notes.txt"
     path.write_bytes(content)
-    with pytest.raises(Misuse, match=f"{path} exists and is no ready file: choose another --ready-file"):
+    with pytest.raises(Misuse, match=f"{path} exists and is not a ready file: choose another --ready-file"):
         clear_ready_file(path)
     assert path.read_bytes() == content
 
@@ -190,4 +190,4 @@ def test_a_lag_is_told(run: Run, make_cell: Make) -> None:
         server.cell.enter()
         return told
 
-    assert serving(run, make_cell, play) == ["this process was held up for 61.2 s; the time of the twin was held up as long"]
+    assert serving(run, make_cell, play) == ["this process did not run for 61.2 s; the time of the twin stood still meanwhile"]

@@ -187,5 +187,7 @@ def test_without_any_twin() -> None:
 
 def test_a_device_is_no_twin(run: Any) -> None:
     run(DEMO)
-    with pytest.raises(Misuse, match="/dev/ttyUSB0 is no running twin, and this command is for twins: running twins are mic488"):
+    with pytest.raises(
+        Misuse, match="/dev/ttyUSB0 is not a running twin, and this command is for twins: running twins are mic488"
+    ):
         find_controller("/dev/ttyUSB0")

@@ -108,7 +108,7 @@ def test_a_label_gets_another_number() -> None:
     for edit in sorted(edits[URI], key=lambda edit: -edit.span.start):
         text = text[: edit.span.start] + edit.text + text[edit.span.end :]
     assert text == PROGRAM.replace("i2H7", "i2H9").replace("@7", "@9")
-    for name, message in (("5", "there is a label 5"), ("99", "1 to 15 on M1486A"), ("main", "is no label")):
+    for name, message in (("5", "there is a label 5"), ("99", "1 to 15 on M1486A"), ("main", "is not a label")):
         with pytest.raises(Misuse, match=message):
             navigation.rename(made, URI, PROGRAM.index("i2H7") + 3, name)
     with pytest.raises(Misuse, match="B3 is fixed"):

@@ -292,7 +292,7 @@ def test_a_rename_that_would_change_the_meaning_is_refused() -> None:
     cases = {
         ("count = count", "x"): "x is a variable already",
         ("count = count", "PosM1"): "PosM1 is a register already",
-        ("count = count", "ä"): "is no name",
+        ("count = count", "ä"): "is not a name",
         ("count = count", "pick"): "pick is a label already",
         ("HOME M1 speed", "HOME"): "there is no name",
         ("JUMP PICK", "MAIN"): "MAIN is a label already",

@@ -151,7 +151,7 @@ def test_a_rename_changes_names_and_conditions_but_no_notes() -> None:
         text = text[: edit.span.start] + edit.text + text[edit.span.end :]
     assert text == WORLD.replace('"table', '"bench').replace("and table.", "and bench.")
     assert "start the table" in text
-    for name, message in (("x", "taken already"), ("1x", "is no name"), ("idle", "is a signal"), ("TIME", "is a signal")):
+    for name, message in (("x", "taken already"), ("1x", "is not a name"), ("idle", "is a signal"), ("TIME", "is a signal")):
         with pytest.raises(Misuse, match=message):
             navigation.rename(made, URI, WORLD.index('name = "table"') + 9, name)
 

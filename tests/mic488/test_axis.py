@@ -118,7 +118,7 @@ def test_mic_10_stop_has_no_ramp_and_leaves_status_1(rig: Rig) -> None:
         rig.set("POS_ABS", 10_000.0, axis)
     rig.wait(1.5)
     rig.stop(1)
-    rig.coil(2005, False)  # writing OFF is no stop
+    rig.coil(2005, False)  # writing OFF is not a stop
     rig.word("M_STOP", 0b0100)
     assert [rig.status(axis) for axis in (1, 2, 3)] == [1, 3, 1]
     assert [rig.velocity(axis) for axis in (1, 2, 3)] == [0.0, 1000.0, 0.0]

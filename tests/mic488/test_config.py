@@ -157,9 +157,9 @@ def test_input_numbers_of_encoder_channels() -> None:
         ("[Axis1]\nAcc=-1", "C008", "[Axis1] Acc = -1 is not permitted", "permitted: a number > 0 in units/s²"),
         ("[Axis1]\nDec=0,0", "C008", "[Axis1] Dec = 0,0 is not permitted", "permitted: a number > 0 in units/s²"),
         ("[Axis1]\nVel=1e39", "C008", "[Axis1] Vel = 1e39 is not permitted", "permitted: a number > 0 in units/s"),
-        ("[Axis1]\nVel=fast", "C006", "[Axis1] Vel = fast is no number", "permitted: a number > 0 in units/s"),
-        ("[Axis1]\nVel=nan", "C006", "[Axis1] Vel = nan is no number", "permitted: a number > 0 in units/s"),
-        ("[Axis1]\nVel=1 000", "C006", "[Axis1] Vel = 1 000 is no number", "permitted: a number > 0 in units/s"),
+        ("[Axis1]\nVel=fast", "C006", "[Axis1] Vel = fast is not a number", "permitted: a number > 0 in units/s"),
+        ("[Axis1]\nVel=nan", "C006", "[Axis1] Vel = nan is not a number", "permitted: a number > 0 in units/s"),
+        ("[Axis1]\nVel=1 000", "C006", "[Axis1] Vel = 1 000 is not a number", "permitted: a number > 0 in units/s"),
         ("[Axis1]\nVel=", "C006", "[Axis1] Vel =  has no value", "permitted: a number > 0 in units/s"),
         (
             "[Axis2]\nUnit=6",
@@ -170,7 +170,7 @@ def test_input_numbers_of_encoder_channels() -> None:
         (
             "[Axis2]\nHomeMode=1,5",
             "C007",
-            "[Axis2] HomeMode = 1,5 is no whole number",
+            "[Axis2] HomeMode = 1,5 is not a whole number",
             "permitted: 0 = HOME0, 1 = HOME1, 2 = HOME2, 3 = HOME3, 4 = HOME4",
         ),
         (
@@ -279,7 +279,7 @@ def test_all_errors_at_once_with_file_line_and_key() -> None:
         "  2 | Gear=0\n"
         "    |      ^\n"
         "    = permitted: a number > 0 in pulses per unit\n"
-        "m.cfg:3:5: error C006: [Axis0] Acc = x is no number\n"
+        "m.cfg:3:5: error C006: [Axis0] Acc = x is not a number\n"
         "  3 | Acc=x\n"
         "    |     ^\n"
         "    = permitted: a number > 0 in units/s²\n"
@@ -310,14 +310,14 @@ def test_a_misspelt_key_comes_with_the_repair() -> None:
     "text", ["", " \n; only a comment\n", "PREL M1 10\nWAIT M1\n", "[tool]\nname=x\n[other]\n", "a=1\nb=2\n"]
 )
 def test_a_file_without_any_known_section_is_one_error(text: str) -> None:
-    assert findings(text) == [("C011", "this is no configuration of a MIC488")]
+    assert findings(text) == [("C011", "this is not a configuration of a MIC488")]
     with pytest.raises(ConfigError, match=r"(?s)m\.cfg:.*error C011.*expected: sections such as \[Axis0\]…\[Axis3\]"):
         read_config(parse(text))
 
 
 def test_a_misspelt_section_comes_with_the_repair_where_it_is_the_only_one() -> None:
     assert findings("[Axsi0]\nGear=100") == [
-        ("C011", "this is no configuration of a MIC488"),
+        ("C011", "this is not a configuration of a MIC488"),
         ("C005", "the section [Axsi0] is not known; did you mean [Axis0]?"),
     ]
 

@@ -64,9 +64,9 @@ def test_values_as_people_type_them() -> None:
     assert value_of(acc, "12,5") == 12.5
     assert value_of(acc, "0x10") == 16
     for register, typed, text in (
-        (control, "often", "'often' is no number, or STOP, START, PAUSE"),
-        (output, "up", "'up' is no number, or on, off"),
-        (acc, "on", "'on' is no number$"),
+        (control, "often", "'often' is not a number, or STOP, START, PAUSE"),
+        (output, "up", "'up' is not a number, or on, off"),
+        (acc, "on", "'on' is not a number$"),
     ):
         with pytest.raises(Misuse, match=text):
             value_of(register, typed)
@@ -141,7 +141,7 @@ def test_names_of_values(text: str, name: str, address: int, size: int) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("M1 POS", f"'M1 POS' is no name of a value: {FORM}"),
+        ("M1 POS", f"'M1 POS' is not a name of a value: {FORM}"),
         ("M1_ACC[0]", "'M1_ACC[0]': M1_ACC is one value of type REAL/DINT; name it without [ ] and :"),
         ("M1_ACC:dint", "'M1_ACC:dint': M1_ACC is one value of type REAL/DINT; name it without [ ] and :"),
         ("USER_REGISTER", "'USER_REGISTER': choose one of USER_REGISTER[0] to USER_REGISTER[1999]"),

@@ -115,7 +115,7 @@ def test_every_step_that_is_not_only_for_scripts_is_a_command() -> None:
         ("follow", {"kinds": ["plans"]}, "follow: kinds: no kind of event 'plans' (did you mean 'plan'?); there are plan, "),
         ("couple", {"machine": "a", "axis": 1, "to": "wheel"}, "couple: to: 'wheel': expected 'drive' or 'free' or 'blocked'"),
         ("request", {"line": "b", "unit": 1, "pdu": "0"}, "request: pdu: '0': expected bytes as hexadecimal digits"),
-        ("send", {"line": "b", "text": "ż"}, "send: text: 'ż' is no character of a line, which has 8 bits for each"),
+        ("send", {"line": "b", "text": "ż"}, "send: text: 'ż' is not a character of a line, which has 8 bits for each"),
         ("fault", {"fault": "crk"}, "fault: fault: fault: kind = 'crk': permitted are"),
         ("move", {"machine": "a", "axis": 1}, "move: give either to (a position) or by (a distance)"),
         ("move", {"machine": "a", "axis": 1, "to": 1, "by": 1}, "move: give either to (a position) or by (a distance)"),

@@ -27,7 +27,7 @@ def test_loopback_addresses_are_taken(text: str, address: tuple[str, int], shown
 
 @pytest.mark.parametrize("text", ["", "5020", "127.0.0.1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536", "127.0.0.1:-1"])
 def test_what_is_no_address(text: str) -> None:
-    with pytest.raises(Misuse, match=r"is no address: expected HOST:PORT with a port from 0 to 65535"):
+    with pytest.raises(Misuse, match=r"is not an address: expected HOST:PORT with a port from 0 to 65535"):
         parse_address(text, listen_any=True)
 
 

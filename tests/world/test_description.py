@@ -35,12 +35,12 @@ def wrong(text: str) -> str:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[world\n", "w.toml:1:7: error D001: this is no TOML"),
+        ("[world\n", "w.toml:1:7: error D001: this is not TOML"),
         ("[worlds]\n", "w.toml:1:1: error D004: the file has no [worlds] (did you mean 'world'?)"),
         (TABLE + "[[axs]]\n", "w.toml:3:1: error D004: the file has no [axs]"),
         (TABLE + '[[fault]]\nkind = "crc"\nprobability = 2\n', "w.toml:5:1: error D003: [[fault]] (crc): probability = 2"),
         (TABLE + '[[fault]]\nkind = "stall"\naxis = 9\n', "w.toml:3:1: error D009: fault stall: axis = 9: permitted are 1 to 4"),
-        (f"[world]\nseed = {'9' * 400}\n", "w.toml:2:8: error D001: a value of 400 characters that is no text"),
+        (f"[world]\nseed = {'9' * 400}\n", "w.toml:2:8: error D001: a value of 400 characters that is not text"),
         (f"[world]\nseed = {'9' * 40}\n", "w.toml:2:1: error D001: a whole number of more than 64 bits"),
         (f"[world]\nseed = 0x{'f' * 60}\n", "w.toml:2:1: error D001: a whole number of more than 64 bits"),
         ("[world]\nseed = 1e400\n", "w.toml:2:1: error D003: [world]: seed: inf: permitted are whole numbers"),
@@ -68,18 +68,18 @@ def wrong(text: str) -> str:
         ),
         ("world = 3\n", "w.toml:1:1: error D002: [world] is 3"),
         ("[mic488]\nname = 't'\n", "w.toml:1:1: error D002: [mic488] stands once"),
-        ("[[mic488]]\nname = 'ось'\n", "'ось' is no name: expected a letter from A to Z, then letters, digits, '-' and '_'"),
-        ("[[mic488]]\nname = 'tür'\n", "'tür' is no name: expected a letter from A to Z"),
-        (TABLE + "[[event]]\nat = 1\nsteps = [{ send = 'bus', text = '→' }]\n", "text: '→': '→' is no character of a line"),
+        ("[[mic488]]\nname = 'ось'\n", "'ось' is not a name: expected a letter from A to Z, then letters, digits, '-' and '_'"),
+        ("[[mic488]]\nname = 'tür'\n", "'tür' is not a name: expected a letter from A to Z"),
+        (TABLE + "[[event]]\nat = 1\nsteps = [{ send = 'bus', text = '→' }]\n", "text: '→': '→' is not a character of a line"),
         ("[[mic488]]\nunit = 3\n", "w.toml:1:1: error D005: [mic488]: name is missing"),
         (TABLE + "unti = 3\n", "w.toml:3:1: error D004: [mic488] has no 'unti' (did you mean 'unit'?)"),
         (TABLE + "unit = 300\n", "w.toml:3:1: error D003: [mic488]: unit: 300: permitted are whole numbers from 1 to 247"),
         (TABLE + 'firmware = "1.8"\n', "firmware: '1.8': permitted are 1.23, 1.40, 1.70"),
         (TABLE + "firmware = 1.8\n", "firmware: '1.8': permitted are 1.23, 1.40, 1.70"),
         (TABLE + "firmware = true\n", "firmware: True: permitted are 1.23, 1.40, 1.70"),
-        (BUS + 'tcp = "foo"\n', "w.toml:6:1: error D003: [line]: tcp: 'foo' is no address: expected HOST:PORT"),
-        (BUS + 'tcp = "127.0.0.1:99999"\n', "w.toml:6:1: error D003: [line]: tcp: '127.0.0.1:99999' is no address"),
-        (BUS + 'rtu_tcp = "here"\n', "w.toml:6:1: error D003: [line]: rtu_tcp: 'here' is no address"),
+        (BUS + 'tcp = "foo"\n', "w.toml:6:1: error D003: [line]: tcp: 'foo' is not an address: expected HOST:PORT"),
+        (BUS + 'tcp = "127.0.0.1:99999"\n', "w.toml:6:1: error D003: [line]: tcp: '127.0.0.1:99999' is not an address"),
+        (BUS + 'rtu_tcp = "here"\n', "w.toml:6:1: error D003: [line]: rtu_tcp: 'here' is not an address"),
         (
             CHIP + 'line = "bus"\n[[line]]\nname = "bus"\nkind = "m1486"\nrtu_tcp = "127.0.0.1:0"\n',
             "w.toml:7:1: error D007: rtu_tcp means nothing for kind = 'm1486'",
@@ -95,7 +95,10 @@ def wrong(text: str) -> str:
             TABLE + '[[wire]]\nfrom = "tabel.OUT1"\nto = "table.IN1"\n',
             "w.toml:3:1: error D009: nothing is called 'tabel' (did you mean 'table'?)",
         ),
-        (TABLE + '[[wire]]\nfrom = "table.OUT9"\nto = "table.IN1"\n', "table.OUT9 is no output: outputs of 'table' are OUT1, "),
+        (
+            TABLE + '[[wire]]\nfrom = "table.OUT9"\nto = "table.IN1"\n',
+            "table.OUT9 is not an output: outputs of 'table' are OUT1, ",
+        ),
         (AXIS + "travel = [3, 1]\n", "w.toml:6:1: error D003: [axis]: travel: [3, 1]: the first must be below the second"),
         (AXIS + "travel = [1, 3]\n", "start = 0 is outside travel = [1.0, 3.0]"),
         (AXIS.replace("M1", "M5"), "drive = 'table.M5': table has M1, M2, M3, M4"),
@@ -115,7 +118,7 @@ def wrong(text: str) -> str:
             "mass and forces need a unit of mm, cm, m",
         ),
         (TABLE + "[[event]]\nsteps = []\n", "an event needs one of at, every and when"),
-        (TABLE + '[[event]]\nat = "5 sec"\nsteps = []\n', "w.toml:4:1: error D003: [event]: at: '5 sec' is no time"),
+        (TABLE + '[[event]]\nat = "5 sec"\nsteps = []\n', "w.toml:4:1: error D003: [event]: at: '5 sec' is not a time"),
         (TABLE + "[[event]]\nat = 1\nsteps = [{ wiat = 1 }]\n", "step 1 has 'wiat' (did you mean 'wait'?)"),
         (TABLE + "[[event]]\nat = 1\nsteps = [{ until = 'a >' }]\n", "condition 'a >' ends too early"),
         (TABLE + '[[line]]\nname = "bus"\n', "w.toml:3:1: error D009: nothing is on this line"),
@@ -147,17 +150,17 @@ def wrong(text: str) -> str:
         (TABLE.replace("table", "world"), "w.toml:2:1: error D006: 'world' is what events of the whole world are recorded under"),
         (
             TABLE + '[[wire]]\nfrom = "table.IN1"\nto = "table.IN2"\n',
-            "w.toml:3:1: error D009: table.IN1 is no output: outputs of 'table'",
+            "w.toml:3:1: error D009: table.IN1 is not an output: outputs of 'table'",
         ),
         (
             TABLE + '[[wire]]\nfrom = "table.OUT1"\nto = "table.AIN1"\n',
-            "table.AIN1 is no digital input: digital inputs of 'table' are IN1",
+            "table.AIN1 is not a digital input: digital inputs of 'table' are IN1",
         ),
-        (TABLE + '[[button]]\nname = "b"\nto = "table.AIN2"\n', "w.toml:3:1: error D009: table.AIN2 is no digital input"),
-        (AXIS + '[[axis.switch]]\nto = "table.AIN1"\nbelow = 0\n', "w.toml:6:1: error D009: table.AIN1 is no digital input"),
-        (TABLE + '[[source]]\nto = "table.IN3"\n', "table.IN3 is no analog input: analog inputs of 'table' are AIN1, AIN2"),
-        (CHIP + '[[source]]\nto = "chip.B1"\n', "chip.B1 is no analog input: analog inputs of 'chip' are none"),
-        (CHIP + '[[wire]]\nfrom = "chip.JOG"\nto = "chip.B2"\n', "chip.JOG is no output: outputs of 'chip' are B1, B2"),
+        (TABLE + '[[button]]\nname = "b"\nto = "table.AIN2"\n', "w.toml:3:1: error D009: table.AIN2 is not a digital input"),
+        (AXIS + '[[axis.switch]]\nto = "table.AIN1"\nbelow = 0\n', "w.toml:6:1: error D009: table.AIN1 is not a digital input"),
+        (TABLE + '[[source]]\nto = "table.IN3"\n', "table.IN3 is not an analog input: analog inputs of 'table' are AIN1, AIN2"),
+        (CHIP + '[[source]]\nto = "chip.B1"\n', "chip.B1 is not an analog input: analog inputs of 'chip' are none"),
+        (CHIP + '[[wire]]\nfrom = "chip.JOG"\nto = "chip.B2"\n', "chip.JOG is not an output: outputs of 'chip' are B1, B2"),
         (BUS + '[[wire]]\nfrom = "bus.OUT1"\nto = "table.IN1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
         (BUS + '[[axis]]\nname = "x"\ndrive = "bus.M1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
         (
@@ -384,13 +387,13 @@ def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None
         ("18", "D003: [axis]: start: 'left': expected a number"),
         ("20", "D003: [axis.switch]: below: 'low': expected a number"),
         ("24", "D009: nothing is called 'nobody'"),
-        ("26", "D009: good.IN99 is no digital input: digital inputs of 'good"),
-        ("33", "D003: [button]: bounce: 'soon' is no time: expected a number"),
+        ("26", "D009: good.IN99 is not a digital input: digital inputs of 'good"),
+        ("33", "D003: [button]: bounce: 'soon' is not a time: expected a number"),
         ("41", "D003: [source]: kind: 'sinus': permitted are constant, ramp,"),
         ("46", "D003: [[fault]] (crc): nth = 0: permitted are whole numbers "),
         ("48", "D009: fault stall: axis = 9: permitted are 1 to 4"),
         ("59", "D003: [event]: when: 5: expected a text"),
-        ("61", "D003: [event.steps]: wait: 'soon' is no time: expected a num"),
+        ("61", "D003: [event.steps]: wait: 'soon' is not a time: expected a num"),
         ("64", "D009: step 4: firmware 1.70 has no register named 'M1_ENN'; "),
         ("64", "D009: step 4: firmware 1.70 has no register named 'M2_ENN'; "),
         ("66", "D009: step 6: no signal 'good.M1.stat' (did you mean 'M1.sta"),
@@ -412,7 +415,7 @@ def test_every_input_of_a_controller_has_a_table(number: int) -> None:
 def test_values_are_at_most_so_long() -> None:
     digits = LONGEST_SCALAR - 2
     assert f"a value of {LONGEST_SCALAR} characters" not in wrong(f"{TABLE}unit = 1.{'0' * digits}\n")
-    assert f"a value of {LONGEST_SCALAR + 1} characters that is no text" in wrong(f"{TABLE}unit = 1.{'0' * (digits + 1)}\n")
+    assert f"a value of {LONGEST_SCALAR + 1} characters that is not text" in wrong(f"{TABLE}unit = 1.{'0' * (digits + 1)}\n")
 
 
 def test_a_motor_without_masses_needs_no_length() -> None:

@@ -1,7 +1,7 @@
 """Values by their address on the line: ``10020``, ``hr:10020``, ``hr:10020:real``, ``hr:10020-10023:hex``, ``di:5000-5007``.
 
-Without a space it is the address of a register of the firmware, which is read as what it is. With one the device is asked
-whatever the firmware has there.
+An address without a space must be that of a register of the firmware, and is read with its type. With a space, any address
+is read from the device.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 SPACES = {"hr": 3, "co": 1, "di": 2}
 """Holding registers, coils and discrete inputs, with the function that reads them."""
 FORMS = {"word": 1, "int": 1, "hex": 1, "dint": 2, "real": 2}
-"""How holding registers may be looked at, and how many of them a value takes."""
+"""Forms in which holding registers are shown, and how many of them a value takes."""
 FORM = "expected ADDRESS, or hr:, co: or di: before it and :word, :int, :dint, :real or :hex behind, such as hr:10020:real"
 MOST = 1000
 MOST_READ = 120
-"""At once: a frame carries 125 registers, and this is even."""
+"""The most registers in one request. A frame carries 125; this is even, for 32-bit values."""
 _ADDRESS = re.compile(r"(?:(?P<space>[a-z]+):)?(?P<first>\d{1,5})(?:-(?P<last>\d{1,5}))?(?::(?P<form>\w+))?", re.IGNORECASE)
 
 
@@ -44,7 +44,7 @@ class ValueAddress(NamedTuple):
 
 
 def places(text: str, registers: RegisterMap) -> list[ValueAddress] | list[str] | None:
-    """What an address stands for: values by address, or the name of the register there. None for what is no address.
+    """The values at an address, or the name of the register there. None if the text is not an address.
 
     Raises `Misuse`.
     """
@@ -65,7 +65,7 @@ def places(text: str, registers: RegisterMap) -> list[ValueAddress] | list[str] 
     if (last - first) // step >= MOST:
         raise Misuse(f"{text!r}: at most {MOST} values at once")
     if last != first and (last - first + 1) % step:
-        raise Misuse(f"{text!r}: a {form.upper()} takes {step} registers, {last - first + 1} are no multiple of it")
+        raise Misuse(f"{text!r}: a {form.upper()} takes {step} registers, {last - first + 1} are not a multiple of it")
     if last + (step - 1 if last == first else 0) > 0xFFFF:
         raise Misuse(f"{text!r}: a {form.upper()} takes {step} registers, and 65535 is the last address")
     end = last + 1 if last != first else first + step
@@ -94,7 +94,7 @@ def _register_at(registers: RegisterMap, address: int) -> str:
 
 
 def read_places(mic: Mic488, wanted: Iterable[ValueAddress]) -> dict[ValueAddress, Any]:
-    """The values there. Raises `Refused` where the device has nothing."""
+    """Read the values. Raises `ModbusRefusal` for addresses the device does not have."""
     from steptwin.wire import pdu
 
     content: dict[tuple[str, int, int], Sequence[int]] = {}

@@ -26,7 +26,7 @@ JSON_VERSION = 1
 
 @dataclass(frozen=True)
 class CheckOptions:
-    """What was asked for on the command line; None where nothing was said."""
+    """The options of the command line; None: not given."""
 
     variant: str | None = None
     interface: str | None = None
@@ -36,7 +36,7 @@ class CheckOptions:
     firmware: str | None = None
 
     def refuse(self, language: str, *names: str) -> None:
-        """Raises `Misuse` when one of these options was given, which mean nothing for the language of the file."""
+        """Raises `Misuse` if one of these options was given, which do not apply to the language of the file."""
         for name in names:
             if getattr(self, name):
                 raise Misuse(f"--{name} is not for {language} programs")
@@ -44,9 +44,9 @@ class CheckOptions:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What the checker of one language found: its findings, further members for the JSON, further lines for people.
+    """The result of the checker of one language: findings, further members of the JSON, further lines of the text.
 
-    ``companions`` are the other files that were read, with what is wrong in them.
+    ``companions``: the other files that were read, with their findings.
     """
 
     language: str

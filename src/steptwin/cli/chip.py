@@ -1,4 +1,4 @@
-"""What the commands for devices do with an M1486: info, get, set, watch, send. Its motions are in `steptwin.cli.chip_motion`.
+"""The device commands for an M1486: info, get, set, watch, send. Motions are in `steptwin.cli.chip_motion`.
 
 From Python: `steptwin.drivers.m1486.M1486`.
 """
@@ -54,16 +54,16 @@ def opened_chip(address: DeviceAddress, *, log_frames: bool = False) -> Generato
 
 
 def checked(names: Sequence[str]) -> list[str]:
-    """Raises `Misuse` for a name there is not."""
+    """Raises `Misuse` for an unknown name."""
     wanted = [name.upper() for name in names]
     for name in wanted:
         if name not in NAMES:
-            raise Misuse(f"{name!r} is no value of an M1486: there are {', '.join(NAMES)}")
+            raise Misuse(f"{name!r} is not a value of an M1486: permitted are {', '.join(NAMES)}")
     return wanted
 
 
 def read(chip: M1486, names: Sequence[str]) -> Shown:
-    """Values by name, each with its unit. Errors as `checked`."""
+    """Read values by name, each with its unit. Raises `Misuse` for an unknown name."""
     wanted = checked(names)
     status = chip.status()
     known: Shown = {
@@ -115,7 +115,7 @@ def get(address: DeviceAddress, names: Sequence[str], *, json: bool, log_frames:
 
 
 def set_values(address: DeviceAddress, changes: Sequence[str], *, log_frames: bool) -> None:
-    """All changes are checked before anything is sent."""
+    """Set values. All changes are checked before anything is sent."""
     actions = [_action(change) for change in changes]
     with opened_chip(address, log_frames=log_frames) as chip:
         for action in actions:
@@ -141,7 +141,7 @@ def _action(text: str) -> Callable[[M1486], object]:
     for prefix in ("FLAG", "B", "F"):
         if name.startswith(prefix) and name[len(prefix) :].isdecimal():
             return _switch(prefix, int(name[len(prefix) :]), value, text)
-    raise Misuse(f"{text!r}: {name} cannot be set: there are {SETTABLE}")
+    raise Misuse(f"{text!r}: {name} cannot be set: permitted are {SETTABLE}")
 
 
 def _switch(prefix: str, number: int, value: str, text: str) -> Callable[[M1486], object]:
@@ -161,7 +161,7 @@ def _switch(prefix: str, number: int, value: str, text: str) -> Callable[[M1486]
 
 
 def send(address: DeviceAddress, file: Path, *, json: bool, log_frames: bool) -> None:
-    """Download a program into the chips it names by ``X``, or the one meant; it runs from its ``]`` on."""
+    """Download a program into the chips it selects with ``X``, or into the one addressed; it runs from its ``]`` on."""
     from steptwin.drivers.m1486 import M1486, M1486Line
     from steptwin.drivers.m1486.sync import download_to
     from steptwin.files.textfiles import read_text
@@ -189,29 +189,30 @@ def send(address: DeviceAddress, file: Path, *, json: bool, log_frames: bool) ->
 
 
 def _started(text: str) -> str | None:
-    """What a sent program does already; None: nothing that moves."""
+    """What a downloaded program already does, as the end of a sentence; None if it cannot move the motor."""
     from steptwin.m1486.syntax import parse
 
     keys = {command.key for command in parse(text).program.commands}
     if "]" in keys:
-        return " and has been started by its ]: the motor may move; 'steptwin stop --program' ends it"
-    return " and was carried out as it was sent: the motor may move" if keys & {"R", "(", ")", "J"} else None
+        return " and was started by its ]: the motor may move; 'steptwin stop --program' ends it"
+    return " and its commands were executed while it was sent: the motor may move" if keys & {"R", "(", ")", "J"} else None
 
 
 def _addressed(text: str, chip: int | None, file: Path) -> list[int | None]:
-    """The chips a program is for: those it names by X, and ``chip`` for what stands before. Errors in it are reported later."""
+    """The chips a program is for: those it selects with X, and ``chip`` for commands before the first X. Errors in it are
+    reported later."""
     from steptwin.drivers.m1486.download import parts
     from steptwin.m1486.syntax import parse
 
     named = dict.fromkeys(chip if address is None else address for address, _ in parts(parse(text).program))
     if None in named and len(named) > 1:
-        raise Misuse(f"{file} is not sent: the commands before its first X need a chip: --device ADDRESS,chip=N")
+        raise Misuse(f"{file} was not sent: the commands before its first X need a chip: --device ADDRESS,chip=N")
     return list(named) or [chip]
 
 
 @contextlib.contextmanager
 def _progress(title: str) -> Generator[Callable[[int, int], object]]:
-    """A bar on the standard error, if that is a terminal."""
+    """A progress bar on standard error, if that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda done, total: None
         return

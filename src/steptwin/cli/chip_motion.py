@@ -1,4 +1,4 @@
-"""What move, home, seek, jog and stop do with an M1486. Positions are in full steps.
+"""move, home, seek, jog and stop for an M1486. Positions are in full steps.
 
 From Python: `steptwin.drivers.m1486.M1486`. Ctrl-C, SIGTERM and a closed terminal end a motion with K, which makes the position
 unknown unless it was a seek.
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from steptwin.drivers.address import DeviceAddress
     from steptwin.drivers.m1486 import M1486, ChipMoveEnd
 
-LOST = "; the chip counts the whole move, so its position is wrong now: home, or set POSITION"
+LOST = "; the chip has counted the whole move, so its position is wrong: home the axis, or set POSITION"
 """After Kill in a move (M-16)."""
 HOLD_RANGE_S = (0.2, 2.0)
 LATE_S = 2.0
-"""A jog in which a move takes so much longer than meant was suspended, or the line fails: no more moves follow."""
+"""A jog whose move takes this much longer than planned was suspended, or its line fails; it ends."""
 _SOUGHT = re.compile(r"([+-])B?(\d{1,2})", re.IGNORECASE)
 
 
 def axis_value(given: Sequence[str], form: str) -> str:
-    """What stands behind ``1=``: an M1486 has one axis. Raises `Misuse`."""
+    """The text behind ``1=``: an M1486 has one axis. Raises `Misuse` for another axis."""
     text = " ".join(given)
     name, _, value = text.partition("=")
     if name.strip().upper().removeprefix("M") != "1":
@@ -83,7 +83,7 @@ def seek(
 ) -> None:
     """Move at start/stop speed until a line has its end level; ``home``: that is position 0 then."""
     if home and not wait:
-        raise Misuse("--no-wait: to home an M1486 is to seek a line and to set the position there, so its end is waited for")
+        raise Misuse("--no-wait is not possible for an M1486: the command sets the position at the end of the seek")
     with _opened(address, log_frames=log_frames) as (chip, held_up), _stopping(chip):
         held_up.check()
         chip.seek(wanted.direction, wanted.line)
@@ -108,8 +108,8 @@ def jog(
 ) -> None:
     """Short moves, one after the other, until a key is pressed or the time is over; each takes the hold time.
 
-    Whatever happens to this process the chip ends the move it has, and no more of them come. ``velocity`` sets V, full steps/s;
-    the moves are whole full steps.
+    If this process dies, the chip completes its present move and gets no further one. ``velocity`` sets V, full steps/s; the
+    moves are whole full steps.
     """
     from steptwin.m1486.variants import Store
 
@@ -141,7 +141,7 @@ def jog(
 
 
 def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
-    """K is sent whether the chip can be asked or not: one that moves cannot."""
+    """Send K. The chip is not asked before: it does not respond while it moves."""
     from steptwin.drivers.m1486 import M1486
 
     chip = M1486(
@@ -172,7 +172,7 @@ def _opened(address: DeviceAddress, *, log_frames: bool) -> Generator[tuple[M148
 
 @contextlib.contextmanager
 def _stopping(chip: M1486, note: str = "") -> Generator[None]:
-    """Ctrl-C and what ends the process stop the motor; ``note`` is what there is to know then."""
+    """Stop the motor on Ctrl-C and on signals that end the process; ``note`` is added to the message."""
     with interruptible():
         try:
             yield
@@ -183,12 +183,12 @@ def _stopping(chip: M1486, note: str = "") -> Generator[None]:
 
 
 def _wait(chip: M1486, timeout: float | None) -> ChipMoveEnd:
-    """The end of the motion; one that is not over in time is stopped."""
+    """Wait for the end of the motion, and stop it at the timeout."""
     tell_under_way(["M1"])
     end = chip.wait(timeout, check=False)
     if end.reason.name == "OVERDUE":
         chip.stop()
-        complain("stopped, because the time is over")
+        complain("stopped: timeout")
     return end
 
 

@@ -1,6 +1,6 @@
-"""What the shell completes with Tab: values of options, names of running twins, their pins, kinds of faults.
+"""Completion in the shell: values of options, names of running twins, their pins, kinds of faults.
 
-Nothing here may fail or print: what cannot be found out is not offered.
+Nothing here raises or prints: a value that cannot be determined is not offered.
 """
 
 from __future__ import annotations

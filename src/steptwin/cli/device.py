@@ -53,7 +53,7 @@ def opened(address: DeviceAddress, *, observe: bool = True, log_frames: bool = F
 
     if address.kind != "mic488":
         commands = "info, get, set, watch, home, seek, move, jog, stop, send and terminal"
-        raise Misuse(f"this command is for the MIC488; an M1486 has {commands}")
+        raise Misuse(f"this command is for the MIC488; for an M1486 there are {commands}")
     mic = Mic488(
         address.place,
         address.unit,
@@ -77,7 +77,7 @@ def opened(address: DeviceAddress, *, observe: bool = True, log_frames: bool = F
 
 @contextlib.contextmanager
 def search_line(place: str, baud: int) -> Generator[SearchLine]:
-    """A line on which M1486 chips are looked for."""
+    """Open a line to search it for M1486 chips."""
     from steptwin.drivers.blocking import finish
     from steptwin.drivers.m1486.identify import SearchLine
 
@@ -90,7 +90,7 @@ def search_line(place: str, baud: int) -> Generator[SearchLine]:
 
 
 def drop_rubbish(place: str, baud: int) -> None:
-    """If those that did not answer Modbus are M1486 chips, its bytes stand in front of the next command: they are ended."""
+    """End the Modbus bytes on the line, so that M1486 chips on it, if any, read their next command correctly."""
     from steptwin.drivers.address import CHIP_BAUD
     from steptwin.drivers.blocking import finish
     from steptwin.drivers.m1486.identify import end_line
@@ -101,7 +101,7 @@ def drop_rubbish(place: str, baud: int) -> None:
 
 
 def complain(text: str) -> None:
-    """Say something beside the results."""
+    """Print a message to standard error."""
     print(text, file=sys.stderr, flush=True)  # noqa: T201
 
 
@@ -112,7 +112,7 @@ def axis_of(text: str) -> int:
     """``1`` or ``M1``. Raises `Misuse`."""
     number = text.strip().upper().removeprefix("M")
     if number not in ("1", "2", "3", "4"):
-        raise Misuse(f"{text!r} is no axis: axes are 1 to 4, or M1 to M4")
+        raise Misuse(f"{text!r} is not an axis: permitted are 1 to 4, or M1 to M4")
     return int(number)
 
 
@@ -140,14 +140,14 @@ def number_of(value: str, whole: str) -> float:
     try:
         return int(value, 16) if value.lower().startswith("0x") else float(value.replace(",", "."))
     except ValueError:
-        raise Misuse(f"{whole!r}: {value!r} is no number") from None
+        raise Misuse(f"{whole!r}: {value!r} is not a number") from None
 
 
 # ---------------------------------------------------------------------- what people read
 
 
 class HeldUp:
-    """Finds out that the command was suspended between two of its steps: nothing is to move any more by what was asked before."""
+    """Detects that the command was suspended between two of its steps, so that no motion starts late."""
 
     LIMIT_S = 20.0
     """Longer than any step that comes before a motion: opening an E type takes about five seconds."""
@@ -159,12 +159,12 @@ class HeldUp:
         """Immediately before a motion. Raises `Refusal` when too much time has passed since the last step."""
         away_s = time.monotonic() - self._at
         if away_s > self.LIMIT_S:
-            raise Refusal(f"not moved: the command was suspended, or held up by the line, for {away_s:.0f} s; give it again")
+            raise Refusal(f"not moved: the command was suspended, or delayed by the line, for {away_s:.0f} s; repeat it")
         self._at = time.monotonic()
 
 
 def tell_under_way(names: Sequence[str]) -> None:
-    """Say on a terminal that a motion is under way, because it takes its time."""
+    """Print to a terminal that axes are moving and how to stop them."""
     if sys.stderr.isatty():
         typer.echo(f"{', '.join(names)} under way; Ctrl-C stops", err=True)
 
@@ -180,7 +180,7 @@ def shown(value: object) -> str:
 
 
 def as_json(value: Any) -> Any:
-    """Data for JSON: what is a REAL is given with the digits that tell it from its neighbours."""
+    """Data for JSON: REAL values have the shortest form that reads back as the same REAL."""
     match value:
         case float() if isfinite(value):
             from steptwin.mic488.encoding import real_to_words, shortest_real, words_to_real
@@ -196,7 +196,7 @@ def as_json(value: Any) -> Any:
 
 
 def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """Columns below each other; a column of numbers is set to the right."""
+    """A table with aligned columns; columns of numbers are right-aligned."""
     lines = [tuple(head), *map(tuple, rows)] if head else [tuple(row) for row in rows]
     if not lines:
         return ""
@@ -205,7 +205,7 @@ def table(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
 
 
 def aligned(lines: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
-    """Columns below each other, to the left but for those named (from 0)."""
+    """A table with left-aligned columns, except those named (from 0), which are right-aligned."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     cells = [
         [cell.rjust(w) if n in right else cell.ljust(w) for n, (cell, w) in enumerate(zip(line, widths, strict=True))]

@@ -26,7 +26,7 @@ _RUN = re.compile(r"(?P<head>\w+\[)(?P<first>\d+)-(?P<last>\d+)(?P<tail>\].*)")
 
 
 def names_from(incomplete: str) -> list[str]:
-    """For the shell: names of registers that begin like this."""
+    """Shell completion: names of registers with this beginning."""
     from steptwin.mic488.registers import register_map
 
     return [r.name for r in register_map() if r.name.startswith(incomplete.upper())]
@@ -73,7 +73,8 @@ def set_(
 ) -> None:
     """Write registers by name, one after the other. A motion register moves at once.
 
-    A register that repeats would act twice on is sent once only; where its answer is lost, the message says so.
+    A register that acts on every write is sent only once. If its response is lost, the message says that the write is
+    unconfirmed.
     """
     address = find(device)
     if address.kind == "m1486":
@@ -105,7 +106,7 @@ def map_of(mic: Mic488) -> RegisterMap:
 
 
 def look(mic: Mic488, wanted: Sequence[str | ValueAddress]) -> dict[str, tuple[Any, str]]:
-    """Values by name and by address, each with its unit."""
+    """Read values by name and by address, each with its unit."""
     names = [one for one in wanted if isinstance(one, str)]
     values = mic.get_shown(*names) if names else {}
     by_address = read_places(mic, [one for one in wanted if not isinstance(one, str)])
@@ -113,9 +114,9 @@ def look(mic: Mic488, wanted: Sequence[str | ValueAddress]) -> dict[str, tuple[A
 
 
 def expanded(registers: RegisterMap, names: Sequence[str]) -> list[str | ValueAddress]:
-    """Names with ``*`` and ``?``, runs of user registers, and addresses, as all they stand for.
+    """Expand names with ``*`` and ``?``, ranges of user registers, and addresses.
 
-    Raises `Misuse` for one that stands for none.
+    Raises `Misuse` for one that matches nothing.
     """
     found: dict[str | ValueAddress, None] = {}
     for name in names:

@@ -206,7 +206,7 @@ def _do(
             raise
         if any(end.reason.name == "OVERDUE" for end in ends.values()):
             mic.stop(*values)
-            complain("stopped, because the time is over")
+            complain("stopped: timeout")
     if json:
         print_json([_data(end) for end in ends.values()])
     else:

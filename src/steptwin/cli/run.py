@@ -1,4 +1,4 @@
-"""``steptwin run``: a program in virtual time, and what it does when. Exit code 1 if something in it went wrong.
+"""``steptwin run``: run a program in virtual time. Exit code 1 if something in it failed.
 
 From Python: `steptwin.commands.run_m1486.run` and its neighbours.
 """
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 _NAMES = {"moment": "from"}
-"""RunOptions that are no names in Python."""
+"""Options whose names are not names in Python."""
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What was asked for on the command line; None where nothing was said."""
+    """The options of the command line; None: not given."""
 
     limit: Nanos | None
     until: str | None
@@ -55,29 +55,34 @@ class RunOptions:
         return self.until == "idle"
 
     def refuse(self, files: str, *names: str) -> None:
-        """Raises `Misuse` when one of these options was given, which mean nothing for such files."""
+        """Raises `Misuse` if one of these options was given, which do not apply to such files."""
         for name in names:
             if getattr(self, name) not in (None, []):
                 raise Misuse(f"--{_NAMES.get(name, name).replace('_', '-')} is not for {files}")
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="What to run, by its suffix: .prg, .wbc, .m1486, .toml, or .json, a session.")],
+    file: Annotated[
+        Path, typer.Argument(help="File to run: a program (.prg, .wbc, .m1486), a world (.toml) or a session (.json).")
+    ],
     duration: Annotated[
-        str | None, typer.Option("--for", metavar="TIME", help="At most so long, such as 10s. Default 60s, 1h with --until.")
+        str | None,
+        typer.Option("--for", metavar="TIME", help="Longest virtual time to run, such as 10s. Default 60s; 1h with --until."),
     ] = None,
     until: Annotated[
         str | None,
         typer.Option(
-            metavar="idle", help="'idle': ends also where nothing would happen any more without input. A world: any condition."
+            metavar="idle", help="'idle': end as soon as only an input could cause anything further. A world: any condition."
         ),
     ] = None,
     inputs: Annotated[
         list[str] | None,
-        typer.Option("--input", metavar="PIN=VALUE@TIME,...", help="Changes of inputs: B3=0@1.5s,B3=1@2s. 7.B3 names the chip."),
+        typer.Option(
+            "--input", metavar="PIN=VALUE@TIME,...", help="Changes of inputs: B3=0@1.5s,B3=1@2s. 7.B3 selects the chip."
+        ),
     ] = None,
     trace: Annotated[
-        Path | None, typer.Option(help="Write what happened to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")
+        Path | None, typer.Option(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     variant: Annotated[
@@ -86,26 +91,27 @@ def run(
     ] = None,
     interface: Annotated[str | None, typer.Option(help="M1486: driver interface sd, dual or two. Default sd.")] = None,
     wire: Annotated[
-        list[str] | None, typer.Option(help="M1486: from a pin of one chip to an input of another, 0.B1=7.B3. Again for more.")
+        list[str] | None, typer.Option(help="M1486: wire from a pin of one chip to an input of another, 0.B1=7.B3; repeatable.")
     ] = None,
     positions: Annotated[Path | None, typer.Option(help="MIC488: position table. Default: the .csv of the same name.")] = None,
     config: Annotated[Path | None, typer.Option(help="MIC488: configuration. Default: the .cfg of the same name.")] = None,
     firmware: Annotated[
-        str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70, which is the default.", autocompletion=completion.firmwares)
+        str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70. Default 1.70.", autocompletion=completion.firmwares)
     ] = None,
     travel: Annotated[
         list[str] | None,
         typer.Option(
             metavar="Mn=LOW..HIGH,...",
-            help="MIC488: switches KL and KR of axes, seen from power-on: M1=-10..250, M1=-50.. or M1=..250.",
+            help="MIC488: positions of the switches KL and KR, relative to the position at power-on: M1=-10..250, M1=-50.. or "
+            "M1=..250.",
         ),
     ] = None,
     statement_time: Annotated[
-        str | None, typer.Option(metavar="TIME", help="MIC488: what one statement takes; default 1ms, 0 for none.")
+        str | None, typer.Option(metavar="TIME", help="MIC488: execution time of a statement. Default 1ms; 0 for none.")
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="World: fault from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
+        typer.Option(help="World: fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="World: random seed. Default: that of its file.")] = None,
     state: Annotated[
@@ -119,13 +125,13 @@ def run(
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="World: exit code 1 also for a wait that timed out.")] = False,
     print_world: Annotated[
-        bool, typer.Option("--print-world", help="Program: print the description of the world it runs in, and run nothing.")
+        bool, typer.Option("--print-world", help="Program: print the description of the world it would run in, and end.")
     ] = False,
     allow_outside: Annotated[
-        bool, typer.Option("--allow-outside", help="World: permit files that do not lie beside its file or below.")
+        bool, typer.Option("--allow-outside", help="World: permit files outside the folder of its file.")
     ] = False,
 ) -> None:
-    """Run a program or a world in virtual time: its moves, waits, outputs and uploads with their times. A session goes on."""
+    """Run a program or a world in virtual time and print its moves, waits, outputs and uploads. A session is continued."""
     from steptwin.files.timedinputs import parse_duration, parse_inputs
 
     runner = _RUNNERS.get(file.suffix.lower())
@@ -172,7 +178,7 @@ def run(
 
 
 _WORLDS = ("fault", "session", "seed", "state", "moment", "allow_outside", "strict")
-"""RunOptions for worlds alone."""
+"""Options that apply to worlds only."""
 
 
 def _run_m1486(file: Path, options: RunOptions) -> bool:

@@ -18,7 +18,7 @@ from steptwin.cli.device import Json, complain, drop_rubbish, print_json, search
 from steptwin.errors import LineFailure, Misuse
 
 BAUDS = (38400, 9600, 19200, 57600, 115200)
-"""What a MIC488 is asked at; chips have rates of their own."""
+"""Baud rates at which MIC488 controllers are searched, bit/s."""
 
 
 class ScannedKind(enum.StrEnum):
@@ -37,26 +37,26 @@ def ports(json: Json = False) -> None:
     elif places:
         typer.echo(table([(place.address, place.what) for place in places]))
     else:
-        complain("no serial port here, and no twin is running")
+        complain("this computer has no serial port, and no twin is running")
 
 
 def scan(
     places: Annotated[
         list[str] | None, typer.Argument(metavar="ADDRESS", help="Ports or addresses. Default: all that 'ports' lists.")
     ] = None,
-    kind: Annotated[ScannedKind, typer.Option(help="What to look for.")] = ScannedKind.ANY,
+    kind: Annotated[ScannedKind, typer.Option(help="Kind of controller to find.")] = ScannedKind.ANY,
     units: Annotated[str, typer.Option(help="Slave addresses of MIC488, such as 1-247 or 1,2,5.")] = "1-16",
     baud: Annotated[
-        str | None, typer.Option(help="Baud rates to try on serial ports. Default: those each kind of device has.")
+        str | None, typer.Option(help="Baud rates to try on serial ports. Default: all rates of each kind of controller.")
     ] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds to wait for each answer beside the time on the wire.")] = 0.1,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for each response, in addition to the time on the wire.")] = 0.1,
     json: Json = False,
 ) -> None:
-    """Look for controllers. Nothing moves, and no setting is changed.
+    """Find controllers on serial ports and network addresses. Nothing moves, and no setting is changed.
 
-    M1486 chips are asked for their type first: chip after chip, where anybody answers at all. Only where none does, MIC488
-    controllers are asked to read their inputs: each unit, at each baud rate. A chip that moves or runs a program cannot answer.
-    It is made deaf meanwhile, as far as that is possible, because rubbish would end its program; --kind m1486 is safe for it.
+    The scan first asks each M1486 chip for its type. Where no chip responds, it reads the inputs of MIC488 controllers: each
+    unit, at each baud rate. A chip that moves or runs a program does not respond, and Modbus bytes would end its program; the
+    scan deselects it first where it can. --kind m1486 never disturbs a chip.
 
     Exit code 1 when no device responds.
     """
@@ -87,7 +87,7 @@ def _which(row: dict[str, Any]) -> str:
 
 
 def _found_at(place: str, kind: ScannedKind, units: list[int], bauds: list[int] | None, timeout: float) -> list[dict[str, Any]]:
-    """All devices that respond at an address; none where it cannot be opened, which is reported."""
+    """All devices that respond at an address. An address that cannot be opened is reported and gives none."""
     from steptwin.drivers.m1486.identify import CHIP_BAUDS
 
     rows: list[dict[str, Any]] = []
@@ -113,7 +113,7 @@ def _found_at(place: str, kind: ScannedKind, units: list[int], bauds: list[int] 
 
 
 def _rates(place: str, bauds: list[int]) -> list[int]:
-    """Rates matter to serial ports, here or over the network; elsewhere any is as good."""
+    """The rates to try: all on serial ports, local or RFC 2217; one elsewhere, where the rate has no effect."""
     if place.startswith("rfc2217://") or not ("://" in place or str(Path(place).resolve()).startswith("/dev/pts/")):
         return bauds
     return bauds[:1]
@@ -153,7 +153,7 @@ def _chips(place: str, bauds: list[int], timeout: float) -> list[dict[str, Any]]
 
 
 def _let_chips_listen(place: str, bauds: list[int]) -> None:
-    """At the likeliest rate last: what is said at the others is rubbish at it."""
+    """Select all chips again at each rate; the most likely rate is last, because characters at other rates are rubbish at it."""
     from steptwin.drivers.blocking import finish
     from steptwin.drivers.m1486.identify import let_all_listen
 
@@ -177,7 +177,7 @@ def _controllers(place: str, bauds: list[int], units: list[int], timeout: float)
                     place,
                     baud,
                     ScannedKind.MIC488,
-                    "answers, but is no MIC488" if one.firmware is None else f"MIC488, firmware {one.firmware}",
+                    "responds, but is not a MIC488" if one.firmware is None else f"MIC488, firmware {one.firmware}",
                     unit=one.unit,
                     firmware=one.firmware,
                 )
@@ -192,7 +192,7 @@ def _title(place: str, baud: int) -> str:
 
 @contextlib.contextmanager
 def _progress(title: str, total: int, form: str) -> Generator[Callable[[int], object]]:
-    """A bar on the standard error, if that is a terminal."""
+    """A progress bar on standard error, if that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda number: None
         return
@@ -211,7 +211,7 @@ def numbers_of(text: str, option: str, least: int, most: int) -> list[int]:
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         if not first.isdecimal() or (dash and not last.isdecimal()):
-            raise Misuse(f"{option} {text}: {part.strip()!r} is no number and no range such as 1-16")
+            raise Misuse(f"{option} {text}: {part.strip()!r} is neither a number nor a range such as 1-16")
         begin, end = int(first), int(last or first)
         if not least <= begin <= end <= most:
             raise Misuse(f"{option} {text}: {part.strip()} is outside {least} to {most}")

@@ -23,17 +23,16 @@ def send(
     json: Json = False,
     log_frames: LogFrames = False,
 ) -> None:
-    """Download a program into an M1486. A file in [ ] is started by its ]: the motor may move. An E type is erased before.
+    """Download a program into an M1486. A program in [ ] starts at its ]: the motor may move. E types are erased first.
 
-    A program that names its chips with X goes into all of them: --device
-    names their line: ADDRESS,kind=m1486, or the twin.
+    A program that selects chips with X is sent to all of them; --device then names their line: ADDRESS,kind=m1486, or the twin.
     """
     address = None if file.suffix.lower() in MIC488_PROGRAMS else find(device, whole_line=True)
     if address is not None and address.kind == "m1486":
         send_to_chip(address, file, json=json, log_frames=log_frames)
         return
     raise Refusal(
-        f"{file} is not sent: how the vendor's tool downloads a program into a MIC488 is documented nowhere. "
-        "'steptwin build' makes the vendor's image of it; download that with the vendor's tool, or give it to a twin: "
-        "'steptwin serve mic488 --program'. An M1486 takes programs: name it with --device"
+        f"{file} was not sent: the download protocol of the MIC488 is not documented. Compile it with 'steptwin build' and "
+        "download the image with the vendor's tool, or run it in a twin with 'steptwin serve mic488 --program'. To send to an "
+        "M1486, name it with --device"
     )

@@ -1,4 +1,4 @@
-"""``steptwin serve``: twins that listen."""
+"""``steptwin serve``: serve twins made from options."""
 
 from __future__ import annotations
 
@@ -17,20 +17,23 @@ M1486_TCP_PORT = 5022
 
 ListenAny = Annotated[
     bool,
-    typer.Option("--listen-any", help="Permit addresses that others can reach; without any address, listen on all interfaces."),
+    typer.Option(
+        "--listen-any", help="Permit addresses that other computers can reach; without any address, listen on all interfaces."
+    ),
 ]
 
 Fault = Annotated[
-    list[str] | None, typer.Option(help="Fault from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds.")
+    list[str] | None,
+    typer.Option(help="Fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
 ]
 Seed = Annotated[int, typer.Option(help="Random seed for faults.")]
 
 Trace = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="Write what happens to a file; 'ring N' keeps the last N records for 'save'; 'off'."),
+    typer.Option(metavar="FILE", help="Write a trace to a file; 'ring N' keeps the last N records for 'save'; 'off' keeps none."),
 ]
 PrintWorld = Annotated[
-    bool, typer.Option("--print-world", help="Print what would be served as the description of a world, for 'up', and end.")
+    bool, typer.Option("--print-world", help="Print the description of this twin as a world, for 'up', and end.")
 ]
 SaveWorld = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Write that description to FILE, with the files it names beside it, and end.")
@@ -89,7 +92,9 @@ def mic488(
             "It does not split frames, which may pause for 2 s. Default: 0.75 on a serial port, else 20."
         ),
     ] = None,
-    ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
+    ready_file: Annotated[
+        Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")
+    ] = None,
     log_frames: Annotated[
         bool, typer.Option("--log-frames", help="Print every frame with time, direction, bytes and meaning.")
     ] = False,
@@ -158,22 +163,25 @@ def m1486(
     chain: Annotated[str, typer.Option(help="Addresses of the chips on the line, such as 0,7; hexadecimal digits.")] = "F",
     interface: Annotated[str, typer.Option(help="Driver interface: sd, dual or two.")] = "sd",
     wire: Annotated[
-        list[str] | None, typer.Option(help="From a pin of one chip to an input of another: 0.B1=7.B3. Again for more.")
+        list[str] | None, typer.Option(help="Wire from a pin of one chip to an input of another: 0.B1=7.B3; repeatable.")
     ] = None,
     pty: Annotated[Path | None, typer.Option(help="The line on a pseudo terminal, with PATH as a link to it.")] = None,
     serial: Annotated[str | None, typer.Option(help="The line on a real serial port, 8N1.")] = None,
-    baud: Annotated[int | None, typer.Option(help="Baud rate the BR pins choose. Default: the highest of the type.")] = None,
+    baud: Annotated[int | None, typer.Option(help="Baud rate selected by the BR pins. Default: the highest of the type.")] = None,
     tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="The line as raw TCP; port 0 takes a free one.")] = None,
     rfc2217: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="The line as a network serial port (RFC 2217).")
     ] = None,
     state: Annotated[
-        Path | None, typer.Option(help="Directory of the EEPROMs of E types. Without it they end with the twin.")
+        Path | None,
+        typer.Option(help="Directory that keeps the EEPROMs of E types. Without it their contents are lost when the twin ends."),
     ] = None,
-    program: Annotated[Path | None, typer.Option(help="Program a single chip is switched on with.")] = None,
+    program: Annotated[Path | None, typer.Option(help="Program in the memory of a single chip at power-on.")] = None,
     trace: Trace = None,
-    line_timing: Annotated[str, typer.Option(help="'real': characters take the time a wire would; 'off'.")] = "off",
-    ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
+    line_timing: Annotated[str, typer.Option(help="'real': characters take their time on the wire; 'off': none.")] = "off",
+    ready_file: Annotated[
+        Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")
+    ] = None,
     log_frames: Annotated[
         bool, typer.Option("--log-frames", help="Print everything on the line with time, direction, bytes and meaning.")
     ] = False,
@@ -184,7 +192,7 @@ def m1486(
     print_world: PrintWorld = False,
     save_world: SaveWorld = None,
 ) -> None:
-    """Serve virtual M1486 chips on one line; several programs may be connected to it.
+    """Serve virtual M1486 chips on one line; several clients may be connected to it.
 
     Without any of --pty, --serial, --tcp and --rfc2217 it listens on a pty and on 127.0.0.1:5022 (raw TCP).
     """

@@ -46,13 +46,15 @@ class Selected:
 
     @property
     def shown(self) -> Sequence[str]:
-        """The controllers that are meant: the one named, or all of them."""
+        """The selected controllers: the one named, or all."""
         return self.controllers if self._controller is None else (self._controller,)
 
     def one(self) -> str:
-        """The controller that is meant. Raises `Misuse` where it is not clear which."""
+        """The selected controller. Raises `Misuse` if the twin has several and none was named."""
         if len(self.shown) != 1:
-            raise Misuse(f"several controllers: name one, --device TWIN.CONTROLLER: {', '.join(self.controllers)}")
+            raise Misuse(
+                f"the twin has several controllers: name one with --device TWIN.CONTROLLER: {', '.join(self.controllers)}"
+            )
         return self.shown[0]
 
     def sheet(self, name: str) -> Datasheet:
@@ -60,7 +62,7 @@ class Selected:
         return next(part.datasheet for part in self.subject.description.machines if part.name == name)
 
     def called(self, name: str) -> str:
-        """The controller called ``name``, in capitals or not. Raises `Misuse`."""
+        """The controller called ``name``; case does not matter. Raises `Misuse`."""
         found = next((each for each in self.controllers if each.upper() == name.upper()), None)
         if found is None:
             raise Misuse(f"no controller {name!r}: there are {', '.join(self.controllers)}")
@@ -69,7 +71,7 @@ class Selected:
 
 @contextmanager
 def selected(twin: str | None) -> Generator[Selected]:
-    """The twin that ``twin`` names and its controller. Raises `LineFailure` or `Misuse` where it is not clear which."""
+    """The twin that ``twin`` names and its controller. Raises `LineFailure` or `Misuse` if that is ambiguous."""
     from steptwin.live.remote import RemoteSubject
     from steptwin.live.twins import find_controller
 
@@ -79,7 +81,7 @@ def selected(twin: str | None) -> Generator[Selected]:
 
 
 def ask_twin(twin: str | None, command: Command) -> Any:
-    """What the twin that ``twin`` names answers to a command about all of it."""
+    """The response of the twin that ``twin`` names to a command for the whole twin."""
     from steptwin.live.remote import ask
     from steptwin.live.twins import find_controller
 
@@ -103,7 +105,7 @@ def pin(
         try:
             wanted[name.strip().upper()] = float(value.replace(",", "."))
         except ValueError:
-            raise Misuse(f"{change!r}: {value!r} is no number") from None
+            raise Misuse(f"{change!r}: {value!r} is not a number") from None
     with selected(twin) as there:
         for command in _changes(there, wanted):
             there.do(command)
@@ -115,14 +117,14 @@ def pin(
 
 
 def levels_of(there: Selected) -> dict[str, float]:
-    """The pins that are meant, as CONTROLLER.PIN."""
+    """The selected pins, as CONTROLLER.PIN."""
     from steptwin.subject.commands import ReadPins
 
     return {name: level for machine in there.shown for name, level in there.do(ReadPins(machine)).items()}
 
 
 def _changes(there: Selected, wanted: dict[str, float]) -> list[Command]:
-    """The commands for pins and buttons: first all pins together."""
+    """The commands for pins and buttons: one for all pins, then one for each button."""
     from steptwin.world.script import Press, Release, Set
 
     levels: list[tuple[str, str, float]] = []

@@ -25,25 +25,21 @@ def up(
     ] = None,
     speed: Annotated[
         str,
-        typer.Option(
-            help="Virtual seconds in a second: 0.1, 1, 10; 'max' for worlds without clients outside; 0: paused at first."
-        ),
+        typer.Option(help="Virtual seconds per second: 0.1, 1, 10; 'max' for worlds without external clients; 0 starts paused."),
     ] = "1",
-    name: Annotated[
-        str | None, typer.Option(help="Name under which 'steptwin pin' and its like find it. Default: that of the file.")
-    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name by which --device finds it. Default: that of the file.")] = None,
     session: Annotated[Path | None, typer.Option(help="Write a session for 'steptwin replay' when it ends.")] = None,
     trace: Annotated[
         str | None,
         typer.Option(
             metavar="FILE",
-            help="Write what happens to a file or into a directory. 'ring N' keeps the last N records for 'save'. 'off'. "
-            "Default: as described.",
+            help="Write a trace to a file or into a directory; 'ring N' keeps the last N records for 'save'; 'off' keeps none. "
+            "Default: that of the description.",
         ),
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="Fault from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
+        typer.Option(help="Fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Random seed. Default: that of the description.")] = None,
     state: Annotated[
@@ -54,18 +50,20 @@ def up(
         str | None,
         typer.Option("--from", metavar="TIME", help="Session: continue from this moment, such as 2.5s. Default: its end."),
     ] = None,
-    ready_file: Annotated[Path | None, typer.Option(help="JSON file with the end points, written once they listen.")] = None,
+    ready_file: Annotated[
+        Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")
+    ] = None,
     control: Annotated[
         str | None,
-        typer.Option(metavar="HOST:PORT", help="Control endpoint over TCP, too, on this computer."),
+        typer.Option(metavar="HOST:PORT", help="Also open the control endpoint on this loopback TCP address."),
     ] = None,
-    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that others can reach.")] = False,
+    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")] = False,
     log_frames: Annotated[
-        bool, typer.Option("--log-frames", help="Print what goes over every line with time, direction, bytes and meaning.")
+        bool, typer.Option("--log-frames", help="Print the traffic of every line with time, direction, bytes and meaning.")
     ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 also for a wait that timed out.")] = False,
     allow_outside: Annotated[
-        bool, typer.Option("--allow-outside", help="Permit files that do not lie beside the description or below.")
+        bool, typer.Option("--allow-outside", help="Permit files outside the folder of the description.")
     ] = False,
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
     form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
@@ -78,7 +76,7 @@ def up(
         show(sections(), form)
         return
     if world is None:
-        raise Misuse("which world? give the TOML file that describes it")
+        raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
     from steptwin.commands.up_world import UpOptions
     from steptwin.commands.up_world import up as run_up
     from steptwin.files.timedinputs import parse_duration

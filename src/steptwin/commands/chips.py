@@ -1,4 +1,4 @@
-"""M1486 chips on a line as options of commands name them: addresses, wires, pins."""
+"""M1486 chips on a line, parsed from options of commands: addresses, wires, pins."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _WIRE = re.compile(r"\s*([0-9A-Fa-f])\.([^.=]+)=\s*([0-9A-Fa-f])\.([^.=]+)\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chain:
-    """How the chips of a line are made and tied. Wires name chips by address, a hexadecimal digit."""
+    """The chips of a line and the wires between them. Wires name chips by address, a hexadecimal digit."""
 
     variant: Variant = DEFAULT
     addresses: Sequence[int] = (OPEN_ADDRESS,)
@@ -38,7 +38,7 @@ def check_chain(chain: Chain, *, has_program: bool) -> None:
             except Misuse as error:
                 raise Misuse(f"--wire {wire.source}={wire.target}: {error}") from None
     if has_program and len(chain.addresses) > 1:
-        raise Misuse(f"a program to switch on with is for a single chip: here are {len(chain.addresses)}")
+        raise Misuse(f"--program is for a single chip: --chain has {len(chain.addresses)}")
     for address in chain.addresses:
         if address not in kind.addresses:
             raise Misuse(
@@ -62,7 +62,7 @@ def parse_addresses(text: str) -> list[int]:
     for part in text.split(","):
         digit = part.strip().upper()
         if len(digit) != 1 or digit not in "0123456789ABCDEF":
-            raise Misuse(f"--chain {text}: {digit!r} is no address; permitted are 0 to 9 and A to F, separated by commas")
+            raise Misuse(f"--chain {text}: {digit!r} is not an address; permitted are 0 to 9 and A to F, separated by commas")
         if int(digit, 16) in addresses:
             raise Misuse(f"--chain {text}: {digit} is given twice")
         addresses.append(int(digit, 16))

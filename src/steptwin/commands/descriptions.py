@@ -1,4 +1,4 @@
-"""Descriptions of small worlds that commands make of their options: printed, or saved with the files they name."""
+"""Print and save the descriptions of worlds that commands make from their options."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from steptwin.inputfiles import read_bytes
 from steptwin.world.description import read_world
 
 Named: TypeAlias = Callable[[Path], str]
-"""What a file is called in a description."""
+"""The name of a file in a description."""
 Describe: TypeAlias = Callable[[Named], str]
 
 
 def print_world(text: str, name: str) -> None:
-    """The description, and on standard error the files it needs that do not lie below this folder."""
+    """Print the description, and to standard error the files it needs from outside this folder."""
     sys.stdout.write(text)
     folder = Path.cwd().resolve()
     for file, _ in read_world(name, text).files():
         if not (folder / file).resolve().is_relative_to(folder):
-            sys.stderr.write(f"{file} does not lie in this folder: --save-world FILE copies it, 'up --allow-outside' reads it\n")
+            sys.stderr.write(f"{file} is outside this folder: --save-world FILE copies it, 'up --allow-outside' reads it\n")
 
 
 def save_world(describe: Describe, where: Path) -> None:
-    """The description in a file, and the files it names beside that. Raises `Misuse` where something else is there."""
+    """Write the description to a file, and copy the files it names beside it. Raises `Misuse` if another file is in the way."""
     check_folder(where)
     name = str(where)
     given, text = describe(str), describe(lambda path: path.name)

@@ -3,12 +3,12 @@
 | line | does |
 |---|---|
 | ``get NAME...`` | reads registers at one moment |
-| ``set NAME=VALUE`` | writes one: a number, ON, OFF or the name of a value |
+| ``set NAME=VALUE`` | writes a register: a number, ON, OFF or the name of a value |
 | ``sleep SECONDS`` | waits |
-| ``wait AXIS...`` | waits until axes have come to rest, and says why they have |
+| ``wait AXIS...`` | waits until axes are at rest, and records why they stopped |
 | ``raw HEX`` | sends a PDU (function and data) |
 
-``#`` begins a comment. Refusals of the controller are results, not the end.
+``#`` begins a comment. A refusal by the controller is a result; the session continues.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ FORMAT = "steptwin session 1"
 
 @dataclass(frozen=True, slots=True)
 class SessionStep:
-    """A line that was carried out: ``at_s`` since the beginning of the session, and what came of it."""
+    """An executed line, the time ``at_s`` since the beginning of the session, and its results."""
 
     line: str
     at_s: float
@@ -40,11 +40,11 @@ class SessionStep:
 
 
 Action = Callable[[Mic488], dict[str, Any]]
-"""Carries a step out, and tells what came of it."""
+"""Executes a step and returns its results."""
 
 
 def steps_of(text: str, registers: RegisterMap) -> list[tuple[str, Action]]:
-    """The lines of a session for a controller with these registers. Raises `Misuse` naming the first that is no step."""
+    """The lines of a session for a controller with these registers. Raises `Misuse` for the first invalid line."""
     steps = []
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.partition("#")[0].strip()
@@ -54,12 +54,12 @@ def steps_of(text: str, registers: RegisterMap) -> list[tuple[str, Action]]:
             except Misuse as error:
                 raise Misuse(f"line {number}: {error}") from None
     if not steps:
-        raise Misuse(f"there is no step: {FORM}")
+        raise Misuse(f"unknown step: {FORM}")
     return steps
 
 
 def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[SessionStep]:
-    """Each step after the other. Raises `Refusal` for one that makes no sense after those before it, and `LineFailure`."""
+    """Execute all steps in order. Raises `Refusal` for a step that is not possible after those before it, and `LineFailure`."""
     begin = time.monotonic()
     for line, action in steps:
         try:
@@ -69,7 +69,7 @@ def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[Sess
 
 
 def carry_out_one(mic: Mic488, line: str) -> dict[str, Any]:
-    """What came of one step. Raises `Misuse` for one that makes no sense and `LineFailure`."""
+    """Execute one step. Raises `Misuse` for an invalid one, and `LineFailure`."""
     return _result(mic, action_of(line, register_map(mic.firmware)))
 
 
@@ -83,7 +83,7 @@ def _result(mic: Mic488, action: Action) -> dict[str, Any]:
 
 
 def action_of(line: str, registers: RegisterMap) -> Action:
-    """What a line does. Raises `Misuse` for one that makes no sense, so that it is known before anything is sent."""
+    """The action of a line. Raises `Misuse` for an invalid line, before anything is sent."""
     word, *rest = line.split()
     step = _STEPS.get(word)
     if step is None:
@@ -96,7 +96,7 @@ def action_of(line: str, registers: RegisterMap) -> Action:
 
 def _get(names: list[str], registers: RegisterMap) -> Action:
     if not names:
-        raise Misuse("no name of a register is given")
+        raise Misuse("the name of a register is missing")
     plan(registers, [named(registers, name) for name in names])
     return lambda mic: mic.get(*names)
 
@@ -168,26 +168,26 @@ _STEPS: dict[str, Callable[[list[str], RegisterMap], Action]] = {
 
 
 def to_text(steps: Iterable[SessionStep], about: dict[str, Any]) -> Iterator[str]:
-    """A recording: a head, then a line of JSON for each step."""
+    """The recording as text: a header, then a line of JSON for each step."""
     yield json.dumps({"format": FORMAT, **about}, ensure_ascii=False)
     for step in steps:
         yield json.dumps({"line": step.line, "at_s": round(step.at_s, 4), "result": step.result}, ensure_ascii=False)
 
 
 def from_text(text: str, name: str) -> list[SessionStep]:
-    """Raises `Misuse` for what is no recording."""
+    """The steps of a recording. Raises `Misuse` for text that is not a recording."""
     head, *lines = text.splitlines() or [""]
     try:
         if json.loads(head)["format"] != FORMAT:
             raise ValueError
         return [SessionStep(str(data["line"]), float(data["at_s"]), dict(data["result"])) for data in map(json.loads, lines)]
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise Misuse(f"{name} is no recording of a session ('steptwin record' makes them)") from None
+        raise Misuse(f"{name} is not a recording of a session ('steptwin record' makes them)") from None
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Where two recordings of the same session say something else. ``step`` counts from 1."""
+    """A difference between two recordings of the same session. ``step`` counts from 1."""
 
     step: int
     line: str
@@ -206,12 +206,12 @@ def _said(value: Any) -> str:
 def differences(
     one: list[SessionStep], two: list[SessionStep], *, tolerance: float = 0.0, time_s: float | None = None
 ) -> list[Difference]:
-    """What differs by more than ``tolerance``, and with ``time_s`` what came earlier or later than that.
+    """Values that differ by more than ``tolerance``; with ``time_s`` also steps whose times differ by more than that.
 
     Raises `Misuse` for recordings of different sessions.
     """
     if [step.line for step in one] != [step.line for step in two]:
-        raise Misuse("these are recordings of different sessions: their lines are not the same")
+        raise Misuse("the recordings are of different sessions: their lines differ")
     found = []
     for number, (a, b) in enumerate(zip(one, two, strict=True), start=1):
         flat_a, flat_b = dict(_flat(a.result)), dict(_flat(b.result))

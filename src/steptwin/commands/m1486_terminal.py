@@ -1,4 +1,4 @@
-"""Talking to M1486 chips as a person types: commands go out as they are, what comes back is put into words."""
+"""A terminal for M1486 chips: commands are sent as typed, and received bytes are shown decoded."""
 
 from __future__ import annotations
 
@@ -22,29 +22,30 @@ from steptwin.wire.line import SerialLine
 
 LOOK_S = 0.02
 HELD_UP_S = 2.0
-"""Longer than any step of the thread takes by itself."""
+"""A step of the thread that takes longer means that the program was suspended."""
 QUIET_S = 0.1
-"""What a chip sends by itself comes at once, or through adapters that hold it back for 16 ms and more."""
+"""Silence that ends a group of received bytes. Adapters may delay them by 16 ms and more."""
 _ROOM = {
     NO_ROOM: "no room in the input buffer: a character is lost",
     EMPTY: "the input buffer is empty",
     THREE_FREE: "three places are free in the input buffer",
 }
 _IMMEDIATE = ("K", "X")
-"""Commands that act when received, and need no EEPROM."""
+"""Commands that act when received and do not write the EEPROM."""
 _UPLOAD = re.compile(rb"\s*[Uu]\s*(\d+)\s*")
 _SELECT = re.compile(r"[Xx]\s*([0-9A-Fa-fGg])")
 
 
 def command_of(text: str, variant: Variant | None) -> Command | None:
-    """The command somebody types, None for a comment alone. Raises `Misuse` for what the chip would drop as wrong data (M-11).
+    """The command in a typed line; None for a comment. Raises `Misuse` for a command that the chip would drop as wrong data
+    (M-11).
 
-    Where the type is not known, what some type takes is right.
+    If the type of chip is unknown, the commands of all types are accepted.
     """
     line, found = parse_line(text)
     command = line.command
     if found or (command is None and line.comment is None):
-        raise Misuse(f"{text!r} is no command{f': {found[0].message}' if found else ''}")
+        raise Misuse(f"{text!r} is not a command{f': {found[0].message}' if found else ''}")
     if command is not None:
         doubts = [out_of_range(command, one) for one in ([variant] if variant is not None else VARIANTS)]
         if None not in doubts:
@@ -53,25 +54,26 @@ def command_of(text: str, variant: Variant | None) -> Command | None:
 
 
 class TerminalWords:
-    """What comes from a line in words, given what was typed. No I/O, no clock.
+    """Decodes the bytes from a line, given the lines typed. It has neither I/O nor a clock.
 
-    The bytes do not say what they are. With function 41 ON a line comes back before all else; then its end inverted, where it
-    took the last places of the input buffer, or 5EH for what found none; then bytes asked for by ``U``, in their order.
+    The bytes carry no type, so their order decides. With function 41 ON the echo of the line comes first; then its end
+    inverted, if it took the last places of the input buffer, or 5EH for characters without room; then the bytes requested by
+    ``U``, in their order.
     """
 
     def __init__(self) -> None:
         self._typed: list[bytes] = []
         self._asked: deque[int] = deque()
         self.refused = 0
-        """How many characters found no room so far."""
+        """Number of characters that found no room so far."""
 
     @property
     def is_awaiting(self) -> bool:
-        """Whether an upload that was asked for has not come."""
+        """Whether a requested upload has not arrived yet."""
         return bool(self._asked)
 
     def typed(self, line: str) -> None:
-        """A line was sent, without its CR."""
+        """Register a line that was sent, given without its CR."""
         data = line.encode("latin-1")
         self._typed.append(data + b"\r")
         upload = _UPLOAD.fullmatch(data)
@@ -79,7 +81,7 @@ class TerminalWords:
             self._asked.append(int(upload[1]))
 
     def heard(self, data: bytes) -> list[str]:
-        """All that came between two silences."""
+        """Decode all bytes received between two silences."""
         told: list[str] = []
         for line in self._typed:
             data = self._answered(line, data, told)
@@ -93,7 +95,7 @@ class TerminalWords:
         return told
 
     def _answered(self, line: bytes, data: bytes, told: list[str]) -> bytes:
-        """What is left when the echo of a line and what was said about room are taken away."""
+        """The bytes that remain after the echo of a line and reports about room are removed."""
         place = 0
         notes: list[str] = []
         echoed = refused = 0
@@ -151,9 +153,9 @@ def _on(numbers: range | tuple[int, ...], byte: int) -> str:
 
 
 class ChipTerminal:
-    """A line somebody types on. ``tell`` is given what comes back in words, from a thread of its own.
+    """A line for typed commands. ``tell`` is called with each decoded answer, from a separate thread.
 
-    ``variant``: an E type is given the time of its EEPROM for each command.
+    ``variant``: for E types the terminal waits after each command until the EEPROM is written.
     """
 
     def __init__(
@@ -182,16 +184,17 @@ class ChipTerminal:
         self._dropped: LineFailure | None = None  # to be raised once
         self._ends = False
         self.selected = ""
-        """The chip chosen by the last ``X``; nothing where all listen."""
+        """The chip selected by the last ``X``; empty if all chips listen."""
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def type(self, text: str) -> None:
-        """Send a line and its CR. Raises `Misuse` for what is no byte, and the `LineFailure` that has ended the line."""
+        """Send a line and its CR. Raises `Misuse` for characters outside Latin-1, and the `LineFailure` that has ended the
+        line."""
         try:
             text.encode("latin-1")
         except UnicodeEncodeError as error:
-            raise Misuse(f"{text!r}: {text[error.start]!r} is no character of one byte") from None
+            raise Misuse(f"{text!r}: {text[error.start]!r} is not a single-byte character") from None
         chosen = _SELECT.fullmatch(text.strip())
         if chosen is not None:
             self.selected = chosen[1].upper().replace("G", "")
@@ -201,9 +204,9 @@ class ChipTerminal:
             self._outgoing.append(text)
 
     def settle(self, timeout_s: float) -> int:
-        """Wait until what was typed has gone out, uploads asked for have come, and nothing comes any more.
+        """Wait until everything typed is sent, all requested uploads have arrived, and the line is silent.
 
-        Returns how many characters have found no room so far. Raises `LineFailure` when an upload does not come in time.
+        Returns the number of characters that found no room so far. Raises `LineFailure` at the timeout of an upload.
         """
         limit = self._clock() + timeout_s
         with self._changed:
@@ -252,15 +255,13 @@ class ChipTerminal:
                 self._changed.notify_all()
 
     def _drop_waiting(self, seconds: float) -> None:
-        """The program was suspended: nothing is to move any more by what was typed before."""
+        """Drop the waiting commands after a suspension, so that nothing moves late."""
         with self._changed:
             dropped = [line for line in self._outgoing if line.strip()[:1].upper() not in _IMMEDIATE]
             if dropped:
                 self._outgoing = deque(line for line in self._outgoing if line not in dropped)
                 self._unsettled -= len(dropped)
-                self._dropped = LineFailure(
-                    f"{', '.join(dropped)}: not typed, because the program was suspended for {seconds:.0f} s"
-                )
+                self._dropped = LineFailure(f"{', '.join(dropped)}: not sent: the program was suspended for {seconds:.0f} s")
                 self._changed.notify_all()
 
     def _send(self) -> None:
@@ -278,7 +279,8 @@ class ChipTerminal:
             self._ready_at = now + self._write_s
 
     def _next(self) -> str | None:
-        """K goes before what waits for an EEPROM, unless another chip is to be selected first. X needs no EEPROM either."""
+        """The next line to send. K overtakes lines that wait for an EEPROM, unless another chip must be selected first; X does
+        not wait either."""
         waiting = self._outgoing
         for place, line in enumerate(waiting):
             kind = line.strip().upper()[:1]

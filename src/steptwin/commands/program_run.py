@@ -1,4 +1,4 @@
-"""A program alone in a small world: run until it has ended, and what is common to `run_wbc` and `run_m1486`."""
+"""Run a single program in a small world to its end: the parts common to `run_wbc` and `run_m1486`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from steptwin.world.small import InputChange
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
 LIMIT_UNTIL_IDLE_NS: Nanos = 3600 * SECOND
 SLICE_NS: Nanos = SECOND
-"""The longest stretch of time between two looks at whether anything is still going on."""
+"""The longest virtual time between two checks whether the program has ended."""
 NOTE = "note"
 """The subject of records of `InputChange`."""
 
@@ -26,14 +26,14 @@ Print = Callable[[str], None]
 
 
 class Ending(NamedTuple):
-    """When the last thing happened, and why there is nothing more: it has ``ended``, waits for ever (``waiting``), ``limit``."""
+    """The time of the last event, and the reason for the end: ``ended``, ``waiting`` (for ever) or ``limit``."""
 
     at: Nanos
     why: str
 
 
 class Outcome(NamedTuple):
-    """How a run ended, and how long it took on the wall."""
+    """The end of a run, and the real time it took."""
 
     ending: Ending
     wall_s: float
@@ -56,7 +56,7 @@ def limit_of(limit: Nanos | None, *, until_idle: bool) -> Nanos:
 
 
 def changes_of(inputs: Sequence[TimedInput], controller: str) -> Iterator[InputChange]:
-    """Inputs of the only controller."""
+    """The changes of inputs of the only controller."""
     for change in inputs:
         level = f"{real_text(change.value)} V" if change.pin.startswith("AIN") else "on" if change.value else "off"
         yield InputChange(change.time, f"{controller}.{change.pin}", change.value, f"{change.pin} {level}")

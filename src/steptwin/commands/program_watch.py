@@ -1,4 +1,5 @@
-"""What a program of the MIC488 does, in words: waits, registers it sets, motions, outputs, and the statements that cause them."""
+"""Reports what a program of the MIC488 does: waits, writes to registers, motions, outputs, each with the statement that caused
+it."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ from steptwin.world.kernel import Kernel
 
 
 class ProgramEvent(NamedTuple):
-    """Something to report. ``step`` is the step of ``program`` that caused it, where one did."""
+    """An action or event to report. ``step`` is the step of ``program`` that caused it, if one did."""
 
     time: Nanos
     code: str
@@ -32,7 +33,7 @@ class ProgramEvent(NamedTuple):
 
     @property
     def place(self) -> str:
-        """Line and text of the statement; empty where none caused it."""
+        """Line number and text of the statement; empty if no statement caused it."""
         if self.program is None or self.step is None or self.step >= len(self.program.steps):
             return ""
         found, source = self.program.steps[self.step], self.program.source
@@ -40,13 +41,13 @@ class ProgramEvent(NamedTuple):
 
 
 class ProgramWatch:
-    """Follows the programs in the banks of a controller from now on, as a part of its kernel. ``happened`` is in order of time.
+    """Observes the programs in the banks of a controller, as a part of its kernel. ``happened`` is in order of time.
 
-    It changes nothing: the code of every step is called by one that looks at what it did.
+    It does not change the run: the code of each step is wrapped by one that compares the state before and after.
     """
 
     def __init__(self, device: Mic488Device, kernel: Kernel, name: str) -> None:
-        """``name``: that of the controller in the kernel."""
+        """``name``: the name of the controller in the kernel."""
         self.device = device
         self._name = name
         self.happened: list[ProgramEvent] = []
@@ -64,7 +65,7 @@ class ProgramWatch:
         kernel.observers.append(self._edge)
 
     def _of(self, program: LoadedProgram, code: StepCode) -> StepCode:
-        """The code of a step where there are several programs: from then on it is this one that does something."""
+        """The code of a step if there are several programs; it also marks its program as the one that acts."""
 
         def step(machine: Execution, cells: Cells) -> int:
             self.program = program
@@ -78,7 +79,7 @@ class ProgramWatch:
     # ------------------------------------------------------------------ what the program does
 
     def _watched(self, number: int, code: StepCode) -> StepCode:
-        """The code of a step that reports what it does."""
+        """The code of a step, wrapped so that its effects are reported."""
         steps = self.program.steps
         if number == len(steps):
             return self._telling(number, code, "end", "the program ends")
@@ -168,7 +169,7 @@ class ProgramWatch:
         self.happened.append(ProgramEvent(now, code, text, step, self.program))
 
     def _caused(self, now: Nanos) -> int | None:
-        """The step that did what happens at ``now``, if one was executed then."""
+        """The step that was executed at ``now``, if any."""
         moment, step = self._statement
         return step if moment == now else None
 
@@ -181,7 +182,7 @@ class ProgramWatch:
         return None
 
     def look(self, now: Nanos) -> None:
-        """Report what axes have begun or ended."""
+        """Report the motions that axes have begun or ended."""
         for index, axis in enumerate(self.device.axes):
             known = self._axes[index]
             if axis.revision != known[1] or axis.status is not known[0]:
@@ -189,7 +190,7 @@ class ProgramWatch:
                 self._tell_of(axis, known[0], known[2], now)
 
     def _tell_of(self, axis: Axis, before: AxisStatus, velocity_p: float, now: Nanos) -> None:
-        """An axis has another status than ``before``, or another motion."""
+        """Report a changed status or motion of an axis; ``before``: its status at the last report."""
         step = self._caused(now)
         kind = None if step is None or step >= len(self.program.steps) else self.program.steps[step]
         moves = isinstance(kind, s.MotionStep | s.HaltStep | s.RowMotionStep)
@@ -205,7 +206,7 @@ class ProgramWatch:
 
 
 def _words(axis: Axis, before: AxisStatus, now: Nanos) -> str:
-    """What an axis does from now on."""
+    """The present motion of an axis as text."""
     name, unit, gear = f"M{axis.number}", axis.config.unit_name, axis.gear
     place = f"{real_text(axis.coordinate_p(now) / gear)} {unit}"
     match axis.status:

@@ -1,7 +1,7 @@
-"""`steptwin run FILE.m1486`: a program in virtual time, and what it does when.
+"""`steptwin run FILE.m1486`: run a program of an M1486 in virtual time.
 
-A host types the file's lines as soon as the chips have room for them, on a line that takes no time. An E type that gets one
-file in ``[ ]`` is switched on with it in its EEPROM instead: writing takes half a second a command.
+A host sends the lines of the file as soon as the chips have room for them, on a line without delay. A program in ``[ ]`` for
+a single E type is in its EEPROM at power-on instead, because writing it takes half a second per command.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from steptwin.world.trace import TraceRecord
 JSON_VERSION = 1
 
 _HIDDEN = frozenset({"file", "power-on"})
-"""Events that say nothing new about a file that is run."""
+"""Events that are not shown, because they follow from the file."""
 
 _WRONG = frozenset({"wrong-data", "file-refused", "store-failed"})
 
@@ -52,7 +52,7 @@ FROM_HOST = f"{SCRIPTS}/{FrameDirection.IN.value}"
 
 
 class ChipEvent(NamedTuple):
-    """Something to tell of a chip."""
+    """An event of a chip."""
 
     chip: str
     event: M1486Event
@@ -60,7 +60,7 @@ class ChipEvent(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class M1486Run:
-    """What is to be run. ``limit`` ends it where nothing else does; ``until_idle`` ends it also where it waits for ever."""
+    """The options of a run. ``limit`` (ns) ends it at the latest; ``until_idle`` ends it also when the program waits for ever."""
 
     program: Path
     variant: str = DEFAULT.name
@@ -75,10 +75,10 @@ class M1486Run:
 
 
 def run(options: M1486Run, say: Print, warn: Print) -> bool:
-    """Run a program in a world of its own and say what it did; whether everything went right. ``warn`` is told what the checker
-    found.
+    """Run a program in its own world and print what it did. Returns whether no error occurred. ``warn`` gets the findings of
+    the checker.
 
-    Raises `Misuse` for what cannot be run.
+    Raises `Misuse` for a program or option that cannot be run.
     """
     source = read_text(options.program).source
     kind, driver = variant(options.variant), interface(options.interface)
@@ -111,7 +111,7 @@ def run(options: M1486Run, say: Print, warn: Print) -> bool:
 
 
 def describe_chips(chain: Chain, name: str, program: Path | None, typed: Sequence[str], changes: Sequence[InputChange]) -> str:
-    """The description of chips to which a host sends lines, or that are switched on with a program."""
+    """The description of the world: chips to which a host sends lines, or that have a program at power-on."""
     values = {
         "variant": chain.variant.name,
         "interface": chain.interface.name,
@@ -122,16 +122,16 @@ def describe_chips(chain: Chain, name: str, program: Path | None, typed: Sequenc
 
 
 class Chips:
-    """Follows the chips of a world in which a host sends lines."""
+    """Observes the chips of a world in which a host sends lines."""
 
     def __init__(self, world: World, lines: int) -> None:
         self.world = world
         self.chips = {name: view.chip for name, view in world.m1486.items()}
         self.happened: list[ChipEvent] = []
         self.sent = bytearray()
-        """What has come over the line to the host."""
+        """The bytes that the host has received."""
         self.unsent = lines
-        """Lines for which there was no room yet."""
+        """Lines that are not sent yet, for lack of room."""
         self._last: Nanos = 0
         for name, chip in self.chips.items():
             for event in chip.events:
@@ -158,7 +158,7 @@ class Chips:
         return any(happening.event.code in _WRONG for happening in self.happened)
 
     def due(self, limit: Nanos) -> Nanos | None:
-        """The next moment at which something happens by itself. The last W of a program ends without a deadline."""
+        """The time of the next event without input, ns; None: there is none. The last W of a program ends without a deadline."""
         due, now = self.world.due(), self.world.now
         ready = max(chip.program.ready for chip in self.chips.values())
         return min(ready, limit) if due is None and ready > now else due
@@ -169,13 +169,13 @@ class Chips:
         return all(chip.is_idle() for chip in self.chips.values())
 
     def end(self) -> Nanos:
-        """When the last thing happened or the last command was done; the look that finds that out comes later."""
+        """The time of the last event or the end of the last command, ns. It is found out only later."""
         done = (chip.program.ready for chip in self.chips.values())
         return max(self._last, *(moment for moment in done if moment <= self.world.now), 0)
 
 
 def _is_stored(checked: CheckedChipProgram, chain: Chain) -> bool:
-    """Whether the chip is switched on with the program in its EEPROM; else a host sends it."""
+    """Whether the program is in the EEPROM of the chip at power-on; else a host sends it."""
     commands = checked.program.all_commands
     is_file = len(chain.addresses) == 1 and commands and (commands[0].key, commands[-1].key) == ("[", "]")
     if chain.variant.store is Store.EEPROM and is_file and checked.is_sound:
@@ -189,7 +189,7 @@ def _warn_of_errors(checked: CheckedChipProgram, source: SourceText, kind: Varia
     if errors:
         typed = f", typed at {kind.write_ns / SECOND:g} s a command" if kind.store is Store.EEPROM else ""
         warn(render(source, errors))
-        warn(f"{source.name}: the chip sees this, with {len(errors)} error{'s' if len(errors) > 1 else ''} in it{typed}:")
+        warn(f"{source.name}: executed as follows, with {len(errors)} error{'s' if len(errors) > 1 else ''}{typed}:")
 
 
 def _change(change: TimedInput, chain: Chain) -> InputChange:
@@ -215,7 +215,7 @@ def _change(change: TimedInput, chain: Chain) -> InputChange:
 
 
 def _say_lines(chips: Chips, outcome: Outcome, say: Print) -> None:
-    """One line for each thing that happened, and the end."""
+    """Print a line for each event, and how the run ended."""
     several, now = len(chips.chips) > 1, chips.world.now
     for happening in sorted(chips.happened, key=lambda h: h.event.time):
         if happening.event.code not in _HIDDEN:
@@ -228,9 +228,9 @@ def _say_lines(chips: Chips, outcome: Outcome, say: Print) -> None:
     if chips.sent:
         say(f"  sent {chips.sent.hex(' ').upper()}")
     if chips.unsent:
-        say(f"{chips.unsent} lines of the file were not taken: there was no room for them")
+        say(f"{chips.unsent} lines of the file were not sent: the chips had no room for them")
     if outcome.ending.why == "limit":
-        say("ended by the limit of time: --for takes a longer one")
+        say("ended at the time limit; --for sets a longer one")
     say(str(outcome))
 
 

@@ -1,4 +1,4 @@
-"""`steptwin run FILE.prg`: a program of the MIC488 in virtual time, and what it does when."""
+"""`steptwin run FILE.prg`: run a program of the MIC488 in virtual time."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ from steptwin.world.small import Whole, mic488_world
 from steptwin.world.trace import TraceRecord
 
 NAME = "mic488"
-"""Of the controller in the world."""
+"""The name of the controller in the world."""
 PROGRAM = "program"
-"""The subject of its statements in traces."""
+"""The subject of the program's statements in traces."""
 JSON_VERSION = 1
 
 _WRONG = frozenset({"program-error", "position-error", "overrun"})
-"""Events after which a run has not gone well."""
+"""Events that make a run fail."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WbcRun:
-    """What is to be run. ``limit`` ends it where nothing else does; ``until_idle`` ends it also where it waits for ever."""
+    """The options of a run. ``limit`` (ns) ends it at the latest; ``until_idle`` ends it also when the program waits for ever."""
 
     program: Path
     positions: Path | None = None
@@ -72,10 +72,10 @@ class WbcRun:
 
 
 def run(options: WbcRun, say: Print, warn: Print) -> bool:
-    """Run a program in a world of its own and say what it did; whether everything went right. ``warn`` is told what the checker
-    found.
+    """Run a program in its own world and print what it did. Returns whether no error occurred. ``warn`` gets the findings of
+    the checker.
 
-    Raises `Misuse` for what cannot be run, `ProgramErrors` for a program with errors.
+    Raises `Misuse` for options or files that cannot be run, `ProgramErrors` for a program with errors.
     """
     given = _read(options, warn)
     if options.print_world:
@@ -83,7 +83,7 @@ def run(options: WbcRun, say: Print, warn: Print) -> bool:
         return True
     files = {str(path): read_bytes(path) for path in given.paths}
     is_late = options.statement_time == 0
-    """What a program does at power-on itself is done before it can be followed: it is started then."""
+    """Whether the program is started by this command after power-on, so that its first statements are observed, too."""
     late = {f"mic488.{NAME}.start": False} if is_late else NO_OVERRIDES
     keep_trace = options.trace is not None
     with world_of(given.describe(str), files, options.program, keep_trace=keep_trace, overrides=late) as world:
@@ -109,13 +109,13 @@ def run(options: WbcRun, say: Print, warn: Print) -> bool:
 
 
 class Prepared(NamedTuple):
-    """What a run is made of."""
+    """The checked input of a run."""
 
     options: WbcRun
     companions: Companions
     placed: Placed
     banks: ProgramConfig
-    """Which banks the configuration starts with."""
+    """The banks that the configuration starts."""
 
     @property
     def paths(self) -> list[Path]:
@@ -142,7 +142,7 @@ class Prepared(NamedTuple):
 
 
 def _read(options: WbcRun, warn: Print) -> Prepared:
-    """Read and check the files. ``warn`` is told what is doubtful."""
+    """Read and check the files. ``warn`` gets their warnings."""
     files = Companions.of(options.program, options.positions, options.config)
     config = ControllerConfig() if files.config is None else load_config(files.config, options.firmware, warn)
     for change in options.inputs:
@@ -158,7 +158,7 @@ def _read(options: WbcRun, warn: Print) -> Prepared:
 
 
 def load_config(path: Path, firmware: str, warn: Print) -> ControllerConfig:
-    """The configuration in a ``.cfg`` file; ``warn`` is told what is doubtful. Raises `Misuse`, with every error in it."""
+    """Read a configuration (``.cfg``). ``warn`` gets its warnings. Raises `Misuse`, with all errors in it."""
     file = IniFile.parse(read_bytes(path), str(path))
     config, findings = examine_config(file, firmware)
     if any(finding.severity is Severity.ERROR for finding in findings):
@@ -175,7 +175,7 @@ def _warn(findings: Findings, warn: Print) -> None:
 
 
 class RunWatch(ProgramWatch):
-    """Follows the program of the only controller; events and inputs are among what ``happened``."""
+    """Observes the program of the only controller; ``happened`` includes events and inputs."""
 
     def __init__(self, world: World) -> None:
         self._trace = world.trace
@@ -199,7 +199,7 @@ class RunWatch(ProgramWatch):
         return due is None and self.device.program.state is ProgramState.STOPPED
 
     def settled(self) -> Nanos:
-        """From when on nothing has happened, and every axis stands or keeps its velocity."""
+        """The time (ns) since which nothing has changed: every axis is at rest or moves at constant velocity."""
         last = max((happening.time for happening in self.happened), default=0)
         for axis in self.device.axes:
             profile = axis.profile
@@ -208,7 +208,7 @@ class RunWatch(ProgramWatch):
 
 
 def missing_switches(device: Mic488Device, switched: Collection[str]) -> list[str]:
-    """Of every axis that homes: what it waits for, where nothing in the run can bring that about."""
+    """A text for each axis that is homing to a switch or index that nothing in the run can operate."""
     homing = [(axis.number, _missing(device, axis, switched)) for axis in device.axes if axis.status is AxisStatus.HOMING]
     return [f"M{number} homes {reason}" for number, reason in homing if reason is not None]
 
@@ -216,10 +216,10 @@ def missing_switches(device: Mic488Device, switched: Collection[str]) -> list[st
 def _missing(device: Mic488Device, axis: Axis, switched: Collection[str]) -> str | None:
     homing = axis.homing
     if homing.leg == Homing.TO_STOP:
-        return "to a mechanical stop: a run without a world has none"
+        return "to a mechanical stop, which only a world has"
     if homing.leg == Homing.TO_INDEX:
         pin = f"IN{index_input(axis.number - 1) + 1}"
-        missing = f"to channel C of its encoder on {pin}, which nothing switches: --input {pin}=1@TIME"
+        missing = f"to channel C of its encoder on {pin}, which nothing operates: --input {pin}=1@TIME"
         return None if pin in switched else missing
     side = "KL" if homing.velocity_p < 0 else "KR"
     if homing.sensor >= len(device.inputs.pins):
@@ -227,11 +227,11 @@ def _missing(device: Mic488Device, axis: Axis, switched: Collection[str]) -> str
     pin = f"IN{homing.sensor + 1}"
     if pin in switched:
         return None
-    return f"to {side} on {pin}, which nothing switches: --travel M{axis.number}={'LOW..' if side == 'KL' else '..HIGH'}"
+    return f"to {side} on {pin}, which nothing operates: --travel M{axis.number}={'LOW..' if side == 'KL' else '..HIGH'}"
 
 
 class Ran(NamedTuple):
-    """A run that has ended."""
+    """The result of a run."""
 
     options: WbcRun
     given: Prepared
@@ -283,12 +283,12 @@ def _ending(watch: RunWatch, ending: Ending) -> str:
         return "the program has ended"
     place = place_of(watch.device)
     if place is None:
-        return "ended by the limit of time"
+        return "ended at the time limit"
     if ending.why == "waiting":
         moving = [f"M{axis.number}" for axis in watch.device.axes if axis.profile.moving(ending.at)]
         meanwhile = f", while {' and '.join(moving)} {'moves' if len(moving) == 1 else 'move'} on" if moving else ""
-        return f"it waits for ever in line {place.line}: {place.text}{meanwhile}"
-    return f"ended by the limit of time (--for takes a longer one) in line {place.line}: {place.text}"
+        return f"the program waits for ever in line {place.line}: {place.text}{meanwhile}"
+    return f"ended at the time limit (--for sets a longer one) in line {place.line}: {place.text}"
 
 
 def _data(ran: Ran, *, wrong: bool) -> dict[str, object]:

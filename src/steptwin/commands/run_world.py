@@ -1,4 +1,4 @@
-"""`steptwin run MACHINE.toml` and `steptwin replay FILE`: a world in virtual time, and what happened in it."""
+"""`steptwin run MACHINE.toml` and `steptwin replay FILE`: run a world in virtual time and report what happened."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ Print = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldRun:
-    """What is to be run. ``until`` is a condition; ``limit`` ends the run where that does not come true.
+    """The options of a run. ``until`` is a condition; ``limit`` (ns) ends the run at the latest.
 
-    Without ``limit`` it is a minute, and with ``until`` an hour.
+    Default of ``limit``: a minute; with ``until`` an hour.
     """
 
     world: Path
-    """A description, or a session to go on from."""
+    """A description, or a session to continue."""
     moment: Nanos | None = None
-    """That of the session; None: its end."""
+    """The moment of the session to continue from; None: its end."""
     seed: int | None = None
     state: Path | None = None
     """Directory of the non-volatile memory; None: that of the description."""
@@ -56,14 +56,15 @@ class WorldRun:
     allow_outside: bool = False
     """Files of the description may lie anywhere."""
     strict: bool = False
-    """Whether what was waited for in vain counts as a failure."""
+    """Whether a wait that timed out counts as a failure."""
     as_json: bool = False
 
 
 def run(options: WorldRun, say: Print, warn: Print) -> bool:
-    """Run a world and report what happened; whether all expectations held. ``warn`` is told what is doubtful in its files.
+    """Run a world and report what happened. Returns whether all expectations held. ``warn`` gets the warnings about its files.
 
-    Raises `Misuse` for what cannot be run, and `KeyboardInterrupt` after one that Ctrl-C has ended, when everything is written.
+    Raises `Misuse` for a file or option that cannot be run. After Ctrl-C everything is written, then `KeyboardInterrupt`
+    raised.
     """
     keep_trace = options.trace is not None or not options.as_json
     with begin_world(
@@ -108,7 +109,7 @@ def _run_and_report(world: World, options: WorldRun, say: Print) -> bool:
 
 
 def _watched(world: World) -> dict[str, ProgramWatch]:
-    """What the programs of controllers do from now on."""
+    """Watches for the programs of all controllers."""
     return {
         name: ProgramWatch(view.device, world.plan.kernel_of[name], name)
         for name, view in world.mic488.items()
@@ -117,7 +118,7 @@ def _watched(world: World) -> dict[str, ProgramWatch]:
 
 
 def _run(world: World, until: str | None, limit: Nanos, progress: Progress) -> str | None:
-    """Run on; gives why it ended before its time. What has been done by the first Ctrl-C is kept."""
+    """Run to the limit; returns the reason of an earlier end. The first Ctrl-C ends the run and keeps its results."""
 
     def watch(now: Nanos) -> None:
         progress(now)
@@ -132,13 +133,13 @@ def _run(world: World, until: str | None, limit: Nanos, progress: Progress) -> s
 
 
 class _Interrupted(Exception):
-    """Somebody wants a run to end."""
+    """A signal has requested the end of the run."""
 
 
 class WorldRunResult(NamedTuple):
-    """How a run ended; ``reason`` is why before its time, ``in_vain`` what did not come true in its time.
+    """The end of a run. ``reason``: why it ended early; ``in_vain``: the condition that did not come true in time.
 
-    ``known``: how many of the records that are told each machine had when it ``began``.
+    ``known``: the number of records of each machine at the moment it ``began``.
     """
 
     began: Nanos
@@ -151,7 +152,7 @@ class WorldRunResult(NamedTuple):
 
 
 def _arrange(world: World, options: WorldRun) -> None:
-    """Inputs and faults of the command line."""
+    """Apply the inputs and faults of the command line."""
     set_faults(world, options.faults)
     for given in options.inputs:
         machine, dot, pin = given.pin.rpartition(".")
@@ -191,7 +192,7 @@ def _write_trace(world: World, where: Path) -> list[Path]:
 
 
 def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramWatch], say: Print) -> None:
-    """What happened in the world, and what programs did with the statements that caused it, in order of time."""
+    """Print in order of time what happened in the world, and what programs did with the statements that caused it."""
     shown: list[tuple[Nanos, str]] = []
     for record in filter(is_shown, world.trace):
         if outcome.known[record.machine]:
@@ -266,7 +267,7 @@ def _json(world: World, outcome: WorldRunResult, say: Print) -> None:
 
 
 def replay(path: Path, trace: Path | None, say: Print, warn: Print, *, as_json: bool = False) -> bool:
-    """Run a session again; whether the same happened. Raises `Misuse` for what is no session."""
+    """Run a session again. Returns whether the result was the same. Raises `Misuse` for a file that is not a session."""
     session = sessions.load(path)
     world = session.replay()
     digest = world.trace.digest()

@@ -1,4 +1,4 @@
-"""`steptwin serve`: a small world from options, which then runs as `steptwin up` runs any other."""
+"""`steptwin serve`: make a world from options and run it as `steptwin up` does."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MOST_GAP_MS = 10_000.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeOptions:
-    """What both devices have; see ``steptwin serve mic488 --help``."""
+    """The options common to both controllers; see ``steptwin serve mic488 --help``."""
 
     name: str
     pty: Path | None = None
@@ -107,7 +107,7 @@ def serve_m1486(options: ServeM1486) -> None:
 
 
 def _serve(options: ServeOptions, describe: Describe, text: str) -> None:
-    """``text`` is the description without its faults, which are set as `up` sets those of its command line."""
+    """Run the description ``text``. Faults are not part of it; they are set as `up` sets those of its command line."""
     check_name(options.name)
     name = f"serve {options.name}"
     if options.print_world:
@@ -137,7 +137,7 @@ def _serve(options: ServeOptions, describe: Describe, text: str) -> None:
 
 
 def describe_mic488(options: ServeMic488, named: Named = str) -> str:
-    """The description of what is to be served. Raises `Misuse` for options that cannot be meant."""
+    """The description of the world to serve. Raises `Misuse` for invalid options."""
     check_line_timing(options.line_timing, "real", "strict")
     if options.baud is not None and options.baud not in BAUDS:
         raise Misuse(f"--baud {options.baud}: permitted are {', '.join(map(str, BAUDS))} bit/s")
@@ -165,7 +165,7 @@ def describe_mic488(options: ServeMic488, named: Named = str) -> str:
 
 
 def describe_m1486(options: ServeM1486, named: Named = str) -> str:
-    """The description of what is to be served. Raises `Misuse` for options that cannot be meant."""
+    """The description of the world to serve. Raises `Misuse` for invalid options."""
     check_line_timing(options.line_timing, "real")
     kind = variant(options.variant)
     baud_pins(kind, options.baud)
@@ -185,7 +185,7 @@ def parse_units(text: str) -> list[int]:
     units: list[int] = []
     for part in text.split(","):
         if not part.strip().isdecimal() or not 1 <= int(part) <= 247:
-            raise Misuse(f"--units {text}: {part.strip()!r} is no slave address; permitted are 1 to 247, separated by commas")
+            raise Misuse(f"--units {text}: {part.strip()!r} is not a slave address; permitted are 1 to 247, separated by commas")
         if int(part) in units:
             raise Misuse(f"--units {text}: {int(part)} is given twice")
         units.append(int(part))

@@ -1,4 +1,4 @@
-"""A line between two others in words: listening on it, or standing in it and passing everything on."""
+"""Decode the traffic of a line, either by listening or as a relay between a client and the device."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from steptwin.world.kernel import Kernel
 
 Sink = Callable[[FrameLine], None]
 QUIET_NS: Nanos = 100 * MILLISECOND
-"""After this silence of the chips nothing belongs to what they have said before."""
+"""Silence that ends a group of bytes from the chips, ns."""
 MOST_TYPED = 4096
-"""Characters whose echo is waited for: far more than an input buffer holds."""
+"""Most characters whose echo is expected: far more than an input buffer holds."""
 ARROWS = {FrameDirection.IN: "→", FrameDirection.OUT: "←"}
 
 
 class Decoder(Protocol):
-    """Puts bytes into words. ``direction`` is None where both come from one wire."""
+    """Decodes bytes. ``direction`` is None if both directions share one wire."""
 
     def heard(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None: ...
     def deadline(self) -> Nanos | None: ...
@@ -47,7 +47,7 @@ class Decoder(Protocol):
 
 
 class ModbusDecoder:
-    """Modbus RTU or TCP, in the words of a MIC488."""
+    """Decodes Modbus RTU or TCP, with the register names of a MIC488."""
 
     def __init__(self, sink: Sink, firmware: str, *, tcp: bool) -> None:
         words = FrameWords(register_map(firmware), tcp=tcp)
@@ -69,10 +69,10 @@ class ModbusDecoder:
 
 
 class M1486Decoder:
-    """Commands and answers of M1486 chips. On one wire everything is taken for commands.
+    """Decodes commands and answers of M1486 chips. On one wire all bytes are decoded as commands.
 
-    The bytes of the chips do not say what they are. What repeats the characters typed, in their order and to the CR, is their
-    echo (function 41); else what comes after a command U is taken for what it uploads.
+    The bytes of the chips carry no type. Bytes that repeat the characters sent, in order and up to the CR, are their echo
+    (function 41); other bytes after a command U are its upload.
     """
 
     def __init__(self, sink: Sink, kind: str) -> None:
@@ -124,7 +124,7 @@ class M1486Decoder:
             self._log.sent(now, byte)
 
     def _settle(self) -> None:
-        """Nothing more repeats what was typed."""
+        """End the comparison with the characters sent."""
         if self._uploads:
             for byte in self._repeated:
                 self._is_upload(byte, self._repeated_ns)
@@ -155,7 +155,7 @@ class M1486Decoder:
 
 
 class _Between:
-    """A port that passes on what its client sends, and gives him what the device says. See `TalkingPort`."""
+    """A port that passes the bytes of its client to the device, and those of the device to the client. See `TalkingPort`."""
 
     broken: str | None = None
 
@@ -188,7 +188,7 @@ class _Between:
 
 
 class Tap(asyncio.Protocol):
-    """The connection to the device; programs that want to talk to it come as `clients`."""
+    """The connection to the device; programs that use it through this relay are `clients`."""
 
     def __init__(self, decoder: Decoder, *, stands_between: bool) -> None:
         self.clients: list[_Between] = []
@@ -199,7 +199,7 @@ class Tap(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.Transport, transport)  # serialx' is no subclass
+        self._transport = cast(asyncio.Transport, transport)  # serialx' is not a subclass
 
     def connection_lost(self, exc: Exception | None) -> None:
         if not self.ended.done():
@@ -236,12 +236,12 @@ async def sniff(
     pty: Path | None = None,
     ready: Callable[[str], object] = str,
 ) -> None:
-    """Put a line into words until it is gone, which is raised as `LineFailure`.
+    """Decode a line until it is lost, which raises `LineFailure`.
 
-    ``listen`` or ``pty``: where programs connect that then talk to the device through this. ``ready`` is told where.
+    ``listen`` or ``pty``: the address at which clients connect to the relay. ``ready`` is called with the open address.
     """
     if place.framed and listen is None:
-        raise Misuse("a Modbus TCP connection cannot be listened to: stand in it, --listen HOST:PORT")
+        raise Misuse("a Modbus TCP connection cannot be monitored from outside: use a relay, --listen HOST:PORT")
     tap = Tap(decoder, stands_between=listen is not None or pty is not None)
     transport = await place.endpoint.connect(lambda: tap)
     cell = Cell(Kernel(), Clock())
@@ -262,7 +262,7 @@ async def sniff(
         if not links:
             ready(f"listening on {place.endpoint}")
         why = await tap.ended
-        raise LineFailure(f"{place.endpoint} is gone: {why}")
+        raise LineFailure(f"{place.endpoint} was lost: {why}")
     finally:
         for link in links:
             await link.close()

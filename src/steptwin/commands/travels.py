@@ -1,4 +1,4 @@
-"""Switches KL and KR of a MIC488 that runs a program alone: where ``--travel`` says, or where homing needs them."""
+"""Switches KL and KR for a MIC488 that runs a single program: placed by ``--travel``, or assumed where homing needs them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from steptwin.wbc.real import real_text
 from steptwin.world.small import AxisSwitches
 
 ASSUMED_TRAVEL_S = 0.1
-"""How far from the place at power-on a switch is assumed, for homing: what VMAX covers in this time."""
+"""Distance of an assumed homing switch from the position at power-on, as travel time at VMAX, s."""
 ASSUMED_FAR_S = 10.0
-"""The same for KR where a program homes to both sides: it has to leave a way between the switches."""
+"""The same for KR if a program homes to both sides, so that there is travel between the switches."""
 
 
 class Travel(NamedTuple):
-    """Where the switches of ``axis`` (from 1) are, in configured units seen from the place at power-on; None: no switch."""
+    """Positions of the switches of ``axis`` (from 1) in configured units, relative to that at power-on; None: no switch."""
 
     axis: int
     low_u: float | None
@@ -26,7 +26,8 @@ class Travel(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """Switches of a run; ``assumed`` lists those that nobody placed as text, ``pins`` is what they or the run drive."""
+    """The switches of a run. ``assumed``: texts about switches that were not placed; ``pins``: inputs driven by switches or by
+    the run."""
 
     switches: Sequence[AxisSwitches]
     assumed: Sequence[str]
@@ -36,9 +37,9 @@ class Placed(NamedTuple):
 def place_switches(
     config: ControllerConfig, travels: Sequence[Travel], homed: Mapping[int, frozenset[int]], driven: Collection[str]
 ) -> Placed:
-    """Switches where ``travels`` say, or for axes they do not name where ``homed`` (`homing_sides`) needs them.
+    """Place switches from ``travels``; for axes not named there, assume those that ``homed`` (`homing_sides`) needs.
 
-    None is assumed on the pins in ``driven``. Raises `Misuse` for a switch that the configuration does not have.
+    No switch is assumed on a pin in ``driven``. Raises `Misuse` for a switch without an input in the configuration.
     """
     known = {travel.axis: travel for travel in travels}
     switches: list[AxisSwitches] = []
@@ -65,7 +66,7 @@ def _contact(config: ControllerConfig, pin: int) -> str:
 
 
 def _assumed(number: int, axis: AxisConfig, sides: frozenset[int], driven: Collection[str]) -> Travel:
-    """Where KL and KR of an axis have to be that is homed to ``sides``."""
+    """The assumed positions of KL and KR for an axis that is homed to ``sides``."""
     has_kl, has_kr = (pin < INPUTS and f"IN{pin + 1}" not in driven for pin in (axis.in_kl, axis.in_kr))
     if 0 in sides:
         sides |= {-1 if has_kl else 1}

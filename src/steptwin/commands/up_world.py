@@ -1,4 +1,4 @@
-"""`steptwin up MACHINE.toml`: a world in real time, whose lines other programs can talk on."""
+"""`steptwin up MACHINE.toml`: run a world in real time, with lines to which other programs connect."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class UpOptions:
     """The command's options as given; see ``steptwin up --help``."""
 
     world: Path | None
-    """A description, or a session to go on from; None for a world that was made of options."""
+    """A description, or a session to continue; None for a world made from options."""
     moment: Nanos | None = None
-    """That of the session; None: its end."""
+    """The moment of the session to continue from; None: its end."""
     seed: int | None = None
     state: Path | None = None
     """Directory of the non-volatile memory; None: that of the description."""
@@ -55,13 +55,13 @@ class UpOptions:
     name: str | None = None
     session: Path | None = None
     trace: str | None = None
-    """A file or directory, ``ring N`` or ``off``; None: as the description says."""
+    """A file or directory, ``ring N`` or ``off``; None: the setting of the description."""
     faults: Sequence[str] = ()
     ready_file: Path | None = None
     control: str | None = None
     """HOST:PORT on this computer for the control endpoint, besides the local socket."""
     strict: bool = False
-    """Whether what was waited for in vain counts as a failure."""
+    """Whether a wait that timed out counts as a failure."""
     listen_any: bool = False
     log_frames: bool = False
     allow_outside: bool = False
@@ -69,12 +69,12 @@ class UpOptions:
 
 
 def up(options: UpOptions) -> bool:
-    """Run a world until SIGINT, SIGTERM or SIGHUP, or until a script stops it; whether all expectations held.
+    """Run a world until SIGINT, SIGTERM or SIGHUP, or until a script stops it. Returns whether all expectations held.
 
     Raises `Misuse` or another `SteptwinError` with a text for the user.
     """
     if options.world is None:
-        raise Misuse("which world? give the TOML file that describes it")
+        raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
     check_name(options.name or options.world.stem)
     read_speed(options.speed, least=0)
     with begin_world(
@@ -91,7 +91,7 @@ def up(options: UpOptions) -> bool:
 
 
 def up_with(world: World, options: UpOptions) -> bool:
-    """As `up`, with a world that is there."""
+    """As `up`, with an existing world."""
     name = options.name or (world.spec.name if options.world is None else options.world.stem)
     speed = read_speed(options.speed, least=0)
     _send_away(world)
@@ -118,7 +118,7 @@ def up_with(world: World, options: UpOptions) -> bool:
 
 
 def _send_away(world: World) -> None:
-    """Who was there in the session is not there now."""
+    """Disconnect the clients of a continued session: they are not connected now."""
     for line in world.lines.values():
         for place in [place for place in line.places if place != SCRIPTS]:
             world.outside(Leave(line.name, place))
@@ -161,7 +161,7 @@ def _face(live: LiveWorld, cell: Cell, output: Output, *, log_frames: bool) -> F
 
 
 def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
-    """What keeps the trace from now on in a file; a ring belongs to the world."""
+    """The recorder that writes the trace to a file; None for a ring, which the world keeps."""
     world, recorder = live.world, None
     if isinstance(kept, int):
         live.ring = Ring(world.trace, kept)
@@ -173,7 +173,7 @@ def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
 
 
 def _keep(options: UpOptions, live: LiveWorld, output: Output, recorder: TraceFile | None, kept: Kept) -> None:
-    """Write what was asked for when it is over. The session first: a trace can be made from it. Raises `Misuse`."""
+    """Write session and trace at the end: the session first, because a trace can be made from it. Raises `Misuse`."""
     world = live.world
     world.advance(world.now)
     world.settle_all()
@@ -202,7 +202,7 @@ def _write_session(where: Path, live: LiveWorld) -> list[Path]:
 
 
 def _write_trace(recorder: TraceFile, where: Path, ended: Nanos) -> list[Path]:
-    """End the file; other formats are made of it."""
+    """Close the trace, and convert it where another format is wanted."""
     recorder.close(ended)
     if recorder.path == where:
         return [where]

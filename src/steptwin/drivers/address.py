@@ -80,7 +80,7 @@ def split_device(text: str) -> tuple[str, dict[str, Any]]:
         try:
             found[name] = _TYPES[name](value)
         except ValueError:
-            raise Misuse(f"device {text!r}: {value!r} is no number for {name}") from None
+            raise Misuse(f"device {text!r}: {value!r} is not a number for {name}") from None
     return place, found
 
 

@@ -303,7 +303,7 @@ class TcpMaster:
     def _feed(self, data: bytes) -> list[mbap.TcpFrame]:
         frames = self._framer.feed(data)
         if self._framer.broken is not None:
-            raise LineLost(f"{self._place}: what came is no Modbus TCP ({self._framer.broken})")
+            raise LineLost(f"{self._place}: what came is not Modbus TCP ({self._framer.broken})")
         return frames
 
     def abandon(self, now: Nanos) -> bytes:

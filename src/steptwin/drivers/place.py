@@ -68,12 +68,12 @@ def parse_line_address(text: str, baud: int) -> LineAddress:
     scheme, separator, _ = text.partition("://")
     if not separator:
         if not text or (":" in text and "/" not in text):
-            raise Misuse(f"{text!r} is no address: {FORMS}")
+            raise Misuse(f"{text!r} is not an address: {FORMS}")
         return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme == "rfc2217":
         return LineAddress(SerialEndpoint(text, baud), serial=SerialLine(baud))
     if scheme not in ("tcp", "rtu-tcp"):
-        raise Misuse(f"{text!r} is no address: {FORMS}")
+        raise Misuse(f"{text!r} is not an address: {FORMS}")
     try:
         parts = urlsplit(text)
         host, port = parts.hostname, parts.port
@@ -81,7 +81,7 @@ def parse_line_address(text: str, baud: int) -> LineAddress:
     except ValueError:
         host, port, rest = None, None, ""
     if not host or rest:
-        raise Misuse(f"{text!r} is no address: {FORMS}")
+        raise Misuse(f"{text!r} is not an address: {FORMS}")
     if port is None:
         if scheme != "tcp":
             raise Misuse(f"{text!r} names no port: {FORMS}")

@@ -45,7 +45,7 @@ def begin_world(
     """
     if not is_session(path):
         if moment is not None:
-            raise Misuse(f"--from: {path} is no session; a description begins at 0 s")
+            raise Misuse(f"--from: {path} is not a session; a description begins at 0 s")
         world = World.load(
             path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs, allow_outside=allow_outside, state=state
         )

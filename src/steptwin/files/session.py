@@ -156,7 +156,7 @@ def save(session: Session, path: Path | str) -> None:
 
 
 def load(path: Path | str) -> Session:
-    """What `save` wrote. Raises `Misuse` for a file that cannot be read or is no session."""
+    """What `save` wrote. Raises `Misuse` for a file that cannot be read or is not a session."""
     content = read_bytes(Path(path), MOST_RECORDED_BYTES)
     try:
         data = json.loads(content, parse_int=_whole, parse_constant=_finite)
@@ -164,7 +164,7 @@ def load(path: Path | str) -> Session:
             raise Misuse(f"{path} is a session of format {data['steptwin_session']}: this version reads {FORMAT}")
         return _session(data)
     except (LookupError, TypeError, ValueError, RecursionError, OverflowError, AttributeError) as error:
-        raise error if isinstance(error, Misuse) else Misuse(f"{path} is no session of a world: {_why(error)}") from None
+        raise error if isinstance(error, Misuse) else Misuse(f"{path} is not a session of a world: {_why(error)}") from None
 
 
 def _whole(text: str) -> int:
@@ -174,7 +174,7 @@ def _whole(text: str) -> int:
 
 
 def _finite(text: str) -> float:
-    raise ValueError(f"{text} is no number of a session")
+    raise ValueError(f"{text} is not a number of a session")
 
 
 def _why(error: Exception) -> str:
@@ -184,7 +184,7 @@ def _why(error: Exception) -> str:
 
 
 def _session(data: Mapping[str, Any]) -> Session:
-    """Raises `LookupError`, `TypeError` and `ValueError` for what is no session."""
+    """Raises `LookupError`, `TypeError` and `ValueError` for what is not a session."""
     until = fitting("until_ns", data["until_ns"], int)
     if not 0 <= until <= LONGEST_NS:
         raise ValueError(f"until_ns is {until}: permitted are 0 to {LONGEST_NS}")

@@ -42,7 +42,7 @@ def check_writable(path: Path) -> None:
     if number:
         raise Misuse(f"cannot write {shown(path)}: {reason(OSError(number, ''))}")
     if path.exists() and not path.is_file():
-        raise Misuse(f"cannot write {path}: it is no regular file")
+        raise Misuse(f"cannot write {path}: it is not a regular file")
 
 
 def check_folder(path: Path) -> None:
@@ -64,7 +64,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 def read_text(path: Path) -> TextFile:
     """A text file in UTF-8, UTF-16 with its byte order mark, or the code page of Polish Windows.
 
-    Raises `Misuse` when it cannot be read or is no text.
+    Raises `Misuse` when it cannot be read or is not text.
     """
     decoded = decode(read_bytes(path), str(path))
     return TextFile(SourceText(str(path), decoded.text), decoded)

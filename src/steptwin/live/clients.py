@@ -54,7 +54,7 @@ class Clients:
 
 
 def listening(address: Address) -> socket.socket:
-    """A socket that listens. Raises `OSError`, or `UnicodeError` for what is no name of a host."""
+    """A socket that listens. Raises `OSError`, or `UnicodeError` for what is not a name of a host."""
     family = socket.getaddrinfo(*address, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0][0]
     listener = socket.create_server(address, family=family, backlog=BACKLOG)
     listener.setblocking(False)

@@ -36,11 +36,11 @@ def private_directory(path: Path) -> Path:
 def permissions(path: Path) -> int:
     """The permission bits of a directory; 0o700 where they mean nothing (Windows: access follows the directory above).
 
-    Raises `Misuse` for what is no directory, or of another user.
+    Raises `Misuse` for what is not a directory, or of another user.
     """
     found = path.lstat()
     if not stat.S_ISDIR(found.st_mode):
-        raise Misuse(f"{path} is no directory")
+        raise Misuse(f"{path} is not a directory")
     if not is_own(found):
         raise Misuse(f"{path} belongs to another user")
     return 0o700 if user() is None else stat.S_IMODE(found.st_mode)

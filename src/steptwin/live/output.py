@@ -23,7 +23,7 @@ PATIENCE_S = 1.0
 class Output:
     """Writes to ``stream``'s descriptor, in order, from a thread of its own. Also a file that rich can draw on.
 
-    A reader that has closed its end gets no more output; that is no error.
+    A reader that has closed its end gets no more output; that is not an error.
     """
 
     def __init__(self, stream: TextIO | None) -> None:

@@ -70,7 +70,7 @@ class PtyLink:
     def _take_path(self) -> None:
         """Own the path, unless something lies there that is not what a twin left behind."""
         if self.path.exists() and not self.path.is_symlink():
-            raise Misuse(f"{self.path} exists and is no link to a pseudo terminal: choose another --pty")
+            raise Misuse(f"{self.path} exists and is not a link to a pseudo terminal: choose another --pty")
         self._owned = Ownership(self.path.with_name(f".{self.path.name}.lock"))
         if self.path.is_symlink():
             target = os.readlink(self.path)

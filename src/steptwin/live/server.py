@@ -56,7 +56,7 @@ class EndPoint:
 
 
 class Server:
-    """Opens links one after the other and closes all of them, whatever happened.
+    """Opens links one after the other, and closes all of them in any case.
 
     ``show`` is called with notices for the user.
     """
@@ -165,7 +165,7 @@ class Server:
             raise LineFailure(self._failure)
 
     def _lagged(self, by: Nanos) -> None:
-        self.notice(f"this process was held up for {by / SECOND:.1f} s; the time of the twin was held up as long")
+        self.notice(f"this process did not run for {by / SECOND:.1f} s; the time of the twin stood still meanwhile")
 
     def _trouble(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """Errors without a caller: the end where machines cannot go on, else a notice."""
@@ -216,6 +216,6 @@ def clear_ready_file(path: Path) -> None:
     except (ValueError, TypeError, KeyError, RecursionError):
         pid = None
     if not isinstance(pid, int) or not 0 < pid < 1 << 31:
-        raise Misuse(f"{path} exists and is no ready file: choose another --ready-file")
+        raise Misuse(f"{path} exists and is not a ready file: choose another --ready-file")
     if pid == os.getpid() or not process_exists(pid):
         path.unlink()

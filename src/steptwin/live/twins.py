@@ -196,14 +196,14 @@ def controller_of(text: str | None) -> TwinController | None:
 def find_controller(text: str | None) -> tuple[str, str | None]:
     """The running twin that ``text`` names (None: the only one), and its controller where ``text`` selects one.
 
-    Errors as of `find_device`; `Misuse` for a device that is no twin.
+    Errors as of `find_device`; `Misuse` for a device that is not a twin.
     """
     place, options = (None, dict[str, Any]()) if text is None else split_device(text)
     of_twin = _named(place)
     if of_twin is None:
         of_twin = _controllers_at(_address(place or ""))
         if not of_twin:
-            raise Misuse(f"{text} is no running twin, and this command is for twins: {_there()}")
+            raise Misuse(f"{text} is not a running twin, and this command is for twins: {_there()}")
     meant = [each for each in of_twin if each.is_meant(options)]
     if not meant:
         raise _unclear(text or "", of_twin, meant)

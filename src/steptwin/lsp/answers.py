@@ -156,7 +156,7 @@ class CodeAction:
 
 @dataclass(frozen=True, slots=True)
 class Hint:
-    """A text shown behind a character, which is no part of the file."""
+    """A text shown behind a character, which is not part of the file."""
 
     place: int
     label: str

@@ -62,7 +62,7 @@ class Chip:
 
 
 def machines_of(world: str, text: str) -> tuple[list[ControllerFiles], list[Chip]]:
-    """The controllers of a world and their files. Raises `Misuse` for a text that is no TOML; leaves out what is wrong."""
+    """The controllers of a world and their files. Raises `Misuse` for a text that is not TOML; leaves out what is wrong."""
     try:
         data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:

@@ -242,7 +242,7 @@ class EditorSession:
         return next((chip for world in self.worlds() for chip in self._machines(world)[1] if chip.program == program), None)
 
     def _machines(self, world: str) -> tuple[list[ControllerFiles], list[Chip]]:
-        """Those of a world; while it is no TOML, because somebody types, those it had before."""
+        """Those of a world; while it is not TOML, because somebody types, those it had before."""
         before = self._kept.get(world)
         kept = self._keep(world)
         if kept is not before and kept.lines is not None:

@@ -121,7 +121,7 @@ class TableAnalysis(Analysis):
 
     def new_name_problem(self, symbol: Symbol, text: str) -> str | None:
         if not is_name(text):
-            return f"{text!r} is no name: letters without accents, digits and _, no digit first"
+            return f"{text!r} is not a name: letters without accents, digits and _, no digit first"
         if text.upper() != symbol.key and self._table.index(text) is not None:
             return f"there is a position {text} already"
         return None

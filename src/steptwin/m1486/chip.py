@@ -496,7 +496,7 @@ class M1486Chip(Stateful):
     # ------------------------------------------------------------------ snapshots
 
     def snapshot(self) -> ChipSnapshot:
-        """All state at the present moment; hooks are no part of it."""
+        """All state at the present moment; hooks are not part of it."""
         return ChipSnapshot(self.variant, self.is_timed, self.program.statement_ns, self.copy_state())
 
     def restore(self, snapshot: ChipSnapshot) -> None:

@@ -170,7 +170,7 @@ _ROWS: tuple[CommandSpec, ...] = (
 
 #: Sizes the manual states by themselves (chapter II, Memory): four commands take no memory; ``I`` holds line, level and label.
 _STATED_BITS = {"@": 0, "[": 0, "]": 0, "\\": 0, "I": 32}
-#: Keys whose number may not be left out: it is no number of the numeric kind, or nothing could be known without it.
+#: Keys whose number may not be left out: it is not a number of the numeric kind, or nothing could be known without it.
 _NEEDS_ARGUMENT = frozenset("@IX")
 
 #: Of all variants; it decides the size of a label in the memory of each.

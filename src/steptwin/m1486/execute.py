@@ -30,7 +30,7 @@ def compile_command(chip: CommandHost, command: Command, place: int, following: 
     why = out_of_range(command, chip.variant)
     spec = find(command.key, command.number, chip.variant)
     if why is not None or spec is None:
-        return CompiledCommand(refusing(why or f"{command} is no command"), computes=True, is_linked=False)
+        return CompiledCommand(refusing(why or f"{command} is not a command"), computes=True, is_linked=False)
     if isinstance(command.argument, JumpCondition):
         return CompiledCommand(*flow_effects.condition(chip, command.argument, following), is_linked=True)
     row = _MAKERS[spec.name]

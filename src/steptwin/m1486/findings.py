@@ -77,7 +77,7 @@ REGISTERS_SHARED = _F("M216", "registers share the command memory", "Registers 1
 BOTH_OPERANDS = _F("M217", "functions 46 and 58 both ON", "Not documented in the manual; the lines are read (M-14).")
 NOT_IN_FILE = _F("M218", "not stored in the EEPROM", "Only commands in [ ] run again at power-up.")
 SECOND_FILE = _F("M219", "second file for the EEPROM", "The manual describes one file, stored into an erased EEPROM.")
-ACTS_AT_ONCE = _F("M220", "acts when received", "It is no part of the stored file: it acts while the file is being sent.")
+ACTS_AT_ONCE = _F("M220", "acts when received", "It is not part of the stored file: it acts while the file is being sent.")
 POSITION_PASSED = _F(
     "M221", "position counter passed its end", "It has 24 bits without a sign; G and H count from what it shows."
 )

@@ -173,7 +173,7 @@ def _operand(command: Command, state: Settings, interface: Interface) -> _Fault 
     if state.lines_operand is None or state.register_operand is None:
         return None
     if state.register_operand and number not in GENERAL:
-        return findings.OUT_OF_RANGE, f"{number} is no operand register, and function 58 is ON", "1 to 8"
+        return findings.OUT_OF_RANGE, f"{number} is not an operand register, and function 58 is ON", "1 to 8"
     if command.key == "/" and not state.register_operand:
         return _dividend(number, state)
     return None

@@ -61,7 +61,7 @@ def _indirect(chip: CommandHost, number: int, now: Nanos, *, low_byte: bool) -> 
             raise WrongData(f"{number} names no lines, and function 46 is ON: first line and count, such as 14, up to line 21")
         return chip.read(lines, now)
     if number not in GENERAL:
-        raise WrongData(f"{number} is no operand register, and function 58 is ON: permitted are 1 to 8")
+        raise WrongData(f"{number} is not an operand register, and function 58 is ON: permitted are 1 to 8")
     value = chip.memory.register(number)
     return value & 0xFF if low_byte else value
 

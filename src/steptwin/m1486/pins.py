@@ -39,7 +39,7 @@ class ChipPins(Stateful):
 
     def __init__(self, address: int, baud_code: int, interface: Interface, on_change: Callable[[str, int, Nanos], None]) -> None:
         self._on_change = on_change
-        # Index 0 of these lists is no line.
+        # Index 0 of these lists is not a line.
         #: What pulls a line from outside; by default nothing does.
         self.external = [1] * (LINES.stop)
         for bit, line in enumerate(_ADDRESS_LINES):

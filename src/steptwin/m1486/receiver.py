@@ -145,7 +145,7 @@ class Receiver(Stateful):
         if self._acts_when_received():
             self._echo(byte, now)
         elif self.is_listening and not self._skips_line and not self._store(byte, now) and not self._is_torn:
-            # What is not received is no part of the line: K may follow at once.
+            # What is not received is not part of the line: K may follow at once.
             self._seen = before
 
     def _acts_when_received(self) -> bool:
@@ -351,5 +351,5 @@ def _read(text: str, variant: Variant) -> Command | str:
     command = line.command
     if command is None:
         return f"{text}: {found[0].message if found else 'no command'}"
-    # Where in the line it stood is no part of a command that may be kept.
+    # Where in the line it stood is not part of a command that may be kept.
     return out_of_range(command, variant) or Command(command.key, command.argument)

@@ -260,7 +260,7 @@ def _no_word(reader: _LineReader, key: str, number: int | None) -> None:
     """Letters in the place of a number are no row of commands."""
     if number is None and _WORD.match(reader.chars, reader.at):
         hint = "a number, or the end of the line for the internal variable" if takes_variable(key) else "a number"
-        reader.give_up(findings.BAD_ARGUMENT, reader.rest_span(), f"{reader.left} is no number", hint)
+        reader.give_up(findings.BAD_ARGUMENT, reader.rest_span(), f"{reader.left} is not a number", hint)
 
 
 def _no_other_notation(reader: _LineReader, key: str, start: int) -> None:

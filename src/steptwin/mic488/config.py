@@ -313,10 +313,10 @@ class _ConfigReader:
 
     def _value(self, entry: IniEntry, key: ConfigKey) -> float | None:
         if not _NUMBER.match(entry.value):
-            return self._refuse("C006", entry, key, "is no number" if entry.value else "has no value")
+            return self._refuse("C006", entry, key, "is not a number" if entry.value else "has no value")
         value = float(entry.value.replace(",", "."))
         if key.whole and not value.is_integer():
-            return self._refuse("C007", entry, key, "is no whole number")
+            return self._refuse("C007", entry, key, "is not a whole number")
         if not key.permits(value):
             return self._refuse("C008", entry, key, "is not permitted")
         return int(value) if key.whole else value
@@ -355,7 +355,7 @@ def _no_configuration(file: IniFile) -> Diagnostic:
     first = len(text) - len(text.lstrip())
     line = text[first:].split("\n", 1)[0].rstrip()
     hint = f"expected: sections such as [Axis0]…[Axis{AXES - 1}], [IN0]…[IN{INPUTS - 1}], [AIN0], [AIN1], [WBC_PROGRAM]"
-    return Diagnostic("C011", Severity.ERROR, Span(first, first + len(line)), "this is no configuration of a MIC488", hint)
+    return Diagnostic("C011", Severity.ERROR, Span(first, first + len(line)), "this is not a configuration of a MIC488", hint)
 
 
 def _near(name: str, there: list[str]) -> str | None:

@@ -93,7 +93,7 @@ class Mic488Device(ControllerCore):
     # ------------------------------------------------------------------ snapshots
 
     def snapshot(self) -> ControllerSnapshot:
-        """All state at the present moment; hooks are no part of it."""
+        """All state at the present moment; hooks are not part of it."""
         return ControllerSnapshot(self.config, self.firmware.name, self.copy_state(), self.program.contents())
 
     def restore(self, snapshot: ControllerSnapshot) -> None:

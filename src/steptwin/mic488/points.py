@@ -134,7 +134,7 @@ def limits(permitted: Range) -> Limits:
 
 def live_point(device: Mic488Device, text: str) -> LivePoint | None:
     """The point of a name (``M1.position``, ``M1_ACC``, ``USER_REGISTER[12]:real``) or address (``hr:10020``), else None.
-    Raises `Misuse` for what is no whole value."""
+    Raises `Misuse` for what is not a whole value."""
     registers, units = device.registers, [axis.unit_name for axis in device.config.axes]
     short = _short_name(text)
     if short is not None:
@@ -171,7 +171,7 @@ def _short_name(text: str) -> tuple[ShortName, int | None] | None:
 
 
 def item_of(registers: RegisterMap, text: str) -> RegisterItem | None:
-    """What a name or an address of a register means, None where there is none. Raises `Misuse` for what is no whole value."""
+    """What a name or an address of a register means, None where there is none. Raises `Misuse` for what is not a whole value."""
     match = _ADDRESS.fullmatch(text)
     if match is None:
         if "." in text:

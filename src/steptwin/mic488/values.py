@@ -83,7 +83,7 @@ def named(registers: RegisterMap, text: str) -> RegisterItem:
     """The value of that name: ``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``. Raises `Misuse`."""
     match = _NAME.match(text.strip())
     if match is None:
-        raise Misuse(f"{text!r} is no name of a value: {FORM}")
+        raise Misuse(f"{text!r} is not a name of a value: {FORM}")
     register = registers.named(match["name"])
     if register.type is not Type.MEMORY:
         if match["cell"] or match["view"]:
@@ -122,7 +122,7 @@ def value_of(register: Register, typed: str) -> float:
     except ValueError:
         names = ("on", "off") if register.type is Type.BIT else tuple(register.values.values())
         others = f", or {', '.join(names)}" if names else ""
-        raise Misuse(f"{text!r} is no number{others}") from None
+        raise Misuse(f"{text!r} is not a number{others}") from None
 
 
 # ---------------------------------------------------------------------- values and words

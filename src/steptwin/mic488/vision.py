@@ -51,7 +51,7 @@ class VisionReceiver(Stateful):
         return [VisionRecord(*(float(number.replace(b",", b".")) for number in match.groups())) for match in found if match]
 
     def forget(self) -> None:
-        """What has come of the present line is no part of a record."""
+        """What has come of the present line is not part of a record."""
         self._line = b""
 
 

@@ -443,4 +443,4 @@ def _number(typed: str) -> float:
     try:
         return float(typed.strip().replace(",", "."))
     except ValueError:
-        raise SteptwinError(f"{typed.strip()!r} is no number") from None
+        raise SteptwinError(f"{typed.strip()!r} is not a number") from None

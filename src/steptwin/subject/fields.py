@@ -261,7 +261,7 @@ def _characters(value: Any) -> bytes:
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError as error:
-        raise Misuse(f"{value[error.start]!r} is no character of a line, which has 8 bits for each") from None
+        raise Misuse(f"{value[error.start]!r} is not a character of a line, which has 8 bits for each") from None
 
 
 CHARACTERS = ValueType(

@@ -300,7 +300,7 @@ class StatementReader:
         if token is None:
             raise Rejected(f.TOO_FEW.at(at, "the name of a position is missing after @", f"write {row.usage}"))
         if token.kind not in (WORD, WRONG_NUMBER):
-            raise Rejected(f.WRONG_ARGUMENT.at(token, f"{token.text!r} is no name of a position", f"write {row.usage}"))
+            raise Rejected(f.WRONG_ARGUMENT.at(token, f"{token.text!r} is not a name of a position", f"write {row.usage}"))
         name = self._name(token)
         return Position(at.start, token.end, name)
 
@@ -332,7 +332,7 @@ class StatementReader:
             return left
         token = self._tokens[self._at]
         if token.kind == COMPARISON or (token.kind == OPERATOR and token.text not in OPERATORS):
-            raise Rejected(f.WRONG_OPERATOR.at(token, f"{token.text} is no operator of SET", f"one of {' '.join(OPERATORS)}"))
+            raise Rejected(f.WRONG_OPERATOR.at(token, f"{token.text} is not an operator of SET", f"one of {' '.join(OPERATORS)}"))
         if token.kind != OPERATOR:
             return left
         self._at += 1

@@ -156,7 +156,7 @@ class _Resolver:
             if key.startswith((PREFIX, HARD_PREFIX)) and key not in PREDEFINED:
                 known = f"INT_IN1…INT_IN{INPUT_LABELS}, INT_MODBUS, INT_TICK"
                 hint = f"{known}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
-                self._say(f.RESERVED_LABEL.at(name, f"{name.text} is no interrupt label, but begins like one", hint))
+                self._say(f.RESERVED_LABEL.at(name, f"{name.text} is not an interrupt label, but begins like one", hint))
             elif key in self._scope.constants or key in self._scope.variables:
                 kind = "a constant" if key in self._scope.constants else "a variable"
                 message = f"{name.text} cannot be a label: it is {kind}"

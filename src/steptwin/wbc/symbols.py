@@ -134,7 +134,7 @@ def name_problem(text: str, scope: Scope, labels: Container[str]) -> str | None:
     """Why a text cannot be the name of a constant, a variable or a label; None when it can."""
     key = text.upper()
     if not is_name(text):
-        return f"{text!r} is no name: letters without accents, digits and _, no digit first"
+        return f"{text!r} is not a name: letters without accents, digits and _, no digit first"
     taken = scope.reserved(key)
     if taken is None and key in BY_LABEL:
         taken = "an interrupt label"

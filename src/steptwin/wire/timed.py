@@ -61,7 +61,7 @@ class TimedUnits(Stateful):
         self._next = dict.fromkeys(devices, 0)  # when each may execute its next request
 
     def addressed(self, unit: int, function: int) -> list[int]:
-        """The units that a request is for; none for a foreign unit or a broadcast that is no write (MIC-2)."""
+        """The units that a request is for; none for a foreign unit or a broadcast that is not a write (MIC-2)."""
         if unit == rtu.BROADCAST:
             return list(self.devices) if function in WRITES else []
         return [unit] if unit in self.devices and 0 < function < REFUSED else []

@@ -26,7 +26,7 @@ def parse_address(text: str, *, listen_any: bool) -> Address:
     if host in ("", "localhost"):
         host = LOOPBACK  # one address: port 0 would be two ports on the two that "localhost" has
     if not colon or not number.isdecimal() or int(number) > 65535:
-        raise Misuse(f"{text!r} is no address: expected HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:5020")
+        raise Misuse(f"{text!r} is not an address: expected HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:5020")
     if not listen_any and not _is_loopback(host):
         raise Misuse(
             f"{host} is not a loopback address: the protocols served here have no authentication, whoever reaches the port "

@@ -42,8 +42,8 @@ def read_world(name: str, text: str, seed: int | None = None, overrides: Overrid
 
 
 def describe(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
-    """As `read_world`, but raises `WorldError` only for what is no TOML. What is wrong is in ``text`` of the result, for more may
-    be found when the world is built."""
+    """As `read_world`, but raises `WorldError` only for text that is not TOML. Other errors are kept in ``text`` of the result,
+    because building the world may find more."""
     toml = TomlText(name, text, tuple(KINDS))
     data = toml.data
     override(data, overrides)

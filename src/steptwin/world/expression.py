@@ -199,7 +199,7 @@ class SignalCondition:
     __slots__ = ("_comparisons", "_crossings", "_node", "_signals", "text")
 
     def __init__(self, text: str, signals: Signals) -> None:
-        """Raises `Misuse` for text that is no condition, and where two signals are compared that change between events."""
+        """Raises `Misuse` for text that is not a condition, and where two signals are compared that change between events."""
         self.text = text
         self._node = parse(text)
         self._signals = {name: signals(name) for name in names(self._node)}

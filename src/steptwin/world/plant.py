@@ -152,7 +152,7 @@ class Plant:
         return Unknown(name, f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
 
     def condition(self, text: str) -> SignalCondition:
-        """Raises `Misuse` for what is no condition, and for unknown signals."""
+        """Raises `Misuse` for what is not a condition, and for unknown signals."""
         found = self._conditions.get(text)
         if found is None:
             if len(self._conditions) >= MOST_REMEMBERED:

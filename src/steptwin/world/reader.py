@@ -48,7 +48,7 @@ class TomlText:
     """A TOML text that knows where its keys are, and collects what is wrong with them."""
 
     def __init__(self, name: str, text: str, controllers: Sequence[str] = ()) -> None:
-        """``controllers`` are the tables that describe one. Raises `WorldError` for a text that is no TOML."""
+        """``controllers`` are the tables that describe one. Raises `WorldError` for a text that is not TOML."""
         self.source = SourceText(name, text)
         self.controllers = tuple(controllers)
         self.findings: list[Diagnostic] = []
@@ -72,10 +72,10 @@ class TomlText:
                 lines = text.splitlines(keepends=True)
                 start = min(sum(map(len, lines[: int(place[1]) - 1])) + int(place[2]) - 1, len(text))
             message = str(error).split(" (at ")[0]
-            self.wrong_at(Span(start, min(start + 1, len(text))), "D001", f"this is no TOML: {message}")
+            self.wrong_at(Span(start, min(start + 1, len(text))), "D001", f"this is not TOML: {message}")
             raise self.error() from None
         except (RecursionError, ValueError):
-            self.wrong_at(Span(0, 0), "D001", "this is no TOML of a world: it is nested too deeply, or a number is too long")
+            self.wrong_at(Span(0, 0), "D001", "this is not TOML of a world: it is nested too deeply, or a number is too long")
             raise self.error() from None
         self._check_numbers((), self.data)
 
@@ -277,7 +277,7 @@ _NAME = re.compile(r"[A-Za-z_][\w-]*\Z", re.ASCII)
 
 def name_value(value: Any) -> str:
     if not isinstance(value, str) or not _NAME.match(value):
-        raise Misuse(f"{value!r} is no name: expected a letter from A to Z, then letters, digits, '-' and '_'")
+        raise Misuse(f"{value!r} is not a name: expected a letter from A to Z, then letters, digits, '-' and '_'")
     return value
 
 

@@ -112,7 +112,7 @@ class Script:
         self.name = name
         self.make = make
         self.is_outside = is_outside
-        """Whether it is no part of the description: what it does comes from outside."""
+        """Whether it is not part of the description: what it does comes from outside."""
         self._sent = SentValues()
         self._steps = make()
         self.waiting: ScriptWait | None = None

@@ -352,7 +352,7 @@ def _characters(value: Any) -> bytes:
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError as error:
-        raise Misuse(f"{value!r}: {value[error.start]!r} is no character of a line, which has 8 bits for each") from None
+        raise Misuse(f"{value!r}: {value[error.start]!r} is not a character of a line, which has 8 bits for each") from None
 
 
 def _turn(axis: tuple[str, int], counts: int) -> Turn:

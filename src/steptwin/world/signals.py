@@ -40,7 +40,7 @@ class SignalOf:
     versions: Callable[[], object] | None = None
     unit: str = ""
     is_kept: bool = False
-    """Whether it may change by a request that is no event of its kernel."""
+    """Whether it may change by a request that is not an event of its kernel."""
     check: Callable[[], None] = lambda: None
     """Raises `Misuse` where no condition can be on it: it changes between events at moments that are not known."""
 

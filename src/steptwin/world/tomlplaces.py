@@ -2,7 +2,7 @@
 
 `tomllib` reads TOML and reports what is wrong with it, but keeps no places; no maintained library for Python does. This finds
 them by the same grammar without evaluating it: strings, comments and brackets; all else is left to `tomllib`. In a
-text that is no TOML it stops where it does not understand more.
+text that is not TOML it stops where it does not understand more.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def find_places(text: str) -> dict[Path, Span]:
 
 
 class _Lost(Exception):
-    """What comes next is no TOML."""
+    """What comes next is not TOML."""
 
 
 class _Finder:
@@ -137,7 +137,7 @@ class _Finder:
             if found is None:
                 raise _Lost
             if len(found[0]) > LONGEST_SCALAR:
-                message = f"a value of {len(found[0])} characters that is no text: permitted are {LONGEST_SCALAR}"
+                message = f"a value of {len(found[0])} characters that is not text: permitted are {LONGEST_SCALAR}"
                 raise TooMuch(Span(found.start(), found.start() + LONGEST_SCALAR), message)
             self.at = found.end()
 

@@ -42,7 +42,7 @@ class TraceRecord(NamedTuple):
     subject: str
     value: object
     facts: tuple[Fact, ...] = ()
-    """The content of the event's text as fields, for programs. It is no part of the digest, which has the text."""
+    """The content of the event's text as fields, for programs. It is not part of the digest, which has the text."""
 
 
 Recorder: TypeAlias = Callable[[TraceRecord], None]

@@ -218,7 +218,7 @@ def test_ranges_are_in_units() -> None:
         mic.axis(1).move_velocity(1e6)
     with pytest.raises(Misuse, match=r"M1: position 3e\+07 mm is outside"):
         mic.axis(1).move_to(3e7)
-    with pytest.raises(Misuse, match="M1: nan mm is no position"):
+    with pytest.raises(Misuse, match="M1: nan mm is not a position"):
         mic.axis(1).move_to(math.nan)
     with pytest.raises(Misuse, match="homing of M1 at 0 mm/s: the sign of the velocity chooses the switch"):
         mic.axis(1).home(0.0)
@@ -296,7 +296,7 @@ def test_a_ramp_that_no_axis_has_is_refused_before_it_is_sent() -> None:
     wire, mic = ready()
     wire.sent.clear()
     for velocity in (641.0, 1e30, float("nan")):
-        with pytest.raises(Misuse, match=r"^M1: (velocity .* mm/s is outside|nan mm/s is no velocity)"):
+        with pytest.raises(Misuse, match=r"^M1: (velocity .* mm/s is outside|nan mm/s is not a velocity)"):
             mic.axis(1).set_ramp(velocity=velocity)
     assert wire.sent == []
     mic.axis(1).set_ramp(velocity=640.0)

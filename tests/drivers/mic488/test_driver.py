@@ -226,7 +226,7 @@ def test_registers_by_name() -> None:
         ("USER_REGISTER", 1, r"choose one of USER_REGISTER\[0\] to"),
         ("USER_REGISTER[1]", 70000, "permitted 0…65535"),
         ("M1_EN[2]", 1, "M1_EN is one value of type BIT"),
-        ("?", 1, "is no name of a value"),
+        ("?", 1, "is not a name of a value"),
     ],
 )
 def test_what_cannot_be_written_is_refused_before_it_is_sent(name: str, value: float, text: str) -> None:
@@ -364,7 +364,7 @@ def test_a_data_type_that_no_mic488_has_is_told() -> None:
         wire.inject(rtu.encode_frame(1, bytes((3, 2 * count, 0, 7, *bytes(2 * count - 2)))), after=wire.latency)
 
     wire.before_each = reply
-    with pytest.raises(NotReady, match="memory: unit 1 reads DATA_TYPE = 7, which is no value of a MIC488"):
+    with pytest.raises(NotReady, match="memory: unit 1 reads DATA_TYPE = 7, which is not a value of a MIC488"):
         driver(wire)
 
 

@@ -154,7 +154,7 @@ class AsyncChip:
 
     def _counter_of(self, position: float) -> int:
         if not isfinite(position):
-            raise Misuse(f"{position} {self.unit} is no position")
+            raise Misuse(f"{position} {self.unit} is not a position")
         counter = self._on_grid(position, self.origin_u)
         if not 0 <= counter <= LARGEST:
             least, most = self._shown(0), self._shown(LARGEST)

@@ -22,7 +22,7 @@ from steptwin.m1486.variants import Store
 from steptwin.machine import SECOND
 
 MARK = "u15"
-"""The last command of a block: uploads the driver interface, a byte that is no type letter."""
+"""The last command of a block: uploads the driver interface, a byte that is not a type letter."""
 _TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
 """Commands that may be typed alone: they move nothing, lead nowhere and are not answered."""
 
@@ -56,7 +56,7 @@ class AsyncM1486(AsyncChip):
     async def move_by(self, distance: float) -> None:
         """Begin to move by a distance, rounded to a microstep. Errors as `move_to`."""
         if not isfinite(distance):
-            raise Misuse(f"{distance} {self.unit} is no distance")
+            raise Misuse(f"{distance} {self.unit} is not a distance")
         distance_u = self._on_grid(distance, 0)
         if abs(distance_u) > LARGEST:
             raise Misuse(f"distance {distance:g} {self.unit} is outside ±{LARGEST / self.scale_u:g} {self.unit}")
@@ -182,7 +182,7 @@ class AsyncM1486(AsyncChip):
         """A command as `command` types it. Raises `Misuse` for what it does not type."""
         typed = self._unit.checked(text)
         if typed[0] not in _TYPED:
-            raise Misuse(f"{text!r} is no command to type alone: motions, files and questions have methods of their own")
+            raise Misuse(f"{text!r} is not a command to type alone: motions, files and questions have methods of their own")
         return typed
 
     def _learn(self, typed: str) -> None:

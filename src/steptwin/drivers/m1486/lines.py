@@ -36,7 +36,7 @@ def talking(
 
 
 def in_words(data: bytes) -> str:
-    """``f12800 CR`` and the like; what is no character as it is."""
+    """``f12800 CR`` and the like; what is not a character as it is."""
     return "".join(" CR " if byte == 0x0D else chr(byte) if 0x20 <= byte < 0x7F else f" {byte:02X}H " for byte in data).strip()
 
 

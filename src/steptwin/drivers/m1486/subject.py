@@ -57,7 +57,7 @@ class M1486Part:
         read only into the internal variable, which a program may need: they are unknown."""
         for point in points:
             if point.upper() not in self._units:
-                raise Misuse(f"{point!r} is no point of an M1486: there are {', '.join(self._paths)}")
+                raise Misuse(f"{point!r} is not a point of an M1486: there are {', '.join(self._paths)}")
         return {point: (await self._value(point.upper()), self._units[point.upper()]) for point in points}
 
     async def _value(self, path: str) -> float | None:

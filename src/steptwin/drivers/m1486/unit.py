@@ -300,7 +300,7 @@ class ChipUnit:
         line, found = parse_line(text)
         command = line.command
         if command is None:
-            raise Misuse(f"{text!r} is no command{f': {found[0].message}' if found else ''}")
+            raise Misuse(f"{text!r} is not a command{f': {found[0].message}' if found else ''}")
         why = out_of_range(command, self.variant)
         if why is not None:
             raise Misuse(why)

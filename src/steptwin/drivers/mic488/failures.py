@@ -34,7 +34,7 @@ class NotReady(Refusal):
 
 
 class NoMic488(Refusal):
-    """The device that answers is no MIC488."""
+    """The device that answers is not a MIC488."""
 
 
 class MoveFailed(Refusal):

@@ -26,7 +26,7 @@ read. 1.40 has the addresses of 1.70, and no read tells them apart."""
 
 
 class Found(NamedTuple):
-    """A unit that answers. ``firmware`` is None when it is no MIC488."""
+    """A unit that answers. ``firmware`` is None when it is not a MIC488."""
 
     unit: int
     firmware: str | None

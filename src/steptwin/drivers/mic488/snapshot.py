@@ -44,7 +44,8 @@ class Mic488Snapshot:
 
     @classmethod
     def from_json(cls, text: str) -> Mic488Snapshot:
-        """Raises `Misuse` for what is no snapshot. Whether a controller takes its values is checked before they are put back."""
+        """The snapshot in a JSON text. Raises `Misuse` for other text. Values are checked later, when they are written to a
+        controller."""
         try:
             data: dict[str, Any] = json.loads(text)
             if data["format"] != FORMAT:
@@ -55,7 +56,7 @@ class Mic488Snapshot:
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             if isinstance(error, Misuse):
                 raise
-            raise Misuse(f"this is no snapshot of a MIC488 ({type(error).__name__}: {error})") from None
+            raise Misuse(f"this is not a snapshot of a MIC488 ({type(error).__name__}: {error})") from None
 
 
 def _checked(name: str, value: Any, kind: Any) -> Any:

@@ -264,7 +264,7 @@ class Unit:
         values = self._control_block.values(words(answer), DataType.REAL)
         found = [int(values[item]) for item in self._control_items]
         if found[0] not in (DataType.REAL, DataType.DINT):
-            raise NotReady(f"{self.place}: unit {self.number} reads DATA_TYPE = {found[0]}, which is no value of a MIC488")
+            raise NotReady(f"{self.place}: unit {self.number} reads DATA_TYPE = {found[0]}, which is not a value of a MIC488")
         status = found[3] if self._has_status else None
         control = Control(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
         self.wording.data_type = control.data_type

@@ -153,7 +153,7 @@ def _record(data: dict[str, Any]) -> TraceRecord:
         raise Misuse(f"no kind of record {shown(kind)}: kinds are {', '.join(KINDS)}")
     value = _from_json(data["value"])
     if not _is_value(kind, value):
-        raise Misuse(f"{shown(value)} is no value of a record of kind {kind!r}")
+        raise Misuse(f"{shown(value)} is not a value of a record of kind {kind!r}")
     time = fitting("time_ns", data["time_ns"], int)
     if not 0 <= time <= LATEST_NS:
         raise Misuse(f"time_ns is {time}: permitted are 0 to {LATEST_NS}")

@@ -112,7 +112,7 @@ class M1486Analysis(Analysis):
         if symbol.kind is not SymbolKind.LABEL:
             return f"{symbol.text} is fixed: only labels have numbers of their own"
         if not (text.isascii() and text.isdecimal() and len(text) < 9) or find("J", int(text), self._variant) is None:
-            return f"{text!r} is no label: permitted are 1 to {self._variant.labels} on {self._variant.title}"
+            return f"{text!r} is not a label: permitted are 1 to {self._variant.labels} on {self._variant.title}"
         chip = symbol.key.rpartition(":")[0]
         key = f"{chip}:{int(text)}" if chip else str(int(text))
         if key != symbol.key and any(use.symbol.key == key for use in self.uses if use.symbol.kind is SymbolKind.LABEL):

@@ -34,7 +34,7 @@ class Fault:
         value = self.get(name)
         if isinstance(value, int | float):
             return value
-        raise Misuse(f"fault {self.kind.name}: {name} = {value!r} is no number")
+        raise Misuse(f"fault {self.kind.name}: {name} = {value!r} is not a number")
 
     def whole(self, name: str) -> int | None:
         value = self.get(name)

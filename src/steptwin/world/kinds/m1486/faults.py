@@ -27,7 +27,7 @@ class M1486Body:
         if kind.needs is Need.ENCODER:
             return "is an M1486, which reads no encoder"
         if kind.needs is Need.MODBUS_MASTER:
-            return "is an M1486, which is no Modbus master"
+            return "is an M1486, which is not a Modbus master"
         if kind.occasion is Occasion.SAVE and self._chip.variant.store is not Store.EEPROM:
             return "saves nothing: it has no memory that survives power-off"
         return None

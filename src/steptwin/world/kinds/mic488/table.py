@@ -72,7 +72,7 @@ def banks_value(value: Any) -> tuple[tuple[int, str], ...]:
         raise Misuse(f"{value!r}: expected a file, a list of files, or files by bank such as {{ 3 = 'file' }}")
     for bank in value:
         if not (bank.isascii() and bank.isdecimal() and len(bank) < 4) or (len(bank) > 1 and bank[0] == "0"):
-            raise Misuse(f"{bank!r} is no bank: expected a number from 0 on")
+            raise Misuse(f"{bank!r} is not a bank: expected a number from 0 on")
     return tuple(sorted((int(bank), text_value(name)) for bank, name in value.items()))
 
 
@@ -128,7 +128,7 @@ def _configured(row: ConfigKey) -> Callable[[Any], Any]:
         number = value
         if isinstance(value, str):
             if value.upper() not in words:
-                raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is no number")
+                raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is not a number")
             number = words[value.upper()]
         if isinstance(number, bool) or not isinstance(number, int | float) or not row.permits(number):
             raise Misuse(f"{value!r}: permitted are {permitted}" if words else f"{value!r} is not permitted")
