@@ -339,5 +339,5 @@ def test_recording_and_comparing(twin: Any, shell: Shell, tmp_path: Path) -> Non
 def test_what_cannot_be_downloaded(shell: Shell) -> None:
     shell("send", "machine.prg")
     assert shell.code == 1
-    assert "documented nowhere" in shell.errors
+    assert "protocol of the MIC488 is not documented" in shell.errors
     assert "steptwin build" in shell.errors

@@ -50,7 +50,7 @@ def test_a_refusal_is_a_result() -> None:
     ("line", "text"),
     [
         ("jump", "expected get NAME"),
-        ("get", "'get': no name"),
+        ("get", "'get': the name of a register"),
         ("get M1_STOP", "M1_STOP can only be written"),
         ("set M1_ACC", "expected set NAME=VALUE"),
         ("set M1_ACC=x", "'set M1_ACC=x': 'x' is not a number"),
@@ -101,7 +101,7 @@ def test_two_recordings() -> None:
         "step 4, get M1_POS_ACT M1_STATUS: M1_POS_ACT: 8.0 | nothing",
     ]
     assert len(differences(one, other, tolerance=0.011)) == 2
-    with pytest.raises(Misuse, match="recordings of different sessions"):
+    with pytest.raises(Misuse, match="recordings are of different sessions"):
         differences(one, one[1:])
 
 

@@ -73,7 +73,7 @@ def test_what_is_looked_at_before_it_is_typed() -> None:
     assert str(command_of("f 12800 ; forward", None)) == "F12800"
     assert command_of("; a comment", None) is None
     assert str(command_of("@80", None)) == "@80"
-    for text, kind, why in (("@80", "A", "out of range"), ("v20001", None, "out of range"), ("hello", None, "no command")):
+    for text, kind, why in (("@80", "A", "out of range"), ("v20001", None, "out of range"), ("hello", None, "not a command")):
         with pytest.raises(Misuse, match=why):
             command_of(text, None if kind is None else variant(kind))
 

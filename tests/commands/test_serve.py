@@ -146,4 +146,4 @@ def test_a_printed_description_tells_of_files_elsewhere(
     serve_mic488(ServeMic488(config=Path("../machine.cfg"), tcp="127.0.0.1:0", print_world=True))
     shown = capsys.readouterr()
     assert tomllib.loads(shown.out)["mic488"][0]["config"] == "../machine.cfg"
-    assert shown.err.startswith("../machine.cfg does not lie in this folder: --save-world FILE copies it")
+    assert shown.err.startswith("../machine.cfg is outside this folder: --save-world FILE copies it")

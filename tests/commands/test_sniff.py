@@ -151,7 +151,7 @@ def test_listening_only() -> None:
         tap = asyncio.create_task(sniff(place, decoder, ready=ready))
         await enough(frames, 3)
         os.close(master)
-        with pytest.raises(LineFailure, match="is gone"):
+        with pytest.raises(LineFailure, match="was lost"):
             await tap
 
     asyncio.run(main())
@@ -185,7 +185,7 @@ def test_standing_in_a_line_with_a_pty(tmp_path: Path) -> None:
 
 def test_a_connection_cannot_be_listened_to() -> None:
     place = parse_line_address("tcp://127.0.0.1:1", 38400)
-    with pytest.raises(Misuse, match="stand in it, --listen HOST:PORT"):
+    with pytest.raises(Misuse, match="use a relay, --listen HOST:PORT"):
         asyncio.run(sniff(place, ModbusDecoder(print, "1.70", tcp=True)))
 
 

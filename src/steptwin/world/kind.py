@@ -80,7 +80,8 @@ class Terminals:
         pins = {DIGITAL_INPUT: self.digital_inputs, ANALOG_INPUT: self.analog_inputs, OUTPUT: self.outputs}[kind]
         if name.pin not in pins:
             there = ", ".join(pins) or "none"
-            raise Misuse(f"{name} is no {kind}: {kind}s of {name.machine!r} are {there}")
+            article = "an" if kind[0] in "ao" else "a"
+            raise Misuse(f"{name} is not {article} {kind}: {kind}s of {name.machine!r} are {there}")
 
 
 class Service(NamedTuple):

@@ -210,7 +210,7 @@ class AsyncMic488Axis:
         is_velocity = kind in (MotionKind.VELOCITY, MotionKind.HOMING)
         unit = f"{self.unit}/s" if is_velocity else self.unit
         if not isfinite(value_u):
-            raise Misuse(f"M{self.number}: {value_u} {unit} is no {kind.value}")
+            raise Misuse(f"M{self.number}: {value_u} {unit} is not a {kind.value}")
         if gear is None:
             return
         least, most = (-MAX_SPEED_P, MAX_SPEED_P) if is_velocity else (DINT_MIN, DINT_MAX)
