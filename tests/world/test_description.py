@@ -388,7 +388,7 @@ def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None
         ("20", "D003: [axis.switch]: below: 'low': expected a number"),
         ("24", "D009: nothing is called 'nobody'"),
         ("26", "D009: good.IN99 is not a digital input: digital inputs of 'g"),
-        ("33", "D003: [button]: bounce: 'soon' is not a time: expected a number"),
+        ("33", "D003: [button]: bounce: 'soon' is not a time: expected a num"),
         ("41", "D003: [source]: kind: 'sinus': permitted are constant, ramp,"),
         ("46", "D003: [[fault]] (crc): nth = 0: permitted are whole numbers "),
         ("48", "D009: fault stall: axis = 9: permitted are 1 to 4"),
