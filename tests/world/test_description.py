@@ -393,7 +393,7 @@ def test_everything_is_told_in_one_round_and_nothing_that_only_follows() -> None
         ("46", "D003: [[fault]] (crc): nth = 0: permitted are whole numbers "),
         ("48", "D009: fault stall: axis = 9: permitted are 1 to 4"),
         ("59", "D003: [event]: when: 5: expected a text"),
-        ("61", "D003: [event.steps]: wait: 'soon' is not a time: expected a num"),
+        ("61", "D003: [event.steps]: wait: 'soon' is not a time: expected a "),
         ("64", "D009: step 4: firmware 1.70 has no register named 'M1_ENN'; "),
         ("64", "D009: step 4: firmware 1.70 has no register named 'M2_ENN'; "),
         ("66", "D009: step 6: no signal 'good.M1.stat' (did you mean 'M1.sta"),
