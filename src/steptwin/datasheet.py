@@ -54,6 +54,12 @@ class AxisDescription:
     """Of its positions; velocities are in it per second."""
     pulses_per_unit: float | None
     """None where it is not known: of a device without its configuration."""
+    positions: Limits | None = None
+    """To which it can be sent; None where that is not known, as below."""
+    distances: Limits | None = None
+    """By which it can be moved at once."""
+    velocities: Limits | None = None
+    """That it can be commanded to make, with their sign."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,8 +113,9 @@ class Argument:
     type: str
     unit: str = ""
     limits: Limits | None = None
-    values: tuple[int, ...] = ()
+    values: tuple[int | str, ...] = ()
     """All that is permitted, where it is no range."""
+    is_optional: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,7 +207,7 @@ def plain(value: Any) -> Any:
 def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
     """The data sheet in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `plain` does not give."""
     lists: dict[str, Any] = {
-        "axes": tuple(AxisDescription(**axis) for axis in data["axes"]),
+        "axes": tuple(map(_read_axis, data["axes"])),
         "pins": tuple(map(_read_pin, data["pins"])),
         "points": tuple(map(_read_point, data["points"])),
         "commands": tuple(map(_read_command, data["commands"])),
@@ -208,6 +215,11 @@ def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
         "details": tuple(Detail(one["name"], one["meaning"], FactType(one["type"]), one["unit"]) for one in data["details"]),
     }
     return Datasheet(**{**data, **lists})
+
+
+def _read_axis(data: Mapping[str, Any]) -> AxisDescription:
+    read: dict[str, Any] = {name: _read_limits(data[name]) for name in ("positions", "distances", "velocities")}
+    return AxisDescription(**{**data, **read})
 
 
 def _read_pin(data: Mapping[str, Any]) -> Pin:
@@ -227,11 +239,11 @@ def _read_point(data: Mapping[str, Any]) -> Point:
 
 
 def _read_command(data: Mapping[str, Any]) -> CommandDescription:
-    read: dict[str, Any] = {"arguments": tuple(map(_read_argument, data["arguments"])), "effect": PointEffect(data["effect"])}
+    read: dict[str, Any] = {"arguments": tuple(map(read_argument, data["arguments"])), "effect": PointEffect(data["effect"])}
     return CommandDescription(**{**data, **read})
 
 
-def _read_argument(data: Mapping[str, Any]) -> Argument:
+def read_argument(data: Mapping[str, Any]) -> Argument:
     read: dict[str, Any] = {"limits": _read_limits(data["limits"]), "values": tuple(data["values"])}
     return Argument(**{**data, **read})
 

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from world_rig import small
 
+from steptwin.datasheet import Limits
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import session_of
 from steptwin.files.world import World
@@ -95,6 +96,18 @@ def test_a_description_survives_json_and_names_points_that_can_be_read() -> None
         "table": ("enable", "move", "home", "jog", "stop", "program"),
         "drum": ("move", "jog", "stop"),
     }
+    takes = {(one.command, part.name, one.axis): one.arguments for part in description.machines for one in part.takes}
+    (velocity,) = takes["jog", "table", 2]
+    (axis,) = (axis for axis in description.machines[0].datasheet.axes if axis.number == 2)
+    assert axis.pulses_per_unit is not None
+    fastest = 64_000 / axis.pulses_per_unit
+    assert (velocity.unit, velocity.limits) == (f"{axis.unit}/s", Limits(-fastest, fastest))
+    to, by = takes["move", "drum", 1]
+    assert (to.limits, by.limits) == (Limits(0, 16_000_000), Limits(-16_000_000, 16_000_000))
+    assert (to.unit, by.is_optional) == ("microstep", True)
+    assert takes["program", "table", None][0].values == ("start", "pause", "stop")
+    assert (takes["stop", "table", None], takes["stop", "table", 4]) == ((), ())
+    assert ("home", "drum", 1) not in takes
     points = [point for part in (*description.machines, *description.axes) for point in part.points]
     assert len(points) > 150
     found = {reading.point: reading for reading in subject.read(*(point for point in points if "USER_REGISTER" not in point))}

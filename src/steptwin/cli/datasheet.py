@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from steptwin.cli.device import print_json, table
+from steptwin.cli.device import table
 from steptwin.cli.twin import Json, Twin, selected
 from steptwin.errors import Misuse
 
@@ -27,9 +27,11 @@ def datasheet(
     """Show what a controller offers: axes, pins, points with unit and range, commands, events."""
     found = _of_twin(twin, variant) if kind is None else _of_kind(kind, variant, twin)
     if json:
+        from json import dumps
+
         from steptwin.datasheet import plain
 
-        print_json(plain(found))
+        typer.echo(dumps(plain(found), ensure_ascii=False, indent=2))  # ranges are exact, not REAL
     else:
         typer.echo("\n\n".join(_sections(found)))
 

@@ -11,7 +11,7 @@ only a twin can do (pins, faults, time, power) is a `Refusal`. Events come from 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from typing import Any, Protocol, TypeAlias, get_args
+from typing import Any, Protocol, TypeAlias
 
 from steptwin.datasheet import Datasheet
 from steptwin.drivers.blocking import Blocking, blocking, finish
@@ -20,11 +20,11 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.machine import SECOND, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.subject import commands as command
-from steptwin.subject.commands import COMMANDS, Command, name_of, row_of
+from steptwin.subject.commands import COMMANDS, Command, row_of
 from steptwin.subject.contract import GOOD, UNKNOWN, Description, LinePart, MachinePart, Reading, Result
+from steptwin.subject.controls import controls_of
 from steptwin.subject.events import Numbering, Payload
 from steptwin.subject.following import Filter, Followers, Following, Taken
-from steptwin.world.control import ControllerCommand
 
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
@@ -92,8 +92,8 @@ class AsyncDeviceSubject:
 
     def _described(self) -> Description:
         place = self._line.place
-        controls = tuple(name_of(kind) for kind in self._actions if kind in get_args(ControllerCommand))
-        machine = MachinePart(self.name, self._device.datasheet, place, self._device.address, controls)
+        sheet = self._device.datasheet
+        machine = MachinePart(self.name, sheet, place, self._device.address, controls_of(sheet, self._actions))
         names = tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
         return Description(self.name, (machine,), lines=(LinePart(place, self._device.line_kind, None),), commands=names)
 

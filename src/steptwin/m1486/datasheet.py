@@ -19,6 +19,7 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec
 from steptwin.m1486.details import DETAILS
 from steptwin.m1486.events import EVENTS
+from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS
 from steptwin.m1486.points import POINTS, UNIT
 from steptwin.m1486.variants import Variant
@@ -27,7 +28,6 @@ MOTION_SECTION = "VII.2"
 STARTS = frozenset({"R", ")", "("})
 """Commands that start a motion; the others of their section set what the next one does."""
 ACTIVE_LOW = frozenset({"JOG", "LIMIT", "SD", "S&D", "DUAL", "BOOST"})
-AXES = (AxisDescription(number=1, name="M1", unit=UNIT, pulses_per_unit=1.0),)
 
 
 def datasheet(chip: M1486Chip) -> Datasheet:
@@ -40,12 +40,28 @@ def datasheet_of(variant: Variant) -> Datasheet:
         kind="m1486",
         title="M1486",
         variant=variant.name,
-        axes=AXES,
+        axes=(axis(variant, UNIT, 1.0),),
         pins=tuple(_pins()),
         points=tuple(POINTS.values()),
         commands=tuple(_command(spec, variant) for spec in TABLE),
         events=tuple(EVENTS.values()),
         details=tuple(row.detail for row in DETAILS),
+    )
+
+
+def axis(variant: Variant, unit: str, pulses_per_unit: float) -> AxisDescription:
+    """The axis in a unit of some minimum microsteps: positions of G, distances of F and B, velocities of V."""
+    numbers = {spec.key: spec.permitted(variant) for spec in TABLE}
+    fastest = numbers["V"][-1] * FULL_STEP * variant.clock / pulses_per_unit
+    farthest = numbers["F"][-1] / pulses_per_unit
+    return AxisDescription(
+        number=1,
+        name="M1",
+        unit=unit,
+        pulses_per_unit=pulses_per_unit,
+        positions=Limits(0, numbers["G"][-1] / pulses_per_unit),
+        distances=Limits(-farthest, farthest),
+        velocities=Limits(-fastest, fastest),
     )
 
 

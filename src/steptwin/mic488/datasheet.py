@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 from steptwin.datasheet import Argument, AxisDescription, CommandDescription, Datasheet, Limits, Pin, PinDirection, PointEffect
+from steptwin.mic488.axis_motion import MAX_SPEED_P
 from steptwin.mic488.core import ANALOG_PINS, ENABLE_PINS, INPUT_PINS, OUTPUT_PINS
 from steptwin.mic488.details import DETAILS
 from steptwin.mic488.device import Mic488Device
@@ -14,6 +16,7 @@ from steptwin.mic488.points import EFFECTS, limits, points, unit_of
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import AXES, register_map
 
+COORDINATES = 2**31
 MOST_KEPT = 64
 """Controllers of one firmware with the same units share a data sheet."""
 DEFAULT_SCALES = (("imp", 1.0),) * AXES
@@ -33,16 +36,22 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
         kind="mic488",
         title="MIC488",
         variant=registers.firmware.name,
-        axes=tuple(
-            AxisDescription(number=number, name=f"M{number}", unit=unit, pulses_per_unit=gear)
-            for number, (unit, gear) in enumerate(scales, start=1)
-        ),
+        axes=tuple(_axis(number, unit, gear) for number, (unit, gear) in enumerate(scales, start=1)),
         pins=tuple(_pins()),
         points=tuple(points(registers, units)),
         commands=tuple(_commands(registers, units)),
         events=tuple(EVENTS.values()),
         details=tuple(row.detail for row in DETAILS),
     )
+
+
+def _axis(number: int, unit: str, gear: float | None) -> AxisDescription:
+    """Coordinates are whole numbers of 32 bits with a sign, in pulses (MIC-7); a distance may wrap (MIC-42)."""
+    axis = AxisDescription(number=number, name=f"M{number}", unit=unit, pulses_per_unit=gear)
+    if gear is None:
+        return axis
+    coordinates = Limits(-COORDINATES / gear, (COORDINATES - 1) / gear)
+    return replace(axis, positions=coordinates, velocities=Limits(-MAX_SPEED_P / gear, MAX_SPEED_P / gear))
 
 
 def _pins() -> Iterator[Pin]:

@@ -198,7 +198,8 @@ class CommandRow:
 _MACHINE = Field("machine", TEXT, "The name of a machine.")
 _AXIS = Field("axis", whole(1, 64), "The number of an axis.")
 _NOTHING = "null"
-_UNITS = "units of the data sheet"
+UNITS = "units of the data sheet"
+"""Of fields that are in the unit of their axis."""
 
 
 _ROWS = (
@@ -259,7 +260,7 @@ _ROWS = (
         do.Write,
         "Registers of a MIC488 take values, as a master writes them.",
         _NOTHING,
-        (Field("values", LEVELS, "Registers by MACHINE.REGISTER.", unit=_UNITS),),
+        (Field("values", LEVELS, "Registers by MACHINE.REGISTER.", unit=UNITS),),
     ),
     CommandRow(
         "send",
@@ -323,8 +324,8 @@ _ROWS = (
         (
             _MACHINE,
             _AXIS,
-            Field("to", number(), "To this position.", None, _UNITS),
-            Field("by", number(), "By this distance.", None, _UNITS),
+            Field("to", number(), "To this position.", None, UNITS),
+            Field("by", number(), "By this distance.", None, UNITS),
         ),
     ),
     CommandRow(
@@ -332,14 +333,14 @@ _ROWS = (
         Home,
         "Begin to home.",
         _NOTHING,
-        (_MACHINE, _AXIS, Field("velocity", number(), "Its sign chooses the switch.", unit=f"{_UNITS}/s")),
+        (_MACHINE, _AXIS, Field("velocity", number(), "Its sign chooses the switch.", unit=f"{UNITS}/s")),
     ),
     CommandRow(
         "jog",
         Jog,
         "Begin to move without end.",
         _NOTHING,
-        (_MACHINE, _AXIS, Field("velocity", number(), "Velocity with its sign.", unit=f"{_UNITS}/s")),
+        (_MACHINE, _AXIS, Field("velocity", number(), "Velocity with its sign.", unit=f"{UNITS}/s")),
     ),
     CommandRow(
         "stop",

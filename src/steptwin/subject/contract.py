@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple, Protocol
 
-from steptwin.datasheet import Datasheet, plain, read_datasheet
+from steptwin.datasheet import Datasheet, plain, read_argument, read_datasheet
 from steptwin.machine import Nanos
 from steptwin.subject.commands import VERSION, Command
+from steptwin.subject.controls import ControlDescription
 from steptwin.subject.following import Filter, Following
 
 GOOD, UNKNOWN = "good", "unknown"
@@ -45,8 +46,13 @@ class MachinePart:
     line: str | None = None
     unit: int | None = None
     """Slave address, or address of a chip."""
-    controls: tuple[str, ...] = ()
-    """Names of those commands for controllers (`steptwin.world.control`) that it takes: ``enable``, ``jog``."""
+    takes: tuple[ControlDescription, ...] = ()
+    """The commands for controllers that it takes, for each axis, with their arguments."""
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """The names of these commands: ``enable``, ``jog``."""
+        return tuple(dict.fromkeys(one.command for one in self.takes))
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -100,6 +106,7 @@ class Description:
                 "line": part.line,
                 "unit": part.unit,
                 "controls": part.controls,
+                "takes": plain(part.takes),
             }
             for part in self.machines
         ]
@@ -116,7 +123,7 @@ def read_description(data: Mapping[str, Any]) -> Description:
     """The description in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
     sheets = [read_datasheet(sheet) for sheet in data["datasheets"]]
     machines = tuple(
-        MachinePart(one["name"], sheets[one["datasheet"]], one["line"], one["unit"], tuple(one["controls"]))
+        MachinePart(one["name"], sheets[one["datasheet"]], one["line"], one["unit"], tuple(map(_read_control, one["takes"])))
         for one in data["machines"]
     )
     axes = tuple(
@@ -126,6 +133,10 @@ def read_description(data: Mapping[str, Any]) -> Description:
     return Description(
         data["name"], machines, axes, tuple(data["buttons"]), lines, tuple(data["commands"]), version=data["version"]
     )
+
+
+def _read_control(data: Mapping[str, Any]) -> ControlDescription:
+    return ControlDescription(data["command"], data["axis"], tuple(map(read_argument, data["arguments"])))
 
 
 class Subject(Protocol):

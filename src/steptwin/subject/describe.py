@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from steptwin.subject.commands import COMMANDS, name_of
+from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import Description, LinePart, MachinePart, MechanicsPart
+from steptwin.subject.controls import controls_of
 from steptwin.world.plant import Plant
 from steptwin.world.signals import MECHANICS
 
@@ -24,7 +25,8 @@ def _machine(world: Plant, name: str) -> MachinePart:
     on = world.plan.line_of.get(name)
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
-    return MachinePart(name, kind.datasheet(world.machines[name]), line, unit, tuple(map(name_of, kind.control)))
+    sheet = kind.datasheet(world.machines[name])
+    return MachinePart(name, sheet, line, unit, controls_of(sheet, kind.control))
 
 
 def _mechanics(world: Plant, name: str) -> MechanicsPart:

@@ -11,6 +11,7 @@ from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import Datasheet
 from steptwin.subject.commands import COMMANDS, VERSION, CommandRow
 from steptwin.subject.contract import Description
+from steptwin.subject.controls import ControlDescription
 from steptwin.subject.events import KINDS
 from steptwin.subject.fields import LONGEST_ID, Field
 from steptwin.subject.shapes import members, shape
@@ -167,6 +168,11 @@ def _description() -> dict[str, object]:
                 "type": "array",
                 "items": _TEXT,
                 "description": "Which of enable, move, home, jog, stop, program it takes.",
+            },
+            "takes": {
+                "type": "array",
+                "items": shape(ControlDescription),
+                "description": "The same for each axis, and with axis null for the whole controller, with their arguments.",
             },
         }
     )

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
 
-from steptwin.datasheet import AxisDescription, Datasheet
+from steptwin.datasheet import Datasheet
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.failures import Busy
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.subject import Action, Value
 from steptwin.errors import Misuse, Refusal
-from steptwin.m1486.datasheet import datasheet_of
+from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.subject import commands as command
 from steptwin.subject.events import Payload, SamplePayload, StatusPayload
@@ -33,8 +33,7 @@ class M1486Part:
 
     def __init__(self, chip: AsyncM1486) -> None:
         self._chip = chip
-        axis = AxisDescription(number=AXIS, name=f"M{AXIS}", unit=chip.unit, pulses_per_unit=chip.scale_u)
-        self.datasheet: Datasheet = replace(datasheet_of(chip.variant), axes=(axis,))
+        self.datasheet: Datasheet = replace(datasheet_of(chip.variant), axes=(axis(chip.variant, chip.unit, chip.scale_u),))
         self._paths = [*(point.path for point in self.datasheet.points), *(pin.name for pin in self.datasheet.pins)]
         self._units = {point.path.upper(): point.unit for point in self.datasheet.points}
         self._units |= {pin.name.upper(): pin.unit for pin in self.datasheet.pins}
