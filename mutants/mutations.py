@@ -2,7 +2,8 @@
 
 Mutated are comparisons, arithmetic and logical operators, numbers, truth values, statements (left out) and arguments (left out or
 swapped), in functions as well as in tables and defaults. Not mutated: texts, annotations, decorators, imports, and what changes
-nothing: the order in max() and min(), the ``strict`` of zip(). A product becomes a sum: a quotient by a sign would be the same.
+nothing: the order in max() and min(), the ``strict`` of zip(), ``return None`` at the end of a function. A product becomes a sum:
+a quotient by a sign would be the same.
 """
 
 from __future__ import annotations
@@ -98,7 +99,10 @@ class _Finder:
         for name, value in ast.iter_fields(node):
             if name in {"annotation", "returns", "decorator_list", "type_params"} or getattr(node, "arg", None) == "strict":
                 continue
-            for child in value if isinstance(value, list) else [value]:
+            children = value if isinstance(value, list) else [value]
+            if isinstance(node, ast.FunctionDef) and name == "body" and _returns_none(children[-1]):
+                children = children[:-1]
+            for child in children:
                 if isinstance(child, ast.AST) and not isinstance(child, ast.JoinedStr | ast.Import | ast.ImportFrom):
                     yield child
 
@@ -177,6 +181,10 @@ class _Finder:
     def _offset(self, line: int, column: int) -> int:
         """ast counts the bytes of UTF-8."""
         return self._starts[line - 1] + len(self._lines[line - 1].encode()[:column].decode())
+
+
+def _returns_none(statement: ast.AST) -> bool:
+    return isinstance(statement, ast.Return) and isinstance(statement.value, ast.Constant) and statement.value.value is None
 
 
 def _comparison_sign(operator: ast.cmpop) -> str:

@@ -41,6 +41,12 @@ def changed(source: str, kind: str) -> list[str]:
         ("max(a, b)", "argument", []),
         ("zip(a, a, strict=True)", "argument", []),
         ("zip(a, a, strict=True)", "truth value", []),
+        ("def f():\n  return None", "statement", []),
+        (
+            "def f():\n  if a: return None\n  return 1",
+            "statement",
+            ["def f():\n  if a: pass\n  return 1", "def f():\n  if a: return None\n  pass"],
+        ),
         ("x = True", "truth value", ["x = False"]),
         ("x = 0x10", "number", ["x = (0x10 + 1)"]),
         ("x: Literal[1] = y", "number", []),

@@ -259,6 +259,23 @@ def test_what_follows_a_lone_dot_is_looked_at() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (":5\n<3\nf", []),  # what a register holds is not known
+        (":5\nf", ["M111"]),
+        ("b64\nr\n\\\ng64", []),  # a reset zeroes the counter
+        ("b64\nr\n=16000064\ng64", ["M110", "M221"]),  # what is refused does not
+        ("p8000\nv8000\nr", ["M212"]),
+        ("p8001\nv8000\nr", []),
+        ("p7000\nv8000\nr", []),
+        ("j1\n\\\n@1", ["M120", "M206"]),  # a reset forgets what comes later, too
+    ],
+)
+def test_what_commands_leave_behind(text: str, found: list[str]) -> None:
+    assert codes(text, B) == found
+
+
+@pytest.mark.parametrize(
     ("text", "message", "hint"),
     [
         ("?10", "? 10 is out of range", "no line: the count in 10 is 0; "),

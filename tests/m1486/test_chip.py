@@ -302,6 +302,29 @@ def test_rst_that_was_high_before_does_not_end_shutdown() -> None:
     assert not bench.chip.is_shut_down
 
 
+def test_the_baud_rate_is_read_when_shutdown_ends() -> None:
+    """Chapter II, Serial interface: 00 300, 01 1200, 10 2400, 11 4800."""
+    bench = Bench("B", address=3, baud=4800)
+    bench.pin(SD=0)
+    bench.pin(BR0=0)
+    bench.pin(SD=1, RST=1)
+    assert bench.chip.uart.baud == 4800
+    bench.run(ms=10)
+    assert bench.chip.uart.baud == 2400
+
+
+def test_a_program_that_has_been_overwritten_does_not_begin_again() -> None:
+    """M-23, M-12: the memory of an A holds 54 commands of 16 bits."""
+    bench = Bench("A", address=3)
+    bench.do(*["u20"] * 54)
+    bench.pin(RST=1)
+    assert bench.finish() == b"\x41" * 54
+    bench.pin(RST=0)
+    bench.do("u20")
+    bench.pin(RST=1)
+    assert bench.finish() == b""
+
+
 def test_shutdown_stops_the_motor() -> None:
     bench = Bench("B")
     bench.file("f640000", "r")

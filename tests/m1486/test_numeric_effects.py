@@ -58,6 +58,16 @@ def test_the_manuals_compare() -> None:
 # ---------------------------------------------------------------------- registers
 
 
+def test_the_carry_is_set_from_2_to_the_24_on() -> None:
+    bench = Bench()
+    bench.do(":16777214", "+1")
+    assert (bench.variable, bench.chip.unit.carry) == (2**24 - 1, False)
+    bench.do("+1")
+    assert (bench.variable, bench.chip.unit.carry) == (0, True)
+    bench.do(":5", "-5")
+    assert (bench.variable, bench.chip.unit.carry) == (0, False)
+
+
 @pytest.mark.parametrize("kind", ["A", "B", "C", "E1"])
 def test_registers_1_to_8_keep_16_bits(kind: str) -> None:
     bench = Bench(kind)

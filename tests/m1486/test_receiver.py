@@ -178,6 +178,18 @@ def test_function_41_sends_every_character_back() -> None:
     assert bench.raw(b"u20\r") == b"\x42"
 
 
+def test_function_41_sends_empty_lines_and_the_end_of_lines_that_are_not_read_back() -> None:
+    bench = Bench("A")
+    bench.do("t41")
+    assert bench.raw(b"\r;c\r") == b"\r;c\r"
+    bench.do("f640000")
+    bench.send("r")
+    bench.run(ms=50)
+    answers = bench.raw(b"w" * 14)
+    assert answers[-1:] == b"\x5e"
+    assert bench.raw(b"\r") == b"\r"
+
+
 def test_function_57_reports_three_free_bytes_and_an_empty_buffer() -> None:
     bench = Bench("A")
     assert bench.do("t57") == b""

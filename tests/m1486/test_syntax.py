@@ -151,11 +151,14 @@ def test_a_line_by_itself_has_spans_of_the_text_it_is_part_of() -> None:
         ("F12y", [("M102", "y")]),
         ("W2.5", [("M102", "2.5")]),
         ("W2,5", [("M102", "2,5")]),
+        ("W.5", [("M103", ".5"), ("M104", "5")]),
+        ("Wlong", [("M102", "long")]),
         ("F-640", [("M102", "-640")]),
         ("Fl2800", [("M102", "l2800")]),
         ("f1O", [("M102", "O")]),
         ("F" + "1" * 5000, [("M102", "1" * 5000)]),
         ("F640 R", [("M103", "R")]),
+        ("F6+4", [("M103", "+4")]),
         ("[ ]", [("M103", "]")]),
         ("R5", [("M104", "5")]),
         ("G+5", [("M104", "5")]),
@@ -176,11 +179,27 @@ def test_what_cannot_be_read_is_pointed_at(text: str, found: list[tuple[str, str
 
 
 @pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("Wlong", "long is no number", "a number, or the end of the line for the internal variable"),
+        ("@one", "one is no number", "a number"),
+        ("F-640", "-640 has a sign", "F moves in positive, B in negative direction"),
+        ("V-640", "-640 has a sign", "numbers have no sign"),
+        ("F" + "1" * 5000, "a number of 5000 digits", "no number has more than 8"),
+    ],
+)
+def test_what_is_no_number_is_explained(text: str, message: str, hint: str) -> None:
+    (found,) = parse(text).diagnostics
+    assert (found.message, found.hint) == (message, hint)
+
+
+@pytest.mark.parametrize(
     ("text", "mended"),
     [
         ("i116", "i1L6"),  # printed so in the manual's example of Subroutine
         ("Fl28O0", "F12800"),
         ("120", "L20"),
+        ("12", "L2"),
         ("’3", "'3"),
         ("×2", "*2"),
         ("R5", "R"),
