@@ -253,6 +253,23 @@ export type Description = {
     unit: number | null;
     /** Which of enable, move, home, jog, stop, program it takes. */
     controls: string[];
+    /** The same for each axis, and with axis null for the whole controller, with their arguments. */
+    takes: ({
+      command: string;
+      axis: number | null;
+      arguments: ({
+        name: string;
+        type: string;
+        unit: string;
+        limits: {
+          low: number | null;
+          high: number | null;
+          is_low_excluded: boolean;
+        } | null;
+        values: (number | string)[];
+        is_optional: boolean;
+      })[];
+    })[];
   })[];
   datasheets: ({
     kind: string;
@@ -263,6 +280,21 @@ export type Description = {
       name: string;
       unit: string;
       pulses_per_unit: number | null;
+      positions: {
+        low: number | null;
+        high: number | null;
+        is_low_excluded: boolean;
+      } | null;
+      distances: {
+        low: number | null;
+        high: number | null;
+        is_low_excluded: boolean;
+      } | null;
+      velocities: {
+        low: number | null;
+        high: number | null;
+        is_low_excluded: boolean;
+      } | null;
     })[];
     pins: ({
       name: string;
@@ -274,6 +306,7 @@ export type Description = {
         high: number | null;
         is_low_excluded: boolean;
       };
+      is_active_low: boolean;
     })[];
     points: ({
       path: string;
@@ -309,7 +342,8 @@ export type Description = {
           high: number | null;
           is_low_excluded: boolean;
         } | null;
-        values: number[];
+        values: (number | string)[];
+        is_optional: boolean;
       })[];
       effect: "none" | "parameter" | "acts" | "moves";
       source: string;
@@ -319,12 +353,55 @@ export type Description = {
       meaning: string;
       facts: ({
         name: string;
-        type: "whole number" | "number" | "true or false" | "text";
+        type: "whole number" | "number" | "true or false" | "text" | "whole numbers" | "whole numbers by name";
         unit: string;
         is_optional: boolean;
       })[];
     })[];
+    details: ({
+      name: string;
+      meaning: string;
+      type: "whole number" | "number" | "true or false" | "text" | "whole numbers" | "whole numbers by name";
+      unit: string;
+    })[];
   })[];
+};
+
+/** What is not known is null. The data sheet describes the details. */
+export type State = {
+  kind: string;
+  variant: string;
+  time_s: number | null;
+  status: {
+    code: number | null;
+    text: string;
+    level: "ok" | "warning" | "error";
+  };
+  program: {
+    state: "stopped" | "running" | "waiting" | "paused" | null;
+    text: string;
+    file: string | null;
+    line: number | null;
+    statement: string | null;
+    variables: Record<string, number>;
+  };
+  axes: ({
+    number: number;
+    name: string;
+    unit: string;
+    position: number | null;
+    velocity: number | null;
+    moving: boolean | null;
+    enabled: boolean | null;
+    encoder: number | null;
+    status: {
+      code: number | null;
+      text: string;
+      level: "ok" | "warning" | "error";
+    };
+  })[];
+  pins: Record<string, number | null>;
+  details: Record<string, boolean | number | string | number[] | Record<string, number> | null>;
 };
 
 /** What there is. Answer: version, name, machines with the numbers of their datasheets, axes, buttons, lines, commands. */
@@ -355,7 +432,7 @@ export type PinsRequest = {
   machine?: string | null;
 };
 
-/** Everything about a machine. Answer: an object by the kind of the machine. */
+/** The present state of a machine. Answer: the state, alike for all kinds. */
 export type StateRequest = {
   do: "state";
   /** Comes back with the answer. */
@@ -911,7 +988,7 @@ export type HelloMessage = {
     virtual: boolean;
     description: Description;
     /** By machine, as the answer to state; empty for a device. */
-    state: Record<string, Record<string, unknown>>;
+    state: Record<string, State>;
     /** As the answer to faults. */
     faults: Record<string, unknown>[];
     /** Present plans of all axes. */
