@@ -29,6 +29,7 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "state", "machine": "a"}, command.State("a")),
     ({"do": "encoders", "machine": "a"}, command.Encoders("a")),
     ({"do": "faults"}, command.ListFaults()),
+    ({"do": "fault_kinds"}, command.ListFaultKinds()),
     ({"do": "time"}, command.Time()),
     ({"do": "end_points"}, command.EndPoints()),
     (

@@ -29,6 +29,7 @@ from steptwin.wire.crc import with_crc
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes
 from steptwin.world.faults import read as read_fault
+from steptwin.world.faults.kinds import KINDS
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 READ_POSITION = with_crc(bytes.fromhex("01 03 27 24 00 02"))
@@ -118,6 +119,28 @@ def test_a_description_survives_json_and_names_points_that_can_be_read() -> None
     assert {"table.M1_POS_ABS", "table.M1_STOP", "table.JOG_SPEED"} <= unknown
     assert found["table.M1_EN"].value == 0.0
     assert len(found) - len(unknown) > 100
+
+
+def test_every_kind_of_fault_says_what_it_takes() -> None:
+    found = {kind["name"]: kind for kind in of(small()).do(command.ListFaultKinds()).value}
+    assert set(found) == set(KINDS)
+    assert json.loads(json.dumps(found)) == found
+    stuck = found["stuck"]
+    assert (stuck["layer"], stuck["occasion"], stuck["lines"]) == ("physics", "always", [])
+    assert stuck["parameters"][:2] == [
+        {"name": "pin", "meaning": "Which input.", "permitted": "text", "default": "", "words": [], "required": True},
+        {
+            "name": "value",
+            "meaning": "The level; volts on analog inputs.",
+            "permitted": "numbers 0 to 10",
+            "default": "the one it has",
+            "words": [],
+            "required": False,
+        },
+    ]
+    (nth,) = (one for one in found["crc"]["parameters"] if one["name"] == "nth")
+    assert nth["default"] == "each time"
+    assert next(one for one in found["flip"]["parameters"] if one["name"] == "direction")["words"] == ["in", "out"]
 
 
 def test_what_is_not_there_is_misuse_and_changes_nothing() -> None:

@@ -19,6 +19,7 @@ PERMITS: Mapping[str, Permit] = complete(
         "state": LOOK,
         "encoders": LOOK,
         "faults": LOOK,
+        "fault_kinds": LOOK,
         "time": LOOK,
         "end_points": LOOK,
         "follow": LOOK,

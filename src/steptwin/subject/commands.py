@@ -82,6 +82,11 @@ class ListFaults:
 
 
 @dataclass(frozen=True, slots=True)
+class ListFaultKinds:
+    """What can go wrong, and what each kind of fault takes."""
+
+
+@dataclass(frozen=True, slots=True)
 class Time:
     """The present moment, and how time goes."""
 
@@ -164,6 +169,7 @@ Command: TypeAlias = (
     | State
     | Encoders
     | ListFaults
+    | ListFaultKinds
     | Time
     | EndPoints
     | Follow
@@ -226,6 +232,12 @@ _ROWS = (
     CommandRow("state", State, "The present state of a machine.", "the state, alike for all kinds", (_MACHINE,)),
     CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (_MACHINE,)),
     CommandRow("faults", ListFaults, "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)"),
+    CommandRow(
+        "fault_kinds",
+        ListFaultKinds,
+        "The kinds of faults.",
+        "a list of name, layer, occasion, meaning, lines, parameters: name, meaning, permitted, default, words, required",
+    ),
     CommandRow("time", Time, "The present moment, and how time goes.", "world, time_ns, time_s, paused, speed, stopped"),
     CommandRow("end_points", EndPoints, "Where programs can connect.", "a list of kind, protocol and the address"),
     CommandRow(

@@ -20,6 +20,7 @@ from steptwin.wire.slave import FrameDirection
 from steptwin.world import script as steps
 from steptwin.world.actions import Outside, See
 from steptwin.world.control import ControllerCommand, Jog
+from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
 from steptwin.world.plant import WORLD, Plant
 from steptwin.world.trace import TraceRecord
@@ -60,6 +61,7 @@ class WorldSubject:
             command.State: self._state,
             command.Encoders: self._encoders,
             command.ListFaults: lambda _: self._faults(),
+            command.ListFaultKinds: lambda _: [kind.plain() for kind in rows()],
             command.Time: lambda _: self.time(),
             command.Advance: lambda wanted: advance(self, wanted),
         }

@@ -108,6 +108,17 @@ class Parameter:
         )
         return f"{what} {bounds}".rstrip()
 
+    def plain(self) -> dict[str, object]:
+        """As JSON. ``default`` is the text of the value that holds without one, or says what does."""
+        return {
+            "name": self.name,
+            "meaning": self.meaning,
+            "permitted": self.permitted,
+            "default": self.otherwise if self.default is None else f"{self.default}",
+            "words": list(self.words),
+            "required": self.is_required,
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class OfByte:
@@ -208,6 +219,17 @@ class FaultKind:
     def parameters(self) -> tuple[Parameter, ...]:
         """All it takes: its own, where it happens, when it happens."""
         return (*self.own, *WHERE[self.layer], *WHEN[self.occasion])
+
+    def plain(self) -> dict[str, object]:
+        """As JSON."""
+        return {
+            "name": self.name,
+            "layer": self.layer.value,
+            "occasion": self.occasion.value,
+            "meaning": self.meaning,
+            "lines": [line.value for line in self.lines],
+            "parameters": [parameter.plain() for parameter in self.parameters],
+        }
 
     def parameter(self, name: str) -> Parameter | None:
         return next((parameter for parameter in self.parameters if parameter.name == name), None)

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | AuditRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | AuditRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -455,6 +455,14 @@ export type EncodersRequest = {
 /** The faults that are set. Answer: a list of name, fault, seen (occasions), happened (how often). */
 export type FaultsRequest = {
   do: "faults";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** The kinds of faults. Answer: a list of name, layer, occasion, meaning, lines, parameters: name, meaning, permitted, default, words, required. */
+export type FaultKindsRequest = {
+  do: "fault_kinds";
   /** Comes back with the answer. */
   id?: string | number | null;
   version?: 1;
@@ -1078,6 +1086,7 @@ export interface Requests {
   state: { request: StateRequest; answer: unknown };
   encoders: { request: EncodersRequest; answer: unknown };
   faults: { request: FaultsRequest; answer: unknown };
+  fault_kinds: { request: FaultKindsRequest; answer: unknown };
   time: { request: TimeRequest; answer: unknown };
   end_points: { request: EndPointsRequest; answer: unknown };
   follow: { request: FollowRequest; answer: unknown };
