@@ -119,7 +119,6 @@ def test_nothing_is_inline_and_nothing_is_fetched_from_elsewhere(require_page: P
 
 
 def test_the_source_archive_has_the_page_and_builds_without_node(require_page: Path, tmp_path: Path) -> None:
-    # A clone whose page is up to date; its sources are older than it.
     build = [sys.executable, "-m", "hatchling", "build", "-d", str(tmp_path)]
     subprocess.run([*build, "-t", "sdist"], cwd=ROOT, check=True, capture_output=True)
     (archive,) = tmp_path.glob("*.tar.gz")

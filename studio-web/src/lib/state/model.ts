@@ -30,8 +30,12 @@ export interface AxisModel {
   enabled: string | null;
   velocityPoint: string | null;
   positionPoint: string | null;
-  /** The greatest velocity of moves. */
+  /** The point with the greatest velocity of moves. */
   fastest: string | null;
+  /** What it can be commanded to do; null where that is not known. */
+  positions: AxisSheet["positions"];
+  distances: AxisSheet["distances"];
+  velocities: AxisSheet["velocities"];
   limits: [string, string] | null;
 }
 
@@ -96,6 +100,9 @@ function axisModel(
     velocityPoint: find("velocity"),
     positionPoint: find("position"),
     fastest: register("VMAX"),
+    positions: axis.positions,
+    distances: axis.distances,
+    velocities: axis.velocities,
     limits: left !== null && right !== null ? [left, right] : null,
   };
 }

@@ -39,7 +39,8 @@ export class Jogging {
   fullOf(axis: AxisModel): number {
     const typed = Number(this.full[axis.id]);
     if (typed > 0) return typed;
-    return this.watch()?.get(axis.fastest) ?? USUAL_PULSES / (axis.pulses_per_unit ?? 1);
+    const usual = this.watch()?.get(axis.fastest) ?? USUAL_PULSES / (axis.pulses_per_unit ?? 1);
+    return Math.min(usual, axis.velocities?.high ?? Infinity);
   }
 
   begin(axis: AxisModel, sign: number, percent = this.percent): void {
