@@ -2,8 +2,8 @@
 
 Mutated are comparisons, arithmetic and logical operators, numbers, truth values, statements (left out) and arguments (left out or
 swapped), in functions as well as in tables and defaults. Not mutated: texts, annotations, decorators, imports, and what changes
-nothing: the order in max() and min(), the ``strict`` of zip(), ``return None`` at the end of a function. A product becomes a sum:
-a quotient by a sign would be the same.
+nothing: the order in max() and min(), the ``strict`` of zip(), the variance of a TypeVar, ``return None`` at the end of a function.
+A product becomes a sum: a quotient by a sign would be the same.
 """
 
 from __future__ import annotations
@@ -100,11 +100,14 @@ class _Finder:
             if name in {"annotation", "returns", "decorator_list", "type_params"} or getattr(node, "arg", None) == "strict":
                 continue
             children = value if isinstance(value, list) else [value]
-            if isinstance(node, ast.FunctionDef) and name == "body" and _returns_none(children[-1]):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and name == "body" and _returns_none(children[-1]):
                 children = children[:-1]
             for child in children:
-                if isinstance(child, ast.AST) and not isinstance(child, ast.JoinedStr | ast.Import | ast.ImportFrom):
-                    yield child
+                match child:
+                    case ast.JoinedStr() | ast.Import() | ast.ImportFrom() | ast.Call(func=ast.Name(id="TypeVar")):
+                        pass
+                    case ast.AST():
+                        yield child
 
     def _at(self, node: ast.AST) -> Iterator[Mutation]:
         match node:

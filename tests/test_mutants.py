@@ -49,6 +49,7 @@ def changed(source: str, kind: str) -> list[str]:
         ),
         ("x = True", "truth value", ["x = False"]),
         ("x = 0x10", "number", ["x = (0x10 + 1)"]),
+        ("T = TypeVar('T', covariant=True)", "truth value", []),
         ("x: Literal[1] = y", "number", []),
         ("@cache(1)\nclass A: pass", "number", []),
         ("x = f'{a:3}'", "number", []),

@@ -32,6 +32,7 @@ class Spelling:
         self.held = ""
         self.heard: list[bytes] = []
         self.resets = 0
+        self.abandoned = 0
         self.may_wait = True
         self.wary = False
 
@@ -54,6 +55,7 @@ class Spelling:
         return len(request.text) * MILLISECOND
 
     def abandon(self, now: int) -> bytes:
+        self.abandoned += 1
         return self.held.encode()
 
     def stray(self, data: bytes, now: int) -> None:
@@ -76,8 +78,11 @@ def submit(e: Exchanger[Ask, str], text: str, device: str = "a", **options: obje
 
 def test_one_exchange_at_a_time_in_the_order_they_came() -> None:
     e = engine()
-    first, second = submit(e, "one"), submit(e, "two")
+    first = submit(e, "one")
+    assert (e.busy, e.in_flight) == (True, False)
+    second = submit(e, "two")
     assert e.step(0) == b"one"
+    assert (e.busy, e.in_flight) == (True, True)
     assert e.step(1) == b""
     e.receive(b"on", 2)
     assert not first.done
@@ -165,6 +170,30 @@ def test_each_device_has_its_pace_and_others_go_first_meanwhile() -> None:
     assert e.step(4) == b""
     assert e.deadline() == 10 * MILLISECOND
     assert e.step(10 * MILLISECOND) == b"a2"
+    e.receive(b"a2!", 11 * MILLISECOND)
+    assert e.step(11 * MILLISECOND) == b""
+    assert e.deadline() is None, "nothing is to be done any more"
+
+
+@pytest.mark.parametrize("waiting", ["ab", "ba"])
+def test_the_device_that_may_be_asked_first_is_asked_first(waiting: str) -> None:
+    e = engine(interval=10 * MILLISECOND)
+    for at, device in ((0, "a"), (4, "b")):
+        submit(e, device, device)
+        assert e.step(at) == device.encode()
+        e.receive(f"{device}!".encode(), at)
+    for device in waiting:
+        submit(e, device, device)
+    assert (e.step(5), e.deadline()) == (b"", 10 * MILLISECOND)
+    assert e.step(10 * MILLISECOND) == b"a"
+
+
+def test_behind_an_urgent_job_that_nobody_wants_any_more_the_others_go_on() -> None:
+    e = engine()
+    e.withdraw(submit(e, "stop", urgent=True))
+    submit(e, "one")
+    assert (e.step(7), e.deadline()) == (b"", 7)
+    assert e.step(7) == b"one"
 
 
 def test_nothing_goes_before_an_urgent_job_that_waits_for_its_pace() -> None:
@@ -226,6 +255,7 @@ def test_a_withdrawn_job_is_not_sent_and_one_on_the_line_runs_to_its_end() -> No
     assert e.step(2) == b"three"
     e.receive(b"three!", 3)
     assert third.result() == "three!"
+    assert not e.busy, "nothing of it is kept"
 
 
 def test_bytes_without_exchange_are_stray() -> None:
@@ -282,6 +312,7 @@ def test_a_lost_connection_leaves_a_change_in_doubt() -> None:
     e.fail_all(LineLost("no port"))
     with pytest.raises(LineFailure, match="no port"):
         waiting.result()
+    assert not e.busy
 
 
 def test_a_broken_connection_is_the_shells_affair() -> None:
@@ -348,6 +379,7 @@ def test_the_second_part_of_an_exchange_is_not_sent_too_late() -> None:
     e.receive(b"one+", 1)
     time.now = SECOND + 1
     assert e.step(time.now) == b"two"
+    assert e.discipline.abandoned == 1, "what is said on the line is told that the exchange has ended"  # type: ignore[attr-defined]
     e.receive(b"two!", time.now + 1)
     assert waiting.result() == "two!"
     with pytest.raises(TooLate):

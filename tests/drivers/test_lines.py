@@ -132,6 +132,19 @@ def test_a_waiting_motion_is_not_begun_after_a_stop() -> None:
     assert not wire.moving()
 
 
+def test_what_is_refused_is_refused_at_once_whoever_else_waits() -> None:
+    """A job of another thread has the pause of its device before it; this thread has nothing to wait for."""
+    wire = Wire()
+    line = thread_line(wire)
+    finish(line.open())
+    finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+    line._engine.submit(Job(Query(1, ReadRequest(3, 1, 1)), TIMEOUT))
+    asked = wire.now
+    with pytest.raises(Overtaken):
+        finish(line.exchange(Job(Query(1, M1_STOP), TIMEOUT, permission=Permission(wire.clock, TIMEOUT, lambda: True))))
+    assert wire.now == asked
+
+
 def test_an_interrupted_call_leaves_the_line_usable() -> None:
     wire = Wire()
     fill(wire)

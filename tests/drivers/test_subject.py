@@ -16,7 +16,7 @@ import pytest
 from host_rig import Wire, async_driver, run_virtual, task_line
 from tests.conftest import until
 
-from steptwin.drivers.m1486 import M1486
+from steptwin.drivers.m1486 import M1486, Busy
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject
@@ -25,6 +25,7 @@ from steptwin.files.world import World
 from steptwin.live.remote import RemoteSubject
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import SECOND
+from steptwin.mic488.status import ControllerStatus
 from steptwin.subject import commands as command
 from steptwin.subject.commands import row_of
 from steptwin.subject.contract import UNKNOWN, Reading, Subject, read_description
@@ -348,6 +349,22 @@ def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) ->
     following.close()
 
 
+def test_what_the_controller_and_its_program_do_is_told_in_words(table: DeviceSubject, rig: Rig) -> None:
+    following = table.follow(filter_of(["status"]), 99)
+    twin = rig.world.mic488["table"].device
+    told = []
+    for shown in (True, False):
+        twin.set_master_error(shown, rig.time.now())
+        rig.time.sleep(0.3)
+        told += following.take().events
+    assert [(event.text, event.axis) for event in told] == [
+        ("controller: Modbus master communication error", None),
+        ("controller: ok", None),
+    ]
+    assert told[0].payload.plain()["code"] == "controller-status"
+    assert told[0].payload.plain()["facts"] == {"status": ControllerStatus.MASTER_ERROR}
+
+
 def test_a_device_that_nobody_follows_is_not_polled(table: DeviceSubject, rig: Rig) -> None:
     following = table.follow(filter_of(), 99)
     following.close()
@@ -357,6 +374,26 @@ def test_a_device_that_nobody_follows_is_not_polled(table: DeviceSubject, rig: R
     assert frames.take().events == []
     table.read("table.IN1")
     assert len(frames.take().events) > 1
+
+
+@pytest.mark.parametrize("period_s", [0.5, 60.0])
+def test_a_device_is_polled_at_the_period_that_was_asked_for(rig: Rig, period_s: float) -> None:
+    table = rig.mic.subject("table", period_s=period_s)
+    begin = rig.time.now()
+    following = table.follow(filter_of(["edge"]), 9)
+    rig.world.outside(do.Set((("table", "IN7", 1.0),)))
+    due = begin + round(period_s * SECOND)
+    rig.time.advance(due - 1)
+    assert following.take().events == []
+    rig.time.advance(due)
+    assert [event.text for event in following.take().events] == ["IN7: 1"]
+
+
+@pytest.mark.parametrize("period_s", [0.019, 60.5, float("nan")])
+def test_periods_at_which_no_device_is_polled(rig: Rig, period_s: float) -> None:
+    with pytest.raises(Misuse, match=r"period_s = .*: permitted are 0.02 to 60 s"):
+        rig.mic.subject("table", period_s=period_s)
+    rig.mic.subject("table", period_s=0.02)
 
 
 def test_a_slow_follower_loses_the_oldest_and_is_told_how_many(table: DeviceSubject, rig: Rig) -> None:
@@ -371,6 +408,8 @@ def test_a_slow_follower_loses_the_oldest_and_is_told_how_many(table: DeviceSubj
 def test_an_m1486_moves_and_is_unknown_meanwhile(drum: DeviceSubject, rig: Rig) -> None:
     assert drum.description.machines[0].datasheet.axes[0].unit == "step"
     assert drum.description.machines[0].controls == ("move", "jog", "stop", "program")
+    assert drum.description.machines[0].unit == 3
+    assert [reading.value for reading in drum.read("drum.B1", "drum.U3", "drum.U20")] == [None, 0.0, ord("B")]
     drum.do(command.Move("drum", 1, by=5000.0))
     moving = {reading.point: reading for reading in drum.read("drum.counter", "drum.moving", "drum.B1", "drum.position")}
     assert {reading.quality for reading in moving.values()} == {UNKNOWN}
@@ -386,12 +425,80 @@ def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:
     drum.do(command.Jog("drum", 1, -50.0))
     rig.time.sleep(2.0)
     assert [event.text for event in following.take().events] == ["moves, waits or runs its program"]
+    assert rig.world.read("drum.velocity") == -50.0 * 64
     drum.do(command.StopAxes("drum", 1))
     rig.time.sleep(2.0)
     status, sample = following.take().events
     assert status.text == "is at rest"
     assert sample.kind == "sample"
     assert rig.world.read("drum.velocity") == 0.0
+    rig.time.sleep(2.0)
+    assert following.take().events == []
+    assert {reading.value for reading in drum.read("drum.moving", "drum.velocity")} == {0.0}
+    drum.do(command.Jog("drum", 1, 50.0))
+    rig.time.sleep(2.0)
+    assert rig.world.read("drum.velocity") == 50.0 * 64
+    drum.do(command.StopAxes("drum"))
+
+
+def test_an_m1486_is_moved_and_shown_in_the_unit_of_its_driver(rig: Rig) -> None:
+    """40 full steps per millimetre, 0 at 100 mm of the counter."""
+    line: Any = rig.chip._driver.line
+    with M1486(line, 3, steps_per_unit=40.0, unit="mm", origin_u=100 * 40 * 64) as chip:
+        drum = chip.subject("drum")
+        drum.do(command.Move("drum", 1, to=-60.0))
+        rig.time.sleep(60.0)
+        assert rig.world.read("drum.counter") == 40 * 40 * 64
+        (sample,) = drum.follow(filter_of(), 9).take().events
+        assert sample.payload.plain() == {"axis": "1", "position": -60.0, "unit": "mm"}
+        drum.do(command.Move("drum", 1, by=-2.0))
+        rig.time.sleep(60.0)
+        assert rig.world.read("drum.counter") == 38 * 40 * 64
+        drum.do(command.Jog("drum", 1, 0.5))
+        rig.time.sleep(1.0)
+        assert rig.world.read("drum.velocity") == 0.5 * 40 * 64
+
+
+def test_of_an_m1486_only_what_was_asked_for_is_followed(drum: DeviceSubject, rig: Rig) -> None:
+    samples, states = drum.follow(filter_of(["sample"]), 9), drum.follow(filter_of(["status"]), 9)
+    drum.do(command.Move("drum", 1, by=5000.0))
+    found = []
+    for pause in (2.0, 60.0):
+        rig.time.sleep(pause)
+        found.append([[event.kind for event in following.take().events] for following in (samples, states)])
+    assert found == [[["sample"], ["status"]], [["sample"], ["status"]]], "the first sample is where it stood"
+    samples.close()
+    frames = WorldSubject(rig.world).follow(filter_of(["frame"]), 99)
+    states.take()
+    rig.time.sleep(1.0)
+    states.take()
+    asked = "".join(event.text for event in frames.take().events)
+    assert "75 32 30" in asked, "u20: is it at rest"
+    assert "75 31" not in asked, "u1: the counter is of no use to whoever follows states"
+
+
+def test_an_m1486_that_begins_to_move_while_it_is_looked_at(
+    drum: DeviceSubject, rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was at rest when it was asked, and its counter is not to be had any more."""
+    following = drum.follow(filter_of(), 9)
+    following.take()
+
+    async def moves() -> int:
+        raise Busy("it moves")
+
+    monkeypatch.setattr(rig.chip._driver, "counter", moves)
+    rig.time.sleep(1.0)
+    assert following.take().events == []
+
+
+def test_the_program_of_an_m1486_is_ended(drum: DeviceSubject, rig: Rig) -> None:
+    rig.chip.download("[\n@3\nF640\nR\nW1000\nJ3\n]")
+    rig.time.sleep(5.0)
+    drum.do(command.ControlProgram("drum", "stop"))
+    stood = rig.world.read("drum.counter")
+    rig.time.sleep(10.0)
+    assert rig.world.read("drum.counter") == stood
 
 
 def test_characters_for_an_m1486_are_whole_commands_that_move_nothing(drum: DeviceSubject, rig: Rig) -> None:
@@ -404,6 +511,9 @@ def test_characters_for_an_m1486_are_whole_commands_that_move_nothing(drum: Devi
     assert drum.read("drum.variable")[0].value == 17.0
 
 
+SECOND_AXIS = (command.Move("drum", 2, to=9.0), command.Jog("drum", 2, 50.0), command.StopAxes("drum", 2))
+
+
 @pytest.mark.parametrize(
     ("wanted", "kind", "message"),
     [
@@ -411,7 +521,9 @@ def test_characters_for_an_m1486_are_whole_commands_that_move_nothing(drum: Devi
         (command.Enable("drum", 1), Refusal, "enable cannot be done with this device"),
         (command.ControlProgram("drum", "start"), Refusal, "an M1486 has no command to start its program"),
         (command.Jog("drum", 1, 0.0), Misuse, "the sign of the velocity is the direction"),
-        (command.StopAxes("drum", 2), Misuse, "axis = 2: an M1486 has axis 1 only"),
+        *((wanted, Misuse, "axis = 2: an M1486 has axis 1 only") for wanted in SECOND_AXIS),
+        (command.StopAxes("drun"), Misuse, "no machine is called 'drun' .did you mean 'drum'.*; there are drum"),
+        (do.Write((("drun", "X", 1.0),)), Refusal, "write cannot be done with this device"),
         (command.ReadPoints(("drum.B99",)), Misuse, "'B99' is not a point of an M1486: there are position"),
     ],
 )

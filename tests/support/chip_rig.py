@@ -22,7 +22,7 @@ from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
 
 Direction = Literal["to chip", "to host"]
-Kind = Literal["drop", "flip 4", "flip 0", "invert", "double", "insert", "late"]
+Kind = Literal["drop", "flip 4", "flip 0", "invert", "double", "insert", "late", "semicolon"]
 KINDS: tuple[Kind, ...] = ("drop", "flip 4", "flip 0", "invert", "double", "insert", "late")
 LATE_NS = 700 * 1_000_000
 """Later than the time-out of an exchange."""
@@ -49,6 +49,8 @@ class Fault:
                 return bytes((NOISE, byte))
             case "invert":
                 return bytes((~byte & 0xFF,))
+            case "semicolon":
+                return b";"
             case "flip 4":
                 return bytes((byte ^ 0x10,))
             case "flip 0":

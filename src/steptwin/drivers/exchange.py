@@ -239,7 +239,7 @@ class Exchanger(Generic[Q, A]):
         self._waiting: deque[Job[Q, A]] = deque()
         self._current: Job[Q, A] | None = None
         self._more: SendNext | None = None  # what the current exchange has still to send
-        self._deadline: Nanos = 0  # of the current exchange
+        self._deadline: Nanos  # of the current exchange
         self._due: Nanos | None = None  # when the next one may begin
         self._next: dict[Hashable, Nanos] = {}  # when a device may be asked again
 
@@ -264,7 +264,6 @@ class Exchanger(Generic[Q, A]):
 
     def withdraw(self, job: Job[Q, A]) -> None:
         """Whoever wanted it is gone. It is not sent any more; what is on the line runs to its end."""
-        job.tell = None
         job.done = True
 
     def fail_all(self, error: SteptwinError) -> None:
@@ -330,8 +329,8 @@ class Exchanger(Generic[Q, A]):
                 due = begin
             if job.urgent:
                 break
-        if due is None and (self._urgent or self._waiting):
-            due = now  # jobs were refused: others may be behind them
+        if due is None and self._waiting:
+            due = now  # urgent jobs were refused: others may be behind them
         self._due = due
         return None
 

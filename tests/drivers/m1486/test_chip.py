@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-import pytest
-from chip_rig import ChipWire, chip_driver, chip_line
+import math
+from collections.abc import Callable
+from typing import Any
 
-from steptwin.drivers.m1486 import M1486, NoEcho, WrongType
+import pytest
+from chip_rig import ChipWire, Fault, chip_driver, chip_line
+
+from steptwin.drivers.m1486 import M1486, Busy, Garbled, NoEcho, WrongType
 from steptwin.drivers.m1486.lines import TALK
 from steptwin.drivers.m1486.talk import SPOILER
+from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.lines import DUAL_DAC
 
 
@@ -143,3 +148,158 @@ def test_the_status_has_each_number_in_its_place() -> None:
     assert [number for number, on in status.flags.items() if on] == [80, 86]
     assert [number for number, on in status.functions.items() if on] == [41, *range(48, 56)]
     assert (chip.flags(), chip.functions()) == (status.flags, status.functions)
+
+
+def test_an_output_whose_number_was_cut_short_by_a_semicolon_is_in_doubt() -> None:
+    """The chip hears ``t1;`` for ``t16``: what makes other lines no command is a comment then, and B1 may have been switched."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.set_output(1, False)
+    wire.put(Fault("to chip", len("u20|") + len("t1"), "semicolon"))
+    with pytest.raises(Garbled, match="it is not known whether the chip has") as caught:
+        chip.set_output(16, True)
+    assert caught.value.uncertain
+    assert wire.faults[0].met
+
+
+def test_a_number_cut_short_by_a_semicolon_is_typed_again_where_it_only_sets_something() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.put(Fault("to chip", len("u20|") + len(":1"), "semicolon"))
+    chip.set_variable(16)
+    assert wire.faults[0].met
+    assert chip.variable() == 16
+
+
+def test_settings_are_typed_as_they_are_given_those_that_others_depend_on_first() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.sent.clear()
+    chip.configure(waveform=2, velocity=1000, start_stop=200, acceleration=5000, profile=25000, qualification=4, microstep=16)
+    typed = b"".join(data for _, data in wire.sent).decode().replace("\r", " ")
+    assert typed == "u20 m16 q4 s200 a5000 v1000 p25000 n2 "
+    wire.sent.clear()
+    chip.configure()
+    assert b"".join(data for _, data in wire.sent) == b"u20\r"
+
+
+def test_the_range_of_positions_has_both_its_ends() -> None:
+    line = chip_line(ChipWire("B"))
+    chip, shifted = M1486(line), M1486(line, origin_u=16_000_000)
+    chip.open()
+    chip.set_position(250_000.0)
+    assert chip.counter() == 16_000_000
+    chip.set_position(0.0)
+    assert chip.counter() == 0
+    assert (shifted.counter(), shifted.position()) == (0, -250_000.0)
+
+
+def test_lines_are_read_with_one_question_whether_the_chip_rests() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.chip.set_pin("B3", 1, wire.now)
+    wire.chip.set_pin("B4", 0, wire.now)
+    wire.sent.clear()
+    assert chip.inputs(3, 2) == (True, False)
+    assert b"".join(data for _, data in wire.sent).replace(b"\r", b" ") == b"u20 ?32 " + 2 * b"u4 u5 u6 "
+
+
+def test_a_line_of_its_own_is_closed_when_nobody_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = ChipWire("B")
+    line = chip_line(wire)
+    monkeypatch.setattr("steptwin.drivers.m1486.sync._ThreadM1486._own_line", lambda *_: line)
+    chip = M1486("memory")
+    wire.severed = True
+    with pytest.raises(NoEcho):
+        chip.open()
+    with pytest.raises(Misuse, match="the line memory is closed"):
+        chip.counter()
+    wire.severed = False
+    with chip:
+        assert chip.counter() == 0
+    with pytest.raises(Misuse, match="the line memory is closed"):
+        chip.counter()
+
+
+def test_a_shared_line_stays_open_when_a_driver_of_it_is_closed() -> None:
+    wire = ChipWire("B", (0, 7))
+    line = chip_line(wire)
+    with M1486(line, 0):
+        pass
+    with M1486(line, 7) as chip:
+        assert chip.counter() == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"timeout_s": 0.0}, "a time-out of 0 s is outside 0 to 60 s"),
+        ({"timeout_s": 60.5}, "a time-out of 60.5 s is outside"),
+        ({"timeout_s": math.nan}, "a time-out of nan s is outside"),
+        ({"address": 16}, "address 16: permitted are 0 to 15"),
+        ({"address": -1}, "address -1: permitted are 0 to 15"),
+        ({"steps_per_unit": 0.0}, "steps_per_unit = 0: must be above 0"),
+        ({"steps_per_unit": math.inf}, "steps_per_unit = inf: must be above 0"),
+        ({"steps_per_unit": -math.inf}, "steps_per_unit = -inf: must be above 0"),
+        ({"origin_u": -1}, "origin_u = -1: permitted are 0 to 16000000 minimum microsteps"),
+        ({"origin_u": 16_000_001}, "origin_u = 16000001: permitted are"),
+        ({"variant": "Z"}, "'Z'"),
+    ],
+)
+def test_what_no_chip_has_is_refused_before_anything_is_opened(options: dict[str, Any], message: str) -> None:
+    wire = ChipWire("B")
+    with pytest.raises(Misuse, match=message):
+        M1486(chip_line(wire), **options)
+    for kept in ({"timeout_s": 60.0}, {"address": 0}, {"address": 15}, {"origin_u": 0}, {"origin_u": 16_000_000}):
+        M1486(chip_line(wire), **kept)  # type: ignore[arg-type]
+
+
+def test_the_type_of_a_chip_that_is_not_there_any_more_is_to_be_found_anew() -> None:
+    wire = ChipWire("B")
+    line = chip_line(wire)
+    found, given = M1486(line), M1486(line, variant="B")
+    for chip in (found, given):
+        chip.open()
+        wire.severed = True
+        with pytest.raises((NoEcho, LineFailure)):
+            chip.open()
+        wire.severed = False
+        if chip is given:
+            assert chip.variant.name == "B"
+        else:
+            with pytest.raises(Misuse, match="memory: the chip is not open"):
+                assert chip.variant
+
+
+def test_a_function_that_another_program_has_switched_is_known_once_it_was_read() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.chain.receive(b"c51\r", wire.now)
+    wire.sleep(1.0)
+    wire.unread = b""
+    assert chip.functions()[51] is False
+    chip.run(1)
+    chip.stop()
+    wire.sleep(1.0)
+    with pytest.raises(Busy, match="is held by Kill because its function 51 is OFF: recover it"):
+        chip.counter()
+
+
+@pytest.mark.parametrize("read", [lambda c: c.inputs(), lambda c: c.flags(), lambda c: c.variable(), lambda c: c.status()])
+def test_nothing_is_read_of_a_chip_that_moves(read: Callable[[M1486], object]) -> None:
+    chip = chip_driver(ChipWire("B"))
+    chip.run(1)
+    with pytest.raises(Busy, match="the chip is not done with a run without end"):
+        read(chip)
+
+
+def test_a_line_that_belongs_to_the_interface_is_no_output() -> None:
+    chip = chip_driver(ChipWire("B", interface=DUAL_DAC))
+    with pytest.raises(Misuse, match=f"B{min(DUAL_DAC.occupied)} belongs to the Dual DAC interface"):
+        chip.set_output(min(DUAL_DAC.occupied), True)
+    chip.set_output(1, True)
+
+
+def test_who_is_what() -> None:
+    chip = chip_driver(ChipWire("B", (10,)), 10, unit="mm")
+    assert (repr(chip), chip.place, chip.address, chip.unit) == ("<M1486 chip A on memory>", "memory", 10, "mm")

@@ -71,6 +71,12 @@ def typed(wire: ChipWire) -> str:
         (lambda c: c.uploaded(1, float("inf")), "a time to wait of inf s is outside"),
         (lambda c: c.start_program(81), "the label = 81"),
         (lambda c: c.run(0), "direction 0"),
+        (lambda c: c.set_variable(1 << 24), "the internal variable = 16777216: M1486B takes 0 to"),
+        (lambda c: c.configure(velocity=math.inf), "velocity = inf: M1486B takes 16 to 20 000 step/s"),
+        (lambda c: c.configure(velocity=math.nan), "velocity = nan: M1486B takes 16 to 20 000 step/s"),
+        (lambda c: c.set_variable(-1), "the internal variable = -1: M1486B takes 0 to"),
+        (lambda c: c.move_to(250_001.0), "position 250001 step is outside 0 to 250000 step"),
+        (lambda c: c.move_by(-250_001.0), "distance -250001 step is outside ±250000 step"),
     ],
 )
 def test_misuse_is_told_before_anything_is_typed(call: object, text: str) -> None:

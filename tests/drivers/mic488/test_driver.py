@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
 import pytest
-from host_rig import Fault, Wire, driver, spindles, thread_line
+from host_rig import Fault, Wire, async_driver, driver, run_virtual, spindles, task_line, thread_line
 
 from steptwin.drivers import (
     Mic488,
@@ -14,11 +15,14 @@ from steptwin.drivers import (
     ModbusRefusal,
     NoAnswer,
     NotReady,
+    Overtaken,
     ProgramState,
     Reason,
+    TooLate,
     Unconfirmed,
     load_config,
 )
+from steptwin.drivers.exchange import Job
 from steptwin.drivers.mic488.lines import ThreadModbusLine
 from steptwin.drivers.modbus import Query
 from steptwin.errors import Misuse
@@ -26,6 +30,7 @@ from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
+from steptwin.mic488.values import encoded, named
 from steptwin.wire import pdu, rtu
 from steptwin.wire.pdu import BitsResponse, ReadRequest, WriteCoilRequest, WriteRegisterRequest
 
@@ -151,6 +156,48 @@ def test_axes_begin_together() -> None:
     assert wire.twin.trigger_mode == 0
     with pytest.raises(Misuse, match="no axis is given to be moved"):
         mic.move_together({})
+
+
+def test_axes_that_were_stopped_before_they_were_to_begin_leave_no_trace() -> None:
+    """Not even the trigger mode is set for them."""
+    wire = Wire()
+    line = task_line(wire)
+
+    async def main() -> None:
+        async with async_driver(line, wire) as mic:
+            await mic.enable()
+            wire.sent.clear()
+            moving = asyncio.create_task(mic.move_together({1: 10.0, 3: 20.0}))
+            await asyncio.sleep(0)
+            await mic.axis(3).stop()
+            with pytest.raises(Overtaken, match=r"AXIS_CTR_MODE = TRIGGER .1.' was not sent: a stop was given meanwhile"):
+                await moving
+
+    run_virtual(wire, main())
+    written = [frame for _, frame in wire.sent if frame[1] not in (3, 5)]
+    assert written == [Query(1, WriteRegisterRequest(10004, 0)).rtu_frame], "direct, to be sure"
+    assert not wire.moving(1)
+
+
+@pytest.mark.parametrize("act", ["set", "request"])
+def test_what_may_move_is_not_written_when_the_line_was_busy_for_too_long(act: str) -> None:
+    """Another program on the line waits longer than anybody at the machine would; what moves nothing is written nevertheless."""
+    wire = Wire()
+    mic = driver(wire)
+    mic.enable()
+    engine = mic._driver.line._engine  # type: ignore[attr-defined]
+
+    def keep_the_line() -> None:
+        engine.submit(Job(Query(2, ReadRequest(3, 0, 1)), 60 * SECOND))
+
+    request = encoded(named(register_map("1.70"), "M1_VEL_ABS"), 5.0, DataType.REAL)
+    keep_the_line()
+    with pytest.raises(TooLate, match=r"M1_VEL_ABS.* was not sent: it was asked for more than 5 s ago"):
+        mic.set("M1_VEL_ABS", 5.0) if act == "set" else mic.request(request)
+    assert not wire.moving()
+    keep_the_line()
+    mic.set("M1_ACC", 7.0)
+    assert mic.get("M1_ACC") == {"M1_ACC": 7.0}
 
 
 def test_no_trigger_mode_is_left_when_its_answer_is_lost() -> None:

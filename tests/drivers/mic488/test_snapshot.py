@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from host_rig import Wire, driver
 
 from steptwin.drivers import Mic488, Mic488Snapshot, NotReady
+from steptwin.drivers.mic488.snapshot import FORMAT
 from steptwin.errors import Misuse
+from steptwin.mic488.registermap import DataType
 
 
 def changed(mic: Mic488) -> None:
@@ -69,15 +72,64 @@ def test_nothing_is_put_back_while_something_moves() -> None:
         mic.restore_snapshot(kept)
 
 
+def test_what_the_controller_has_not_kept_is_told() -> None:
+    """As where a program of it writes the same user register."""
+    wire = Wire()
+    mic = driver(wire)
+    kept = mic.take_snapshot()
+    mic.user.words.write_many(100, [1, 2])
+
+    def write(frame: bytes) -> None:
+        if frame[1] == 16:
+            wire.before_each = lambda _: wire.twin.user.__setitem__(101, 9)
+
+    wire.before_each = write
+    with pytest.raises(NotReady, match=r"memory: not kept by the controller: USER_REGISTER\[101\]: 9 → 0$"):
+        mic.restore_snapshot(kept)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_values_are_put_back_with_the_data_type_they_were_read_with(backwards: bool) -> None:
+    """Whatever the order of the names in the file."""
+    wire = Wire()
+    mic = driver(wire)
+    mic.set("DATA_TYPE", DataType.DINT)
+    data = json.loads(mic.take_snapshot().to_json())
+    data["values"] = dict(sorted(data["values"].items(), reverse=backwards))
+    mic.set("DATA_TYPE", DataType.REAL)
+    mic.axis(2).set_ramp(acc=7.0)
+    changes = mic.restore_snapshot(Mic488Snapshot.from_json(json.dumps(data)))
+    assert str(changes[0]) == f"DATA_TYPE: {DataType.REAL} → {DataType.DINT}"
+    assert "M2_ACC: ? → 5000" in map(str, changes)
+    assert (wire.twin.data_type, wire.twin.axes[1].acc_p) == (DataType.DINT, 5000)
+
+
+def test_neighbouring_user_registers_are_written_together() -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.user.words.write_many(100, [1, 2, 0, 4])
+    kept = mic.take_snapshot()
+    mic.user.words.write_many(100, [0, 0, 0, 0])
+    wire.sent.clear()
+    mic.restore_snapshot(kept)
+    written = [rtu for _, rtu in wire.sent if rtu[1] == 16]
+    assert [(int.from_bytes(rtu[2:4]), int.from_bytes(rtu[4:6])) for rtu in written] == [(100, 2), (103, 1)]
+    assert mic.user.words.read_many(100, 4) == [1, 2, 0, 4]
+    assert len(mic.restore_snapshot(replace(kept, user=(7,) * 2000), dry_run=True)) == 2000
+
+
 def test_snapshots_are_text() -> None:
     mic = driver(Wire())
     changed(mic)
     kept = mic.take_snapshot()
     assert Mic488Snapshot.from_json(kept.to_json()) == kept
     assert kept.user[100:] == (1, 2, 3)
-    for text in ("", "[]", "{}", '{"format": "something"}', "[" * 100_000):
-        with pytest.raises(Misuse, match=r"no snapshot|the format is"):
+    for text in ("", "[]", "{}", "[" * 100_000):
+        with pytest.raises(Misuse, match=r"^this is no snapshot of a MIC488 \("):
             Mic488Snapshot.from_json(text)
+    other = kept.to_json().replace(FORMAT, "something")
+    with pytest.raises(Misuse, match=rf"^the format is 'something', expected '{FORMAT}'$"):
+        Mic488Snapshot.from_json(other)
     with pytest.raises(Misuse, match=r"the snapshot is of firmware 1.70, this controller has 1.23"):
         driver(Wire(firmware="1.23")).restore_snapshot(kept)
 
@@ -93,6 +145,7 @@ def test_snapshots_are_text() -> None:
         ("M1_ACC", float("nan"), "M1_ACC = nan u/s²: permitted > 0"),
         ("M1_NONE", 5, "no register named 'M1_NONE'"),
         ("user", [0, 70000], r"USER_REGISTER\[1\] = 70000: permitted 0…65535"),
+        ("user", [7] * 2001, "the snapshot has 2001 user registers, this controller 2000"),
         ("user", [7] * 3001, "the snapshot has 3001 user registers, this controller 2000"),
     ],
 )

@@ -201,20 +201,20 @@ class AsyncChip:
         """Everything the chip tells of itself. Raises `Busy` while it moves."""
         async with self._unit.turn():
             found = await self._unit.read(1, 2, 3, 4, 5, 6, 14, 15, 16, 17, 18, 19)
-        word = int.from_bytes(bytes(found[9:12]), "little")
-        counter = int.from_bytes(bytes(found[0:3]), "little")
+        (flags, mode, series), functions = found[6:9], int.from_bytes(bytes(found[9:]), "little")
+        counter = int.from_bytes(bytes(found[:3]), "little")
         interface = self._unit.notes.interface
         return ChipStatus(
             type=self.variant.title,
-            interface=f"mode {found[7]}" if interface is None else interface.title,
-            series=found[8],
+            interface=f"mode {mode}" if interface is None else interface.title,
+            series=series,
             counter_u=counter,
             position=self._shown(counter),
             unit=self.unit,
             is_position_valid=self._unit.notes.is_position_valid,
             variable=int.from_bytes(bytes(found[3:6]), "little"),
-            flags={number: bool(found[6] >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))},
-            functions={number: bool(word >> bit & 1) for bit, number in enumerate(FUNCTIONS)},
+            flags={number: bool(flags >> bit & 1) for bit, number in enumerate((*USER_FLAGS, CARRY))},
+            functions={number: bool(functions >> bit & 1) for bit, number in enumerate(FUNCTIONS)},
         )
 
     async def is_busy(self) -> bool:

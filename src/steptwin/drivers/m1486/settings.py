@@ -7,6 +7,7 @@ commands; at 24 MHz the motor turns twice as fast with the same numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from math import isfinite
 
 from steptwin.errors import Misuse
 from steptwin.m1486.commands import find, range_text, rows
@@ -77,9 +78,9 @@ def after_reset(variant: Variant, interface: Interface) -> ChipSettings:
 def checked_number(letter: str, number: float, variant: Variant, what: str) -> int:
     """``number`` if the command takes it. Raises `Misuse` with the permitted range."""
     key = letter.upper()
-    if number != int(number) or find(key, int(number), variant) is None:
+    if not isfinite(number) or number != int(number) or find(key, int(number), variant) is None:
         (spec,) = rows(key)
-        raise Misuse(f"{what} = {number:g}: {variant.title} takes {range_text(spec, variant, named=False)}")
+        raise Misuse(f"{what} = {number:.15g}: {variant.title} takes {range_text(spec, variant, named=False)}")
     return int(number)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from steptwin.datasheet import Datasheet
 from steptwin.drivers.line import DriverLine
@@ -17,6 +18,7 @@ from steptwin.drivers.subject import Action, Value
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.registers import UPLOADS
 from steptwin.subject import commands as command
 from steptwin.subject.events import Payload, SamplePayload, StatusPayload
 from steptwin.world import script as steps
@@ -37,7 +39,8 @@ class M1486Part:
         self._paths = [*(point.path for point in self.datasheet.points), *(pin.name for pin in self.datasheet.pins)]
         self._units = {point.path.upper(): point.unit for point in self.datasheet.points}
         self._units |= {pin.name.upper(): pin.unit for pin in self.datasheet.pins}
-        self._readers: Mapping[str, Callable[[], Awaitable[float]]] = {"COUNTER": chip.counter, "VARIABLE": chip.variable}
+        self._readers: dict[str, Callable[[], Awaitable[float]]] = {"COUNTER": chip.counter, "VARIABLE": chip.variable}
+        self._readers |= {f"U{number}": partial(chip.byte, number) for number in UPLOADS}
         self._was_busy: bool | None = None
         self._counter: int | None = None
 
@@ -60,16 +63,15 @@ class M1486Part:
         return {point: (await self._value(point.upper()), self._units[point.upper()]) for point in points}
 
     async def _value(self, path: str) -> float | None:
+        if path in ("MOVING", "VELOCITY"):
+            return None if await self._chip.is_busy() else 0.0
+        reader = self._readers.get(path)
+        if reader is None:
+            return None
         try:
-            if path in self._readers:
-                return float(await self._readers[path]())
-            if path in ("MOVING", "VELOCITY"):
-                return None if await self._chip.is_busy() else 0.0
-            if path[0] == "U" and path[1:].isdecimal():
-                return float(await self._chip.byte(int(path[1:])))
+            return float(await reader())
         except Busy:
-            pass
-        return None
+            return None
 
     # ------------------------------------------------------------------ commands
 
@@ -88,7 +90,10 @@ class M1486Part:
 
     async def _move(self, wanted: command.Move) -> None:
         self._check_axis(wanted.axis)
-        await (self._chip.move_by(wanted.by or 0.0) if wanted.to is None else self._chip.move_to(wanted.to))
+        if wanted.to is not None:
+            await self._chip.move_to(wanted.to)
+        elif wanted.by is not None:
+            await self._chip.move_by(wanted.by)
 
     async def _jog(self, wanted: command.Jog) -> None:
         self._check_axis(wanted.axis)

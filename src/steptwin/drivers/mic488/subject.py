@@ -103,7 +103,10 @@ class Mic488Part:
 
     async def _move(self, wanted: command.Move) -> None:
         axis = self._mic.axis(wanted.axis)
-        await (axis.move_by(wanted.by or 0.0) if wanted.to is None else axis.move_to(wanted.to))
+        if wanted.to is not None:
+            await axis.move_to(wanted.to)
+        elif wanted.by is not None:
+            await axis.move_by(wanted.by)
 
     async def _home(self, wanted: command.Home) -> None:
         await self._mic.axis(wanted.axis).home(wanted.velocity)
