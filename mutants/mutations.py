@@ -2,8 +2,8 @@
 
 Mutated are comparisons, arithmetic and logical operators, numbers, truth values, statements (left out) and arguments (left out or
 swapped), in functions as well as in tables and defaults. Not mutated: texts, annotations, decorators, imports, and what changes
-nothing: the order in max() and min(), the ``strict`` of zip(), the variance of a TypeVar, ``return None`` at the end of a function.
-A product becomes a sum: a quotient by a sign would be the same.
+nothing: the order in max() and min(), the ``strict`` of zip(), the variance of a TypeVar, ``return None`` at the end of a
+function. A product becomes a sum: a quotient by a sign would be the same.
 """
 
 from __future__ import annotations

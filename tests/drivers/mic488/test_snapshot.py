@@ -125,7 +125,7 @@ def test_snapshots_are_text() -> None:
     assert Mic488Snapshot.from_json(kept.to_json()) == kept
     assert kept.user[100:] == (1, 2, 3)
     for text in ("", "[]", "{}", "[" * 100_000):
-        with pytest.raises(Misuse, match=r"^this is no snapshot of a MIC488 \("):
+        with pytest.raises(Misuse, match=r"^this is not a snapshot of a MIC488 \("):
             Mic488Snapshot.from_json(text)
     other = kept.to_json().replace(FORMAT, "something")
     with pytest.raises(Misuse, match=rf"^the format is 'something', expected '{FORMAT}'$"):
