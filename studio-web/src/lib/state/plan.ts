@@ -46,6 +46,8 @@ function onArc({ way, course: [centre, radius, angle, turn] }: Arc, t: number): 
 /** A plan made ready to be asked very often. */
 export class Course {
   readonly start_ns: bigint;
+  /** Ends of its segments, in seconds after the start. */
+  readonly corners_s: readonly number[];
   /** When it stands again; null where it never does. */
   readonly end_ns: bigint | null;
   private readonly segments: readonly Segment[];
@@ -53,6 +55,7 @@ export class Course {
   constructor(private readonly plan: Plan) {
     this.start_ns = BigInt(plan.start_ns);
     this.segments = plan.segments as readonly Segment[];
+    this.corners_s = [0, ...this.segments.map(endOf).filter((end) => end !== null)];
     const last = this.segments.at(-1);
     const end = last === undefined ? 0 : endOf(last);
     this.end_ns = end === null ? null : this.start_ns + BigInt(Math.ceil(end * 1e9));

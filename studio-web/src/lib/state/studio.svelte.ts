@@ -11,6 +11,7 @@ import { openInWorker } from "../protocol/link";
 import type { Pushed, Requests, SubjectEvent } from "../protocol/types";
 import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
+import { Edges } from "./edges";
 import { EventLog } from "./events.svelte";
 import { modelOf, type AxisModel, type MachineModel, type Model } from "./model";
 import { Pins } from "./pins.svelte";
@@ -73,6 +74,7 @@ export class Studio {
   readonly clock = new WorldClock();
   readonly log = new EventLog();
   readonly pins = new Pins();
+  readonly edges = new Edges();
   /** By `table.M1`. */
   axes = $state.raw<ReadonlyMap<string, AxisState>>(new Map());
   private readonly watches = new Watches((name, fields) => this.ask(name, fields));
@@ -188,6 +190,9 @@ export class Studio {
     if (isNew || JSON.stringify(hello.description) !== this.description) this.describe(hello);
     for (const event of hello.plans) this.toAxis(event);
     this.pins.reset(hello.state);
+    for (const [machine, { pins }] of Object.entries(hello.state)) {
+      for (const [pin, level] of Object.entries(pins)) this.edges.take(`${machine}.${pin}`, BigInt(hello.time_ns), level);
+    }
     if (!hello.virtual) this.askPins();
     for (const following of this.followings) this.beginFollowing(following);
     this.watches.renew();
@@ -249,7 +254,11 @@ export class Studio {
     this.clock.atLeast(time_ns, performance.now());
     for (const event of events) {
       this.toAxis(event);
-      if (event.kind === "edge") this.pins.take({ [`${event.machine}.${event.pin}`]: event.level });
+      if (event.kind === "edge") {
+        const pin = `${event.machine}.${event.pin}`;
+        this.pins.take({ [pin]: event.level });
+        this.edges.take(pin, BigInt(event.time_ns), event.level);
+      }
     }
     this.log.take(events);
     for (const listener of this.listeners) listener(events);

@@ -1,0 +1,61 @@
+/** Levels of pins in the past: their edges, with the moments. Bounded; the oldest are forgotten first. */
+
+interface PinEdges {
+  times: bigint[];
+  levels: number[];
+}
+
+/** Edges kept of one pin. */
+const KEPT = 5000;
+
+export class Edges {
+  private readonly pins = new Map<string, PinEdges>();
+
+  /** The level of a pin from `time_ns` on; null where it is not known. */
+  take(pin: string, time_ns: bigint, level: number | null): void {
+    let kept = this.pins.get(pin);
+    if (kept === undefined) this.pins.set(pin, (kept = { times: [], levels: [] }));
+    const value = level ?? NaN;
+    if (Object.is(kept.levels.at(-1), value)) return;
+    kept.times.push(time_ns);
+    kept.levels.push(value);
+    if (kept.times.length > KEPT) {
+      kept.times.splice(0, KEPT / 10);
+      kept.levels.splice(0, KEPT / 10);
+    }
+  }
+
+  /** NaN where it is not known. */
+  at(pin: string, time_ns: bigint): number {
+    const kept = this.pins.get(pin);
+    return kept === undefined ? NaN : (kept.levels[this.before(kept, time_ns)] ?? NaN);
+  }
+
+  /** Calls with each stretch of a level that has a part between two moments. */
+  stretches(
+    pin: string,
+    from_ns: bigint,
+    to_ns: bigint,
+    draw: (from_ns: bigint, to_ns: bigint, level: number) => void,
+  ): void {
+    const kept = this.pins.get(pin);
+    if (kept === undefined) return;
+    for (let index = Math.max(0, this.before(kept, from_ns)); index < kept.times.length; index++) {
+      const begin = kept.times[index] as bigint;
+      if (begin >= to_ns) return;
+      const end = kept.times[index + 1] ?? to_ns;
+      draw(begin < from_ns ? from_ns : begin, end > to_ns ? to_ns : end, kept.levels[index] as number);
+    }
+  }
+
+  /** The index of the last edge at or before a moment; −1 without. */
+  private before(kept: PinEdges, time_ns: bigint): number {
+    let [low, high] = [0, kept.times.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if ((kept.times[middle] as bigint) <= time_ns) low = middle + 1;
+      else high = middle;
+    }
+    return low - 1;
+  }
+}

@@ -1,0 +1,336 @@
+import { shortNumber, shownNumber } from "../../lib/state/numbers";
+import type { Studio } from "../../lib/state/studio.svelte";
+import { Columns, fill } from "./columns";
+import { isCurve, tracksOf, type Signal } from "./signals";
+import { bounds, digitsOf, ticks, type View } from "./view";
+
+/** Pixels. */
+const LEFT = 62;
+const RIGHT = 10;
+const BOTTOM = 20;
+const MARKS = 12;
+const LANE = 20;
+const GAP = 6;
+const LEAST_TRACK = 60;
+
+/** Lines that are told apart without colour. */
+const DASHES: readonly (readonly number[])[] = [[], [7, 3], [2, 2], [9, 3, 2, 3]];
+
+export interface Colours {
+  paper: string;
+  ink: string;
+  dim: string;
+  rule: string;
+  accent: string;
+  warn: string;
+  danger: string;
+  traces: readonly string[];
+}
+
+export interface Mark {
+  time_ns: bigint;
+  severity: "plain" | "warning" | "alarm";
+}
+
+export interface Scene {
+  view: View;
+  now_ns: bigint;
+  signals: readonly Signal[];
+  marks: readonly Mark[];
+  cursors: { a: bigint | null; b: bigint | null };
+  trigger: { track: string; level: number } | null;
+}
+
+export const styleOf = (index: number): { trace: number; dash: readonly number[] } => ({
+  trace: index % 8,
+  dash: DASHES[Math.floor(index / 2) % DASHES.length] as readonly number[],
+});
+
+/** The picture of the scope, on a canvas. */
+export class Picture {
+  private columns: Columns[] = [];
+  private readonly kept = new Map<string, [number, number]>();
+  private readonly ctx: CanvasRenderingContext2D;
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly studio: Studio,
+  ) {
+    this.ctx = canvas.getContext("2d") as CanvasRenderingContext2D;
+  }
+
+  /** The fraction of the width of the curves at a place of the pointer; below 0 and above 1 beside them. */
+  fraction(x: number): number {
+    return (x - LEFT) / this.inner;
+  }
+
+  private get inner(): number {
+    return Math.max(10, this.canvas.clientWidth - LEFT - RIGHT);
+  }
+
+  draw(scene: Scene, colours: Colours): void {
+    const { ctx, canvas } = this;
+    const ratio = window.devicePixelRatio || 1;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    ctx.fillStyle = colours.paper;
+    ctx.fillRect(0, 0, width, height);
+    ctx.font = "11px 'IBM Plex Mono', 'DejaVu Sans Mono', monospace";
+    ctx.textBaseline = "middle";
+
+    const bottom = height - BOTTOM;
+    this.time(scene.view, bottom, colours);
+    this.marks(scene, colours);
+    const lanes = scene.signals.filter(({ kind }) => kind === "level");
+    const tracks = tracksOf(scene.signals);
+    const room = bottom - MARKS - lanes.length * LANE;
+    const each = tracks.length ? Math.max(LEAST_TRACK, room / tracks.length) : 0;
+    let top = MARKS;
+    for (const { unit, signals } of tracks) {
+      this.track(scene, unit, signals, top, each - GAP, colours);
+      top += each;
+    }
+    for (const signal of lanes) {
+      this.lane(scene, signal, top, colours);
+      top += LANE;
+    }
+    this.cursor(scene, scene.cursors.a, "A", bottom, colours);
+    this.cursor(scene, scene.cursors.b, "B", bottom, colours);
+  }
+
+  private x({ view }: Scene, time_ns: bigint): number {
+    return LEFT + (Number(time_ns - view.from_ns) / Number(view.span_ns)) * this.inner;
+  }
+
+  private line(x0: number, y0: number, x1: number, y1: number): void {
+    this.ctx.beginPath();
+    this.ctx.moveTo(Math.round(x0) + 0.5, Math.round(y0) + 0.5);
+    this.ctx.lineTo(Math.round(x1) + 0.5, Math.round(y1) + 0.5);
+    this.ctx.stroke();
+  }
+
+  private time(view: View, bottom: number, colours: Colours): void {
+    const { ctx } = this;
+    const span_s = Number(view.span_ns) / 1e9;
+    const from_s = Number(view.from_ns) / 1e9;
+    const marks = ticks(from_s, from_s + span_s, this.inner / 90);
+    const digits = digitsOf(marks);
+    ctx.lineWidth = 1;
+    ctx.textAlign = "center";
+    for (const mark of marks) {
+      if (mark < 0) continue;
+      const x = LEFT + ((mark - from_s) / span_s) * this.inner;
+      ctx.strokeStyle = colours.rule;
+      this.line(x, MARKS, x, bottom);
+      ctx.fillStyle = colours.dim;
+      ctx.fillText(shownNumber(mark, digits), x, bottom + 10);
+    }
+    ctx.textAlign = "left";
+    ctx.fillText("s", LEFT + this.inner - 4, bottom + 10);
+  }
+
+  private marks(scene: Scene, colours: Colours): void {
+    for (const { time_ns, severity } of scene.marks) {
+      const x = this.x(scene, time_ns);
+      if (x < LEFT || x > LEFT + this.inner) continue;
+      this.ctx.fillStyle = { plain: colours.dim, warning: colours.warn, alarm: colours.danger }[severity];
+      this.ctx.beginPath();
+      this.ctx.moveTo(x - 4, 1);
+      this.ctx.lineTo(x + 4, 1);
+      this.ctx.lineTo(x, severity === "plain" ? 6 : 10);
+      this.ctx.fill();
+    }
+  }
+
+  private track(
+    scene: Scene,
+    unit: string,
+    signals: readonly Signal[],
+    top: number,
+    height: number,
+    colours: Colours,
+  ): void {
+    const { ctx } = this;
+    const filled = signals.map((signal) => [signal, this.filled(scene, signal)] as const);
+    let [low, high] = [Infinity, -Infinity];
+    for (const [, columns] of filled) {
+      const [from, to] = columns.range();
+      if (from < low) low = from;
+      if (to > high) high = to;
+    }
+    [low, high] = this.steady(unit, bounds(low, high));
+    const y = (value: number) => top + height - ((value - low) / (high - low)) * height;
+    const marks = ticks(low, high, Math.max(1, height / 34));
+    const digits = digitsOf(marks);
+    ctx.lineWidth = 1;
+    ctx.textAlign = "right";
+    for (const mark of marks) {
+      ctx.strokeStyle = mark === 0 ? colours.dim : colours.rule;
+      this.line(LEFT, y(mark), LEFT + this.inner, y(mark));
+      ctx.fillStyle = colours.dim;
+      ctx.fillText(shownNumber(mark, digits), LEFT - 5, y(mark));
+    }
+    ctx.textAlign = "left";
+    ctx.fillStyle = colours.ink;
+    ctx.fillText(unit, LEFT + 5, top + 8);
+    if (scene.trigger?.track === unit) {
+      ctx.strokeStyle = colours.warn;
+      ctx.setLineDash([3, 3]);
+      this.line(LEFT, y(scene.trigger.level), LEFT + this.inner, y(scene.trigger.level));
+      ctx.setLineDash([]);
+    }
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(LEFT, top, this.inner, height);
+    ctx.clip();
+    ctx.lineWidth = 1.5;
+    ctx.lineJoin = "round";
+    for (const [signal, columns] of filled) {
+      const { trace, dash } = styleOf(scene.signals.indexOf(signal));
+      ctx.strokeStyle = colours.traces[trace] as string;
+      ctx.setLineDash([...dash]);
+      this.curve(columns, y);
+    }
+    ctx.restore();
+  }
+
+  /** A range shrinks only when what is shown fills less than half of it: values do not jump about. */
+  private steady(unit: string, [low, high]: [number, number]): [number, number] {
+    const kept = this.kept.get(unit);
+    const fits = kept !== undefined && kept[0] <= low && kept[1] >= high && high - low > (kept[1] - kept[0]) / 2;
+    const range: [number, number] = fits ? kept : [low, high];
+    this.kept.set(unit, range);
+    return range;
+  }
+
+  private filled(scene: Scene, signal: Signal): Columns {
+    const index = scene.signals.indexOf(signal);
+    const width = Math.floor(this.inner);
+    let columns = this.columns[index];
+    if (columns?.width !== width) this.columns[index] = columns = new Columns(width);
+    const { from_ns, span_ns } = scene.view;
+    if (isCurve(signal)) {
+      fill(columns, this.studio.axis(signal.axis), signal.kind, from_ns, span_ns, scene.now_ns);
+      return columns;
+    }
+    const found = columns;
+    found.clear();
+    const until = from_ns + span_ns < scene.now_ns ? from_ns + span_ns : scene.now_ns;
+    this.studio.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
+      if (Number.isNaN(level)) return;
+      const [first, last] = [begin, end].map((at) => (Number(at - from_ns) / Number(span_ns)) * width) as [
+        number,
+        number,
+      ];
+      for (let column = Math.floor(first); column <= last; column++) found.add(column, level);
+    });
+    return found;
+  }
+
+  private curve({ first, last, low, high, width }: Columns, y: (value: number) => number): void {
+    const { ctx } = this;
+    ctx.beginPath();
+    let isDown = false;
+    for (let column = 0; column < width; column++) {
+      const value = first[column] as number;
+      if (Number.isNaN(value)) {
+        isDown = false;
+        continue;
+      }
+      const x = LEFT + column;
+      if (isDown) ctx.lineTo(x, y(value));
+      else ctx.moveTo(x, y(value));
+      isDown = true;
+      if (low[column] !== high[column]) {
+        ctx.lineTo(x, y(low[column] as number));
+        ctx.lineTo(x, y(high[column] as number));
+        ctx.lineTo(x, y(last[column] as number));
+      }
+    }
+    ctx.stroke();
+  }
+
+  private lane(scene: Scene, signal: Signal, top: number, colours: Colours): void {
+    if (isCurve(signal)) return;
+    const { ctx } = this;
+    const colour = colours.traces[styleOf(scene.signals.indexOf(signal)).trace] as string;
+    const [low, high] = [top + LANE - 5, top + 4];
+    ctx.textAlign = "right";
+    ctx.fillStyle = colours.ink;
+    ctx.fillText(signal.label.length > 8 ? `…${signal.label.slice(-7)}` : signal.label, LEFT - 5, top + LANE / 2);
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = 1.5;
+    const { from_ns, span_ns } = scene.view;
+    const until = from_ns + span_ns < scene.now_ns ? from_ns + span_ns : scene.now_ns;
+    let before: number | null = null;
+    ctx.beginPath();
+    this.studio.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
+      const [x0, x1] = [this.x(scene, begin), this.x(scene, end)];
+      if (Number.isNaN(level)) {
+        before = null;
+        return;
+      }
+      const y = level > 0 ? high : low;
+      if (before !== null) ctx.lineTo(x0, y);
+      else ctx.moveTo(x0, y);
+      ctx.lineTo(x1, y);
+      if (level > 0) {
+        ctx.save();
+        ctx.globalAlpha = 0.18;
+        ctx.fillStyle = colour;
+        ctx.fillRect(x0, high, Math.max(1, x1 - x0), low - high);
+        ctx.restore();
+      }
+      before = y;
+    });
+    ctx.stroke();
+  }
+
+  private cursor(scene: Scene, time_ns: bigint | null, name: string, bottom: number, colours: Colours): void {
+    if (time_ns === null) return;
+    const x = this.x(scene, time_ns);
+    if (x < LEFT || x > LEFT + this.inner) return;
+    const { ctx } = this;
+    ctx.strokeStyle = ctx.fillStyle = colours.accent;
+    ctx.lineWidth = 1;
+    ctx.setLineDash(name === "A" ? [] : [5, 3]);
+    this.line(x, MARKS, x, bottom);
+    ctx.setLineDash([]);
+    ctx.textAlign = "center";
+    ctx.fillText(name, x, bottom - 8);
+  }
+}
+
+/** Of the page, as its theme has them. */
+export function coloursOf(element: Element): Colours {
+  const style = getComputedStyle(element);
+  const colour = (name: string) => style.getPropertyValue(`--${name}`).trim();
+  return {
+    paper: colour("paper"),
+    ink: colour("ink"),
+    dim: colour("dim"),
+    rule: colour("rule"),
+    accent: colour("accent"),
+    warn: colour("warn"),
+    danger: colour("danger"),
+    traces: Array.from({ length: 8 }, (_, index) => colour(`trace-${index + 1}`)),
+  };
+}
+
+/** A span in the unit that suits it. */
+export function shownSpan(span_ns: bigint): string {
+  const span = Number(span_ns);
+  for (const [unit, size] of [
+    ["h", 3.6e12],
+    ["min", 6e10],
+    ["s", 1e9],
+    ["ms", 1e6],
+  ] as const) {
+    if (span >= size) return `${shortNumber(Number((span / size).toPrecision(3)))} ${unit}`;
+  }
+  return `${shortNumber(span / 1e3)} µs`;
+}
