@@ -191,7 +191,8 @@ export class Studio {
     for (const event of hello.plans) this.toAxis(event);
     this.pins.reset(hello.state);
     for (const [machine, { pins }] of Object.entries(hello.state)) {
-      for (const [pin, level] of Object.entries(pins)) this.edges.take(`${machine}.${pin}`, BigInt(hello.time_ns), level);
+      for (const [pin, level] of Object.entries(pins))
+        this.edges.take(`${machine}.${pin}`, BigInt(hello.time_ns), level);
     }
     if (!hello.virtual) this.askPins();
     for (const following of this.followings) this.beginFollowing(following);
