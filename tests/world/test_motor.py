@@ -379,6 +379,7 @@ def test_a_motor_on_an_arc_loses_the_field_where_the_curve_is_too_tight() -> Non
     ("speed", "start", "lost", "caught"),
     [
         (15_999.0, 16_000.0, None, 0.5),
+        (16_000.0, 16_000.0, None, 0.5),
         (16_001.0, 16_000.0, 0.5, None),
         (8000.0, 7999.0, None, None),
         (8000.0, 8000.0, None, 0.5),

@@ -17,6 +17,7 @@ from steptwin.wire.slave import FrameDirection
 from steptwin.world import plant
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, Leave, See
+from steptwin.world.faults import read
 from steptwin.world.script import Steps
 
 
@@ -243,6 +244,64 @@ def test_what_comes_from_outside_acts_and_is_in_the_trace() -> None:
     ):
         with pytest.raises(Misuse, match=message):
             world.outside(step)
+
+
+def test_what_an_action_leads_to_happens_at_once() -> None:
+    world = small()
+    world.outside(do.Write((("a", "M1_EN", 1.0), ("a", "M1_POS_ABS", 60.0))))
+    world.outside(do.Press("go"))
+    happened = list(world.trace)
+    assert [r.time for r in happened if (r.machine, r.kind, r.subject) == ("b", "edge", "IN4")][-1:] == [0]
+    plan = [r for r in happened if (r.machine, r.kind, r.subject) == ("a", "plan", "1")][-1]
+    assert plan.value.moving(1)  # type: ignore[attr-defined]
+
+
+def test_an_encoder_that_nothing_turns_stands_still() -> None:
+    world = small()
+    world.outside(do.Couple("b", 1, "free"))
+    world.mic488["b"].axis[1].enable()
+    world.mic488["b"].axis[1].move_to(1000.0)
+    world.run(for_="10 s")
+    assert (world.mic488["b"].axis[1].position, world.mic488["b"].axis[1].encoder) == (1000.0, 0)
+    assert next((r.machine, r.subject, r.value) for r in world.trace if r.kind == "input") == ("b", "M1 coupled", "free")
+
+
+def test_a_button_that_is_pressed_again_is_not_released_by_the_first_time() -> None:
+    world = small()
+    world.press("go", 1.0)
+    world.run(for_=0.5)
+    world.press("go")
+    world.run(for_=2)
+    assert world.read("go.pressed") == 1.0
+
+
+def test_a_switch_is_off_where_its_axis_begins_beside_its_zone() -> None:
+    """Within the hysteresis it depends on where the axis comes from; there it comes from nowhere."""
+    for start, level in ((-0.1, 1.0), (0.1, 0.0)):
+        world = World.from_toml(dedent(SMALL).replace("start = 50.0", f"start = {start}"))
+        assert world.read("a.IN1") == level
+
+
+READ, WRITE = with_crc(bytes.fromhex("01 03 00 64 00 01")), with_crc(bytes.fromhex("01 06 00 64 00 01"))
+
+
+@pytest.mark.parametrize(
+    ("timing", "fault", "data", "idle"),
+    [
+        ("off", "", READ, True),
+        ("off", "", WRITE, False),
+        ("off", "", READ + READ, False),
+        ("off", "crc probability=0.5", READ, False),
+        ("real", "", READ, False),
+    ],
+)
+def test_a_read_changes_nothing_unless_it_takes_time_or_may_fail(timing: str, fault: str, data: bytes, idle: bool) -> None:
+    world = World.from_toml(f'[[line]]\nname = "bus"\ntiming = "{timing}"\n[[mic488]]\nname = "t"\nline = "bus"\n')
+    if fault:
+        world.outside(do.SetFault(read(fault)))
+    line = world.lines["bus"]
+    line.connect("plc", "rtu")
+    assert line.is_idle_read(line.places["plc"], data) is idle
 
 
 def test_what_was_to_be_done_later_is_done_once_and_may_be_called_off() -> None:

@@ -143,3 +143,15 @@ def test_any_characters_are_gone_over_to_an_end(text: str) -> None:
 def test_what_nobody_writes_is_refused_at_once(text: str) -> None:
     with pytest.raises(TooMuch):
         find_places(text)
+
+
+@pytest.mark.parametrize(("opening", "closing"), [("[", "]"), ("{a=", "}"), ("[{a=", "}]")])
+def test_values_may_be_nested_so_deeply_and_no_deeper(opening: str, closing: str) -> None:
+    levels = MOST_NESTED // (len(closing))
+
+    def nested(number: int) -> str:
+        return f"a = {opening * number}1{closing * number}"
+
+    assert ("a",) in find_places(nested(levels))
+    with pytest.raises(TooMuch):
+        find_places(nested(levels + 1))

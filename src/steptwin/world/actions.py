@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
 
 from steptwin.errors import Misuse
 from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
-from steptwin.world.kernel import PinName
+from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.master import ANSWER_NS
 from steptwin.world.trace import TraceRecord
@@ -64,12 +65,19 @@ def _record(plant: Plant, machine: str, what: str, value: object) -> None:
     plant.trace.add(TraceRecord(plant.now, machine, "input", what, value))
 
 
+@contextmanager
+def _now(plant: Plant, name: str) -> Generator[Kernel]:
+    """The kernel of a machine or line at this moment; what an action leads to happens when it is done."""
+    kernel = plant.touch(name)
+    yield kernel
+    kernel.settle()
+
+
 def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, value in step.levels:
         known = plant.input_pin(name, pin, value)
-        kernel = plant.touch(name)
-        kernel.give(PinName(name, known), value)
-        kernel.settle()
+        with _now(plant, name) as kernel:
+            kernel.give(PinName(name, known), value)
 
 
 def _press(plant: Plant, step: do.Press) -> None:
@@ -88,57 +96,51 @@ def _releasing(button: str) -> str:
 
 
 def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
-    button, kernel = plant.button(name)
+    button, _ = plant.button(name)
     plant.call_off(_releasing(name))
-    kernel.advance(plant.now)
-    _record(plant, button.target.machine, name, "pressed" if pressed else "released")
-    button.press(pressed, plant.now)
-    kernel.settle()
+    with _now(plant, button.target.machine):
+        _record(plant, button.target.machine, name, "pressed" if pressed else "released")
+        button.press(pressed, plant.now)
 
 
 def _write(plant: Plant, step: do.Write) -> None:
     for name, values in plant.by_machine(step):
         registers = plant.registers(name)
-        kernel = plant.touch(name)
-        on = plant.plan.line_of.get(name)
-        for pdu in plant.requests(name, values):
-            if on is not None:
-                line, unit = on
-                line.master.ask(encode_frame(unit, pdu), ANSWER_NS, plant.now)
-            else:
-                _record(plant, name, "request", pdu)
-                registers.execute(plant.machine(name), pdu, plant.now)
-        kernel.settle()
+        with _now(plant, name):
+            on = plant.plan.line_of.get(name)
+            for pdu in plant.requests(name, values):
+                if on is not None:
+                    line, unit = on
+                    line.master.ask(encode_frame(unit, pdu), ANSWER_NS, plant.now)
+                else:
+                    _record(plant, name, "request", pdu)
+                    registers.execute(plant.machine(name), pdu, plant.now)
 
 
 def _request(plant: Plant, step: do.Request) -> None:
     line = plant.line_called(step.line)
-    kernel = plant.touch(step.line)
-    line.master.ask(encode_frame(step.unit, step.pdu), step.within, plant.now)
-    kernel.settle()
+    with _now(plant, step.line):
+        line.master.ask(encode_frame(step.unit, step.pdu), step.within, plant.now)
 
 
 def _send(plant: Plant, step: do.Send) -> None:
     line = plant.line_called(step.line)
-    kernel = plant.touch(step.line)
-    line.receive(SCRIPTS, step.data, plant.now)
-    kernel.settle()
+    with _now(plant, step.line):
+        line.receive(SCRIPTS, step.data, plant.now)
 
 
 def _bytes(plant: Plant, given: Bytes) -> None:
     line = plant.line_called(given.line)
-    kernel = plant.touch(given.line)
-    line.connect(given.place, given.kind)
-    line.receive(given.place, given.data, plant.now)
-    kernel.settle()
+    with _now(plant, given.line):
+        line.connect(given.place, given.kind)
+        line.receive(given.place, given.data, plant.now)
 
 
 def _see(plant: Plant, given: See) -> None:
     vision = plant.vision(given.machine)
-    kernel = plant.touch(given.machine)
-    _record(plant, given.machine, "vision", given[1:])
-    vision.see(plant.machine(given.machine), given[1:], plant.now)
-    kernel.settle()
+    with _now(plant, given.machine):
+        _record(plant, given.machine, "vision", given[1:])
+        vision.see(plant.machine(given.machine), given[1:], plant.now)
 
 
 def _leave(plant: Plant, given: Leave) -> None:
@@ -149,26 +151,23 @@ def _leave(plant: Plant, given: Leave) -> None:
 
 def _power_cycle(plant: Plant, step: do.PowerCycle) -> None:
     machine = plant.machine(step.machine)
-    kernel = plant.touch(step.machine)
-    _record(plant, step.machine, "power-cycle", "")
-    machine.power_cycle(plant.now)
-    kernel.settle()
+    with _now(plant, step.machine):
+        _record(plant, step.machine, "power-cycle", "")
+        machine.power_cycle(plant.now)
 
 
 def _turn(plant: Plant, step: do.Turn) -> None:
     encoders = plant.encoders(step.machine)
-    kernel = plant.touch(step.machine)
-    _record(plant, step.machine, f"M{step.axis} turned", step.counts)
-    encoders.reader(plant.machine(step.machine)).turn_encoder(step.axis, step.counts, plant.now)
-    kernel.settle()
+    with _now(plant, step.machine):
+        _record(plant, step.machine, f"M{step.axis} turned", step.counts)
+        encoders.reader(plant.machine(step.machine)).turn_encoder(step.axis, step.counts, plant.now)
 
 
 def _couple(plant: Plant, step: do.Couple) -> None:
     encoders = plant.encoders(step.machine)
-    kernel = plant.touch(step.machine)
-    _record(plant, step.machine, f"M{step.axis} coupled", step.coupling)
-    encoders.couple(plant.machine(step.machine), step.axis, step.coupling, plant.now)
-    kernel.settle()
+    with _now(plant, step.machine):
+        _record(plant, step.machine, f"M{step.axis} coupled", step.coupling)
+        encoders.couple(plant.machine(step.machine), step.axis, step.coupling, plant.now)
 
 
 def _set_fault(plant: Plant, step: do.SetFault) -> None:

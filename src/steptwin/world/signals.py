@@ -173,7 +173,7 @@ def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Mi
     axis, dot, _ = rest.rpartition(".")
     of_axis = [path for path in known if dot and path.upper().startswith(f"{axis.upper()}.")]
     shown = of_axis or known[:MOST_NAMED]
-    more = "" if of_axis or len(known) <= MOST_NAMED else f" and more, {len(known)} in all"
+    more = "" if of_axis or len(shown) == len(known) else f" and more, {len(known)} in all"
     return Misuse(
         f"no signal {name!r}{NearMiss().hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}"
     )

@@ -13,8 +13,29 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.tables import IncompleteTable
 from steptwin.world.faults import KINDS, Active, Fault, FaultKind, Layer, Occasion, Parameter, parse, read, schema
+from steptwin.world.faults.active import addresses
 from steptwin.world.faults.stream import Run, spoil
 from steptwin.world.faults.table import LARGEST_WHOLE, FaultReporter, OfByte, ParameterForm, check, checked
+
+
+@pytest.mark.parametrize(
+    ("pdu", "touched"),
+    [
+        ("01 00 64 00 03", range(100, 103)),  # Modbus Application Protocol 6.1 to 6.4: first address and quantity
+        ("04 00 64 00 01", range(100, 101)),
+        ("05 00 64 FF 00", range(100, 101)),  # 6.5, 6.6: address and value
+        ("06 00 64 00 09", range(100, 101)),
+        ("10 00 64 00 02 04 00 00 00 00", range(100, 102)),  # 6.12
+        ("07", None),
+        ("08 00 00 00 00", None),
+        ("00 00 64 00 01", None),
+        ("03 00 64 00", None),
+        ("", None),
+    ],
+)
+def test_the_addresses_that_a_request_touches(pdu: str, touched: range | None) -> None:
+    assert addresses(bytes.fromhex(pdu)) == touched
+
 
 WANTED = {
     Layer.BYTES: {"flip", "drop", "insert", "gap", "split", "noise"},

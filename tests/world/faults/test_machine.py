@@ -228,6 +228,37 @@ def test_bouncing_ends_where_the_switch_goes_back() -> None:
     assert rig.level("IN4") == 0
 
 
+def test_a_bouncing_that_is_removed_leaves_the_level_of_the_switch_and_the_other_bouncing() -> None:
+    rig = FaultRig("bounce name=one pin=IN4 bounces=4 for_ms=6", "bounce pin=IN5 bounces=4 for_ms=6")
+    rig.pin("IN4", 1)
+    rig.pin("IN5", 1)
+    rig.wait(0.001)
+    rig.faults.remove("one", rig.now)
+    before = len(rig.levels("IN4"))
+    rig.wait(0.1)
+    assert len(rig.levels("IN4")) == before
+    assert [level for _, level in rig.levels("IN5")] == [0, 1] * 4
+
+
+def test_an_input_that_sticks_does_not_bounce_any_more() -> None:
+    rig = FaultRig("bounce pin=IN4 bounces=4 for_ms=6", "bounce pin=IN5 bounces=4 for_ms=6", "stuck pin=IN4 value=0 from_s=0.001")
+    rig.pin("IN4", 1)
+    rig.pin("IN5", 1)
+    rig.wait(0.1)
+    assert rig.level("IN4") == 0
+    assert rig.levels("IN4")[-1][0] <= 1 * MILLISECOND
+    assert [level for _, level in rig.levels("IN5")] == [0, 1] * 4
+
+
+@pytest.mark.parametrize("faults", [("wear writes=0", "power-cut written=0"), ("power-cut written=0", "wear writes=0")])
+def test_a_worn_memory_may_lose_its_supply(faults: tuple[str, str]) -> None:
+    rig = FaultRig(*faults)
+    before = stored(rig)
+    fill(rig, 0x1111)
+    assert rig.ask(SAVE) == b""
+    assert stored(rig) == before
+
+
 def test_supply_drop_silences_everything_and_comes_back_as_after_power_on() -> None:
     rig = moving("supply-drop at_s=1 for_s=0.5")
     rig.wait(0.9)

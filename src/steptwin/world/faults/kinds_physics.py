@@ -167,7 +167,7 @@ PHYSICS = (
         Occasion.SAVE,
         "The supply fails while memory is being saved: what was not yet written keeps its old content.",
         (OFF, whole("written", "Bytes written until then.", 0, None, otherwise="any number")),
-        effect=OfSave(_cut_power, is_last=True),
+        effect=OfSave(_cut_power),
     ),
     FaultKind(
         "wear",

@@ -361,7 +361,7 @@ class FaultyMachine(Stateful):
         """What the memory holds when ``new`` was to be saved over ``old`` of the same length."""
         kept = bytearray(new)
         saves = [active for active in self._mine() if isinstance(active.fault.kind.effect, OfSave)]
-        for active in sorted(saves, key=lambda active: active.fault.kind.effect.is_last):
+        for active in saves:
             if active.strikes(now):
                 active.fault.kind.effect.act(active, self, old, kept, now)
         return bytes(kept)

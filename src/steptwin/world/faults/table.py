@@ -180,10 +180,9 @@ class OfChange:
 
 @dataclass(frozen=True, slots=True)
 class OfSave:
-    """``act`` takes what the memory held and changes what it keeps. ``is_last``: after those that are not."""
+    """``act`` takes what the memory held and changes what it keeps."""
 
     act: Callable[[Active, FaultyMachine, bytes, bytearray, Nanos], None]
-    is_last: bool = False
 
 
 _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {

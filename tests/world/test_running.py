@@ -1,0 +1,35 @@
+"""What a script in Python has been sent is kept and given again in the same order."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.world.running import SentValues
+
+VALUES = st.lists(st.none() | st.booleans() | st.floats(allow_nan=False) | st.binary(max_size=300))
+
+
+@given(VALUES, VALUES)
+def test_values_come_back_as_they_were_sent(first: list[object], more: list[object]) -> None:
+    sent = SentValues()
+    for value in first:
+        sent.add(value)
+    copy = sent.copy()
+    for value in more:
+        sent.add(value)
+    assert (len(copy), len(sent)) == (len(first), len(first) + len(more))
+    for found, expected in ((copy, first), (sent, first + more)):
+        values = list(found.values())
+        assert values == expected
+        assert [type(value) for value in values] == [type(value) for value in expected]
+
+
+@pytest.mark.parametrize("value", [1, "text", Decimal(1)])
+def test_what_no_step_gives_is_refused(value: object) -> None:
+    with pytest.raises(Misuse, match="a step gives nothing, a truth value, a number or bytes"):
+        SentValues().add(value)
