@@ -1,4 +1,4 @@
-"""Descriptions that ``serve`` and ``run`` make, as a person gets them to go on with: golden/small.txt, without what is said of keys.
+"""What ``serve`` and ``run`` describe, as a person gets it to go on with: golden/small.txt, without what is said of keys.
 
 Regenerate with ``python tests/world/test_small.py`` and read the diff.
 """
