@@ -44,8 +44,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         metavar="[NAME=]ADDRESS",
         help="run tests of the fixtures mic488 and m1486 against a real device: /dev/ttyUSB0, tcp://HOST:PORT, "
-        "rtu-tcp://HOST:PORT or rfc2217://HOST:PORT, with ,unit=N ,baud=N ,config=FILE behind it. IT MOVES. NAME= says which, "
-        "where tests need several: mic488=, m1486=, or a controller of a world",
+        "rtu-tcp://HOST:PORT or rfc2217://HOST:PORT, with ,unit=N ,baud=N ,config=FILE behind it. IT MOVES. NAME= before it "
+        "selects the device if tests need several: mic488=, m1486=, or a controller of a world",
     )
     parser.addini(TIME, "real or virtual: time of twins, unless their marker sets it", default="real")
 
@@ -79,8 +79,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     used = {name for item in items for name in ("mic488", "m1486") if name in getattr(item, "fixturenames", ())}
     if "" in devices and len(used - set(devices)) > 1:
         raise pytest.UsageError(
-            f"--device {devices['']}: these tests are for a MIC488 and for an M1486: say which it is, mic488=ADDRESS or "
-            "m1486=ADDRESS, or choose tests with -k"
+            f"--device {devices['']}: these tests are for a MIC488 and for an M1486: name the device, mic488=ADDRESS or "
+            "m1486=ADDRESS, or select tests with -k"
         )
 
 

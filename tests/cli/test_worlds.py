@@ -103,7 +103,7 @@ def test_a_session_goes_on_another_way(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["s.json", "--seed", "3"], r"--seed: s\.json is a session, which goes on with its own"),
+        (["s.json", "--seed", "3"], r"--seed: s\.json is a session, which continues with its own"),
         (["s.json", "--from", "3s"], r"the session ends at 2 s, before 3 s"),
         (["s.json", "--input", "table.IN8=1@1s"], r"--input table\.IN8: at 1 s: this world is at 2 s already"),
         ([str(FEEDER), "--from", "1s"], r"--from: .*feeder\.toml is not a session; a description begins at 0 s"),
@@ -192,7 +192,7 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_runs(tm
     with pytest.raises(Misuse, match=r"cannot write .*: is a directory"):
         invoke("up", str(program), "--session", str(tmp_path / "s.json"))
     for command in (("up", str(program), "--session"), ("run", str(program), "--session"), ("save",)):
-        with pytest.raises(Misuse, match=r"now\.toml: a session is called NAME\.json$"):
+        with pytest.raises(Misuse, match=r"now\.toml: the name of a session must end with \.json$"):
             invoke(*command, str(tmp_path / "now.toml"))
 
 

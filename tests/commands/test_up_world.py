@@ -191,7 +191,7 @@ def test_what_did_not_begin_overwrites_nothing(tmp_path: Path) -> None:
     [
         ("-1", "permitted are 0 \\(stands\\), 0.001 to 1000"),
         ("fast", "permitted are 0"),
-        ("max", "line 'bus' has clients outside"),
+        ("max", "line 'bus' has external clients"),
     ],
 )
 def test_speeds_that_cannot_be_are_misuse(speed: str, message: str) -> None:

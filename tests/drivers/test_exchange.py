@@ -132,8 +132,8 @@ def test_no_answer_says_how_often_how_long_and_what_was_heard() -> None:
     with pytest.raises(NoAnswer) as caught:
         job.result()
     assert str(caught.value) == (
-        "here: no answer to 'device a: one' within 0.3 s, tried 2 times; only 6f 6e was received, which is no answer; "
-        "it is not known whether the device has carried it out"
+        "here: no answer to 'device a: one' within 0.3 s, tried 2 times; only 6f 6e was received, which is not an answer; "
+        "it is unknown whether the device has executed it"
     )
     assert (caught.value.uncertain, caught.value.attempts, caught.value.heard) == (True, 2, b"on")
 
@@ -227,7 +227,7 @@ def test_what_is_not_allowed_any_more_is_not_sent() -> None:
     allowed[0] = False
     e.receive(b"one!", 1)
     assert e.step(1) + e.step(1) == b"three"
-    with pytest.raises(Overtaken, match=r"'device a: two' was not sent: a stop was given meanwhile"):
+    with pytest.raises(Overtaken, match=r"'device a: two' was not sent: a stop was requested meanwhile"):
         job.result()
     assert not later.done
 
@@ -305,7 +305,7 @@ def test_a_lost_connection_leaves_a_change_in_doubt() -> None:
     job, waiting = submit(e, "one", changes=True), submit(e, "two")
     e.step(0)
     e.lost(LineLost("unplugged"))
-    with pytest.raises(LineLost, match="unplugged; it is not known whether 'device a: one' was carried out") as caught:
+    with pytest.raises(LineLost, match="unplugged; it is unknown whether 'device a: one' was executed") as caught:
         job.result()
     assert caught.value.uncertain
     assert not waiting.done
@@ -357,7 +357,7 @@ def test_what_was_asked_for_too_long_ago_is_not_sent() -> None:
     time.now = SECOND + 1
     assert e.step(time.now) == b""
     with pytest.raises(
-        TooLate, match="'device a: one' was not sent: it was asked for more than 1 s ago; the program was suspended"
+        TooLate, match="'device a: one' was not sent: it was requested more than 1 s ago; the program was suspended"
     ):
         job.result()
 
@@ -368,7 +368,7 @@ def test_what_was_sent_once_and_is_too_late_to_be_repeated_is_in_doubt() -> None
     assert e.step(0) == b"one"
     time.now = SECOND + 1
     assert e.step(time.now) == b""
-    with pytest.raises(NoAnswer, match="it is not known whether the device has carried it out"):
+    with pytest.raises(NoAnswer, match="it is unknown whether the device has executed it"):
         job.result()
 
 

@@ -142,7 +142,7 @@ def run(operation: Operation, fault: Fault, *, tcp: bool) -> None:
     if failure is not None:
         assert not operation.repeatable, f"{fault}: {failure}"
         assert isinstance(failure, NoAnswer), f"{fault}: {failure}"
-        assert failure.uncertain == ("it is not known" in str(failure))
+        assert failure.uncertain == ("it is unknown" in str(failure))
         check_recovery(wire, mic)
         assert operation.done(wire) or operation.undone(wire), fault
         if not failure.uncertain:
@@ -186,7 +186,7 @@ def test_an_answer_to_something_else_tcp(place: str) -> None:
     assert target(wire) == START_P + 100
     wire.put(Fault("to master", control + written, "corrupt"))
     with pytest.raises(
-        NoAnswer, match=r"^memory: no answer to 'unit 1: .*M1_POS_REL.*only 00 .* was received.*it is not known"
+        NoAnswer, match=r"^memory: no answer to 'unit 1: .*M1_POS_REL.*only 00 .* was received.*it is unknown"
     ) as lost:
         mic.axis(1).move_by(1.0)
     assert lost.value.uncertain

@@ -206,7 +206,7 @@ def test_a_motion_that_may_not_be_repeated_is_in_doubt_when_the_port_goes() -> N
             raise LineLost("unplugged")
 
     wire.before_each = unplug
-    with pytest.raises(LineLost, match="it is not known whether 'unit 1: write M1_POS_REL = 3 mm' was carried out") as caught:
+    with pytest.raises(LineLost, match="it is unknown whether 'unit 1: write M1_POS_REL = 3 mm' was executed") as caught:
         mic.axis(1).move_by(3.0)
     assert caught.value.uncertain
 
@@ -307,7 +307,7 @@ def test_a_motion_called_before_a_stop_does_not_begin_after_it() -> None:
             other = asyncio.create_task(mic.axis(2).move_to(5.0))
             await asyncio.sleep(0)  # both have asked for the control registers
             await mic.axis(1).stop()
-            with pytest.raises(Overtaken, match="M1_POS_ABS = 5 mm' was not sent: a stop was given meanwhile"):
+            with pytest.raises(Overtaken, match="M1_POS_ABS = 5 mm' was not sent: a stop was requested meanwhile"):
                 await motion
             await other
 

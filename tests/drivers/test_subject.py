@@ -517,8 +517,8 @@ SECOND_AXIS = (command.Move("drum", 2, to=9.0), command.Jog("drum", 2, 50.0), co
 @pytest.mark.parametrize(
     ("wanted", "kind", "message"),
     [
-        (command.Home("drum", 1, -5.0), Refusal, "home cannot be done with this device"),
-        (command.Enable("drum", 1), Refusal, "enable cannot be done with this device"),
+        (command.Home("drum", 1, -5.0), Refusal, "home is not possible for this device"),
+        (command.Enable("drum", 1), Refusal, "enable is not possible for this device"),
         (command.ControlProgram("drum", "start"), Refusal, "an M1486 has no command to start its program"),
         (command.Jog("drum", 1, 0.0), Misuse, "the sign of the velocity is the direction"),
         *((wanted, Misuse, "axis = 2: an M1486 has axis 1 only") for wanted in SECOND_AXIS),

@@ -310,8 +310,8 @@ def test_a_damaged_session_is_misuse(tmp_path: Path, change: dict[str, Any], mes
     ("change", "message"),
     [
         ({"seed": -8}, "seed -8: permitted are whole numbers from 0 to"),
-        ({"firmware": {"table": "1.40"}}, "the session says that table is of 1.40, its world 1.70"),
-        ({"until_ns": SECOND}, "the session ends at 1000000000 ns, before what came at 2000000000 ns"),
+        ({"firmware": {"table": "1.40"}}, "table is 1.40 in the session, but its world has 1.70"),
+        ({"until_ns": SECOND}, "the session ends at 1000000000 ns, before an input at 2000000000 ns"),
     ],
 )
 def test_a_session_that_contradicts_itself_is_misuse(tmp_path: Path, change: dict[str, object], message: str) -> None:

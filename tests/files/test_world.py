@@ -46,7 +46,7 @@ def test_a_run_ends_at_a_moment_a_duration_or_a_condition() -> None:
     for moment, message in ((90, r"until 90 s: this world is at 90\.5 s already"), (float("nan"), "nan is not a time")):
         with pytest.raises(Misuse, match=message):
             world.run(until=moment)
-    with pytest.raises(Misuse, match="run needs until or for_"):
+    with pytest.raises(Misuse, match="run needs until \\(a moment or a condition\\) or for_"):
         world.run()
 
 

@@ -38,7 +38,7 @@ def test_files_beside_the_description_and_below(folder: Path, name: str) -> None
 @pytest.mark.parametrize("name", ["../secret.cfg", "{folder}/../secret.cfg", "link.cfg", "below/../../secret.cfg"])
 def test_files_elsewhere_are_for_those_who_allow_it(folder: Path, name: str) -> None:
     name = name.format(folder=folder)
-    with pytest.raises(Misuse, match=r"w\.toml:3:1: error D009: .* does not lie beside the description or below"):
+    with pytest.raises(Misuse, match=r"w\.toml:3:1: error D009: .* is outside the folder of the description"):
         load(folder, name)
     assert name in load(folder, name, allow_outside=True).files
 
@@ -46,7 +46,7 @@ def test_files_elsewhere_are_for_those_who_allow_it(folder: Path, name: str) -> 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("/dev/zero", "does not lie beside"),
+        ("/dev/zero", "is outside the folder"),
         ("none.cfg", r"cannot read .*none\.cfg: no such file"),
         ("pipe.cfg", "it is a pipe, not a file"),
         ("below", "it is a directory, not a file"),

@@ -253,7 +253,7 @@ def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_
         assert (await next_of(reader))["id"] == 2
         assert not desk.followers
         writer.write(b'{"do": "unfollow", "follow": "e"}\n')
-        assert await next_of(reader) == misuse("nothing is followed with the id 'e'")
+        assert await next_of(reader) == misuse("no subscription has the id 'e'")
         writer.close()
 
     served(play)
@@ -280,9 +280,9 @@ def test_follows_need_an_id_of_their_own_and_are_not_too_many() -> None:
         return found
 
     found = served(play)
-    assert found[0]["error"]["message"] == "follow: give an id, with which its events come"
+    assert found[0]["error"]["message"] == "follow: an id is required; its events carry it"
     assert all("ok" in one for one in found[1:17])
-    assert found[17]["error"]["message"] == "follow: there are 16 already, which is the most for a client"
+    assert found[17]["error"]["message"] == "follow: there are 16 already, the most for a client"
     assert found[18]["error"]["message"] == "follow: the id 0 is in use"
 
 
@@ -331,7 +331,7 @@ def test_more_clients_than_there_may_be_are_told_so(monkeypatch: pytest.MonkeyPa
             writer.close()
         return found
 
-    assert served(play)["error"] == {"code": "failure", "message": "there are 2 clients already, which is the most"}
+    assert served(play)["error"] == {"code": "failure", "message": "there are 2 clients already, the most possible"}
 
 
 # ---------------------------------------------------------------------- over TCP

@@ -280,7 +280,7 @@ def test_what_somebody_else_put_there_is_left_alone(tmp_path: Path) -> None:
 
     link = tmp_path / "link"
     link.symlink_to(file)
-    refused(link, f"is somebody's link to {file}")
+    refused(link, f"is an existing link to {file}")
     assert link.readlink() == file
 
     refused(tmp_path, "exists and is not a link")
@@ -291,7 +291,7 @@ def test_the_link_of_another_program_to_a_living_pty_is_left_alone(tmp_path: Pat
     path = tmp_path / "line"
     master, slave = os.openpty()
     path.symlink_to(os.ttyname(slave))
-    refused(path, f"is somebody's link to {os.ttyname(slave)}")
+    refused(path, f"is an existing link to {os.ttyname(slave)}")
     assert path.readlink() == Path(os.ttyname(slave))
     os.close(master)
     os.close(slave)

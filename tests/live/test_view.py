@@ -22,7 +22,7 @@ from steptwin.world.small import LINE, Whole, m1486_world, mic488_world
 Run = Callable[..., Any]
 
 END_POINTS = [EndPoint("pty", "/run/mic488", "Modbus RTU"), EndPoint("tcp", "127.0.0.1:5020", "Modbus TCP")]
-REMARKS = ["non-volatile memory ends with this process (--state DIR keeps it)"]
+REMARKS = ["non-volatile memory is lost at the end of this process (--state DIR keeps it)"]
 
 READ_STATUS = bytes.fromhex("0001 0000 0006 01 03 271A 0004")
 ENABLE = bytes.fromhex("0001 0000 0006 01 05 07D0 FF00")
@@ -59,7 +59,7 @@ def test_the_whole_screen(run: Run) -> None:
         "twin: MIC488, unit 1, firmware 1.70   Ctrl-C ends",
         "  Modbus RTU  /run/mic488",
         "  Modbus TCP  127.0.0.1:5020",
-        "  non-volatile memory ends with this process (--state DIR keeps it)",
+        "  non-volatile memory is lost at the end of this process (--state DIR keeps it)",
         "",
         "mic488        2.0 s  ok",
         "           position        velocity         encoder   status",

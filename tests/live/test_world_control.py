@@ -110,7 +110,7 @@ def test_who_follows_is_told_how_time_goes(run: Run) -> None:
         (do.SetFault(read_fault("stall machine=table axis=9")), "axis = 9: permitted are 1 to 4"),
         (do.Press("strat"), "no button is called 'strat'"),
         (command.Encoders("drum"), "'drum' is an M1486, which has no encoder"),
-        (command.Resume(float("inf")), "has lines with clients outside, which need a clock"),
+        (command.Resume(float("inf")), "has lines with external clients, which need real time"),
     ],
 )
 def test_what_cannot_be_done_is_refused_and_leaves_no_input(run: Run, wanted: command.Command, message: str) -> None:

@@ -173,7 +173,7 @@ def test_files_are_links_and_programs_look_at_the_files_of_their_world() -> None
 def test_a_world_reads_only_what_lies_beside_it() -> None:
     made = session(WORLD.replace("a.prg", "../../etc/passwd"))
     (found,) = of(made).diagnostics()
-    assert "does not lie beside" in found.message
+    assert "is outside the folder" in found.message
 
 
 def test_while_a_world_is_no_toml_its_programs_keep_their_firmware() -> None:

@@ -117,7 +117,7 @@ def test_a_recorded_session_is_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_without_a_session_there_is_none_to_save() -> None:
-    with pytest.raises(Misuse, match="this world records no session: start it with --session FILE"):
+    with pytest.raises(Misuse, match="this world does not record a session: start it with --session FILE"):
         live_world().session()
 
 

@@ -79,7 +79,7 @@ def test_resync_gives_the_whole_state_and_counts_from_there() -> None:
 def test_no_more_viewers_than_there_is_room_for() -> None:
     studio = Studio()
     tabs = [studio.open() for _ in range(MOST_VIEWERS)]
-    assert Tab(studio).error("hello") == ("refusal", f"there are {MOST_VIEWERS} viewers already, which is the most")
+    assert Tab(studio).error("hello") == ("refusal", f"there are {MOST_VIEWERS} viewers already, the most possible")
     tabs[0].close()
     studio.open()
 

@@ -326,7 +326,7 @@ def test_a_world_needs_its_file(run: Run) -> None:
         def test_it(steptwin_world):
             pass
     """)
-    result.stdout.fnmatch_lines(['fixture steptwin_world: which world? @pytest.mark.steptwin_world("machine.toml")'])
+    result.stdout.fnmatch_lines(['fixture steptwin_world: no world is given: @pytest.mark.steptwin_world("machine.toml")'])
 
 
 # ---------------------------------------------------------------------- nothing is left

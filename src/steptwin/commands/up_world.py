@@ -104,7 +104,7 @@ def up_with(world: World, options: UpOptions) -> bool:
     set_faults(world, options.faults)
     outside = [line for line in world.spec.lines if line.is_open]
     if speed == inf and outside:
-        raise Misuse(f"--speed max: line {outside[0].name!r} has clients outside, which need a clock; use 'steptwin run'")
+        raise Misuse(f"--speed max: line {outside[0].name!r} has external clients, which need real time; use 'steptwin run'")
     addresses = [address for line in world.spec.lines for key, address in line.links.items() if TRANSPORTS[key].is_address]
     check_addresses((*addresses, *(address for _, address in world.spec.vision_addresses())), listen_any=options.listen_any)
     if isinstance(kept, Path):

@@ -104,8 +104,8 @@ class NoAnswer(LineFailure):
         self.heard = heard
         self.uncertain = request.changes
         tries = "" if attempts == 1 else f", tried {attempts} times"
-        what = f"only {heard.hex(' ')} was received, which is no answer" if heard else "nothing was received"
-        doubt = "; it is not known whether the device has carried it out" if self.uncertain else ""
+        what = f"only {heard.hex(' ')} was received, which is not an answer" if heard else "nothing was received"
+        doubt = "; it is unknown whether the device has executed it" if self.uncertain else ""
         super().__init__(f"{place}: no answer to '{request}' within {timeout_ns / SECOND:g} s{tries}; {what}{doubt}")
 
 
@@ -120,7 +120,7 @@ class Overtaken(Refusal):
 
     def __init__(self, request: object, attempts: int) -> None:
         sent = " again" if attempts else ""
-        super().__init__(f"'{request}' was not sent{sent}: a stop was given meanwhile")
+        super().__init__(f"'{request}' was not sent{sent}: a stop was requested meanwhile")
 
 
 class TooLate(Refusal):
@@ -128,8 +128,8 @@ class TooLate(Refusal):
 
     def __init__(self, request: object, patience_ns: Nanos) -> None:
         super().__init__(
-            f"'{request}' was not sent: it was asked for more than {patience_ns / SECOND:g} s ago; the program was suspended, or "
-            "the line was busy. Ask for it again"
+            f"'{request}' was not sent: it was requested more than {patience_ns / SECOND:g} s ago; the program was suspended, "
+            "or the line was busy. Repeat it"
         )
 
 
@@ -140,8 +140,8 @@ class SentLate(LineFailure):
 
     def __init__(self, request: object, patience_ns: Nanos) -> None:
         super().__init__(
-            f"'{request}' was sent more than {patience_ns / SECOND:g} s after it was asked for, because the program was "
-            "suspended at that moment; a motion that began by it was stopped"
+            f"'{request}' was sent more than {patience_ns / SECOND:g} s after it was requested, because the program was "
+            "suspended at that moment; a motion that it began was stopped"
         )
 
 
@@ -411,8 +411,6 @@ class Exchanger(Generic[Q, A]):
         self.discipline.reset()
         job, self._current, self._more = self._current, None, None
         if job is not None:
-            failure = (
-                LineLost(f"{error}; it is not known whether '{job.request}' was carried out") if job.request.changes else error
-            )
+            failure = LineLost(f"{error}; it is unknown whether '{job.request}' was executed") if job.request.changes else error
             failure.uncertain = job.request.changes
             self._missed(job, failure)

@@ -20,7 +20,7 @@ def never() -> bool:
 class Permission:
     """Permission for a request that acts; it ends for good with a stop, or ``patience_ns`` after it was given or extended.
 
-    ``clock`` is that of the line; ``is_stopped`` tells whether a stop was given meanwhile.
+    ``clock`` is that of the line; ``is_stopped`` tells whether a stop was requested meanwhile.
     """
 
     __slots__ = ("_clock", "_has_expired", "_until", "is_stopped", "patience_ns")

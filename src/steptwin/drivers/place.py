@@ -243,7 +243,7 @@ class SerialEndpoint:
         return cast(asyncio.Transport, transport)
 
     def _failed(self, error: Exception) -> LineLost:
-        why = "another program has it" if getattr(error, "errno", None) == errno.EBUSY else reason(error)
+        why = "in use by another program" if getattr(error, "errno", None) == errno.EBUSY else reason(error)
         return LineLost(f"cannot open serial port {self.device} at {self.baud} bit/s: {why}")
 
 
@@ -267,7 +267,7 @@ class SerialChannel:
         return bytes(self._buffer[:count])
 
     def _gone(self, error: Exception) -> LineLost:
-        return LineLost(f"serial port {self._place} is gone: {reason(error)}")
+        return LineLost(f"serial port {self._place} was lost: {reason(error)}")
 
     def close(self) -> None:
         with contextlib.suppress(Exception):

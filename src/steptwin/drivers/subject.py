@@ -121,7 +121,7 @@ class AsyncDeviceSubject:
         action = self._actions.get(type(wanted))
         if action is None:
             can = ", ".join(self.description.commands)
-            raise Refusal(f"{row_of(wanted).name} cannot be done with this device ({self._line.place}); what can: {can}")
+            raise Refusal(f"{row_of(wanted).name} is not possible for this device ({self._line.place}); possible are {can}")
         self._check_names(wanted)
         number = self._numbering.command(self.now())
         try:

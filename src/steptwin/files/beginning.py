@@ -24,7 +24,7 @@ def is_session(path: Path) -> bool:
 def check_session_target(path: Path) -> None:
     """Whether a session can be written there, and is one by its name afterwards. Raises `Misuse`."""
     if not is_session(path):
-        raise Misuse(f"{path}: a session is called NAME{SESSION_SUFFIX}")
+        raise Misuse(f"{path}: the name of a session must end with {SESSION_SUFFIX}")
     check_writable(path)
 
 
@@ -53,14 +53,15 @@ def begin_world(
             warn(warning)
         return world
     if seed is not None:
-        raise Misuse(f"--seed: {path} is a session, which goes on with its own")
+        raise Misuse(f"--seed: {path} is a session, which continues with its own seed")
     if state is not None:
-        raise Misuse(f"--state: {path} is a session, which goes on with the memory it has")
+        raise Misuse(f"--state: {path} is a session, which continues with its own memory")
     session = sessions.load(path)
     world = session.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
     if moment is None and world.trace.digest() != session.digest:
         warn(
-            f"{path}: the replay differs from the run recorded with steptwin {session.version}; the world goes on from the replay"
+            f"{path}: the replay differs from the run recorded with steptwin {session.version}; the world continues from the "
+            "replay"
         )
     world.go_on()
     return world

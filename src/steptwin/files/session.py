@@ -65,7 +65,7 @@ class Session:
         ran = _firmwares(world)
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
-                raise Misuse(f"the session says that {name} is of {firmware}, its world {ran.get(name, 'has no such machine')}")
+                raise Misuse(f"{name} is {firmware} in the session, but its world has {ran.get(name, 'no such machine')}")
         return world
 
     def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
@@ -79,7 +79,7 @@ class Session:
         world = self.world(keep_trace=keep_trace, keep_inputs=keep_inputs)
         for time, what, settled in self.inputs:
             if time > self.until:
-                raise Misuse(f"the session ends at {self.until} ns, before what came at {time} ns")
+                raise Misuse(f"the session ends at {self.until} ns, before an input at {time} ns")
             if time > end:
                 break
             _bring(world, time)
@@ -116,7 +116,7 @@ def session_of(world: World) -> Session:
     Raises `Misuse` for a world that does not keep its inputs.
     """
     if not world.keeps_inputs:
-        raise Misuse("this world records no session: it does not keep its inputs")
+        raise Misuse("this world does not record a session: it does not keep its inputs")
     _settle(world)
     spec = world.spec
     return Session(

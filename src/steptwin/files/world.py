@@ -221,7 +221,7 @@ class World(Plant):
                 raise Misuse(f"until {until:g} s: this world is at {self.time:g} s already")
             end = moment if for_ is None else min(moment, end)
         elif until is None and for_ is None:
-            raise Misuse("run needs until or for_: a moment, a condition, or a duration")
+            raise Misuse("run needs until (a moment or a condition) or for_ (a duration)")
         if watch is silent:
             return self.run_to(end, condition)
         begin = self.now
@@ -322,7 +322,7 @@ def _beside(folder: Path, name: str, *, allow_outside: bool) -> Path:
     path = folder / name
     try:
         if not allow_outside and not path.resolve().is_relative_to(folder.resolve()):
-            raise Misuse(f"{shown(Path(name))} does not lie beside the description or below: --allow-outside permits it")
+            raise Misuse(f"{shown(Path(name))} is outside the folder of the description: --allow-outside permits it")
     except (OSError, RuntimeError) as error:  # links in a circle
         raise Misuse(f"{shown(Path(name))}: {error}") from None
     except ValueError as error:

@@ -143,7 +143,7 @@ class _Conversation(asyncio.Protocol):
         self._transport = cast(asyncio.Transport, transport)
         self._transport.set_write_buffer_limits(high=MOST_WAITING_BYTES)
         if len(self._clients) >= MOST_CLIENTS:
-            self._end(failure(LineFailure(f"there are {MOST_CLIENTS} clients already, which is the most")))
+            self._end(failure(LineFailure(f"there are {MOST_CLIENTS} clients already, the most possible")))
             return
         self._clients.add(self)
         self._wait()
@@ -250,18 +250,18 @@ class _Conversation(asyncio.Protocol):
         if isinstance(wanted, Unfollow):
             following = self._following.pop(wanted.id, None)
             if following is None:
-                raise Misuse(f"nothing is followed with the id {wanted.id!r}")
+                raise Misuse(f"no subscription has the id {wanted.id!r}")
             following.close()
             return self._subject.do(Time())._replace(value=None)
         return self._subject.do(wanted)
 
     def _follow(self, wanted: Follow, identity: object) -> object:
         if identity is None:
-            raise Misuse("follow: give an id, with which its events come")
+            raise Misuse("follow: an id is required; its events carry it")
         if identity in self._following:
             raise Misuse(f"follow: the id {identity!r} is in use")
         if len(self._following) >= MOST_FOLLOWED:
-            raise Misuse(f"follow: there are {MOST_FOLLOWED} already, which is the most for a client")
+            raise Misuse(f"follow: there are {MOST_FOLLOWED} already, the most for a client")
         what = filter_of(wanted.kinds, wanted.machines, wanted.axes)
         plans = [plan.plain() for plan in self._subject.plans(what)]
         following = self._following[identity] = self._subject.follow(what, wanted.bound)

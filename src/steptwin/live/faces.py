@@ -81,11 +81,11 @@ def remarks_on(world: World, *, listen_any: bool) -> list[str]:
     """What the person who started it should know."""
     found = [remark for name, machine in world.machines.items() for remark in world.kind(name).remarks(name, machine)]
     if listen_any:
-        found.append("the lines have no authentication: whoever reaches these addresses moves the axes")
+        found.append("the lines have no authentication: any client that reaches these addresses can move the axes")
     lasting = {name: world.kind(name).keeps_memory(machine) for name, machine in world.machines.items()}
     where = world.state
     if where is None and any(lasting.values()):
-        found.append("non-volatile memory ends with this process (--state DIR keeps it)")
+        found.append("non-volatile memory is lost at the end of this process (--state DIR keeps it)")
     elif where is not None:
-        found += [f"{name} has no non-volatile memory: nothing of it goes into {where}" for name in lasting if not lasting[name]]
+        found += [f"{name} has no non-volatile memory: {where} keeps nothing of it" for name in lasting if not lasting[name]]
     return found

@@ -88,7 +88,7 @@ class Pace:
     def resume(self, speed: float | None = None) -> None:
         """Time goes on, at another speed where one is given; while it goes, only that changes. Raises `Misuse`."""
         if speed == inf and self._has_clients:
-            raise Misuse("--speed max: this world has lines with clients outside, which need a clock")
+            raise Misuse("--speed max: this world has lines with external clients, which need real time")
         changes = self.is_paused or speed not in (None, self.speed)
         if speed is not None:
             self.speed = speed
@@ -228,7 +228,8 @@ class Pace:
         ring, world = self._live.ring, self._live.world
         if ring is None:
             raise Misuse(
-                f"{path}: this world keeps no last records: start it with --trace 'ring 10000'; a session is called NAME.json"
+                f"{path}: this world does not keep its last records: start it with --trace 'ring 10000'; for a session, name "
+                "the file NAME.json"
             )
         check_target(path)
         self._cell.enter()

@@ -77,7 +77,7 @@ class PtyLink:
             # A number under /dev/pts is given to another process as soon as its owner ends: only the lock shows whose link it is.
             if not target.startswith(DEVICES) or (self.path.exists() and not self._owned.left_behind):
                 self._owned.release()
-                raise Misuse(f"{self.path} is somebody's link to {target}: choose another --pty")
+                raise Misuse(f"{self.path} is an existing link to {target}: choose another --pty")
 
     def write(self, data: bytes) -> None:
         """Send; what finds no room or no program there is lost, as on a serial line whose other end does not listen."""

@@ -51,7 +51,7 @@ class SerialLink:
         self._transport = None
         if not self._closing:
             why = "closed" if error is None else reason(error)
-            self._notice(f"serial port {self._device} is gone ({why}); it is looked for")
+            self._notice(f"serial port {self._device} was lost ({why}); trying to open it again")
             self._search = asyncio.get_running_loop().create_task(self._look_for_it())
 
     async def _look_for_it(self) -> None:

@@ -101,7 +101,7 @@ class LiveWorld:
         if self._full is not None:
             return self._full
         if not self.world.keeps_inputs:
-            raise Misuse("this world records no session: start it with --session FILE")
+            raise Misuse("this world does not record a session: start it with --session FILE")
         return sessions.session_of(self.world)
 
     # ------------------------------------------------------------------ time

@@ -140,7 +140,7 @@ class Hub:
     def join(self, viewer: Viewer) -> None:
         """Raises `Refusal` where there are too many."""
         if len(self.viewers) >= MOST_VIEWERS:
-            raise Refusal(f"there are {MOST_VIEWERS} viewers already, which is the most")
+            raise Refusal(f"there are {MOST_VIEWERS} viewers already, the most possible")
         self.viewers[viewer.number] = viewer
         self.shared["viewers"].put(len(self.viewers))
 

@@ -236,7 +236,7 @@ class Session:
 
     def _unfollow(self, wanted: command.Unfollow) -> None:
         if self._follows.pop(wanted.id, None) is None:
-            raise Misuse(f"nothing is followed with the id {wanted.id!r}")
+            raise Misuse(f"no subscription has the id {wanted.id!r}")
         self._move()
 
     def _move(self) -> None:

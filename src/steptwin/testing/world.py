@@ -80,7 +80,7 @@ class WorldRig(Rig):
     def __init__(self, options: WorldOptions, devices: Mapping[str, str], base: Path) -> None:
         check_time(MARKER, options.time)
         if options.file is None:
-            raise Misuse(f'which world? @pytest.mark.{MARKER}("machine.toml")')
+            raise Misuse(f'no world is given: @pytest.mark.{MARKER}("machine.toml")')
         world = World.load(base / options.file)
         self.options = options
         self._places = count(1)

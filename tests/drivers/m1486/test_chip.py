@@ -36,7 +36,7 @@ def test_a_chip_that_echoes_already_is_known_again_by_the_next_program(kind: str
 
 
 def test_another_type_than_expected_is_refused() -> None:
-    with pytest.raises(WrongType, match="the chip says it is an M1486B, not M1486A"):
+    with pytest.raises(WrongType, match="the chip reports that it is an M1486B, not M1486A"):
         chip_driver(ChipWire("B"), variant="A")
     assert chip_driver(ChipWire("B2x"), variant="B2x").variant.clock == 2
 

@@ -44,10 +44,10 @@ def typed(wire: ChipWire) -> str:
         (lambda c: c.configure(microstep=16, qualification=1), "M16 and Q1 do not go together: with M16 go Q4"),
         (lambda c: c.move_to(-1.0), "position -1 step is outside 0 to 250000 step"),
         (lambda c: c.move_by(250_001.0), "distance 250001 step is outside ±250000 step"),
-        (lambda c: c.move_by(0.25), "0.25 step is 16 minimum microsteps and no whole full step"),
+        (lambda c: c.move_by(0.25), "0.25 step is 16 minimum microsteps, which is not a whole full step"),
         (lambda c: c.seek(1, 22), "the line to seek = 22: M1486B takes 1 to 21"),
         (lambda c: c.set_output(22, True), "no line 22"),
-        (lambda c: c.set_function(41, False), "function 41 is what this driver lives by: it stays ON"),
+        (lambda c: c.set_function(41, False), "function 41 is used by this driver: it stays ON"),
         (lambda c: c.command("f16000001"), "F16000001 is out of range"),
         (lambda c: c.command("r"), "'r' is not a command to type alone"),
         (lambda c: c.command("zz"), "'zz' is not a command: 'z' begins a second command (Zero) on this line"),
@@ -59,7 +59,7 @@ def typed(wire: ChipWire) -> str:
         (lambda c: c.inputs(20, 3), "3 lines from B20 on = 203: M1486B takes"),
         (lambda c: c.set_flag(87, True), "no user flag 87: they are 80 to 86"),
         (lambda c: c.set_function(64, True), "no function 64: they are 40 to 63"),
-        (lambda c: c.set_function(57, True), "function 57 is what this driver lives by: it stays OFF"),
+        (lambda c: c.set_function(57, True), "function 57 is used by this driver: it stays OFF"),
         (lambda c: c.seek(0, 3), "direction 0: permitted are 1 and -1"),
         (lambda c: c.uploaded(0), "0 bytes: at least 1"),
         (lambda c: c.uploaded(1), "no program of the chip was started here"),
@@ -136,7 +136,7 @@ def test_a_run_without_end() -> None:
     chip = chip_driver(wire)
     chip.run(-1, velocity=300)
     wire.sleep(2.0)
-    with pytest.raises(Misuse, match="runs without end: give the time to wait"):
+    with pytest.raises(Misuse, match="runs without end: give timeout_s"):
         chip.wait()
     assert chip.wait(0.5, check=False).reason is ChipReason.OVERDUE
     chip.stop()

@@ -157,7 +157,7 @@ def test_only_what_moves_is_ever_in_doubt() -> None:
     """A move whose R may have been heard: that is said, and position tells afterwards."""
     wire, _, chip = ready()
     wire.put(Fault("to chip", next_cr(), "flip 0"))
-    with pytest.raises(DoubtfulMove, match="it is not known whether chip 7 has begun a move: the command was sent once"):
+    with pytest.raises(DoubtfulMove, match="it is unknown whether chip 7 has begun a move: the command was sent once"):
         chip.move_to(39.0)
     wire.sleep(5.0)
     assert wire.true(7) == 0

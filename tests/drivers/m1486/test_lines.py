@@ -123,7 +123,7 @@ def test_a_move_that_waits_for_the_line_is_not_begun_after_a_stop() -> None:
         moving = asyncio.create_task(chip.move_by(100.0))
         await asyncio.sleep(0.05)  # it reads the counter
         await chip.stop()
-        with pytest.raises(Overtaken, match="'chip 7: r' was not sent: a stop was given meanwhile"):
+        with pytest.raises(Overtaken, match="'chip 7: r' was not sent: a stop was requested meanwhile"):
             await moving
         await line.close()
 

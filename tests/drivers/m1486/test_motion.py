@@ -60,9 +60,9 @@ def test_failures_in_words() -> None:
     assert [error.uncertain for error in garbled.values()] == [True, False]
     assert str(garbled[True]) == (
         "bus: 'chip 7: f64' did not come back as it was sent: 'f6´' instead of 'f64'; "
-        "it is not known whether the chip has acted on it"
+        "it is unknown whether the chip has executed it"
     )
-    assert str(garbled[False]).endswith(": nothing instead of 'f64'; it was not carried out")
+    assert str(garbled[False]).endswith(": nothing instead of 'f64'; it was not executed")
     assert str(NoEcho("bus", "chip 7", lost)) == (
         "bus: chip 7 does not echo: it is off, has another address or baud rate, or is still busy with an earlier command (gone)"
     )

@@ -154,7 +154,7 @@ def test_axes_begin_together() -> None:
     assert not wire.moving(1)
     assert not wire.moving(3)
     assert wire.twin.trigger_mode == 0
-    with pytest.raises(Misuse, match="no axis is given to be moved"):
+    with pytest.raises(Misuse, match="no axis is given"):
         mic.move_together({})
 
 

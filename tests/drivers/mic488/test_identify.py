@@ -77,11 +77,11 @@ def test_an_answer_that_is_lost_makes_no_older_controller(faults: tuple[Fault, .
 def test_somebody_else_is_named() -> None:
     wire = Wire()
     answering(wire, lambda request: words_of(request, 0x7777))
-    with pytest.raises(NoMic488, match=r"unit 1 answers, but has not the registers of a MIC488 \(implausible values\)"):
+    with pytest.raises(NoMic488, match=r"unit 1 responds, but does not have the registers of a MIC488 \(implausible values\)"):
         opened(wire)
     wire = Wire()
     answering(wire, lambda request: bytes((request[0] | 0x80, 1)))
-    with pytest.raises(NoMic488, match="it does not have this function"):
+    with pytest.raises(NoMic488, match="the controller does not have this function"):
         opened(wire)
 
 

@@ -137,10 +137,10 @@ def test_snapshots_are_text() -> None:
 @pytest.mark.parametrize(
     ("what", "value", "text"),
     [
-        ("M1_ACC", "x", 'the snapshot says M1_ACC = "x": expected a number'),
-        ("M1_ACC", None, "the snapshot says M1_ACC = null: expected a number"),
-        ("user", ["7"], r'the snapshot says USER_REGISTER\[0\] = "7": expected a number'),
-        ("user", [1.5], r"the snapshot says USER_REGISTER\[0\] = 1.5: expected a number"),
+        ("M1_ACC", "x", 'the snapshot has M1_ACC = "x": expected a number'),
+        ("M1_ACC", None, "the snapshot has M1_ACC = null: expected a number"),
+        ("user", ["7"], r'the snapshot has USER_REGISTER\[0\] = "7": expected a number'),
+        ("user", [1.5], r"the snapshot has USER_REGISTER\[0\] = 1.5: expected a number"),
         ("M1_ACC", -5, "M1_ACC = -5 u/s²: permitted > 0"),
         ("M1_ACC", float("nan"), "M1_ACC = nan u/s²: permitted > 0"),
         ("M1_NONE", 5, "no register named 'M1_NONE'"),

@@ -146,7 +146,7 @@ def test_only_a_status_read_after_the_limit_tells_that_it_is_exceeded() -> None:
 
 def test_velocity_mode_needs_a_time() -> None:
     for motion in (None, told(MotionKind.VELOCITY, 1.0), told(MotionKind.POSITION, 0.0)):
-        with pytest.raises(Misuse, match="M2 runs in velocity mode and does not end by itself: give the time to wait, timeout_s"):
+        with pytest.raises(Misuse, match="M2 runs in velocity mode and does not end by itself: give timeout_s"):
             limit_s(Unit(), motion, AxisStatus.VELOCITY)
 
 

@@ -168,7 +168,7 @@ class AsyncChip:
         rounded = round(exact / grid) * grid
         if self.settings.microstep is None and abs(exact - rounded) > 0.5:
             raise Misuse(
-                f"{value:g} {self.unit} is {exact:g} minimum microsteps and no whole full step ({FULL_STEP}), and M of "
+                f"{value:g} {self.unit} is {exact:g} minimum microsteps, which is not a whole full step ({FULL_STEP}), and M of "
                 f"{self._unit.name} is not known: configure(microstep=...) first"
             )
         return rounded
@@ -290,7 +290,7 @@ class AsyncChip:
         if function not in FUNCTIONS:
             raise Misuse(f"no function {function}: they are {FUNCTIONS[0]} to {FUNCTIONS[-1]}")
         if function in (RETURN, REPORT):
-            raise Misuse(f"function {function} is what this driver lives by: it stays {'ON' if function == RETURN else 'OFF'}")
+            raise Misuse(f"function {function} is used by this driver: it stays {'ON' if function == RETURN else 'OFF'}")
         await self._switch(function, on)
         self._unit.notes.note_function(function, on=on)
 

@@ -47,7 +47,7 @@ def parts(program: ProgramText) -> list[tuple[int | None, list[Command]]]:
     found: list[tuple[int | None, list[Command]]] = [(None, [])]
     for command in program.commands:
         if command.key == "XG":
-            raise Misuse("XG is not sent: what several chips take at once cannot be verified; name each chip with X")
+            raise Misuse("XG is not sent: a command to several chips cannot be verified; select each chip with X")
         if command.key == "X":
             found.append((command.number, []))
         else:
@@ -193,7 +193,7 @@ class _Typist:
             await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             return
         if await unit.asks_who(round(UNKNOWN_S * SECOND), self._permission) is None:
-            raise Busy(f"{unit.place}: {unit.name} takes no more: it {unit.why_busy()}")
+            raise Busy(f"{unit.place}: {unit.name} takes no more characters: it {unit.why_busy()}")
         self._typed = 0
 
 

@@ -48,7 +48,7 @@ class Garbled(LineFailure):
 
     def __init__(self, place: str, request: object, sent: bytes, heard: bytes, *, uncertain: bool) -> None:
         self.uncertain = uncertain
-        doubt = "; it is not known whether the chip has acted on it" if uncertain else "; it was not carried out"
+        doubt = "; it is unknown whether the chip has executed it" if uncertain else "; it was not executed"
         super().__init__(
             f"{place}: '{request}' did not come back as it was sent: {_shown(heard)} instead of {_shown(sent)}{doubt}"
         )
@@ -85,8 +85,8 @@ class DoubtfulMove(LineFailure):
 
     def __init__(self, chip: str, what: str, cause: LineFailure) -> None:
         super().__init__(
-            f"it is not known whether {chip} has begun {what}: the command was sent once and is not repeated ({cause}); "
-            "stop it, or wait for it and look at its position"
+            f"it is unknown whether {chip} has begun {what}: the command was sent once and is not repeated ({cause}); stop it, "
+            "or wait for it and check its position"
         )
 
 

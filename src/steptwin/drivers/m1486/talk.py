@@ -201,7 +201,7 @@ class CharacterTalk:
             case ChipRequestKind.LINE:
                 self._lines = [*spoiler, *selection, text]
         if not self._lines:
-            raise Misuse(f"{request}: it is selected already")
+            raise Misuse(f"{request}: the driver selects chips by itself")
         return self._put(self._lines[0], now)
 
     def _put(self, data: bytes, now: Nanos) -> bytes:

@@ -381,7 +381,9 @@ class ChipUnit:
             return
         (letter,) = await self.read(20, rests=True)
         if letter != notes.variant.type_letter:
-            raise WrongType(f"{self.place}: {self.name} says it is an M1486{_NAMES.get(letter, '?')}, not {notes.variant.title}")
+            raise WrongType(
+                f"{self.place}: {self.name} reports that it is an M1486{_NAMES.get(letter, '?')}, not {notes.variant.title}"
+            )
 
     def why_busy(self) -> str:
         if self.notes.is_killed and self.notes.function(RECOVER) is False:

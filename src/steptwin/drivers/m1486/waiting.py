@@ -87,7 +87,7 @@ def _time_out_s(unit: ChipUnit, motion: ChipMotionCommand | None) -> float:
     if motion is None or motion.stops != unit.notes.stops:
         return UNKNOWN_S
     if motion.kind is ChipMotion.ENDLESS:
-        raise Misuse(f"{unit.name} runs without end: give the time to wait, timeout_s")
+        raise Misuse(f"{unit.name} runs without end: give timeout_s")
     return UNKNOWN_S if motion.duration_s is None else MARGIN * motion.duration_s + MARGIN_S
 
 

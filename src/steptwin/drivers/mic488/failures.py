@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 _WHY = {
-    1: "it does not have this function",
-    2: "it does not have this register, or not for this",
-    3: "it does not take this value",
+    1: "the controller does not have this function",
+    2: "the controller does not have this register, or not for this function",
+    3: "the controller does not accept this value",
 }
 
 

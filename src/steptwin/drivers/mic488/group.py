@@ -25,7 +25,7 @@ async def trigger(unit: Unit, axes: Mapping[int, AsyncMic488Axis], kind: MotionK
     Raises `Unconfirmed` when the axes have begun to move, but AXIS_CTR_MODE could not be set back to DIRECT.
     """
     if not values:
-        raise Misuse("no axis is given to be moved")
+        raise Misuse("no axis is given")
     chosen = sorted(check_axis(axis) for axis in values)
     for axis in chosen:
         axes[axis].check(kind, values[axis])
@@ -50,6 +50,6 @@ async def trigger(unit: Unit, axes: Mapping[int, AsyncMic488Axis], kind: MotionK
             await unit.write(mode, DIRECT)
         except LineFailure as failure:
             raise Unconfirmed(
-                f"{' '.join(f'M{axis}' for axis in chosen)} began to move, but AXIS_CTR_MODE may still be TRIGGER, in which the "
-                f"controller makes no motion without a trigger: it could not be set back to DIRECT ({failure})"
+                f"{' '.join(f'M{axis}' for axis in chosen)} began to move, but AXIS_CTR_MODE may still be TRIGGER, in which "
+                f"every motion waits for a trigger: it could not be set back to DIRECT ({failure})"
             ) from failure

@@ -70,7 +70,7 @@ async def firmware_of(line: DriverLine[Query, bytes], unit: int, timeout_ns: Nan
     if refusal is None and failure is not None:
         raise failure
     raise NoMic488(
-        f"{line.place}: unit {unit} answers, but has not the registers of a MIC488 ({refusal or 'implausible values'})"
+        f"{line.place}: unit {unit} responds, but does not have the registers of a MIC488 ({refusal or 'implausible values'})"
     )
 
 

@@ -61,7 +61,7 @@ class Mic488Snapshot:
 
 def _checked(name: str, value: Any, kind: Any) -> Any:
     if not isinstance(value, kind):
-        raise Misuse(f"the snapshot says {name} = {json.dumps(value)}: expected a number")
+        raise Misuse(f"the snapshot has {name} = {json.dumps(value)}: expected a number")
     return value
 
 

@@ -90,7 +90,7 @@ class AxisWait:
         if status == AxisStatus.VELOCITY:
             if motion is not None and motion.kind is MotionKind.VELOCITY and motion.value_u == 0.0:
                 return MARGIN * abs(velocity) / acc + MARGIN_S
-            raise Misuse(f"M{axis} runs in velocity mode and does not end by itself: give the time to wait, timeout_s")
+            raise Misuse(f"M{axis} runs in velocity mode and does not end by itself: give timeout_s")
         if motion is None or motion.kind not in (MotionKind.POSITION, MotionKind.DISTANCE):
             return UNKNOWN_S
         distance = motion.value_u - position if motion.kind is MotionKind.POSITION else motion.value_u

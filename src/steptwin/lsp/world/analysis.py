@@ -63,7 +63,7 @@ class WorldAnalysis(Analysis):
         """As worlds do it, only from their own folder and those below."""
         uri = relative(self.uri, name)
         if not uri.startswith(self.uri.rpartition("/")[0] + "/"):
-            raise Misuse(f"{name} does not lie beside the description or below: --allow-outside permits it")
+            raise Misuse(f"{name} is outside the folder of the description: --allow-outside permits it")
         return self._around.read(uri)
 
     def diagnostics(self) -> Sequence[Diagnostic]:
