@@ -411,7 +411,7 @@ def test_what_was_sent_too_late_is_told(answer: bytes) -> None:
         e.receive(answer, time.now + 1)
     else:
         e.step(time.now + 1)
-    with pytest.raises(SentLate, match="'device a: one' was sent more than 1 s after it was asked for") as caught:
+    with pytest.raises(SentLate, match="'device a: one' was sent more than 1 s after it was requested") as caught:
         job.result()
     assert caught.value.uncertain
     assert told == [True], "once"

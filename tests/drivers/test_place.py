@@ -130,7 +130,7 @@ def test_a_port_is_read_with_a_time_out() -> None:
         os.write(master, b"answer")
         assert channel.read(60.0) == b"answer"
         os.close(master)
-        with pytest.raises(LineLost, match=r"serial port /dev/.* is gone"):  # noqa: PT012
+        with pytest.raises(LineLost, match=r"serial port /dev/.* was lost"):  # noqa: PT012
             for _ in range(100):
                 channel.write(b"x")
                 channel.read(0.1)

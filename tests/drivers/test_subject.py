@@ -261,7 +261,7 @@ def test_a_device_answers_the_same_but_for_what_it_cannot_know_or_refuses(told: 
 
 @pytest.mark.parametrize("wanted", ONLY_TWINS, ids=lambda wanted: type(wanted).__name__)
 def test_what_only_a_twin_can_do_is_refused(table: DeviceSubject, wanted: command.Command) -> None:
-    with pytest.raises(Refusal, match=r"cannot be done with this device \(bus\); what can: describe, read, pins, .*write"):
+    with pytest.raises(Refusal, match=r"is not possible for this device \(bus\); possible are describe, read, pins, .*write"):
         table.do(wanted)
     assert row_of(wanted).name not in table.description.commands
 

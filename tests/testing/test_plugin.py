@@ -439,7 +439,7 @@ def test_a_device_that_is_not_there_is_told_in_a_line(run: Run) -> None:
         (["--device", "/dev/a", "--device", "/dev/b"], "*there is an address already: /dev/a*"),
         (["--device", "m1486=/dev/a", "--device", "m1486=/dev/b"], "*m1486 has an address already: /dev/a*"),
         (["--device", "/dev/a", "-n2"], "*several processes (-n) cannot share a device: run without -n*"),
-        (["--device", "/dev/a"], "*for a MIC488 and for an M1486: say which it is, mic488=ADDRESS or m1486=ADDRESS*"),
+        (["--device", "/dev/a"], "*for a MIC488 and for an M1486: name the device, mic488=ADDRESS or m1486=ADDRESS*"),
     ],
 )
 def test_devices_that_cannot_be_meant_are_refused_before_anything_moves(run: Run, options: list[str], message: str) -> None:

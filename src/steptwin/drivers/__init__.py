@@ -1,8 +1,8 @@
 """Drivers for the real devices and their twins.
 
-``with Mic488("/dev/ttyUSB0") as mic:`` for threads, ``async with AsyncMic488("tcp://host:502") as mic:`` for asyncio.
-The M1486 has the same in `steptwin.drivers.m1486`.
-Errors are `steptwin.errors.Misuse`, `Refusal` and `LineFailure`; what is listed here are their kinds.
+``with Mic488("/dev/ttyUSB0") as mic:`` for threads, ``async with AsyncMic488("tcp://host:502") as mic:`` for asyncio. The
+drivers of the M1486 are in `steptwin.drivers.m1486`. Errors are `steptwin.errors.Misuse`, `Refusal` and `LineFailure`; their
+subclasses are listed here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which device, in one text: an address and what else there is to know of it, with commas between.
+"""Device addresses as text: an address, and options behind commas.
 
 ``/dev/ttyUSB0``, ``/dev/ttyUSB0,baud=9600,unit=2,config=machine.cfg``, ``tcp://127.0.0.1:5020``; for an M1486
 ``/dev/ttyUSB0,kind=m1486``, ``tcp://127.0.0.1:5022,chip=7``.
@@ -22,7 +22,8 @@ CHIP_TIMEOUT_S = 0.5
 class DeviceAddress:
     """A device address taken apart; see `steptwin.drivers.mic488.driver.AsyncMic488` for the parts.
 
-    ``chip`` and ``variant`` belong to an M1486: its address on the line (None: it is alone) and its type (None: found out).
+    ``chip`` and ``variant`` are for an M1486: its address on the line (None: the only chip) and its type (None: determined when
+    opened).
     """
 
     place: str
@@ -61,14 +62,14 @@ def parse_device(text: str) -> DeviceAddress:
 
 
 def device_at(text: str, place: str, options: Mapping[str, Any]) -> DeviceAddress:
-    """The device at an address with these options; ``text`` is how it was named, for messages. Raises `Misuse`."""
+    """The device at an address with these options; ``text`` is the whole input, for messages. Raises `Misuse`."""
     found = dict(options)
     _check_kind(text, found)
     return replace(DeviceAddress(place), **found)
 
 
 def split_device(text: str) -> tuple[str, dict[str, Any]]:
-    """What stands before the first comma, and the options behind it. Raises `Misuse`."""
+    """The part before the first comma, and the options behind it. Raises `Misuse`."""
     place, *options = (part.strip() for part in text.split(","))
     if not place:
         raise Misuse(f"device {text!r} has no address: expected ADDRESS, or with options behind it: ADDRESS,{OPTIONS}")
@@ -85,7 +86,7 @@ def split_device(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def _check_kind(text: str, found: dict[str, Any]) -> None:
-    """One kind of device only; what was not said is as that kind has it."""
+    """Check that all options are of one kind of device, and fill in the defaults of that kind."""
     if _OF_M1486 & found.keys():
         found.setdefault("kind", "m1486")
     kind = found.get("kind", KINDS[0])

@@ -1,7 +1,7 @@
-"""Ordinary calls made of a driver's coroutines.
+"""Blocking calls made from a driver's coroutines.
 
-On a `steptwin.drivers.threads.ThreadLine` a coroutine never suspends, so one step runs it to its end. The blocking classes hold a
-driver and name its methods; nothing is said twice.
+On a `steptwin.drivers.threads.ThreadLine` a coroutine never suspends, so one step runs it to its end. The blocking classes
+hold a driver and name its methods.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ def finish(coroutine: Coroutine[Any, Any, R]) -> R:
 
 
 class Method(Protocol[P, R_co]):
-    """A method as type checkers see it."""
+    """The type of a method, for type checkers."""
 
     def __get__(self, instance: Any, owner: Any = None) -> Callable[P, R_co]: ...
 
 
 def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, R]]) -> Method[P, R]:
-    """The method of a blocking class that does what ``method`` does for its ``_driver``."""
+    """The blocking method that calls ``method`` of the class's ``_driver``."""
 
     @functools.wraps(method)
     def call(self: Any, *args: P.args, **kwargs: P.kwargs) -> R:

@@ -1,13 +1,12 @@
-"""One line, one exchange at a time: who is next, what is sent, what counts as its answer, when to give up. No I/O, no clock.
+"""One line with one exchange at a time: order of jobs, sending, matching of answers, time-outs. No I/O, no clock.
 
-A shell (`steptwin.drivers.threads`, `steptwin.drivers.tasks`) has the bytes and the time. It calls `step` whenever `deadline` has
-come or something was submitted, sends what `step` returns, calls `written`, and hands what it receives to `receive`.
+A shell (`steptwin.drivers.threads`, `steptwin.drivers.tasks`) has the bytes and the time. It calls `step` at each `deadline`
+and after each new job, sends the bytes that `step` returns, calls `written`, and passes received bytes to `receive`.
 
-The order of those who wait: an urgent job (a stop) is the next on the line whatever waits. Otherwise first come, first served;
-a device that was asked just now is given its pause, and jobs for other devices may go first meanwhile. Nothing is sent while
-an exchange is going on.
+Order of jobs: an urgent job (a stop) is always next. Other jobs are served in order of arrival; during the pause that a
+device needs after an exchange, jobs for other devices may be served. Nothing is sent during an exchange.
 
-What is said on a line is the affair of its `Discipline`; nothing here knows Modbus.
+The protocol of a line is in its `Discipline`; nothing here knows Modbus.
 """
 
 from __future__ import annotations
@@ -22,16 +21,16 @@ from steptwin.machine import SECOND, Nanos
 
 
 class LineRequest(Protocol):
-    """What is asked. Its text says so to people: ``unit 1: read M1_POS_ACT``."""
+    """A request. Its text is for people: ``unit 1: read M1_POS_ACT``."""
 
     @property
     def device(self) -> Hashable:
-        """Whom it is for: each device on a line has its own pace."""
+        """The device it is for: each device on a line has its own pauses."""
         ...
 
     @property
     def changes(self) -> bool:
-        """Whether the device does more than answer, so that after a lost answer nobody knows whether it did."""
+        """Whether the device acts on it, so that after a lost answer it is unknown whether it did."""
         ...
 
 
@@ -42,9 +41,9 @@ A_co = TypeVar("A_co", covariant=True)
 
 
 class SendNext(NamedTuple):
-    """The exchange goes on: this is to be sent next.
+    """The next bytes to send in an exchange.
 
-    ``may_wait``: an urgent job may go first, and then the exchange is begun anew.
+    ``may_wait``: an urgent job may be served before; the exchange then starts again.
     """
 
     data: bytes
@@ -52,51 +51,51 @@ class SendNext(NamedTuple):
 
 
 class Discipline(Protocol[Q_contra, A_co]):
-    """What is said on a line: how a request becomes bytes, what counts as its answer, how to come back in step."""
+    """The protocol of a line: encoding of requests, matching of answers, resynchronisation."""
 
     @property
     def free_ns(self) -> Nanos:
-        """Nothing may be sent before."""
+        """The time before which nothing may be sent, ns."""
         ...
 
     @property
     def wary(self) -> bool:
-        """Whether an answer may still come that nobody waits for: what came while nobody listened is to be thrown away first."""
+        """Whether a late answer may still arrive, so that bytes received between exchanges must be discarded first."""
         ...
 
     def start(self, request: Q_contra, now: Nanos, *, urgent: bool) -> bytes:
-        """Begin an exchange: what is to be sent."""
+        """Begin an exchange; returns the bytes to send."""
         ...
 
     def receive(self, data: bytes, now: Nanos) -> A_co | SendNext | None:
-        """Bytes that came during the exchange: its answer, what to send next, or None while more is needed.
+        """Take bytes received during the exchange; returns its answer, the next bytes to send, or None while more are needed.
 
-        Raises `Refusal` when the peer refused, `LineLost` when the connection has become useless, and another `LineFailure`
-        when the exchange has failed.
+        Raises `Refusal` if the device refused, `LineLost` if the connection cannot be used any longer, another `LineFailure` if
+        the exchange failed.
         """
         ...
 
     def allowance_ns(self, request: Q_contra) -> Nanos:
-        """Time that request and answer take on the wire, before which no answer can be missed."""
+        """Time that request and answer take on the wire, added to the time-out, ns."""
         ...
 
     def abandon(self, now: Nanos) -> bytes:
-        """Nobody waits for the answer any more. What was heard of it."""
+        """Give up waiting for the answer; returns the bytes received so far."""
         ...
 
     def stray(self, data: bytes, now: Nanos) -> None:
-        """Bytes that came while no exchange was going on."""
+        """Take bytes received between exchanges."""
         ...
 
     def reset(self) -> None:
-        """The connection is new: nothing said before can arrive on it."""
+        """Forget the state of the old connection; no earlier answer can arrive on the new one."""
         ...
 
 
 class NoAnswer(LineFailure):
-    """Nobody answered, or not understandably, as often as was allowed.
+    """No valid answer in all permitted attempts.
 
-    ``uncertain``: the device may have carried the request out nevertheless.
+    ``uncertain``: the device may have executed the request nevertheless.
     """
 
     def __init__(self, place: str, request: LineRequest, attempts: int, timeout_ns: Nanos, heard: bytes) -> None:
@@ -110,13 +109,13 @@ class NoAnswer(LineFailure):
 
 
 class LineLost(LineFailure):
-    """The port or the connection is gone, or could not be opened. ``uncertain`` as of `NoAnswer`."""
+    """The port or connection was lost or could not be opened. ``uncertain`` as of `NoAnswer`."""
 
     uncertain = False
 
 
 class Overtaken(Refusal):
-    """A motion was not begun because a stop of its axis was given meanwhile."""
+    """A motion was not begun because a stop of its axis was requested meanwhile."""
 
     def __init__(self, request: object, attempts: int) -> None:
         sent = " again" if attempts else ""
@@ -124,7 +123,7 @@ class Overtaken(Refusal):
 
 
 class TooLate(Refusal):
-    """Something was not sent: too much time had passed since it was asked for, as when the program was suspended."""
+    """A request was not sent: too much time had passed since the call, for example because the program was suspended."""
 
     def __init__(self, request: object, patience_ns: Nanos) -> None:
         super().__init__(
@@ -134,7 +133,7 @@ class TooLate(Refusal):
 
 
 class SentLate(LineFailure):
-    """Something was sent too long after it was asked for: the program was suspended while it was sent."""
+    """A request was sent too late after the call: the program was suspended during the sending."""
 
     uncertain = True
 
@@ -146,10 +145,10 @@ class SentLate(LineFailure):
 
 
 class Job(Generic[Q, A]):
-    """An exchange that is waited for.
+    """A request in the queue of a line, and its result.
 
-    ``most``: how often it may be sent; more than once only if repeating it cannot move anything twice. ``permission`` is checked
-    before anything of it is sent. ``tell`` is called when it is done.
+    ``most``: how often it may be sent; more than once only if repeating it cannot move anything twice. ``permission`` is
+    checked before anything of it is sent. ``tell`` is called at the end.
     """
 
     __slots__ = (
@@ -172,24 +171,24 @@ class Job(Generic[Q, A]):
         self.urgent = urgent
         self.permission = permission
         self.attempts = 0
-        """How often it has been sent in vain."""
+        """Number of failed attempts."""
         self.missed: LineFailure | None = None
-        """Why the last attempt was in vain."""
+        """Why the last attempt failed."""
         self.is_late = False
-        """Whether it was sent although its permission had expired: the program was suspended between check and sending."""
+        """Whether it was sent after its permission had expired: the program was suspended between check and sending."""
         self.done = False
         self.tell: Callable[[], object] | None = None
         self._answer: A | None = None
         self._error: SteptwinError | None = None
 
     def result(self) -> A:
-        """The answer of a job that is done, or its error raised."""
+        """The answer of a finished job. Raises its error."""
         if self._error is not None:
             raise self._error
         return self._answer  # type: ignore[return-value]
 
     def refusal(self) -> SteptwinError | None:
-        """Why nothing of it may be sent now; None while it may."""
+        """The reason why it must not be sent now; None if it may be."""
         permission = self.permission
         if permission is None:
             return None
@@ -216,7 +215,7 @@ class Job(Generic[Q, A]):
 
 
 class Exchanger(Generic[Q, A]):
-    """The jobs of one line. ``interval_ns`` is the least time between two frames to the same device."""
+    """Executes the jobs of one line. ``interval_ns``: the shortest time between two frames to the same device."""
 
     __slots__ = (
         "_current",
@@ -245,16 +244,16 @@ class Exchanger(Generic[Q, A]):
 
     @property
     def in_flight(self) -> bool:
-        """Whether an exchange is going on."""
+        """Whether an exchange is in progress."""
         return self._current is not None
 
     @property
     def busy(self) -> bool:
-        """Whether there is anything to be done."""
+        """Whether an exchange is in progress or jobs wait."""
         return self._current is not None or bool(self._urgent) or bool(self._waiting)
 
     def deadline(self) -> Nanos | None:
-        """When `step` has something to do if nothing else happens."""
+        """The time of the next call of `step`, ns, if no job or byte arrives before; None: none."""
         return self._deadline if self._current is not None else self._due
 
     # ------------------------------------------------------------------ those who wait
@@ -263,11 +262,11 @@ class Exchanger(Generic[Q, A]):
         (self._urgent if job.urgent else self._waiting).append(job)
 
     def withdraw(self, job: Job[Q, A]) -> None:
-        """Whoever wanted it is gone. It is not sent any more; what is on the line runs to its end."""
+        """Cancel a job: it is not sent any more. An exchange in progress runs to its end."""
         job.done = True
 
     def fail_all(self, error: SteptwinError) -> None:
-        """The line cannot be used: all who wait are told."""
+        """End all jobs with an error, because the line cannot be used."""
         jobs = [*self._urgent, *self._waiting]
         self._urgent.clear()
         self._waiting.clear()
@@ -279,7 +278,7 @@ class Exchanger(Generic[Q, A]):
     # ------------------------------------------------------------------ time
 
     def step(self, now: Nanos) -> bytes:
-        """What is to be sent at ``now``; nothing while an answer is awaited or nobody waits."""
+        """The bytes to send at ``now``; empty during an exchange or without jobs."""
         current = self._current
         if current is not None:
             if now < self._deadline:
@@ -308,7 +307,7 @@ class Exchanger(Generic[Q, A]):
         return data
 
     def _choose(self, queue: deque[Job[Q, A]], now: Nanos) -> Job[Q, A] | None:
-        """Take the next job out of ``queue``, or find out when there will be one."""
+        """Take the next job out of ``queue``, or compute when one may be sent."""
         due: Nanos | None = None
         free = self.discipline.free_ns
         for job in list(queue) if len(queue) > 1 else (queue[0],):
@@ -348,7 +347,7 @@ class Exchanger(Generic[Q, A]):
         return b"" if more is None else more.data
 
     def written(self) -> None:
-        """The bytes `step` has returned are on their way. The program may have been suspended since."""
+        """Register that the bytes of `step` were sent. The program may have been suspended before."""
         job = self._current
         if job is not None and job.permission is not None and job.permission.has_expired():
             job.is_late = True
@@ -359,7 +358,7 @@ class Exchanger(Generic[Q, A]):
             self._next[job.request.device] = now + self._interval_ns
 
     def _missed(self, job: Job[Q, A], error: LineFailure) -> None:
-        """An attempt was in vain: try again before the others of its rank, or give up."""
+        """Handle a failed attempt: repeat it before jobs of the same rank, or give up."""
         job.attempts += 1
         job.missed = error
         if job.done:
@@ -374,7 +373,7 @@ class Exchanger(Generic[Q, A]):
     # ------------------------------------------------------------------ bytes
 
     def receive(self, data: bytes, now: Nanos) -> None:
-        """Bytes came. Raises `LineLost` when the connection has to be given up; the shell then calls `lost`."""
+        """Take received bytes. Raises `LineLost` if the connection must be closed; the shell then calls `lost`."""
         job = self._current
         if job is None or self._more is not None:
             self.discipline.stray(data, now)
@@ -407,7 +406,7 @@ class Exchanger(Generic[Q, A]):
         self._deadline = max(now, self.discipline.free_ns, self._next.get(job.request.device, 0))
 
     def lost(self, error: LineLost) -> None:
-        """The connection is gone. The exchange going on is begun anew on the next one if that is allowed."""
+        """Handle a lost connection. The exchange in progress is repeated on the next one if that is permitted."""
         self.discipline.reset()
         job, self._current, self._more = self._current, None, None
         if job is not None:

@@ -1,4 +1,4 @@
-"""What a driver needs of a line, whatever waits for its answers.
+"""The interface of a line to its drivers, for tasks and threads alike.
 
 Tasks wait on a `steptwin.drivers.tasks.TaskLine`, threads on a `steptwin.drivers.threads.ThreadLine`.
 """
@@ -14,31 +14,31 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 
 LONGEST_WAIT_S = 1e6
-"""Nobody waits longer for a motion: eleven days."""
+"""Longest time-out of a motion, s: eleven days."""
 
 
 LOCK_SLICE_S = 1.0
 
 
 class DriverLine(Protocol[Q, A]):
-    """A line that may be shared by several drivers, tasks or threads.
+    """A line that several drivers, tasks or threads may share.
 
-    ``notes`` is where drivers of one device on the line keep what they have in common.
+    ``notes`` holds the state that drivers of one device on the line share.
     """
 
     notes: dict[Hashable, Any]
 
     @property
     def place(self) -> str:
-        """Where it is, for people."""
+        """The address as text."""
         ...
 
     async def open(self) -> None:
-        """Open the port or the connection. Raises `LineLost`. An exchange opens a line that was lost again."""
+        """Open the port or connection. Raises `LineLost`. An exchange reopens a lost line."""
         ...
 
     async def exchange(self, job: Job[Q, A]) -> A:
-        """The answer. Raises `Refusal` or `LineFailure`."""
+        """Send a request and return the answer. Raises `Refusal` or `LineFailure`."""
         ...
 
     async def sleep(self, seconds: float) -> None: ...
@@ -46,9 +46,9 @@ class DriverLine(Protocol[Q, A]):
     def now(self) -> Nanos: ...
 
     def lock(self, key: Hashable, waiting: Callable[[], object] | None = None) -> AbstractAsyncContextManager[object]:
-        """For several exchanges that belong together; the same key gives the same lock.
+        """A lock for exchanges that belong together; the same key gives the same lock.
 
-        ``waiting`` is called every `LOCK_SLICE_S` while another holds it, so that waiting can be told from being suspended.
+        ``waiting`` is called every `LOCK_SLICE_S` while another holds it, to distinguish waiting from a suspension.
         """
         ...
 
@@ -56,6 +56,6 @@ class DriverLine(Protocol[Q, A]):
 
 
 def check_wait(timeout_s: float | None) -> None:
-    """`Misuse` for a time nobody can wait; None is one to be computed."""
+    """Raises `Misuse` for a time-out (s) outside its range; None: it is computed."""
     if timeout_s is not None and not 0.0 <= timeout_s <= LONGEST_WAIT_S:
         raise Misuse(f"a time to wait of {timeout_s:g} s is outside 0 to {LONGEST_WAIT_S:.0f} s")

@@ -1,4 +1,4 @@
-"""Modbus as a master speaks it: requests, and how they travel as RTU frames or behind an MBAP header. Pure."""
+"""The Modbus master: requests, as RTU frames or behind an MBAP header. Pure."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection, FrameObserver
 
 QUIET_NS: Nanos = rtu.BURSTY_GAP_NS
-"""After a failed exchange a line has to be silent this long before it is used again."""
+"""Silence after a failed exchange before the line is used again, ns."""
 NOISE_NS: Nanos = 200 * MILLISECOND
-"""A line that is not silent for this long never will be."""
+"""Longest wait for that silence, ns."""
 LATE_NS: Nanos = 5 * SECOND
-"""An answer later than this does not come any more."""
+"""Time after which a late answer can no longer arrive, ns."""
 LEAST_GAP_NS: Nanos = 1750 * MICROSECOND
 """Silence before a frame above 19200 bit/s (Modbus over serial line V1.02, section 2.5.1.1); below it 3.5 characters."""
 HELD_BYTES = 2 * rtu.MAX_FRAME
@@ -65,7 +65,7 @@ class Query:
         self.rtu_size = self.size + 3
         self._rtu_frame: bytes | None = None
         self.tcp_tail = (len(self.pdu) + 1).to_bytes(4, "big") + bytes((unit,)) + self.pdu
-        """The frame on Modbus TCP behind its number."""
+        """The Modbus TCP frame without its transaction number."""
 
     @property
     def rtu_frame(self) -> bytes:
@@ -79,12 +79,12 @@ class Query:
         return f"unit {self.device}: {text}"
 
     def answered_by(self, answer: bytes) -> bool:
-        """Whether a PDU is a positive answer to this, by its own bytes."""
+        """Whether a PDU is a positive answer to this request, judged by its bytes."""
         return len(answer) == self.size and answer.startswith(self.head)
 
 
 class _Owed(NamedTuple):
-    """An answer that has not come and still may."""
+    """A late answer that may still arrive."""
 
     query: Query
     until: Nanos
@@ -93,11 +93,11 @@ class _Owed(NamedTuple):
 class RtuMaster:
     """RTU frames on a line whose answers carry no number.
 
-    An answer that comes too late looks like the answer to a later request of the same kind. Devices answer in order; so
-    before such a request a *marker* is sent, a read whose answer has a length no owed answer has: once it is answered, nothing
-    before it can come any more. A repeated request needs none, because either answer is right for it.
+    A late answer looks like the answer to a later request of the same kind. Devices answer in order; so before such a request a
+    *marker* is sent, a read whose answer differs in length from all late ones: once it is answered, no late answer can arrive.
+    A repeated request needs none, because either answer is correct.
 
-    ``serial`` is None where bytes take no time. Adapters that echo what is sent are noticed at the first read.
+    ``serial`` is None if bytes take no time. Adapters that echo the bytes sent are detected at the first read.
     """
 
     __slots__ = (
@@ -109,7 +109,7 @@ class RtuMaster:
         self._gap_ns = 0 if serial is None else max(LEAST_GAP_NS, serial.duration(7) // 2)
         self.on_frame = on_frame
         self.echo = False
-        """Whether everything sent is heard too."""
+        """Whether the adapter echoes the bytes sent."""
         self.reset()
 
     def reset(self) -> None:
@@ -190,7 +190,7 @@ class RtuMaster:
         return answer
 
     def _found(self, asked: Query, held: bytes) -> bytes | None:
-        """The answer to ``asked`` in what was heard, behind whatever rubbish."""
+        """The answer to ``asked`` in the received bytes, possibly behind other bytes."""
         start = 0
         sent = asked.rtu_frame
         if not asked.changes and held.startswith(sent):
@@ -215,7 +215,7 @@ class RtuMaster:
         return None
 
     def _settle(self, asked: Query) -> None:
-        """``asked`` was answered: what its device was asked before is not owed any more, unless this was its answer."""
+        """Forget earlier requests to the device after ``asked`` was answered, unless this was the answer to one of them."""
         of_device = [owed for owed in self._owed if owed.query.device == asked.device]
         if self._then is not None or all(owed.query.function != asked.function for owed in of_device):
             self._owed = [owed for owed in self._owed if owed.query.device != asked.device]
@@ -238,10 +238,10 @@ class RtuMaster:
 
 
 class TcpMaster:
-    """Modbus TCP. Answers carry the number of their request; late ones are known by it and passed over.
+    """Modbus TCP frames. Answers carry the number of their request, so late ones are recognised and ignored.
 
-    So is what has the number but answers something else, as gateways send that mix their lines up: it tells nothing of what
-    the device has done. ``place`` is where the other end is, for people.
+    An answer with the right number to another request, as some gateways send, is ignored, too: it does not show what the device
+    has done. ``place``: the address, for messages.
     """
 
     __slots__ = ("_asked", "_framer", "_no_answer", "_number", "_number_bytes", "_place", "on_frame")
@@ -325,7 +325,7 @@ def bits(answer: bytes, count: int) -> list[bool]:
 
 
 def check_unit(unit: int, *, tcp: bool) -> None:
-    """`Misuse` for a unit that sends no answers."""
+    """Raises `Misuse` for a unit that sends no answers."""
     least, most = (0, 255) if tcp else (1, rtu.MAX_UNIT)
     if not least <= unit <= most:
         raise Misuse(f"unit {unit} is outside {least} to {most}")

@@ -1,8 +1,8 @@
-"""Permission to send what moves something.
+"""Permission to send a request that moves an axis.
 
-A program can be suspended at any moment, by a debugger, SIGSTOP, the sleep of a laptop or a full memory, and go on hours later in
-the middle of what it did. Whoever stands at the machine then does not expect a motion that was asked for before. So a motion has
-a permission: it is checked immediately before anything is sent, by the clock, and expires.
+A program can be suspended at any moment, by a debugger, SIGSTOP, the sleep of a laptop or a lack of memory, and continue
+hours later. A person at the machine does not expect a motion then. So a motion has a permission that expires; it is checked
+against the clock immediately before sending.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ def never() -> bool:
 
 
 class Permission:
-    """Permission for a request that acts; it ends for good with a stop, or ``patience_ns`` after it was given or extended.
+    """Permission for a request that acts. It ends with a stop, or ``patience_ns`` after it was given or extended.
 
-    ``clock`` is that of the line; ``is_stopped`` tells whether a stop was requested meanwhile.
+    ``clock`` is that of the line; ``is_stopped`` returns whether a stop was requested meanwhile.
     """
 
     __slots__ = ("_clock", "_has_expired", "_until", "is_stopped", "patience_ns")
@@ -39,7 +39,8 @@ class Permission:
         return self._has_expired
 
     def extend(self, since: Nanos | None = None) -> None:
-        """What was asked for makes progress (at ``since``, by default now). An expired permission stays expired."""
+        """Extend the permission, because the request makes progress (at ``since``, by default now). An expired one stays
+        expired."""
         now = self._clock()
         if now > self._until:
             self._has_expired = True

@@ -1,4 +1,4 @@
-"""Where a device is reached: ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``."""
+"""Addresses of lines: ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:5020``, ``rtu-tcp://host:5021``, ``rfc2217://host:port``."""
 
 from __future__ import annotations
 
@@ -28,41 +28,41 @@ FORMS = "expected a serial port such as /dev/ttyUSB0 or COM3, tcp://HOST:PORT, r
 
 
 class Channel(Protocol):
-    """Bytes to and from a line, for a thread that waits. Everything raises `LineLost` when the line is gone."""
+    """Bytes to and from a line, for a thread that waits. All methods raise `LineLost` if the line is lost."""
 
     def write(self, data: bytes) -> None: ...
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come; nothing after ``timeout_s``."""
+        """The received bytes; empty after ``timeout_s``."""
         ...
 
     def close(self) -> None: ...
 
 
 class Endpoint(Protocol):
-    """Something that can be opened. Its text is its address."""
+    """An address that can be opened. Its text is the address."""
 
     def open(self) -> Channel:
-        """For a thread. Raises `LineLost` naming the address."""
+        """Open it for a thread. Raises `LineLost` with the address."""
         ...
 
     async def connect(self, make: Callable[[], asyncio.Protocol]) -> asyncio.Transport:
-        """For a task. Raises `LineLost` naming the address."""
+        """Open it for a task. Raises `LineLost` with the address."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class LineAddress:
-    """An address as a driver takes it apart. ``framed``: Modbus TCP rather than the bytes of a serial line."""
+    """A parsed address. ``framed``: Modbus TCP rather than the bytes of a serial line."""
 
     endpoint: Endpoint
     framed: bool = False
     serial: SerialLine | None = None
-    """Set where bytes take their time."""
+    """The settings of a line on which bytes take time; else None."""
 
 
 def parse_line_address(text: str, baud: int) -> LineAddress:
-    """The place behind an address. ``baud`` matters to serial ports. Raises `Misuse`."""
+    """Parse an address. ``baud`` is for serial ports. Raises `Misuse`."""
     if not BAUDS[0] <= baud <= BAUDS[1]:
         raise Misuse(f"{baud} bit/s is outside {BAUDS[0]} to {BAUDS[1]}")
     scheme, separator, _ = text.partition("://")
@@ -123,7 +123,7 @@ class TcpEndpoint:
 
 
 class SocketChannel:
-    """A connection whose time-out the system keeps: that saves a call for each exchange."""
+    """A connection with the time-out of the operating system, which saves a call for each exchange."""
 
     def __init__(self, connected: socket.socket, place: str) -> None:
         connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -166,7 +166,7 @@ class SocketChannel:
 
 
 class TimedSocketChannel(SocketChannel):
-    """The same where a single call cannot be made not to wait (Windows)."""
+    """The same for systems without non-blocking single calls (Windows)."""
 
     def write(self, data: bytes) -> None:
         self._socket.settimeout(0.0)
@@ -200,7 +200,7 @@ CHANNEL = SocketChannel if hasattr(socket, "MSG_DONTWAIT") else TimedSocketChann
 
 @dataclass(frozen=True, slots=True)
 class SerialEndpoint:
-    """A serial port, 8N1. One process at a time may have it."""
+    """A serial port, 8N1. Only one process at a time can open it."""
 
     device: str
     baud: int

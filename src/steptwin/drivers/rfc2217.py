@@ -1,8 +1,8 @@
-"""serialx' network serial port, made to do with servers that do not confirm everything.
+"""serialx' network serial port, for servers that do not confirm all requests.
 
-When it opens a port serialx sends SET-MODEMSTATE-MASK and SET-LINESTATE-MASK and waits until each is confirmed. ser2net (seen
-with 4.3.11) answers the first by NOTIFY-MODEMSTATE and never confirms it, so that no port of it could be opened; pyserial,
-which sends no masks, opens them. Nothing here depends on either mask: they are sent, and nobody waits.
+When it opens a port serialx sends SET-MODEMSTATE-MASK and SET-LINESTATE-MASK and waits until each is confirmed. ser2net
+(seen with 4.3.11) answers the first by NOTIFY-MODEMSTATE and never confirms it, so that no port of it could be opened;
+pyserial, which sends no masks, opens them. Neither mask is needed here, so they are sent without waiting.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Input that was typed while the program was suspended.
 
-A terminal keeps what is typed while the program does not run, and delivers it all at once afterwards. Nothing is to move by it.
+A terminal keeps what is typed while the program does not run, and delivers it all at once afterwards. It must not move
+anything.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ QUIET_S = 0.5
 
 
 class StaleInput:
-    """Tells stale input from fresh. ``clock`` is in seconds. Threads may share it."""
+    """Distinguishes stale input from fresh. ``clock`` is in seconds. Threads may share it."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -26,7 +27,7 @@ class StaleInput:
         self._beat_s = self._stale_until_s = clock()
 
     def beat(self) -> None:
-        """The program runs."""
+        """Report that the program runs."""
         with self._lock:
             self._beat()
 

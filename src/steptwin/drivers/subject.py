@@ -4,8 +4,9 @@ with Mic488("/dev/ttyUSB0", config="machine.cfg") as mic:
     subject = mic.subject("table")
     subject.do(Move("table", 1, to=20.0))
 
-Drivers do the commands, with their own safety (ADR 12). What no register and no command shows has the quality `UNKNOWN`. What
-only a twin can do (pins, faults, time, power) is a `Refusal`. Events come from polling, and only while there are followers.
+Drivers execute the commands, with their own safety (ADR 12). Values that no register or command shows have the quality
+`UNKNOWN`. Commands for twins only (pins, faults, time, power) raise `Refusal`. Events come from polling, and only while there
+are followers.
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
 Action: TypeAlias = Callable[[Any], Awaitable[object]]
 Value: TypeAlias = tuple[float | None, str]
-"""Of a point, None where it is unknown; and its unit."""
+"""The value of a point, None if unknown; and its unit."""
 
 
 class DevicePart(Protocol):
-    """One controller behind a driver that is open."""
+    """One controller behind an open driver."""
 
     @property
     def line(self) -> DriverLine[Any, Any]: ...
@@ -44,31 +45,32 @@ class DevicePart(Protocol):
 
     @property
     def address(self) -> int | None:
-        """On its line; None where it is alone there."""
+        """The address on its line; None for a single chip."""
         ...
 
     @property
     def datasheet(self) -> Datasheet:
-        """Its axes are in the units of the driver."""
+        """The data sheet, with axes in the units of the driver."""
         ...
 
     async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
-        """By the names that were asked for. Raises `Misuse` for a point that is not there."""
+        """The values by name. Raises `Misuse` for an unknown point."""
         ...
 
     def actions(self) -> Mapping[type, Action]:
-        """The commands that it can do; names of machine and line have been checked."""
+        """The commands that the device can execute; names of machine and line have been checked."""
         ...
 
     async def look(self, kinds: frozenset[str]) -> list[Payload]:
-        """What has changed since the last look, and samples; of the kinds that are wanted."""
+        """The changes since the last call, and samples, of the wanted kinds."""
         ...
 
 
 class AsyncDeviceSubject:
-    """The controller ``name``. Others may drive it, too, over the same line. Events come of `poll`; `run` polls again and again.
+    """The controller ``name`` as a subject. Other programs may drive it over the same line. `poll` makes the events; `run`
+    polls repeatedly.
 
-    Times begin with the subject. A cause is known of nothing but what a command is seen to lead to at once.
+    Times begin with the subject. An event has a cause only if a command leads to it at once.
     """
 
     def __init__(self, name: str, device: DevicePart, period_s: float = PERIOD_S) -> None:
@@ -103,7 +105,7 @@ class AsyncDeviceSubject:
     # ------------------------------------------------------------------ what a subject is
 
     async def read(self, *points: str) -> tuple[Reading, ...]:
-        """In as few exchanges as there can be."""
+        """Read points, in as few exchanges as possible."""
         paths = {point: self._path(point) for point in points if point != "time"}
         values = await self._device.values(tuple(dict.fromkeys(paths.values()))) if paths else {}
         found: dict[str, Value] = {point: values[path] for point, path in paths.items()}
@@ -134,13 +136,13 @@ class AsyncDeviceSubject:
         return self.followers.follow(what, bound)
 
     async def poll(self) -> None:
-        """Look once, where anybody follows, and make events of what has changed. Raises `LineFailure`."""
+        """Poll once, if there are followers, and make events of the changes. Raises `LineFailure`."""
         if self.followers:
             for payload in await self._device.look(self.followers.kinds):
                 self.followers.publish(self._numbering.event(self.now(), self.name, payload))
 
     async def run(self) -> None:
-        """Until cancelled. Raises `LineFailure`."""
+        """Poll until cancelled. Raises `LineFailure`."""
         while True:
             await self.poll()
             await self._line.sleep(self.period_ns / SECOND)
@@ -148,7 +150,7 @@ class AsyncDeviceSubject:
     # ------------------------------------------------------------------ commands
 
     def _check_names(self, wanted: Command) -> None:
-        """Those of machines and lines in a command."""
+        """Check the names of machines and lines in a command."""
         for field in row_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
             if field.name == "machine":
@@ -179,7 +181,7 @@ class AsyncDeviceSubject:
 
 
 class DeviceSubject(Blocking):
-    """The same for threads: a `Subject`. Whoever takes events has the device polled for them, at most once in a period."""
+    """The same for threads: a `Subject`. Taking events polls the device, at most once per period."""
 
     _driver: AsyncDeviceSubject
 
@@ -197,7 +199,7 @@ class DeviceSubject(Blocking):
 
 
 class _Polled(Following):
-    """Events of a device that is polled when they are taken."""
+    """Events of a device, which is polled when they are taken."""
 
     __slots__ = ("_due", "_subject")
 

@@ -15,7 +15,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.system import reason
 
 CLOSE_S = 1.0
-"""How long the other end is given for the end of a connection."""
+"""Time for the other end to close a connection, s."""
 
 
 class TaskLine(Generic[Q, A]):
@@ -108,7 +108,7 @@ class TaskLine(Generic[Q, A]):
             self._arm(due)
 
     def _arm(self, due: Nanos) -> None:
-        """An earlier timer than needed is left alone: it finds nothing to do and sets the next."""
+        """Set the timer. An earlier one is kept: it finds nothing to do and sets the next."""
         if self._timer is not None:
             self._timer.cancel()
         self._timer_ns = due
@@ -171,7 +171,7 @@ class TaskLine(Generic[Q, A]):
 
 
 class _SlicedLock:
-    """See `steptwin.drivers.line.Line.lock`. Whoever waits keeps the place in the queue."""
+    """See `steptwin.drivers.line.Line.lock`. Waiting tasks keep their place in the queue."""
 
     __slots__ = ("_lock", "_waiting")
 
@@ -198,7 +198,7 @@ class _SlicedLock:
 
 
 class _LineConnection(asyncio.Protocol):
-    """One connection of a line; what an old one says is not heard any more."""
+    """One connection of a line; bytes from an old one are ignored."""
 
     transport: asyncio.Transport | None = None
 

@@ -1,10 +1,10 @@
 """A line for threads.
 
-Whoever waits for an answer runs the line until it has it; the others wait for their turn. So there is no thread of our own,
-and a process that hangs sends nothing.
+A thread that waits for an answer runs the line until it has it; the others wait for their turn. So there is no background
+thread, and a process that hangs sends nothing.
 
-The methods are coroutines that never suspend: one and the same driver runs on this and on `steptwin.drivers.tasks`.
-`steptwin.drivers.blocking` makes ordinary calls of them.
+The methods are coroutines that never suspend, so the same driver runs on this and on `steptwin.drivers.tasks`.
+`steptwin.drivers.blocking` makes blocking calls of them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from steptwin.machine import SECOND, Nanos
 
 
 class ThreadLine(Generic[Q, A]):
-    """See `steptwin.drivers.line.Line`. ``clock`` and ``sleeping`` are the wall's."""
+    """See `steptwin.drivers.line.Line`. ``clock`` and ``sleeping``: real time."""
 
     def __init__(
         self,
@@ -69,13 +69,13 @@ class ThreadLine(Generic[Q, A]):
         return job.result()
 
     def _follow(self, job: Job[Q, A]) -> None:
-        """Wait until somebody has done it, or nobody runs the line."""
+        """Wait until another thread has finished the job, or none runs the line."""
         job.tell = self._changed.notify_all
         while self._leading and not job.done:
             self._changed.wait()
 
     def _lead(self, job: Job[Q, A]) -> None:
-        """Run the line, for others too, until ``job`` is done."""
+        """Run the line, for other threads, too, until ``job`` is finished."""
         self._leading = True
         try:
             if self._engine.discipline.wary:
@@ -91,7 +91,7 @@ class ThreadLine(Generic[Q, A]):
                 self._changed.notify_all()
 
     def _empty(self) -> None:
-        """Throw away what came while nobody listened."""
+        """Discard bytes received between exchanges."""
         try:
             while self._channel is not None and (data := self._channel.read(0.0)):
                 self._engine.receive(data, self.now())
@@ -125,7 +125,7 @@ class ThreadLine(Generic[Q, A]):
             engine.receive(received, self.now())
 
     def _reopened(self) -> Channel | None:
-        """The line is open again, or all who wait were told why not."""
+        """Open the line again; on failure end all jobs with the error. Returns whether it is open."""
         try:
             self._channel = self._endpoint.open()
         except LineLost as error:
@@ -146,7 +146,7 @@ class ThreadLine(Generic[Q, A]):
         return ThreadLock(self._locks.setdefault(key, threading.Lock()), waiting)
 
     async def close(self) -> None:
-        """Close the line. What other threads wait for ends with `LineLost`, at the latest when it times out."""
+        """Close the line. Waiting jobs of other threads end with `LineLost`, at the latest at their time-out."""
         with self._changed:
             self._closed = True
             if not self._leading:

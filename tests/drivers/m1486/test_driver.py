@@ -493,7 +493,7 @@ def test_a_line_that_is_cut_when_a_move_begins_leaves_it_in_doubt() -> None:
         wire.severed = wire.severed or (data == b"\r" and wire.sent[-1][1] == b"r")
 
     wire.before_each = cut
-    with pytest.raises(DoubtfulMove, match="it is not known whether chip 7 has begun a move") as caught:
+    with pytest.raises(DoubtfulMove, match="it is unknown whether chip 7 has begun a move") as caught:
         chip.move_by(10.0)
     assert caught.value.uncertain
     wire.before_each, wire.severed = None, False

@@ -136,7 +136,7 @@ def test_a_fault_at_every_character_of_every_exchange(name: str) -> None:
                 moved = min(moved, 0)
             assert moved in (0, operation.done), f"{fault}: {error}"
             uncertain = getattr(error, "uncertain", False)
-            assert isinstance(error, FileGivenUp) or uncertain == ("not known" in str(error)), f"{fault}: {error}"
+            assert isinstance(error, FileGivenUp) or uncertain == ("is unknown" in str(error)), f"{fault}: {error}"
             if not uncertain:
                 assert moved == 0, f"{fault}: {error}"
             if isinstance(error, FileGivenUp):

@@ -71,8 +71,8 @@ def test_failures_in_words() -> None:
         "nothing was executed"
     )
     assert str(DoubtfulMove("chip 7", "a move", lost)) == (
-        "it is not known whether chip 7 has begun a move: the command was sent once and is not repeated (gone); "
-        "stop it, or wait for it and look at its position"
+        "it is unknown whether chip 7 has begun a move: the command was sent once and is not repeated (gone); "
+        "stop it, or wait for it and check its position"
     )
     assert str(unconfirmed("chip 7", lost)) == (
         "chip 7 could not be stopped: it cannot be reached and continues its last command (gone)"

@@ -293,7 +293,7 @@ def test_raw_access() -> None:
     assert mic.request(WriteCoilRequest(6001, True)) == WriteCoilRequest(6001, True)
     assert mic.request(ReadRequest(1, 6000, 3)) == BitsResponse(1, b"\2")
     with pytest.raises(
-        ModbusRefusal, match=r"unit 1: read .*was refused: it does not have this register.*exception 02"
+        ModbusRefusal, match=r"unit 1: read .*was refused: the controller does not have this register.*exception 02"
     ) as caught:
         mic.registers(9000, 2)
     assert caught.value.code == 2

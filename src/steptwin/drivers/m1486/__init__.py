@@ -1,7 +1,7 @@
 """Drivers for M1486 chips and their twins.
 
-``with M1486("/dev/ttyUSB0") as chip:`` for threads, ``async with AsyncM1486("tcp://host:5022") as chip:`` for asyncio; several
-chips share an `M1486Line` or `AsyncM1486Line`. Errors as of `steptwin.drivers`; what is listed here are their kinds.
+``with M1486("/dev/ttyUSB0") as chip:`` for threads, ``async with AsyncM1486("tcp://host:5022") as chip:`` for asyncio;
+several chips share an `M1486Line` or `AsyncM1486Line`. Errors as of `steptwin.drivers`; further subclasses are listed here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A chip as a driver opens it, reads it and sets it; nothing here moves it. `steptwin.drivers.m1486.driver` does."""
+"""Opening, reading and setting a chip. The motions are in `steptwin.drivers.m1486.driver`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LARGEST = 16_000_000
 
 @dataclass(frozen=True, slots=True)
 class ChipStatus:
-    """A chip at rest at a glance."""
+    """The state of a chip at rest."""
 
     type: str
     interface: str
@@ -74,7 +74,7 @@ class AsyncChip:
         self._unit = ChipUnit(self.line, address, timeout_ns=round(timeout_s * SECOND))
         self.unit = unit
         self.scale_u = FULL_STEP * steps_per_unit
-        """Minimum microsteps in a unit."""
+        """Minimum microsteps per unit."""
         self.origin_u = origin_u
 
     def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[ChipRequest, bytes]:
@@ -89,18 +89,19 @@ class AsyncChip:
 
     @property
     def variant(self) -> Variant:
-        """The type, once the chip was opened."""
+        """The type; known once the chip is open."""
         return self._unit.variant
 
     @property
     def settings(self) -> ChipSettings:
-        """What the chip is set to as far as drivers on this line have set it."""
+        """The settings of the chip as far as drivers on this line have made them."""
         return self._unit.notes.settings
 
     # ------------------------------------------------------------------ opening
 
     async def open(self) -> None:
-        """Open the line, have the chip echo, find out what it is. Raises `NoEcho`, `Busy` while it moves, `WrongType`."""
+        """Open the line, switch on the echo of the chip and determine its type. Raises `NoEcho`, `Busy` while it moves,
+        `WrongType`."""
         await self.line.open()
         try:
             async with self._unit.turn():
@@ -114,11 +115,11 @@ class AsyncChip:
             raise
 
     async def open_line(self) -> None:
-        """Open the line only: enough for `stop` and `stop_program` of a chip that moves, which cannot be asked anything."""
+        """Open the line only: sufficient for `stop` and `stop_program` of a moving chip, which does not respond."""
         await self.line.open()
 
     async def close(self) -> None:
-        """Close the line, unless it is shared. The chip goes on with what it does."""
+        """Close the line, unless it is shared. The chip continues its motion and program."""
         if self._own:
             await self.line.close()
 
@@ -132,12 +133,14 @@ class AsyncChip:
     # ------------------------------------------------------------------ reading
 
     async def counter(self) -> int:
-        """The position counter, in minimum microsteps. Raises `Busy` while the chip moves: the line gives none then (M-28)."""
+        """The position counter, in minimum microsteps. Raises `Busy` while the chip moves, because it does not respond then
+        (M-28)."""
         async with self._unit.turn():
             return await self._unit.read_number(1)
 
     async def position(self) -> float:
-        """Where the motor is. Raises `Busy` while it moves, `PositionUnknown` after a move that was stopped."""
+        """The position of the motor, in ``unit``. Raises `Busy` while it moves, `PositionUnknown` after a move that was
+        stopped."""
         counter = await self.counter()
         self._check_position()
         return self._shown(counter)
@@ -179,7 +182,7 @@ class AsyncChip:
             return await self._unit.read_number(4)
 
     async def byte(self, number: int) -> int:
-        """What ``U`` with that number sends, 1 to 20. Raises `Busy` while the chip does something."""
+        """The byte that ``U`` with this number (1 to 20) sends. Raises `Busy` while the chip moves, waits or runs its program."""
         async with self._unit.turn():
             (byte,) = await self._unit.read(number)
         return byte
@@ -198,7 +201,7 @@ class AsyncChip:
         return {number: bool(word >> bit & 1) for bit, number in enumerate(FUNCTIONS)}
 
     async def status(self) -> ChipStatus:
-        """Everything the chip tells of itself. Raises `Busy` while it moves."""
+        """Read all uploads. Raises `Busy` while the chip moves."""
         async with self._unit.turn():
             found = await self._unit.read(1, 2, 3, 4, 5, 6, 14, 15, 16, 17, 18, 19)
         (flags, mode, series), functions = found[6:9], int.from_bytes(bytes(found[9:]), "little")
@@ -262,7 +265,7 @@ class AsyncChip:
                 unit.notes.settings = unit.notes.settings.with_(**{name: number})
 
     async def set_position(self, position: float) -> None:
-        """Say where the motor is. It does not move."""
+        """Set the position counter. The motor does not move."""
         counter = self._counter_of(position)
         async with self._unit.turn():
             await self._unit.rest()
@@ -286,7 +289,7 @@ class AsyncChip:
         await self._switch(flag, on)
 
     async def set_function(self, function: int, on: bool) -> None:
-        """Switch function 40 to 63. 41 (echo) and 57 (report) are the driver's own."""
+        """Switch function 40 to 63. 41 (echo) and 57 (report) are reserved for the driver."""
         if function not in FUNCTIONS:
             raise Misuse(f"no function {function}: they are {FUNCTIONS[0]} to {FUNCTIONS[-1]}")
         if function in (RETURN, REPORT):
@@ -295,7 +298,7 @@ class AsyncChip:
         self._unit.notes.note_function(function, on=on)
 
     async def set_limit(self, on: bool) -> None:
-        """Have LIMIT stop the motor (function 42 OFF) or not, as to leave the switch again."""
+        """Select whether LIMIT stops the motor (function 42 OFF), for example to leave the switch."""
         await self.set_function(LIMITOFF, not on)
 
     async def _switch(self, number: int, on: bool) -> None:
@@ -304,14 +307,14 @@ class AsyncChip:
             await self._unit.say(f"{'t' if on else 'c'}{number}", acts=True)
 
     async def set_variable(self, number: int) -> None:
-        """Give the internal variable a value, 0 to 2^24 − 1."""
+        """Set the internal variable, 0 to 2^24 − 1."""
         checked_number(":", number, self.variant, "the internal variable")
         async with self._unit.turn():
             await self._unit.rest()
             await self._unit.say(f":{number}")
 
     async def inputs(self, first: int = 1, count: int = 4) -> tuple[bool, ...]:
-        """Levels of up to nine lines from ``first`` on. They go through the internal variable, which is theirs afterwards."""
+        """Levels of up to nine lines from ``first`` on. This overwrites the internal variable."""
         checked_number("?", 10 * first + count, self.variant, f"{count} lines from B{first} on")
         async with self._unit.turn():
             await self._unit.rest()

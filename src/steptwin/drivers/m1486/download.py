@@ -1,4 +1,4 @@
-"""Programs into a chip: typed command by command with the chip's flow control, a file in ``[ ]`` whole or not at all."""
+"""Download of programs into a chip, command by command with the chip's flow control; a file in ``[ ]`` whole or not at all."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
 
 Progress = Callable[[int, int], object]
-"""Told how many commands were typed, of how many."""
+"""Called with the number of commands sent, and their total."""
 
 MOST_TOLD = 10
-"""So many errors of a program are told: a file of another kind has one in each line."""
+"""Most errors shown for a program: a file of another kind has one in each line."""
 ERASE_MARGIN_S = 0.1
 FULL_PAUSE_NS = 50 * MILLISECOND
-"""The input buffer is given this long to empty when characters come back inverted."""
+"""Pause for the input buffer to empty when characters come back inverted."""
 _MOVES = frozenset("r)(jk'[ie")
-"""What moves, or leads to commands typed before."""
+"""Commands that move, or jump to commands sent before."""
 
 
 def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> ProgramText:
-    """Raises `Misuse` with the errors in it."""
+    """The parsed program. Raises `Misuse` with its errors."""
     from steptwin.m1486.check import check
 
     checked = check(text, variant, interface)
@@ -43,7 +43,7 @@ def checked_program(text: str, variant: Variant, interface: Interface, name: str
 
 
 def parts(program: ProgramText) -> list[tuple[int | None, list[Command]]]:
-    """The commands in order, cut where ``X`` chooses another chip; None before the first X."""
+    """The commands in order, split where ``X`` selects another chip; None before the first X."""
     found: list[tuple[int | None, list[Command]]] = [(None, [])]
     for command in program.commands:
         if command.key == "XG":
@@ -56,9 +56,8 @@ def parts(program: ProgramText) -> list[tuple[int | None, list[Command]]]:
 
 
 def probes(commands: Sequence[Command]) -> list[bool]:
-    """Whether a question may be typed before each command: not where the program comes by again, in a loop or behind a label that
-    is jumped back to, because it would be part of it: every turn would upload a byte.
-    """
+    """Whether a query may be sent before each command. Not in a loop or behind a label that is jumped back to: the query would
+    become part of the program, and each pass would upload a byte."""
     allowed = [True] * len(commands)
     loops: list[int] = []
     labels: dict[int | None, int] = {}
@@ -86,9 +85,8 @@ async def send_program(
     progress: Progress | None = None,
     name: str = "program",
 ) -> bytes:
-    """Type a program into the chips it names; ``units[None]`` gets what stands before any ``X``. Returns what ``U`` uploaded
-    outside ``[ ]``.
-    """
+    """Send a program to the chips it selects; ``units[None]`` gets the commands before any ``X``. Returns the bytes that ``U``
+    uploaded outside ``[ ]``."""
     first = next(iter(units.values()))
     other = next((unit for unit in units.values() if unit.variant is not first.variant), None)
     if other is not None:
@@ -116,7 +114,7 @@ async def send_program(
 
 
 class _Typist:
-    """Types commands into one chip."""
+    """Sends commands to one chip."""
 
     def __init__(self, unit: ChipUnit, tell: Callable[[int], object]) -> None:
         self._unit = unit
@@ -184,9 +182,9 @@ class _Typist:
         return b""
 
     async def _empty(self) -> None:
-        """Until the chip has done all it was told: its buffer is empty then. Raises `Busy` after a minute.
+        """Wait until the chip has executed all commands, so that its buffer is empty. Raises `Busy` after a minute.
 
-        Where nothing may be asked only a moment: a chip that does not move empties it meanwhile, one that does answers 5EH.
+        Where no query is permitted, wait only shortly: a chip at rest empties its buffer meanwhile, a moving one answers 5EH.
         """
         unit = self._unit
         if not self._may_ask:
@@ -198,10 +196,10 @@ class _Typist:
 
 
 async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission, tell: Callable[[int], object]) -> None:
-    """Type a file from ``[`` to ``]``, which makes it run.
+    """Send a file from ``[`` to ``]``, which starts it.
 
-    When something goes wrong before, nothing of it runs: the chip is reset, which is how the manual has a file given up (chapter
-    II, Memory), and `FileGivenUp` is raised. Raises `DoubtfulMove` when nobody knows whether ``]`` was heard.
+    On an earlier error the chip is reset, which discards the file (manual chapter II, Memory), and `FileGivenUp` is raised.
+    Raises `DoubtfulMove` if it is unknown whether ``]`` was received.
     """
     try:
         for count, line in enumerate(lines[:-1], start=1):
@@ -238,7 +236,7 @@ async def begin(
     duration_s: float | None = None,
     retype: bool = True,
 ) -> None:
-    """Say what begins a motion, once."""
+    """Send a command that begins a motion, once."""
     notes = unit.notes
 
     def told(target_u: int | None, duration_s: float | None) -> None:

@@ -1,4 +1,4 @@
-"""An M1486 as a driver shows it, for asyncio. `steptwin.drivers.m1486.sync` has the same for threads."""
+"""The driver of the M1486 for asyncio. `steptwin.drivers.m1486.sync` is the one for threads."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from steptwin.machine import SECOND
 MARK = "u15"
 """The last command of a block: uploads the driver interface, a byte that is not a type letter."""
 _TYPED = frozenset("abdfghmnpqsv:+-*/<>=tcw!?oz")
-"""Commands that may be typed alone: they move nothing, lead nowhere and are not answered."""
+"""Commands that may be sent alone: they move nothing, do not jump and are not answered."""
 
 
 class AsyncM1486(AsyncChip):
     """A chip at an address (``/dev/ttyUSB0``, ``tcp://host:5022``) or on a line shared with others.
 
-    ``address`` 0 to 15 as its pins say; None for the only chip on a line. ``variant``: found out when not given; a type for
-    24 MHz cannot be told from its brother and has to be named. Positions are in ``unit``, ``steps_per_unit`` full steps each;
-    the position counter has no sign, and ``origin_u`` is its value, in minimum microsteps, where the position is 0.
+    ``address``: 0 to 15, set by the pins; None for the only chip on a line. ``variant``: determined when not given; a type for
+    24 MHz responds like the one for 12 MHz and has to be named. Positions are in ``unit`` of ``steps_per_unit`` full steps. The
+    position counter has no sign; ``origin_u`` is its value, in minimum microsteps, at position 0.
 
-    The driver switches function 41 (echo) on and 57 (report) off. It types nothing before `open` (or ``async with``).
+    The driver switches function 41 (echo) on and 57 (report) off. It sends nothing before `open` (or ``async with``).
     """
 
     # ------------------------------------------------------------------ motion
@@ -42,8 +42,8 @@ class AsyncM1486(AsyncChip):
     async def move_to(self, position: float) -> None:
         """Begin to move to a position, rounded to a microstep. `wait` waits for the end.
 
-        Raises `Misuse` for a position the counter has not, `Busy`, `PositionUnknown`; `DoubtfulMove` when nobody knows whether
-        it was begun. R is sent once only.
+        Raises `Misuse` for a position outside the counter, `Busy`, `PositionUnknown`; `DoubtfulMove` if it is unknown whether
+        the move has begun. R is sent only once.
         """
         target = self._counter_of(position)
         unit = self._unit
@@ -91,7 +91,7 @@ class AsyncM1486(AsyncChip):
     async def seek(self, direction: int, line: int) -> None:
         """Begin to move at start/stop speed until a line has its end level: low for B1–3, 8–11, 16–19, else high.
 
-        The number of the line goes through the internal variable: so no garbled digit can make the motor seek another line.
+        The number of the line is passed in the internal variable, so that no garbled digit can select another line.
         """
         if direction not in (1, -1):
             raise Misuse(f"direction {direction}: permitted are 1 and -1")
@@ -103,7 +103,7 @@ class AsyncM1486(AsyncChip):
             await begin(self._unit, ")" if direction > 0 else "(", ChipMotion.SEEK, permission)
 
     async def start_program(self, label: int) -> None:
-        """Go to a label of what is in the command memory. Its number goes through the internal variable, as of `seek`."""
+        """Start the program in the command memory at a label. Its number is passed in the internal variable, as of `seek`."""
         checked_number("j", label, self.variant, "the label")
         permission = self._unit.permission()
         async with self._unit.turn(permission):
@@ -112,9 +112,9 @@ class AsyncM1486(AsyncChip):
             await begin(self._unit, "j", ChipMotion.BLOCK, permission)
 
     async def stop(self) -> None:
-        """K: brake with the ramp. Goes before everything that waits for the line; moves that wait are not begun any more.
+        """Brake with the ramp (K). It precedes all waiting requests; moves that wait for the line are not begun.
 
-        A program goes on after it unless function 51 is OFF: `stop_program` ends it. Raises `steptwin.drivers.Unconfirmed`.
+        A program continues after it unless function 51 is OFF: `stop_program` ends it. Raises `steptwin.drivers.Unconfirmed`.
         """
         notes = self._unit.notes
         motion = notes.motion
@@ -123,16 +123,16 @@ class AsyncM1486(AsyncChip):
         await self._unit.kill()
 
     async def recover(self) -> None:
-        """C75: what Kill has stopped goes on, where function 51 is OFF. A program may move the motor at once."""
+        """Continue what Kill has stopped (C75), if function 51 is OFF. A program may move the motor at once."""
         permission = self._unit.permission()
         async with self._unit.turn(permission):
             await self._unit.act("c75", permission, stored=False, program=True)
             self._unit.notes.is_killed = False
 
     async def stop_program(self, timeout_s: float = 10.0) -> None:
-        """End what the chip does: its motion by Kill, its program by wrong data (function 44 has to be OFF). Nothing is erased.
+        """End motion and program: the motion by Kill, the program by wrong data (function 44 must be OFF). Nothing is erased.
 
-        Raises `Busy` when that did not help: then only `reset` or RST does, which lose the position.
+        Raises `Busy` if that has no effect: then only `reset` or RST helps, and the position is lost.
         """
         unit = self._unit
         notes = unit.notes
@@ -150,13 +150,12 @@ class AsyncM1486(AsyncChip):
                 raise Busy(f"{self.line.place}: {unit.name} continues: function 44 is ON, LIMIT is low, or it is still braking")
 
     async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> ChipMoveEnd:
-        """Wait until the chip has done what it was told, and say why a motion ended.
+        """Wait until the chip has executed all commands, and return why a motion ended.
 
-        Without ``timeout_s`` the time is computed from the motion where all its settings are known, else it is a minute. With
-        other chips on the line it is left to them until shortly before the computed end, and the ends of their moves are watched
-        too; a wait of unknown length keeps it, but for stops.
-        Raises `ChipMoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
-        reported as the end.
+        Without ``timeout_s`` the time-out is computed from the motion if all settings are known, else it is a minute. Other
+        chips can use the line until shortly before the computed end, and the ends of their moves are watched, too; a wait of
+        unknown length keeps the line, except for stops. Raises `ChipMoveFailed` unless the motion ended as intended, and a
+        `LineFailure` if the line fails; with ``check`` false both are returned as the end.
         """
         end = await wait_for(self._unit, timeout_s, self.unit, self._shown, check=check)
         if check and not end.ok:
@@ -166,9 +165,9 @@ class AsyncM1486(AsyncChip):
     # ------------------------------------------------------------------ commands and programs
 
     async def command(self, text: str) -> None:
-        """Type one command, as ``t6`` or ``f12800``. What moves, jumps or answers has a method of its own.
+        """Send one command, such as ``t6`` or ``f12800``. Commands that move, jump or answer have methods of their own.
 
-        Raises `Misuse` for what the chip would drop.
+        Raises `Misuse` for a command that the chip would drop.
         """
         unit = self._unit
         typed = self.check_command(text)
@@ -179,14 +178,14 @@ class AsyncM1486(AsyncChip):
             await unit.act(typed, permission, once=typed[0] in "d+-*/")
 
     def check_command(self, text: str) -> str:
-        """A command as `command` types it. Raises `Misuse` for what it does not type."""
+        """A command as `command` sends it. Raises `Misuse` for others."""
         typed = self._unit.checked(text)
         if typed[0] not in _TYPED:
             raise Misuse(f"{text!r} is not a command to type alone: motions, files and questions have methods of their own")
         return typed
 
     def _learn(self, typed: str) -> None:
-        """Settings typed by hand are known again when they are configured."""
+        """Forget a setting that a typed command changes, until it is configured again."""
         notes = self._unit.notes
         name = next((name for name, letter in COMMANDS.items() if letter == typed[0]), None)
         if name is not None:
@@ -221,11 +220,11 @@ class AsyncM1486(AsyncChip):
         return await self.wait(timeout_s if timeout_s is not None else UNKNOWN_S)
 
     async def uploaded(self, count: int = 1, timeout_s: float = 10.0) -> bytes:
-        """The next bytes that the program of the chip uploads, in their order: ``U`` among its commands sends one each time it is
-        met (manual chapter VII, Upload).
+        """The next bytes that the program of the chip uploads, in order: each ``U`` among its commands sends one (manual
+        chapter VII, Upload).
 
-        The program has to have been started by this driver, and by it alone on this line, for bytes do not say whose they are:
-        else `Misuse`. Raises `LineFailure` when so many have not come in time; those that have are kept for the next call.
+        The program must have been started by this driver, and no other on this line, because bytes carry no sender: else
+        `Misuse`. Raises `LineFailure` at the time-out; bytes that have arrived are kept for the next call.
         """
         check_wait(timeout_s)
         unit = self._unit
@@ -251,7 +250,7 @@ class AsyncM1486(AsyncChip):
     async def reset(self, *, force: bool = False) -> None:
         """``\\``: defaults, position 0, and an E type forgets its stored file. Raises `Busy` while the chip does something.
 
-        ``force``: also then. Its motion is stopped by Kill before, and a file in ``[ ]`` it waits for the rest of is given up.
+        ``force``: also then; Kill stops its motion first, and an incomplete file in ``[ ]`` is discarded.
         """
         unit = self._unit
         if force:
@@ -262,10 +261,11 @@ class AsyncM1486(AsyncChip):
             await reset(unit)
 
     async def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
-        """Type a program into the chip: a file in ``[ ]``, which runs from ``]`` on and which an E type keeps, or plain commands.
+        """Send a program to the chip: a file in ``[ ]``, which runs from ``]`` on and which an E type stores, or plain
+        commands.
 
-        An E type is erased before a file. Returns what ``U`` outside ``[ ]`` uploaded. Raises `Misuse` with the first errors the
-        checker finds, `NoRoom`, `FileGivenUp`.
+        An E type is erased before a file. Returns the bytes that ``U`` outside ``[ ]`` uploaded. Raises `Misuse` with the first
+        errors of the checker, `NoRoom`, `FileGivenUp`.
         """
         return await send_program({self.address: self._unit, None: self._unit}, text, progress=progress, name=name)
 
@@ -278,9 +278,9 @@ async def download_to(
     progress: Progress | None = None,
     name: str = "program",
 ) -> bytes:
-    """Type a program that names its chips with ``X`` into chips on one line, all of one type.
+    """Send a program that selects its chips with ``X`` to chips on one line, all of one type.
 
-    ``first`` gets what stands before any ``X``. Errors as of `AsyncM1486.download`.
+    ``first`` gets the commands before any ``X``. Errors as of `AsyncM1486.download`.
     """
     units = {chip.address: chip._unit for chip in chips}
     if first is not None:

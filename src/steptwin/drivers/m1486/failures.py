@@ -1,4 +1,4 @@
-"""Errors of the M1486 driver, in the three families of `steptwin.errors`, in words a technician understands."""
+"""Errors of the M1486 driver, in the three families of `steptwin.errors`."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ class NoRoom(Refusal):
 
 
 class Busy(Refusal):
-    """The chip does something that has to end first; nothing that moves was sent."""
+    """The chip moves, waits or runs its program; nothing that moves was sent."""
 
 
 class PositionUnknown(Refusal):
-    """The position counter does not tell where the motor is."""
+    """The position counter does not show the position of the motor."""
 
 
 class WrongType(Refusal):
-    """Somebody answers, but not as the chip that was expected."""
+    """Another type of chip responds than expected."""
 
 
 class ChipMoveFailed(Refusal):
-    """A motion did not end as it was meant to; ``end`` tells how."""
+    """A motion did not end as intended; ``end`` has the reason."""
 
     def __init__(self, end: ChipMoveEnd) -> None:
         self.end = end
@@ -43,7 +43,7 @@ class ChipMoveFailed(Refusal):
 class Garbled(LineFailure):
     """A command did not come back from the chip as it was sent.
 
-    ``uncertain``: the chip may have acted on it, or on what it took for it.
+    ``uncertain``: the chip may have executed it, or another command that it received instead.
     """
 
     def __init__(self, place: str, request: object, sent: bytes, heard: bytes, *, uncertain: bool) -> None:
@@ -55,7 +55,7 @@ class Garbled(LineFailure):
 
 
 class NoEcho(LineFailure):
-    """A chip sends nothing back."""
+    """A chip does not echo."""
 
     uncertain = False
 
@@ -67,7 +67,7 @@ class NoEcho(LineFailure):
 
 
 class Restarted(LineFailure):
-    """A chip does not echo any more, as after power-up: settings and position are not what they were."""
+    """A chip does not echo any more, as after power-up: its settings and position were lost."""
 
     uncertain = False
 
@@ -79,7 +79,7 @@ class Restarted(LineFailure):
 
 
 class DoubtfulMove(LineFailure):
-    """It is not known whether a motion was begun."""
+    """It is unknown whether a motion has begun."""
 
     uncertain = True
 
@@ -91,7 +91,7 @@ class DoubtfulMove(LineFailure):
 
 
 class FileGivenUp(LineFailure):
-    """A file could not be brought into the chip whole; nothing of it runs."""
+    """A file could not be sent completely; nothing of it runs."""
 
     uncertain = False
 

@@ -1,18 +1,16 @@
-"""Finding out which chips are on a line, without moving anything.
+"""Find the chips on a line without moving anything.
 
-What is said, and what it does to whoever hears it:
+The characters that are sent, and their effect on every device on the line:
 
-* ``X`` chooses who listens. It acts when received, at any time, and only that.
-* ``U20`` asks for the type letter. Like every question it takes its turn, so a chip that moves, waits or runs a program does
-  not answer, and like every command it passes through the command memory, 16 bits of it (chapter II, Memory); an E type needs
-  half a second for that (and keeps nothing of it, M-37). It changes no setting, no line and no position. A chip that was busy
-  answers when it is done.
-* To a MIC488 it is rubbish: a frame needs a right CRC, and none of these characters is one of its functions.
+* ``X`` selects the chip that listens. It acts when received, at any time, and has no other effect.
+* ``U20`` requests the type letter. It is executed in order, so a chip that moves, waits or runs a program answers only
+  afterwards. It passes through the command memory, 16 bits of it (chapter II, Memory); an E type needs half a second for that
+  (and stores nothing, M-37). It changes no setting, no line and no position.
+* A MIC488 discards them: a frame needs a correct CRC, and none of these characters is one of its functions.
 
-The other way round, a Modbus frame is rubbish to a chip: no frame is a command, but a line of rubbish is wrong data, which ends
-a program that runs (M-11). That is why chips are looked for first, and why chips that may be there without answering are made
-deaf before anybody says something else on the line: ``X`` with an address nobody is found at (`scan_chips` leaves it so, and
-`let_all_listen` ends it). Only the one silent chip that has this address hears on.
+A Modbus frame is wrong data to a chip, which ends a running program (M-11). So chips are searched first, and chips that may
+be present without answering are deselected before Modbus is sent: by ``X`` with an unused address (`scan_chips` leaves it so,
+`let_all_listen` ends it). Only a silent chip with this address stays selected.
 """
 
 from __future__ import annotations
@@ -32,20 +30,20 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.line import SerialLine
 
 CHIP_BAUDS = (4800, 9600, 2400, 1200, 600, 300)
-"""What BR1 and BR0 choose, at 12 and at 24 MHz; open pins first."""
+"""Baud rates selected by BR1 and BR0, at 12 and at 24 MHz; those of open pins first."""
 SCAN_NS: Nanos = 100 * MILLISECOND
-"""How long a chip is waited for, beside the time on the wire and, where there may be E types, of their EEPROM."""
+"""Time to wait for a chip, in addition to the time on the wire and that of the EEPROM of E types, ns."""
 
 _WRITE_NS = max(one.write_ns for one in VARIANTS)
 _LETTERS_RAM = frozenset(one.type_letter for one in VARIANTS if one.store is Store.RAM)
 _AT_24_MHZ = frozenset(v.baud(br1, br0) for v in VARIANTS if v.clock == 2 for br1 in (0, 1) for br0 in (0, 1))
 _AT_12_MHZ = frozenset(v.baud(br1, br0) for v in VARIANTS if v.clock == 1 for br1 in (0, 1) for br0 in (0, 1))
 _PARKED = 0xE
-"""Who listens while others speak on the line, unless he is found: every type takes it, and open pins give F."""
+"""The address selected during Modbus traffic, unless a chip has it: every type accepts it, and open pins give F."""
 
 
 class FoundChip(NamedTuple):
-    """A chip that answers. ``variant`` is None when it is busy: it only said that its input buffer is full or nearly so."""
+    """A chip that responds. ``variant`` is None if it is busy: it has only reported that its input buffer is (nearly) full."""
 
     address: int
     variant: str | None
@@ -56,7 +54,7 @@ class FoundChip(NamedTuple):
 
 
 class Question(NamedTuple):
-    """Something said, and whether the first type letter that comes is its answer."""
+    """Characters to send, and whether the next type letter is their answer."""
 
     text: str
     has_one_answer: bool
@@ -68,7 +66,7 @@ class Question(NamedTuple):
 
 
 class Asking:
-    """The line's side of a search. See `steptwin.drivers.exchange.Discipline`."""
+    """The protocol of a search. See `steptwin.drivers.exchange.Discipline`."""
 
     free_ns: Nanos = 0
     wary = True
@@ -100,7 +98,7 @@ class Asking:
         return self._heard
 
     def stray(self, data: bytes, now: Nanos) -> None:
-        """What came before the question is no answer to it."""
+        """Discard bytes from before the query."""
 
 
 def searching(endpoint: Endpoint, baud: int) -> Exchanger[Question, bytes]:
@@ -108,7 +106,7 @@ def searching(endpoint: Endpoint, baud: int) -> Exchanger[Question, bytes]:
 
 
 class SearchLine(ThreadLine[Question, bytes]):
-    """A line on which chips are looked for, at an address as of `steptwin.drivers.m1486.M1486`."""
+    """A line to search for chips, at an address as of `steptwin.drivers.m1486.M1486`."""
 
     def __init__(self, address: str, *, baud: int) -> None:
         endpoint = line_endpoint(address, baud)
@@ -116,19 +114,19 @@ class SearchLine(ThreadLine[Question, bytes]):
 
 
 def answer_in(said: str, heard: bytes) -> bytes:
-    """What was heard without the echo of what was said (function 41), of which a chip gives the part from its selection on, and
-    without the reports of function 57. No answer is among the characters that are said: they are small letters and digits.
-    """
+    """The received bytes without the echo (function 41), of which a chip sends the part from its selection on, and without the
+    reports of function 57. No answer looks like an echo: the characters sent are lower-case letters and digits."""
     return heard.translate(None, said.encode("ascii") + bytes((EMPTY, THREE_FREE)))
 
 
 def letter_in(answer: bytes) -> int | None:
-    """The type letter, if an answer is nothing else."""
+    """The type letter, if the answer is exactly that."""
     return answer[0] if len(answer) == 1 and answer[0] in LETTERS else None
 
 
 def type_of(letter: int, baud: int | None) -> str:
-    """The type with this letter. Its brother for 24 MHz has the same one; only a rate that the other has not tells them apart."""
+    """The type with this letter. The type for 24 MHz has the same one; only a baud rate that the other lacks distinguishes
+    them."""
     clock = 2 if baud in _AT_24_MHZ - _AT_12_MHZ else 1
     return next(one.name for one in VARIANTS if (one.type_letter, one.clock) == (letter, clock))
 
@@ -140,10 +138,10 @@ async def scan_chips(
     timeout_ns: Nanos = SCAN_NS,
     progress: Callable[[int], Any] | None = None,
 ) -> list[FoundChip]:
-    """The chips that answer on a line. ``progress`` is told each address before it is asked. Raises `LineLost`.
+    """The chips that respond on a line. ``progress`` is called with each address before it is tried. Raises `LineLost`.
 
-    When chips were found all listen afterwards, as after power-up. Otherwise those that may be there without answering are
-    deaf until `let_all_listen`.
+    If chips were found, all listen afterwards, as after power-up. Otherwise chips that may be present stay deselected until
+    `let_all_listen`.
     """
     everybody = f"xg\rxg\r{WHO}\r"  # twice: the first may meet the rest of another line
     heard = answer_in(everybody, await _say(line, everybody, timeout_ns + _WRITE_NS))
@@ -168,12 +166,12 @@ async def scan_chips(
 
 
 async def let_all_listen(line: DriverLine[Question, bytes]) -> None:
-    """End what others have said on the line, to which chips were deaf, and have them listen again."""
+    """End foreign bytes on the line and select all chips again."""
     await _say(line, "\rxg\r", 0)
 
 
 async def end_line(line: DriverLine[Question, bytes]) -> None:
-    """End what others have said on the line: chips that took it for characters drop it. Nobody is selected by it."""
+    """End foreign bytes on the line, so that chips drop them. No chip is selected by it."""
     await _say(line, "\r", 0)
 
 
@@ -190,7 +188,7 @@ async def _asked(
 
 
 async def _say(line: DriverLine[Question, bytes], text: str, patience_ns: Nanos, *, has_one_answer: bool = False) -> bytes:
-    """What is heard meanwhile."""
+    """Send characters; returns the bytes received meanwhile."""
     try:
         return await line.exchange(Job(Question(text, has_one_answer), patience_ns))
     except NoAnswer as silence:

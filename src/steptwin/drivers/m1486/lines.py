@@ -1,4 +1,4 @@
-"""Lines of M1486 chips made of an address. Several drivers, tasks or threads may share one."""
+"""Lines of M1486 chips, opened by address. Several drivers, tasks or threads may share one."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection
 
 BAUD = 4800
-"""What BR1 and BR0 give when they are left open."""
+"""Baud rate with BR1 and BR0 open, bit/s."""
 TALK = "m1486 talk"
-"""Where a line's notes have its `CharacterTalk`."""
+"""The key of the `CharacterTalk` in a line's notes."""
 
 
 def talking(
     endpoint: Endpoint, baud: int, log: Callable[[str], object] | None
 ) -> tuple[Exchanger[ChipRequest, bytes], CharacterTalk]:
-    """The exchanges of a line of chips."""
+    """The exchanger and the protocol of a line of chips."""
 
     def heard(now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if log is not None:
@@ -36,7 +36,7 @@ def talking(
 
 
 def in_words(data: bytes) -> str:
-    """``f12800 CR`` and the like; what is not a character as it is."""
+    """Bytes as text, such as ``f12800 CR``; bytes that are not characters as hexadecimal."""
     return "".join(" CR " if byte == 0x0D else chr(byte) if 0x20 <= byte < 0x7F else f" {byte:02X}H " for byte in data).strip()
 
 
@@ -48,7 +48,7 @@ def line_endpoint(address: str, baud: int) -> Endpoint:
 
 
 class AsyncM1486Line(TaskLine[ChipRequest, bytes]):
-    """A line of chips for tasks, at an address (``/dev/ttyUSB0``, ``tcp://host:5022`` raw, ``rfc2217://host:port``)."""
+    """A line of chips for asyncio, at an address (``/dev/ttyUSB0``, ``tcp://host:5022`` raw, ``rfc2217://host:port``)."""
 
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
         endpoint = line_endpoint(address, baud)
@@ -65,7 +65,7 @@ class AsyncM1486Line(TaskLine[ChipRequest, bytes]):
 
 
 class ThreadM1486Line(ThreadLine[ChipRequest, bytes]):
-    """The same for threads; `steptwin.drivers.m1486.sync.M1486Line` is its face."""
+    """The same for threads, used by `steptwin.drivers.m1486.sync.M1486Line`."""
 
     def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
         endpoint = line_endpoint(address, baud)

@@ -1,4 +1,4 @@
-"""Motions of a chip as a driver sees them, and why they ended."""
+"""Motions of a chip and the reasons of their ends, as far as a driver can know them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ MARGIN_S = 1.0
 MARGIN = 1.2
 """A motion is overdue after this many times its computed duration, and the other margin."""
 UNKNOWN_S = 60.0
-"""Time-out of a motion whose end nobody can compute."""
+"""Time-out of a motion whose duration cannot be computed, s."""
 EARLY_S = 0.05
 EARLY = 0.98
-"""A motion that is over before so much of its computed duration, less the other, did not go all its way."""
+"""A motion that ends before this part of its computed duration, less the other, ended early."""
 
 
 class ChipReason(enum.Enum):
@@ -45,7 +45,7 @@ class ChipMotion(enum.Enum):
 
 @dataclass(slots=True, eq=False)
 class ChipMotionCommand:
-    """A motion command that a chip was sent. ``target_u``: the counter after it, if known (minimum microsteps)."""
+    """A motion command that was sent to a chip. ``target_u``: the counter after it, if known (minimum microsteps)."""
 
     kind: ChipMotion
     at: Nanos
@@ -53,22 +53,22 @@ class ChipMotionCommand:
     target_u: int | None = None
     duration_s: float | None = None
     spoilt: int = 0
-    """Lines the chip was made to drop before."""
+    """Number of lines the chip had dropped before."""
     is_marked: bool = False
-    """Whether its last command is an upload, by which its end is known."""
+    """Whether its last command is an upload that reports its end."""
     is_unfinished: bool = False
-    """Whether that did not come, although the chip is at rest."""
+    """Whether that upload is missing although the chip is at rest."""
     over_at: Nanos | None = None
-    """When its end was seen."""
+    """The time at which its end was detected, ns."""
 
     def is_over(self, now: Nanos) -> bool:
-        """Whether it has ended for certain, although nobody has looked."""
+        """Whether it must have ended by now, from its computed duration."""
         return self.duration_s is not None and now - self.at > (MARGIN * self.duration_s + MARGIN_S) * SECOND
 
 
 @dataclass(frozen=True, slots=True)
 class ChipMoveEnd:
-    """How a motion ended. ``position`` is in ``unit``, None where it is not known. ``ok``: as it was meant to."""
+    """The end of a motion. ``position`` is in ``unit``, None if unknown. ``ok``: it ended as intended."""
 
     address: int | None
     reason: ChipReason

@@ -1,4 +1,4 @@
-"""What a chip was set to by the driver: nothing of it can be read back. And how long a motion takes with it.
+"""The settings made by the driver, which cannot be read back, and the duration of motions with them.
 
 Speeds in full steps/s, accelerations in full steps/s², distances in minimum microsteps (full step/64), as the arguments of the
 commands; at 24 MHz the motor turns twice as fast with the same numbers.
@@ -32,7 +32,7 @@ COMMANDS = {
 
 @dataclass(frozen=True, slots=True)
 class ChipSettings:
-    """What a chip is set to as far as it is known; None: not known."""
+    """The settings of a chip; None: unknown."""
 
     start_stop: int | None = None
     acceleration: int | None = None
@@ -57,7 +57,7 @@ class ChipSettings:
             raise Misuse(f"M{m} and Q{q} do not go together: with M{m} go {', '.join(f'Q{n}' for n in PAIRS[m])}")
 
     def travel_s(self, distance_u: int, variant: Variant) -> float | None:
-        """How long a move takes; None where a setting is not known."""
+        """The duration of a move, s; None if a setting is unknown."""
         s, a, v, p, q = self.start_stop, self.acceleration, self.velocity, self.profile, self.qualification
         if s is None or a is None or v is None or p is None or q is None:
             return None
@@ -76,7 +76,7 @@ def after_reset(variant: Variant, interface: Interface) -> ChipSettings:
 
 
 def checked_number(letter: str, number: float, variant: Variant, what: str) -> int:
-    """``number`` if the command takes it. Raises `Misuse` with the permitted range."""
+    """``number``, if the command accepts it. Raises `Misuse` with the permitted range."""
     key = letter.upper()
     if not isfinite(number) or number != int(number) or find(key, int(number), variant) is None:
         (spec,) = rows(key)

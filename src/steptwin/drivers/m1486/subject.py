@@ -1,6 +1,6 @@
 """An M1486 behind its driver, as a part of a subject (`steptwin.drivers.subject`).
 
-A chip can be asked only while it is at rest (M-28): meanwhile its values are unknown.
+A chip responds only at rest (M-28); while it moves, its values are unknown.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ class M1486Part:
     # ------------------------------------------------------------------ points
 
     async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
-        """Counter, variable and uploads are known at rest, and that nothing moves then. Levels of lines can be
-        read only into the internal variable, which a program may need: they are unknown."""
+        """Counter, variable and uploads are known at rest. Levels of lines are unknown, because reading them would overwrite
+        the internal variable, which a program may need."""
         for point in points:
             if point.upper() not in self._units:
                 raise Misuse(f"{point!r} is not a point of an M1486: there are {', '.join(self._paths)}")
@@ -112,7 +112,7 @@ class M1486Part:
         await self._chip.stop_program()
 
     async def _send(self, wanted: steps.Send) -> None:
-        """Whole commands, all checked before the first is typed; what moves has commands of its own (ADR 12)."""
+        """Send whole commands, all checked before the first is sent; motions have commands of their own (ADR 12)."""
         *lines, rest = wanted.data.decode("latin-1").split("\r")
         if rest or not lines:
             raise Misuse("text: whole commands are sent to a device, each with CR behind it")

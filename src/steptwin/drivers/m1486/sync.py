@@ -1,6 +1,6 @@
 """The M1486 driver for threads: the methods of the asynchronous one as ordinary calls.
 
-Calls may come from any thread. While one waits for a chip, a stop from another goes before whatever waits.
+Calls may come from any thread. A stop precedes all waiting requests of other threads.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class M1486Line(Blocking):
 
     @property
     def line(self) -> ThreadM1486Line:
-        """The line as drivers use it."""
+        """The line that drivers use."""
         return self._driver
 
     open = blocking(ThreadM1486Line.open)
@@ -102,21 +102,21 @@ class M1486(Blocking):
 
     @property
     def variant(self) -> Variant:
-        """The type, once the chip was opened."""
+        """The type; known once the chip is open."""
         return self._driver.variant
 
     @property
     def settings(self) -> ChipSettings:
-        """What the chip is set to as far as drivers on this line have set it."""
+        """The settings of the chip as far as drivers on this line have made them."""
         return self._driver.settings
 
     def download(self, text: str, *, progress: Progress | None = None, name: str = "program") -> bytes:
-        """Type a program into the chip; see `AsyncM1486.download`."""
+        """Send a program to the chip; see `AsyncM1486.download`."""
         return finish(self._driver.download(text, progress=progress, name=name))
 
     def subject(self, name: str = "m1486", *, period_s: float = PERIOD_S) -> DeviceSubject:
-        """The device, once it was opened, with the commands, points and events of a twin. It is polled for events while there are
-        followers, at most once in ``period_s``."""
+        """The open device with the commands, points and events of a twin. It is polled for events while there are followers, at
+        most once per ``period_s``."""
         return DeviceSubject(AsyncDeviceSubject(name, M1486Part(self._driver), period_s))
 
     open = blocking(AsyncM1486.open)
@@ -162,6 +162,6 @@ class M1486(Blocking):
 def download_to(
     chips: Iterable[M1486], text: str, *, first: M1486 | None = None, progress: Progress | None = None, name: str = "program"
 ) -> bytes:
-    """Type a program that names its chips with ``X`` into chips on one line; see `steptwin.drivers.m1486.driver.download_to`."""
+    """Send a program that selects its chips with ``X`` to chips on one line; see `steptwin.drivers.m1486.driver.download_to`."""
     drivers = [chip._driver for chip in chips]
     return finish(async_download_to(drivers, text, first=None if first is None else first._driver, progress=progress, name=name))

@@ -1,11 +1,10 @@
-"""What is said on a line of M1486 chips: one-letter commands, verified by the chip's echo (function 41). Pure.
+"""The protocol of a line of M1486 chips: one-letter commands, verified by the chip's echo (function 41). Pure.
 
-The language has no checksum and no acknowledgement. So a command is typed without its CR first; the echo of every character has
-to come back as it was sent; only then CR makes the chip take it. What does not come back right is made no command at all
-(by `SPOILER`) and typed again. Characters that take one of the last three places of the input buffer come back inverted too;
-5EH says that one found no room.
+The language has neither checksum nor acknowledgement. So a command is sent without its CR first; only if the echo of every
+character is correct, CR makes the chip accept it. A command with a wrong echo is made invalid (by `SPOILER`) and sent again.
+Characters that take one of the last three places of the input buffer also come back inverted; 5EH means that one found no room.
 
-Commands are typed in lower case, so that no echo looks like the type letter of a chip that was asked for it earlier.
+Commands are sent in lower case, so that no echo looks like a type letter that was requested earlier.
 """
 
 from __future__ import annotations
@@ -23,21 +22,21 @@ from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection
 
 SPOILER = b"%"
-"""No command has this character: a line that gets it is dropped as wrong data (M-11)."""
+"""A character that is in no command: a line with it is dropped as wrong data (M-11)."""
 QUIET_NS: Nanos = 30 * MILLISECOND
-"""After a failed exchange the line has to be silent this long before it is used again."""
+"""Silence after a failed exchange before the line is used again, ns."""
 NOISE_NS: Nanos = 300 * MILLISECOND
-"""A line that is not silent for this long never will be."""
+"""Longest wait for that silence, ns."""
 WHO = "u20"
-"""Asks for the type letter. The chip answers in program order: once it does, it has done all it was told."""
+"""Requests the type letter. The chip answers in program order, so the answer means that it has executed all commands."""
 LETTERS = frozenset(variant.type_letter for variant in VARIANTS)
 ALL = None
-"""Address of a single chip, to which ``X`` is never sent."""
+"""Stands for a single chip, to which ``X`` is never sent."""
 _END = bytes((CR,))
 
 
 class ChipRequestKind(enum.Enum):
-    """How a request is said."""
+    """How a request is sent."""
 
     LINE = "typed, verified, then CR"
     SELECT = "only the selection of the chip"
@@ -52,9 +51,9 @@ _SILENT = (ChipRequestKind.LISTEN, ChipRequestKind.LETTER, ChipRequestKind.UPLOA
 
 
 class ChipRequest:
-    """Something said to the chip with ``address`` (None: the only one on the line).
+    """A request to the chip with ``address`` (None: the only one on the line).
 
-    ``answers``: one byte comes back. ``acts``: it matters whether the chip did it, and how often. ``committed``: CR was sent.
+    ``answers``: one byte comes back. ``acts``: executing it twice is not the same as once. ``committed``: CR was sent.
     """
 
     __slots__ = ("acts", "address", "answers", "commented", "committed", "sort", "text")
@@ -75,7 +74,8 @@ class ChipRequest:
         self.acts = acts
         self.committed = False
         self.commented = False
-        """The chip may take the rest of the line for a comment: then nothing spoils what stands before it (M-1)."""
+        """Whether the chip may read the rest of the line as a comment, so that the command before it cannot be invalidated
+        (M-1)."""
 
     @property
     def device(self) -> int | None:
@@ -83,7 +83,7 @@ class ChipRequest:
 
     @property
     def changes(self) -> bool:
-        """Whether the chip may have done it: before CR it has not."""
+        """Whether the chip may have executed it: not before CR."""
         return self.acts and (self.committed or self.commented)
 
     def __str__(self) -> str:
@@ -91,11 +91,11 @@ class ChipRequest:
 
 
 Heard = Callable[[Nanos, FrameDirection, bytes], object]
-"""Told of what is sent and heard."""
+"""Called with all bytes sent and received."""
 
 
 class CharacterTalk:
-    """The line's side of all exchanges. ``echoing`` are the chips known to echo, ``owed`` the type letters each still owes."""
+    """The protocol of all exchanges of a line. ``echoing``: chips known to echo; ``owed``: pending type letters of each chip."""
 
     def __init__(self, serial: SerialLine, place: str, *, on_bytes: Heard | None = None) -> None:
         self._serial = serial
@@ -107,23 +107,23 @@ class CharacterTalk:
         self.free_ns: Nanos = 0
         self._busy_until: Nanos = 0
         self.selected: int | None = ALL
-        """Who listens; None: everybody, as after power-up."""
+        """The selected chip; None: all, as after power-up."""
         self.echoing: set[int | None] = set()
         self.owed: dict[int | None, int] = {}
         self.came: dict[int | None, int] = {}
-        """Letters owed that came while nobody listened for them."""
+        """Pending letters that arrived between exchanges."""
         self.spoilt: dict[int | None, int] = {}
-        """How many lines each chip was made to drop: that ends a program of its (M-11)."""
+        """Number of lines that each chip has dropped as wrong data, which ends its program (M-11)."""
         self.uploads: bytearray | None = None
-        """Where what a program in a chip uploads is kept, while one may run."""
+        """Bytes uploaded by a program in a chip, while one may run."""
         self.letters: int | None = None
-        """Letters that came, whosever they are, while several chips are watched (`steptwin.drivers.m1486.watching`)."""
+        """Letters from any chip while several chips are watched (`steptwin.drivers.m1486.watching`)."""
         self.surplus = 0
-        """Type letters that may come although nobody waits for them any more."""
+        """Number of late type letters that may still arrive."""
         self.dirty = False
-        """Whether characters of a command that was given up may lie in front of the next one."""
+        """Whether characters of an abandoned command may precede the next one."""
         self.nearly_full = False
-        """Whether the last command met one of the last three places of the input buffer."""
+        """Whether the last command took one of the last three places of the input buffer."""
         self._is_stuck = False  # the spoiler found no room: it is to be said again
         self._request: ChipRequest | None = None
         self._lines: list[bytes] = []  # still to be said, the one being said first
@@ -139,28 +139,28 @@ class CharacterTalk:
         return self._serial.duration(2 * len(request.text) + 16)
 
     def wire_ns(self, characters: int) -> Nanos:
-        """Time that characters take on the line."""
+        """The time that characters take on the line, ns."""
         return self._serial.duration(characters)
 
     def knows(self, address: int | None) -> bool:
         return address in self.echoing
 
     def forget(self, address: int | None) -> None:
-        """A chip does not echo any more, as after a reset."""
+        """Forget that a chip echoes, as after a reset."""
         self.echoing.discard(address)
         self.owed.pop(address, None)
         self.came.pop(address, None)
 
     def owes(self, address: int | None) -> int:
-        """How many type letters a chip has been asked for that have not come."""
+        """The number of type letters that a chip has yet to send."""
         return self.owed.get(address, 0)
 
     def settle(self, address: int | None) -> None:
-        """The chip has answered: what it still owes comes right now or was lost."""
+        """Forget the pending letters of a chip that has answered: they arrive right now or were lost."""
         self.surplus += self.owed.pop(address, 0)
 
     def end_watch(self, owed: Mapping[int | None, int], surplus: int) -> None:
-        """Letters are again those of the only chip that owes one: what each owes, and how many come that nobody waits for."""
+        """End a watch: set the pending letters of each chip, and the number of late ones."""
         self.letters = None
         self.surplus += surplus
         for address, count in owed.items():
@@ -277,7 +277,7 @@ class CharacterTalk:
         return Garbled(self._place, request, sent, heard, uncertain=request.changes)
 
     def _absorb(self, letter: int) -> bool:
-        """A type letter has come that is not the answer waited for; whether one was to be expected."""
+        """Take a type letter that is not the expected answer; returns whether one was pending."""
         if self.letters is not None and self.owed:
             self.letters += 1
         elif self.owed:
@@ -334,7 +334,7 @@ class CharacterTalk:
         return answer
 
     def _uploaded(self, byte: int) -> bool:
-        """A byte that belongs to no exchange: whether it is a letter that was to be expected, or of a program."""
+        """Take a byte outside an exchange; returns whether it is a pending letter or an upload of a program."""
         if byte in LETTERS and self._absorb(byte):
             return True
         if self.uploads is None:

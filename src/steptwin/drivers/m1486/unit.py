@@ -1,7 +1,7 @@
-"""One chip on a line: commands, answers, what drivers of the same chip must agree on.
+"""One chip on a line: commands, answers, and the state that drivers of the same chip share.
 
-All exchanges but stops take turns (`ChipUnit.turn`): while a chip has an answer pending, no other chip is addressed: a byte
-does not identify its sender. A stop interrupts a turn.
+All exchanges except stops take turns (`ChipUnit.turn`): while an answer is pending, no other chip is addressed, because a
+byte does not identify its sender. A stop interrupts a turn.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 TRIES = 3
 STOP_TRIES = 5
-"""How often a stop is said before it is given up."""
+"""Number of attempts for a stop."""
 PAUSES_NS: tuple[Nanos, ...] = (40 * MILLISECOND, 1300 * MILLISECOND)
-"""Time for ``t41`` to be done; the other is for chips that write commands into an EEPROM."""
+"""Time for the execution of ``t41``, ns; the second is for chips that write commands into an EEPROM."""
 WAKE_COMMANDS = 5
-"""What `ChipUnit.wake` has typed when all goes well, and a question."""
+"""Number of commands that `ChipUnit.wake` sends without errors, and a query."""
 EVERYBODY = "xg\rxg\r"
-"""All chips listen from now on. The first may meet the rest of something else."""
+"""Selects all chips. The first line may end the rest of another command."""
 PATIENCE_NS: Nanos = 10 * SECOND
-"""A motion is not begun when so much time has passed without progress towards it."""
+"""A motion is not begun after this time without progress towards it, ns."""
 SLICE_NS: Nanos = 20 * MILLISECOND
-"""Whoever listens for an answer that is owed lets a stop go first this often."""
+"""Waiting for a pending answer is interrupted for stops at this interval, ns."""
 _NAMES = {variant.type_letter: variant.name for variant in reversed(VARIANTS)}
 _LOOKED_AT = (15, 17, 18, 19, 20)
 """Interface, functions 40 to 63 and type letter, by the numbers of ``U``."""
 READINGS = 4
-"""How often something is read until it reads the same twice."""
+"""Number of attempts to read the same value twice."""
 
 
 class ChipNotes:
-    """What all drivers of one chip on one line share."""
+    """The state that all drivers of one chip on one line share."""
 
     def __init__(self) -> None:
         self.variant: Variant | None = None
@@ -56,20 +56,20 @@ class ChipNotes:
         self.motion: ChipMotionCommand | None = None
         self.is_position_valid = True
         self.was_awake = False
-        """Whether it echoed before: if it does not any more, it was switched off."""
+        """Whether it has echoed before: if not any more, it was switched off."""
         self.restarted: Restarted | None = None
-        """Somebody who watched another chip has found out that this one was switched off: to be told to who uses it next."""
+        """Set when a wait for another chip has detected that this one was switched off; the next use raises `Restarted`."""
         self.stops = 0
-        """How often it was stopped: a motion asked for before must not begin after."""
+        """Number of stops: a motion requested before a stop must not begin after it."""
         self.is_killed = False
         """Whether Kill may hold the program (function 51 OFF)."""
         self.uploads: bytearray | None = None
-        """What the program that was started last has uploaded and nobody has read."""
+        """Unread uploads of the program that was started last."""
         self.ready_at: Nanos = 0
-        """An EEPROM is being written until then."""
+        """The end of the present EEPROM write, ns."""
 
     def forget(self) -> None:
-        """It was switched off or reset behind our back."""
+        """Forget the state of a chip that was switched off or reset by others."""
         self.settings = ChipSettings()
         self.functions = sum(function.default << bit for bit, function in enumerate(TABLE)) | 1 << (RETURN - FUNCTIONS.start)
         self.motion = None
@@ -109,12 +109,12 @@ class ChipUnit:
 
     @property
     def is_alone(self) -> bool:
-        """Whether no driver of another chip is on the line."""
+        """Whether the line has no driver of another chip."""
         return len(self.line.notes["m1486 chips"]) == 1
 
     @property
     def write_ns(self) -> Nanos:
-        """What an EEPROM takes for a command; 0 where there is none, or nobody knows."""
+        """Time for writing a command into the EEPROM, ns; 0 without EEPROM or if unknown."""
         return 0 if self.notes.variant is None else self.notes.variant.write_ns
 
     @property
@@ -124,11 +124,11 @@ class ChipUnit:
         return self.notes.variant
 
     def turn(self, permission: Permission | None = None) -> AbstractAsyncContextManager[object]:
-        """The line for exchanges that belong together. Waiting for it extends ``permission``."""
+        """Hold the line for exchanges that belong together. Waiting for it extends ``permission``."""
         return self.line.lock("m1486 turn", None if permission is None else permission.extend)
 
     def permission(self) -> Permission:
-        """Permission for a motion that is asked for now, until the chip is stopped or nothing goes on for too long."""
+        """Permission for a motion requested now. It ends with a stop of the chip, or after too long without progress."""
         before = self.notes.stops
         patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
         return Permission(self.line.now, patience_ns, lambda: self.notes.stops != before)
@@ -153,7 +153,7 @@ class ChipUnit:
             await self._exchange(ChipRequest(self.address, text, sort=ChipRequestKind.BLIND), timeout_ns=pause_ns, urgent=urgent)
 
     async def wake(self) -> None:
-        """Have the chip echo what it hears, and select it. Raises `NoEcho`."""
+        """Switch on the echo of the chip and select it. Raises `NoEcho`."""
         failure: LineFailure | None = None
         rest = ""
         for pause in PAUSES_NS:
@@ -185,7 +185,7 @@ class ChipUnit:
         self.talk.selected = selected
 
     async def _ready(self) -> None:
-        """It echoes, and its EEPROM is free."""
+        """Wait until the chip echoes and its EEPROM is free."""
         restarted, self.notes.restarted = self.notes.restarted, None
         if restarted is not None:
             raise restarted
@@ -197,7 +197,7 @@ class ChipUnit:
             await self._ready()
 
     async def _wake_again(self) -> None:
-        """Raises `Restarted` for a chip that echoed before and does not: nothing is as it was. (A line may also have failed.)"""
+        """Raises `Restarted` for a chip that does not echo any more: its settings are lost. (The line may also have failed.)"""
         known = self.notes.was_awake
         if known and await self._still_echoes():
             return
@@ -223,7 +223,7 @@ class ChipUnit:
         return False
 
     def _written(self) -> None:
-        """A command has gone into the memory. As long as the type is not known, so little is typed that the buffer holds it."""
+        """Register a command in the memory. While the type is unknown, no more is sent than the input buffer holds."""
         if self.notes.variant is not None:
             self.notes.ready_at = self.line.now() + self.notes.variant.write_ns
 
@@ -238,12 +238,10 @@ class ChipUnit:
         permission: Permission | None = None,
         stored: bool = True,
     ) -> bytes:
-        """Type a command. ``once``: CR is sent once only, because doing it twice is not as good as once. ``acts``: what the chip
-        may have taken for it matters, even if it is typed right afterwards. ``retype``: it may be typed anew before its CR.
-
-        ``stored``: the command goes into the memory, which takes an E type its time.
-        Raises `NoRoom`, `Garbled` or `NoAnswer`; with ``uncertain`` set the chip may have acted on it.
-        """
+        """Send a command. ``once``: CR is sent only once, because executing it twice is not the same. ``acts``: a garbled
+        command may have acted, even if it is sent correctly afterwards. ``retype``: it may be sent again before its CR.
+        ``stored``: the command goes into the memory, which takes time on an E type. Raises `NoRoom`, `Garbled` or `NoAnswer`;
+        with ``uncertain`` set the chip may have executed it."""
         failure: LineFailure | None = None
         for _ in range(TRIES):
             await self._ready()
@@ -274,8 +272,8 @@ class ChipUnit:
         stored: bool = True,
         program: bool = False,
     ) -> None:
-        """Type a command that may move the motor, as `say`; ``program``: it starts a program. Nothing of it stays in the chip
-        when the permission has ended.
+        """Send a command that may move the motor, as `say`; ``program``: it starts a program. If the permission has ended, the
+        chip drops it.
 
         Raises `Overtaken`, `TooLate`; `SentLate` when it was sent too late, and then the motor was stopped.
         """
@@ -290,13 +288,14 @@ class ChipUnit:
             raise
 
     def _patience(self, answers: bool) -> Nanos:
-        """An answer may have to wait for the EEPROM, of a chip whose type is not known for all that `wake` has typed."""
+        """The time to wait for an answer, ns: it may have to wait for the EEPROM; for an unknown type, for all commands of
+        `wake`."""
         variant = self.notes.variant
         write_ns = WAKE_COMMANDS * max(one.write_ns for one in VARIANTS) if variant is None else variant.write_ns
         return self.timeout_ns + write_ns if answers else self.timeout_ns
 
     def checked(self, text: str) -> str:
-        """A command as it is typed. Raises `Misuse` for one the chip would drop."""
+        """A command as it is sent. Raises `Misuse` for one that the chip would drop."""
         line, found = parse_line(text)
         command = line.command
         if command is None:
@@ -309,7 +308,8 @@ class ChipUnit:
     # ------------------------------------------------------------------ is it at rest, who is it
 
     async def asks_who(self, patience_ns: Nanos = 0, permission: Permission | None = None) -> int | None:
-        """The type letter, once the chip has done all it was told; None if it has not within ``patience_ns`` or a time-out.
+        """The type letter, which the chip sends when it has executed all commands; None if not within ``patience_ns`` or a
+        time-out.
 
         Waiting for it extends ``permission``.
         """
@@ -328,7 +328,7 @@ class ChipUnit:
         return letter
 
     async def _hear_rest(self) -> None:
-        """A chip that was asked twice answers twice: the second letter must not be taken for what it is asked next."""
+        """Receive the second letter of a chip that was asked twice, so that it is not taken for the next answer."""
         talk = self.talk
         if talk.surplus:
             listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN, acts=False)
@@ -338,12 +338,12 @@ class ChipUnit:
             talk.surplus = 0  # lost, or of a chip that is asked no more
 
     async def ask(self) -> None:
-        """Ask for the type letter, which comes when the chip has done all it was told."""
+        """Request the type letter, which the chip sends when it has executed all commands."""
         self.talk.came.pop(self.address, None)
         await self.say(WHO)
 
     async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
-        """Wait for a letter that is owed, in slices, so that a stop comes in between."""
+        """Wait for a pending letter, in slices that stops can interrupt."""
         talk = self.talk
         limit = self.line.now() + patience_ns
         while self.address not in talk.came:
@@ -358,21 +358,21 @@ class ChipUnit:
         return talk.came.pop(self.address)
 
     async def hear_letter(self, patience_ns: Nanos) -> None:
-        """Listen for a letter that any chip owes (`CharacterTalk.letters`)."""
+        """Wait for a pending letter of any chip (`CharacterTalk.letters`)."""
         with suppress(NoAnswer):
             await self._exchange(ChipRequest(self.address, WHO, sort=ChipRequestKind.LETTER, acts=False), timeout_ns=patience_ns)
 
     async def hear_upload(self, patience_ns: Nanos) -> None:
-        """Listen for what a program uploads."""
+        """Wait for bytes that a program uploads."""
         with suppress(NoAnswer):
             await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.UPLOAD, acts=False), timeout_ns=patience_ns)
 
     def others(self) -> list[ChipNotes]:
-        """What is known of the other chips on the line."""
+        """The shared state of the other chips on the line."""
         return [self.line.notes[("m1486", address)] for address in self.line.notes["m1486 chips"] if address != self.address]
 
     async def rest(self) -> None:
-        """Raises `Busy` unless the chip has done all it was told, `WrongType` if it is another one."""
+        """Check that the chip is at rest. Raises `Busy` if it is not, `WrongType` if it has another type."""
         letter = await self.asks_who()
         if letter is None:
             raise Busy(f"{self.place}: {self.name} {self.why_busy()}")
@@ -395,9 +395,8 @@ class ChipUnit:
     # ------------------------------------------------------------------ reading
 
     async def read(self, *numbers: int, rests: bool = False) -> tuple[int, ...]:
-        """Bytes by the number ``U`` gives them. They are read until they read the same twice: the line has no checksum, and a
-        counter may change between its bytes. Raises `Busy` while the chip does something; ``rests``: that it does not is known.
-        """
+        """Read bytes by their numbers of ``U``, until they are the same twice: the line has no checksum, and a counter may
+        change between its bytes. Raises `Busy` unless the chip is at rest; ``rests``: it is known to be."""
         if not rests:
             await self.rest()
         before: tuple[int, ...] | None = None
@@ -409,12 +408,12 @@ class ChipUnit:
         raise LineFailure(f"{self.place}: {self.name}: what U{' U'.join(map(str, numbers))} sends differs at every reading")
 
     async def read_number(self, first: int, *, rests: bool = False) -> int:
-        """24 bits from ``first`` on."""
+        """Read 24 bits from byte ``first`` on."""
         low, middle, high = await self.read(first, first + 1, first + 2, rests=rests)
         return low | middle << 8 | high << 16
 
     async def look(self) -> None:
-        """Find out what is not known of the chip: its type, interface and functions."""
+        """Read type, interface and functions of the chip, unless known."""
         await self.rest()
         code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
         if letter not in _NAMES:
@@ -430,13 +429,13 @@ class ChipUnit:
     # ------------------------------------------------------------------ stopping
 
     async def drop_line(self) -> None:
-        """Have the chip drop what was typed without its CR: the next CR on the line, whoever sends it, would carry it out."""
+        """Make the chip drop characters sent without CR: the next CR on the line would execute them."""
         if self.talk.dirty:
             with suppress(NoAnswer, Garbled):
                 await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT, acts=False))
 
     async def kill(self, *, program: bool = False) -> None:
-        """K, before everything that waits for the line; ``program``: and wrong data before it. Raises `Unconfirmed`."""
+        """Send K before all waiting requests; ``program``: and wrong data before it. Raises `Unconfirmed`."""
         notes = self.notes
         notes.stops += 1
         notes.is_killed = True

@@ -1,4 +1,4 @@
-"""Waiting until a chip has done what it was told, and telling why a motion ended."""
+"""Waiting until a chip has executed its commands, and finding why a motion ended."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import SECOND, Nanos
 
 ASK_AGAIN_NS: Nanos = SECOND
-"""A block that does not end is asked about after this time, and then each time after twice as long."""
+"""First interval of queries about a block that does not end, ns; it doubles each time."""
 
 
 async def wait_for(
@@ -21,7 +21,7 @@ async def wait_for(
 ) -> ChipMoveEnd:
     """See `steptwin.drivers.m1486.driver.AsyncM1486.wait`. ``shown`` turns the counter into a position.
 
-    A line that fails is raised with ``check``, else it is the end.
+    A failing line is raised with ``check``, else returned as the end.
     """
     check_wait(timeout_s)
     notes = unit.notes
@@ -64,10 +64,10 @@ async def wait_for(
 
 
 async def _end_of_block(unit: ChipUnit, limit: Nanos) -> None:
-    """Until a block has sent its mark, or the chip answers without, or ``limit``.
+    """Wait until a block has sent its mark, the chip answers without it, or ``limit``.
 
-    What the chip was asked goes with a block that it drops because of wrong data (M-11). So it is asked again, but not as often
-    as would fill its input buffer.
+    A block that is dropped because of wrong data takes the query with it (M-11). So the query is repeated, but not so often
+    that it fills the input buffer.
     """
     line, talk, notes = unit.line, unit.talk, unit.notes
     most = unit.variant.input_bits // (8 * (len(WHO) + 1)) - 1
@@ -95,7 +95,7 @@ _ENDS = {ChipMotion.ENDLESS: ChipReason.LIMIT, ChipMotion.SEEK: ChipReason.SOUGH
 
 
 def _reason(unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over_at: Nanos) -> tuple[ChipReason, str]:
-    """Why it ended, and more of it. ``over_at``: when it was seen to have ended."""
+    """The reason of the end, and details. ``over_at``: the time at which the end was detected."""
     if motion is None:
         return ChipReason.REST, ""
     if motion.stops != unit.notes.stops:

@@ -1,4 +1,4 @@
-"""A chip made ready for a line that is open already, for programs that type by themselves."""
+"""Prepare a chip on an open line, for programs that send commands themselves."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ TIMEOUT_NS: Nanos = 500 * MILLISECOND
 
 
 def wake(channel: Channel, place: str, address: int | None, baud: int, log: Callable[[str], object] | None = None) -> None:
-    """End what may stand in front of the next command, switch function 41 (echo) on, select the chip; each verified by the echo.
+    """End the rest of earlier commands, switch function 41 (echo) on and select the chip; each step is verified by the echo.
 
-    Raises `NoEcho` when it is not there, moves or runs a program. ``channel`` stays open.
+    Raises `NoEcho` if the chip is absent, moves or runs a program. ``channel`` stays open.
     """
     endpoint = _Opened(channel, place)
     exchanger, talk = talking(endpoint, baud, log)
@@ -31,7 +31,7 @@ def wake(channel: Channel, place: str, address: int | None, baud: int, log: Call
 
 
 class _Opened:
-    """An endpoint whose channel exists."""
+    """An endpoint with an open channel."""
 
     def __init__(self, channel: Channel, place: str) -> None:
         self._channel = channel

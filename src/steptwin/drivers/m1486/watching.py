@@ -1,9 +1,9 @@
-"""Several chips that move at once on one line: whoever waits for one of them watches the ends of all whose time is known.
+"""Several chips that move at once on one line: a wait for one of them watches the ends of all whose duration is known.
 
-A chip says when it is at rest (it answers ``U20``), but its answer does not say whose it is, and it may come into what others
-say. So the line is left to all until shortly before a move should be over. Then, with the line to itself, the watch asks each
-chip whose end is near, and listens. An answer at the time computed for a chip is taken for its. One that comes at any other
-time is somebody's who was stopped early: the chips are asked again one by one, and who is at rest answers at once.
+A chip answers ``U20`` when it is at rest, but the answer carries no sender and may collide with other exchanges. So the line
+is free for all until shortly before the computed end of a move. Then the watch holds the line and queries each chip whose end
+is near. An answer at the computed time of a chip is assigned to it. An answer at another time is from a chip that was stopped
+early: the chips are queried again one by one, and the one at rest answers at once.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 ASK_NS: Nanos = 80 * MILLISECOND
-"""What asking takes beside the time on the wire: each of its steps waits for an echo."""
+"""Duration of a query in addition to the time on the wire, ns: each step waits for an echo."""
 PEEK_NS: Nanos = 60 * MILLISECOND
-"""A chip that is at rest answers so soon, through adapters that hold bytes back too."""
+"""Longest response time of a chip at rest, with adapters that delay bytes, ns."""
 BURST_NS: Nanos = 20 * MILLISECOND
-"""Letters that come one behind the other are no farther apart."""
+"""Longest gap between letters of one burst, ns."""
 GRACE_NS: Nanos = 300 * MILLISECOND
-"""A move that goes on for so long after its time is overdue; it is not watched any more."""
+"""A move that lasts this much longer than computed is overdue and no longer watched, ns."""
 
 
 def early_ns(motion: ChipMotionCommand) -> Nanos:
-    """A move that is over before did not go all its way."""
+    """A move that ends before this time ended early, ns."""
     duration_s = motion.duration_s or 0.0
     return motion.at + round((EARLY * duration_s - EARLY_S) * SECOND)
 
@@ -36,7 +36,7 @@ def end_ns(motion: ChipMotionCommand) -> Nanos:
 
 
 def _is_watched(notes: ChipNotes, now: Nanos) -> bool:
-    """Whether the chip makes a move whose end is known in advance and has not been seen."""
+    """Whether the chip makes a move with a computed end that has not been detected yet."""
     motion = notes.motion
     return (
         motion is not None
@@ -48,7 +48,8 @@ def _is_watched(notes: ChipNotes, now: Nanos) -> bool:
 
 
 async def watch(unit: ChipUnit, motion: ChipMotionCommand, limit: Nanos) -> None:
-    """Until the end of ``motion`` was seen (`ChipMotionCommand.over_at`), until ``limit``, or until nothing is left to watch."""
+    """Watch until the end of ``motion`` is detected (`ChipMotionCommand.over_at`), until ``limit``, or until nothing is left to
+    watch."""
     line = unit.line
     while _is_watched(unit.notes, now := line.now()) and unit.notes.motion is motion and now < limit:
         due = min(_Watch(unit).begins().values(), default=now)
@@ -69,18 +70,18 @@ class _Mover:
         self.owed = 0
 
     def rest_at(self, at: Nanos) -> Nanos:
-        """When it was at rest if this is its answer: an E type writes the question into its EEPROM before."""
+        """The time since which it is at rest, if this is its answer: an E type first writes the query into its EEPROM."""
         return at - self.unit.write_ns
 
     def is_near(self, at: Nanos) -> bool:
-        """Whether its end is to be expected at that time."""
+        """Whether its end is expected at that time."""
         if self.motion.stops != self.unit.notes.stops:
             return True
         return early_ns(self.motion) <= self.rest_at(at) < end_ns(self.motion) + GRACE_NS
 
     @property
     def has_room(self) -> bool:
-        """Whether one more question can lie in its input buffer, which is not emptied while it moves."""
+        """Whether one more query fits into its input buffer, which is not emptied while it moves."""
         return 8 * (self.owed + 2) * (len(WHO) + 1) <= self.unit.variant.input_bits
 
     def is_late(self, now: Nanos) -> bool:
@@ -88,7 +89,7 @@ class _Mover:
 
 
 class _Watch:
-    """One watch, with the line to itself."""
+    """One watch, which holds the line."""
 
     def __init__(self, own: ChipUnit) -> None:
         self._own = own
@@ -96,12 +97,12 @@ class _Watch:
         self._given_up: set[int | None] = set()
         self._asked_last: _Mover | None = None
         self._left = 0
-        """Answers still to come from chips that are known to be at rest."""
+        """Number of pending answers from chips known to be at rest."""
         self._unclear: list[Nanos] = []
-        """When answers came that may be of any of those whose end is to be expected."""
+        """Times of answers that may be from any of the chips whose end is expected."""
 
     def begins(self) -> dict[int | None, Nanos]:
-        """When each chip is to be asked, who was not yet."""
+        """The times at which the remaining chips are to be queried."""
         line = self._own.line
         now = line.now()
         moving: dict[int | None, ChipMotionCommand] = {}
@@ -114,7 +115,7 @@ class _Watch:
         return {address: early_ns(motion) - lead for address, motion in moving.items() if address not in known}
 
     async def run(self, limit: Nanos) -> None:
-        """Until all chips that were asked are at rest, or overdue."""
+        """Watch until all queried chips are at rest or overdue."""
         line, talk = self._own.line, self._own.talk
         talk.letters = 0
         try:
@@ -165,7 +166,7 @@ class _Watch:
     # ------------------------------------------------------------------ whose answer it is
 
     async def _attribute(self) -> None:
-        """Find out whose the letters are that have come."""
+        """Assign the received letters to chips."""
         talk = self._own.talk
         while talk.letters:
             at = self._own.line.now()
@@ -187,7 +188,7 @@ class _Watch:
             await self._search(alike, at, count)
 
     async def _burst(self) -> int:
-        """How many letters have come one behind the other, beside those still to come from chips known to be at rest."""
+        """Number of letters in a burst, without those pending from chips known to be at rest."""
         talk = self._own.talk
         count = talk.letters or 0
         while count:
@@ -201,12 +202,12 @@ class _Watch:
         return count - known
 
     async def _sort_out(self) -> None:
-        """Not all of those have answered of whom it was to be expected: find out who has."""
+        """Find out which of the expected chips have answered."""
         while self._unclear:
             await self._search(self._waited_for(), self._unclear.pop(0), 1)
 
     async def _search(self, movers: list[_Mover], at: Nanos, count: int) -> None:
-        """One of these has answered ``count`` times: ask again, one after the other; who is at rest answers at once."""
+        """Find the chips that have answered ``count`` times: query one after the other; a chip at rest answers at once."""
         talk = self._own.talk
         for mover in movers:
             if mover is movers[-1]:

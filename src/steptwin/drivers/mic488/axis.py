@@ -70,11 +70,11 @@ class AsyncMic488Axis:
         await self._unit.write(self._unit.item("EN", self.number), True)
 
     async def disable(self) -> None:
-        """Switch the drive off: pulses end at once. Goes before everything that waits for the line."""
+        """Switch the drive off: pulses end at once. It precedes all waiting requests."""
         await self._halt("EN", on=False, what="switched off")
 
     async def set_position(self, position_u: float) -> None:
-        """Say where the axis is. It does not move; a motion going on keeps its distance (MIC-13)."""
+        """Set the counted position. The axis does not move; a motion in progress keeps its distance (MIC-13)."""
         await self._store("POS_ACT", position_u)
 
     async def set_ramp(self, *, acc: float | None = None, dec: float | None = None, velocity: float | None = None) -> None:
@@ -100,26 +100,27 @@ class AsyncMic488Axis:
     async def move_to(self, position_u: float) -> None:
         """Begin to move to a position, with ACC, DEC and VMAX. `wait` waits for the end.
 
-        Raises `Misuse` for a position no register holds, `NotReady` when the drive is off.
+        Raises `Misuse` for a position outside the register, `NotReady` if the drive is off.
         """
         self.check(MotionKind.POSITION, position_u)
         await self._begin(MotionKind.POSITION, position_u)
 
     async def move_by(self, distance_u: float) -> None:
-        """Begin to move by a distance from where the axis is at that moment.
+        """Begin to move by a distance from the present position.
 
-        It is sent once only: if its answer is lost, nobody knows whether the axis moves, and the `NoAnswer` says so.
+        It is sent only once: if its answer is lost, it is unknown whether the axis moves, and `NoAnswer` is raised with
+        ``uncertain``.
         """
         self.check(MotionKind.DISTANCE, distance_u)
         await self._begin(MotionKind.DISTANCE, distance_u)
 
     async def move_velocity(self, velocity_u: float) -> None:
-        """Run at a velocity until told otherwise; 0 ramps down."""
+        """Run at a velocity (u/s) until the next command; 0 ramps down."""
         self.check(MotionKind.VELOCITY, velocity_u)
         await self._begin(MotionKind.VELOCITY, velocity_u)
 
     async def home(self, velocity_u: float) -> None:
-        """Begin homing at this velocity: negative towards the switch KL, positive towards KR. Sent once only, as `move_by`."""
+        """Begin homing at this velocity: negative towards the switch KL, positive towards KR. Sent only once, as `move_by`."""
         self.check(MotionKind.HOMING, velocity_u)
         if velocity_u == 0.0:
             raise Misuse(f"homing of M{self.number} at 0 {self.unit}/s: the sign of the velocity chooses the switch")
@@ -135,16 +136,16 @@ class AsyncMic488Axis:
             self.told(kind, value_u, control)
 
     def told(self, kind: MotionKind, value_u: float, control: Control | None) -> None:
-        """The axis has been given a motion; ``control`` is from before."""
+        """Register a motion command; ``control`` is the state before it."""
         before = -1 if control is None else control.axes[self.number - 1]
         self._motion = MotionCommand(kind, value_u, self._unit.line.now(), before)
 
     async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> MoveEnd:
-        """Wait until the axis has come to rest, and say why it has.
+        """Wait until the axis is at rest, and return why.
 
-        Without ``timeout_s`` the time is computed from the motion; a homing, whose way nobody knows, has a minute. Raises
-        `MoveFailed` unless it ended as meant, and a `LineFailure` when the line fails; with ``check`` false both are
-        reported as the end. A motion in velocity mode needs ``timeout_s``.
+        Without ``timeout_s`` the time is computed from the motion; for homing it is a minute. Raises `MoveFailed` unless the
+        motion ended as intended, and a `LineFailure` if the line fails; with ``check`` false both are returned as the end. A
+        motion in velocity mode needs ``timeout_s``.
         """
         watch = AxisWait(self._unit, self.number, self._motion, timeout_s)
         return (await wait_for(self._unit, {self.number: watch}, check=check))[self.number]
@@ -153,9 +154,9 @@ class AsyncMic488Axis:
         return AxisWait(self._unit, self.number, self._motion, timeout_s)
 
     async def stop(self) -> None:
-        """Stop at once, without ramp. Goes before everything that waits for the line.
+        """Stop at once, without ramp. It precedes all waiting requests.
 
-        Motions of this axis that wait for the line are not begun any more. Raises `Unconfirmed`.
+        Motions of this axis that wait for the line are not begun. Raises `Unconfirmed`.
         """
         await self._halt("STOP", on=True, what="stopped")
 
@@ -169,15 +170,15 @@ class AsyncMic488Axis:
         self.forget()
 
     def forget(self) -> None:
-        """Whatever motion was going on was ended on purpose."""
+        """Forget the present motion, which was ended on purpose."""
         self._motion = None
 
     # ------------------------------------------------------------------ jogging
 
     def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> AsyncMic488Jog:
-        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncMic488Jog`.
+        """Run at a velocity (u/s) while it is held: a dead-man's switch. See `AsyncMic488Jog`.
 
-        ``hold_s``: how long the axis runs on without being held before it brakes by itself, from 0.2 to 2 s.
+        ``hold_s``: time the axis continues without `hold` before it brakes by itself, 0.2 to 2 s.
         """
         self.check(MotionKind.VELOCITY, velocity_u)
         if velocity_u == 0.0:
@@ -205,7 +206,7 @@ class AsyncMic488Axis:
     # ------------------------------------------------------------------ ranges
 
     def check(self, kind: MotionKind, value_u: float) -> None:
-        """`Misuse` for a position no register holds or a velocity no output gives, as far as GEAR is known."""
+        """Raises `Misuse` for a position outside the register or a velocity outside the outputs, if GEAR is known."""
         gear = self._unit.gear(self.number)
         is_velocity = kind in (MotionKind.VELOCITY, MotionKind.HOMING)
         unit = f"{self.unit}/s" if is_velocity else self.unit

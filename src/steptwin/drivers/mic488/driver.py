@@ -1,4 +1,4 @@
-"""The MIC488 as a driver shows it, for asyncio. `steptwin.drivers.mic488.sync` has the same for threads."""
+"""The driver of the MIC488 for asyncio. `steptwin.drivers.mic488.sync` is the one for threads."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Mic488Status:
-    """A controller at a glance. ``units`` are those of the axes; ``imp`` where DATA_TYPE is DINT and GEAR is not known."""
+    """The state of a controller. ``units``: units of the axes; ``imp`` (pulses) if DATA_TYPE is DINT and GEAR is unknown."""
 
     positions: tuple[float, ...]
     velocities: tuple[float, ...]
@@ -62,10 +62,9 @@ def load_config(path: str | Path, firmware: str = DEFAULT_FIRMWARE) -> Controlle
 class AsyncMic488:
     """A MIC488 at an address (``/dev/ttyUSB0``, ``tcp://host:5020``, ``rtu-tcp://host:5021``) or on a line shared with others.
 
-    ``firmware``: found out when not given. ``config``: the vendor tool's ``.cfg`` or what is in it; without it units have no
-    name and pulses are not known. ``observe``: DATA_TYPE is left as it is, so that opening changes nothing; else it is set
-    to REAL where it is not. Motions are made with either. ``log`` is given every frame in words. Nothing is done before `open`
-    (or ``async with``).
+    ``firmware``: determined when not given. ``config``: the vendor tool's ``.cfg`` or its contents; without it units have no
+    names and pulses are unknown. ``observe``: DATA_TYPE is left as it is, so that opening changes nothing; else it is set to
+    REAL. Motions work with both. ``log`` gets every frame in words. Nothing is sent before `open` (or ``async with``).
     """
 
     def __init__(
@@ -120,7 +119,7 @@ class AsyncMic488:
     # ------------------------------------------------------------------ opening
 
     async def open(self) -> None:
-        """Open the line, find out the firmware, see to DATA_TYPE. Raises `LineFailure` or `NoMic488`."""
+        """Open the line, determine the firmware, and set DATA_TYPE unless ``observe``. Raises `LineFailure` or `NoMic488`."""
         await self.line.open()
         try:
             await self.find_firmware()
@@ -134,7 +133,7 @@ class AsyncMic488:
             raise
 
     async def find_firmware(self) -> None:
-        """Find out the firmware again, unless it was given: another controller may have taken the place of the one before.
+        """Determine the firmware again, unless it was given: another controller may have replaced the earlier one.
 
         Raises `LineFailure` or `NoMic488`.
         """
@@ -208,15 +207,15 @@ class AsyncMic488:
         await self._unit.write(self._unit.item("M_ENABLE"), axis_mask(axes or ALL_AXES))
 
     async def disable(self, *axes: int) -> None:
-        """Switch drives off in the same instant; without axes all four. Goes before everything that waits for the line."""
+        """Switch drives off in the same instant; without axes all four. It precedes all waiting requests."""
         await self._halt("M_DISABLE", axes, "switched off")
 
     async def stop(self, *axes: int) -> None:
-        """Stop axes in the same instant, without ramp; without axes all four. Goes before everything that waits for the line."""
+        """Stop axes in the same instant, without ramp; without axes all four. It precedes all waiting requests."""
         await self._halt("M_STOP", axes, "stopped")
 
     async def stop_all(self) -> None:
-        """Stop all axes at once, without ramp. A program that runs goes on, and may move them again: see ``program.stop``."""
+        """Stop all axes at once, without ramp. A running program continues, and may move them again: see ``program.stop``."""
         await self.stop()
 
     async def _halt(self, key: str, axes: Sequence[int], what: str) -> None:
@@ -238,7 +237,7 @@ class AsyncMic488:
         await trigger(self._unit, self._axes, MotionKind.VELOCITY, velocities)
 
     async def wait(self, *axes: int, timeout_s: float | None = None, check: bool = True) -> dict[int, MoveEnd]:
-        """Wait until axes (without any: all) have come to rest; see `AsyncMic488Axis.wait`. One that fails ends the waiting."""
+        """Wait until axes (without any: all) are at rest; see `AsyncMic488Axis.wait`. A failed motion ends the wait."""
         chosen = [check_axis(axis) for axis in axes or ALL_AXES]
         return await wait_for(self._unit, {axis: self._axes[axis].watch(timeout_s) for axis in chosen}, check=check)
 
@@ -249,7 +248,7 @@ class AsyncMic488:
     # ------------------------------------------------------------------ registers by name and raw
 
     async def get(self, *names: str) -> dict[str, Value]:
-        """Values by name (``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``), in units where they can be told."""
+        """Values by name (``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``), in units if these are known."""
         return {name: value for name, (value, _) in (await self.get_shown(*names)).items()}
 
     async def get_shown(self, *names: str) -> dict[str, tuple[Value, str]]:
@@ -263,7 +262,7 @@ class AsyncMic488:
     async def set(self, name: str, value: float) -> None:
         """Write a register by name, in units where it has one. A motion register moves.
 
-        Registers whose repetition would do something twice are sent once only.
+        Registers that act on every write are sent only once.
         """
         unit = self._unit
         item = named(unit.registers, name)
@@ -279,19 +278,20 @@ class AsyncMic488:
         return words(await self._unit.look(pdu.READ_HOLDING_REGISTERS, address, count))
 
     async def request(self, request: pdu.Request) -> pdu.Response:
-        """Any request, and its answer. What is no read is sent once, unless its registers are known to bear more."""
+        """Send any request and return its answer. A write is sent only once, unless its registers are known to permit
+        repetition."""
         return pdu.answer(request, await self._unit.ask(request))
 
     # ------------------------------------------------------------------ snapshots
 
     async def take_snapshot(self) -> snapshot.Mic488Snapshot:
-        """Everything the registers let one read and write."""
+        """Read all registers that can be read and written."""
         return await snapshot.take(self._unit)
 
     async def restore_snapshot(
         self, kept: snapshot.Mic488Snapshot, *, counters: bool = False, outputs: bool = False, dry_run: bool = False
     ) -> list[snapshot.SnapshotChange]:
-        """Write what differs from a snapshot, and tell what that was; with ``dry_run`` only tell.
+        """Write the values that differ from a snapshot, and return the changes; with ``dry_run`` only return them.
 
         ``counters``: positions and encoder counters too; ``outputs``: OUT1 to OUT8 too.
         """

@@ -1,4 +1,4 @@
-"""Errors of the MIC488 driver, in the three families of `steptwin.errors`, in words a technician understands."""
+"""Errors of the MIC488 driver, in the three families of `steptwin.errors`."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class ModbusRefusal(Refusal):
 
 
 class NotReady(Refusal):
-    """The controller is in a state in which it would not do what was asked; nothing was sent."""
+    """The state of the controller does not permit the request; nothing was sent."""
 
 
 class NoMic488(Refusal):
-    """The device that answers is not a MIC488."""
+    """The device that responds is not a MIC488."""
 
 
 class MoveFailed(Refusal):
@@ -46,9 +46,9 @@ class MoveFailed(Refusal):
 
 
 class Unconfirmed(LineFailure):
-    """A stop, or a change of mode that ends a motion, was not confirmed by the controller. The text says what it does then."""
+    """A stop, or a change of mode that ends a motion, was not confirmed by the controller. The text says what it does now."""
 
 
 def unconfirmed(who: str, what: str, failure: LineFailure) -> Unconfirmed:
-    """``who`` could not be ``what`` (stopped). A controller out of reach is not one at rest."""
+    """The error for ``who`` that could not be ``what`` (stopped)."""
     return Unconfirmed(f"{who} could not be {what}: the controller cannot be reached and continues its last command ({failure})")

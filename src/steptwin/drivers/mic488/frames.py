@@ -1,4 +1,4 @@
-"""Frames on a line in words, for logs and for listening in on others."""
+"""Frames on a line in words, for logs and for monitoring a line."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Heard(NamedTuple):
 
 
 class FrameWords:
-    """Puts the frames of a line into words and hands them to ``sinks``.
+    """Decodes the frames of a line and passes them to ``sinks``.
 
-    What DATA_TYPE says is learnt from the frames: from its reads and writes, for each unit.
+    DATA_TYPE of each unit is taken from the frames that read or write it.
     """
 
     def __init__(self, registers: RegisterMap | None = None, *, tcp: bool = False) -> None:
@@ -42,18 +42,18 @@ class FrameWords:
         self._asked: dict[int, bytes] = {}
 
     def know(self, unit: int, wording: Wording) -> None:
-        """Use what is known of a unit."""
+        """Set the known properties of a unit."""
         self._wordings[unit] = wording
 
     def observe(self, now: Nanos, direction: FrameDirection, raw: bytes) -> None:
-        """A frame as a master sent or heard it: a `steptwin.wire.slave.FrameObserver`."""
+        """Take a frame that a master sent or received: a `steptwin.wire.slave.FrameObserver`."""
         self._tell(self.frame(now, direction, raw))
 
     def rubbish(self, now: Nanos, raw: bytes) -> None:
         self._tell(Heard(now, None, None, raw, "no frame"))
 
     def lost(self, now: Nanos, count: int) -> None:
-        """Bytes between frames that belong to none."""
+        """Take bytes that belong to no frame."""
         self._tell(Heard(now, None, None, b"", f"no frame: {count} byte{'' if count == 1 else 's'}"))
 
     def _tell(self, heard: Heard) -> None:
@@ -78,7 +78,7 @@ class FrameWords:
         return Heard(now, direction, unit, raw, f"{'broadcast' if unit == 0 else f'unit {unit}'}: {text}")
 
     def _learn(self, wording: Wording, asked: bytes | None, answered: bytes) -> None:
-        """Notice what DATA_TYPE was read as or set to."""
+        """Learn DATA_TYPE from a frame that reads or writes it."""
         address = wording.register_map.of("DATA_TYPE").address
         try:
             request = modbus.decode_request(asked or b"")

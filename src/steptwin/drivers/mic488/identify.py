@@ -1,4 +1,4 @@
-"""Finding out who answers: firmware by its address map, controllers by their slave address."""
+"""Find controllers by slave address, and their firmware by its address map."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from steptwin.mic488.registers import AXES, register_map
 from steptwin.wire import pdu
 
 SCAN_NS: Nanos = 100 * MILLISECOND
-"""How long a scan waits for a unit, beside the time on the wire: USB adapters hold bytes back for 16 ms and more."""
+"""Time a scan waits for a unit, in addition to the time on the wire, ns: USB adapters delay bytes by 16 ms and more."""
 PROBE_TRIES = 2
 
 _GATEWAY_CODES = (0x0A, pdu.GATEWAY_TARGET_FAILED)
 _NEW, _OLD = "1.70", "1.23"
-"""One firmware for each address map. What lies at the addresses of 1.23, the others have as user registers, which anybody can
-read. 1.40 has the addresses of 1.70, and no read tells them apart."""
+"""One firmware for each address map. At the addresses of 1.23 the others have user registers, which can be read. 1.40 has the
+addresses of 1.70, and no read distinguishes them."""
 
 
 class Found(NamedTuple):
-    """A unit that answers. ``firmware`` is None when it is not a MIC488."""
+    """A unit that responds. ``firmware`` is None if it is not a MIC488."""
 
     unit: int
     firmware: str | None
@@ -35,9 +35,9 @@ class Found(NamedTuple):
 async def firmware_of(line: DriverLine[Query, bytes], unit: int, timeout_ns: Nanos) -> str:
     """The firmware whose addresses a controller has: ``1.70`` (which may be 1.40) or ``1.23``.
 
-    A real controller may be silent where another refuses, so no answer is as good as a refusal as long as one address map is
-    answered; but an answer may also have been lost. Raises `NoMic488` when neither is answered, the `LineFailure` when nothing is
-    answered at all, `ModbusRefusal` when a gateway says that nobody does.
+    A real controller may be silent where another refuses, so a missing answer counts as a refusal if the other address map is
+    answered. Raises `NoMic488` if both are refused, the `LineFailure` if there is no answer at all, `ModbusRefusal` if a
+    gateway reports that no device responds.
     """
     refusal: Refusal | None = None
     failure: LineFailure | None = None
@@ -75,7 +75,7 @@ async def firmware_of(line: DriverLine[Query, bytes], unit: int, timeout_ns: Nan
 
 
 def _plausible(registers: RegisterMap, start: int, content: tuple[int, ...]) -> bool:
-    """Whether the registers that count something hold one of it."""
+    """Whether enumerated registers hold one of their values."""
     for register in registers:
         if register.address < start or register.last >= start + len(content) or not register.reads:
             continue
@@ -92,7 +92,7 @@ async def scan(
     timeout_ns: Nanos = SCAN_NS,
     progress: Callable[[int], Any] | None = None,
 ) -> list[Found]:
-    """The units that answer on a line. ``progress`` is told every unit before it is asked. Raises `LineLost`."""
+    """The units that respond on a line. ``progress`` is called with every unit before it is tried. Raises `LineLost`."""
     found = []
     inputs = pdu.ReadRequest(pdu.READ_DISCRETE_INPUTS, 5000, 8)  # every firmware has them, and it is the manual's own example
     for unit in units:

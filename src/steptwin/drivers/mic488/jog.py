@@ -1,11 +1,11 @@
 """Jogging as a dead-man's switch.
 
-The axis is never told to run. Again and again it is told to move a bounded distance from where it is (POS_REL, at the velocity
-of the jog), just far enough to run on for the hold time and then brake. Held in time, it runs evenly; not held, because the
-button was let go, the program hangs, was killed or the line was cut, it comes to rest by itself.
+The axis never gets a command to run without end. It repeatedly gets a bounded relative move (POS_REL, at the velocity of the
+jog), just long enough for the hold time and the ramp. If it is held in time, it runs evenly; if not, because the button was
+released, the program hangs or was killed, or the line was cut, it stops by itself.
 
-Such a move runs at VMAX, whatever its distance, and the controller has no other bounded motion: that is why a jog sets VMAX. To
-leave VMAX alone an axis would have to be told to run (VEL_ABS, the JOG coils), which nothing ends when the program dies.
+Such a move runs at VMAX, whatever its distance, and the controller has no other bounded motion: that is why a jog sets VMAX.
+Commands that leave VMAX alone (VEL_ABS, the JOG coils) run without end if the program dies.
 
 Suffixes: ``_u`` configured units, ``_s`` seconds, ``_ns`` nanoseconds.
 """
@@ -28,22 +28,21 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.status import AxisStatus
 
 HOLD_S = 0.4
-"""How long an axis runs on after it was held last, before it brakes."""
+"""Time an axis continues after the last `hold` before it brakes, s."""
 HOLD_RANGE_S = (0.2, 2.0)
 SINGLE = 2.0**-23
-"""VMAX is a REAL: what it was set to is known so well."""
+"""Relative precision of VMAX, a REAL."""
 RENEWALS = 4
-"""How often it is held in that time."""
+"""Number of renewals within the hold time."""
 
 
 class AsyncMic488Jog:
     """A jog of one axis: ``async with axis.jog(5.0) as jog: while pressed(): await jog.hold()``.
 
-    `hold` returns after a quarter of the hold time: call it again at once for as long as the axis is to run. It says False when
-    the axis has stopped for another reason, which `end` tells. At the end of the block the axis ramps down, and VMAX, which a
-    jog has to change, is what it was. A killed program cannot put it back: VMAX stays the velocity of the jog then. It is never
-    raised, so that what is left behind is an axis that is slower than it was set to, not a faster one: a jog faster than VMAX
-    raises `NotReady`.
+    `hold` returns after a quarter of the hold time: call it again at once as long as the axis shall run. It returns False if
+    the axis has stopped for another reason, which is in `end`. At the end of the block the axis ramps down, and VMAX, which a
+    jog has to change, is restored. A killed program cannot restore it: VMAX then stays at the velocity of the jog. It is never
+    raised, so that the axis is left slower, not faster: a jog faster than VMAX raises `NotReady`.
     """
 
     def __init__(
@@ -70,11 +69,11 @@ class AsyncMic488Jog:
         self._held_ns: Nanos | None = None  # when it was held last
         self._permission: Permission | None = None
         self.end: MoveEnd | None = None
-        """Why the axis does not run any more."""
+        """Why the axis has stopped; None while it runs."""
 
     @property
     def reach_u(self) -> float:
-        """How far the axis goes at most after it was held last, in u."""
+        """The longest distance the axis moves after the last `hold`, in u."""
         return self._reach_u
 
     async def __aenter__(self) -> Self:
@@ -111,7 +110,7 @@ class AsyncMic488Jog:
         return self
 
     async def hold(self) -> bool:
-        """Let the axis run on; False when it has stopped. Raises `Unconfirmed` when the controller cannot be told in time."""
+        """Let the axis run on; False when it has stopped. Raises `Unconfirmed` if the controller cannot be reached in time."""
         unit, permission = self._unit, self._permission
         if permission is None or self._held_ns is None:
             raise Misuse("a jog is held inside its with block")
@@ -149,11 +148,11 @@ class AsyncMic488Jog:
         return control
 
     def _exchange_ns(self) -> Nanos:
-        """A lost answer must not take the time in which another could be had."""
+        """Time-out of an exchange, ns: short enough to repeat it within the hold time."""
         return min(self._unit.timeout_ns, self._renew_ns)
 
     async def _move(self, control: Control, permission: Permission) -> None:
-        """Let the axis run for the hold time from now on."""
+        """Send the move for the hold time from now on."""
         unit, axis = self._unit, self._axis
         distance = self._reach_u if self._velocity_u > 0.0 else -self._reach_u
         at = unit.line.now()
@@ -189,7 +188,7 @@ class AsyncMic488Jog:
                 raise
 
     async def release(self) -> None:
-        """Ramp down, and put VMAX back. Raises `Unconfirmed` when the controller cannot be told."""
+        """Ramp down, and put VMAX back. Raises `Unconfirmed` if the controller cannot be reached."""
         unit = self._unit
         if self.end is None and self._held_ns is not None:
             try:

@@ -1,4 +1,4 @@
-"""Modbus lines made of an address. Several controllers, drivers, tasks or threads may share one."""
+"""Modbus lines, opened by address. Several controllers, drivers, tasks or threads may share one."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 
 FRAMES_PER_SECOND = 100.0
-"""What a MIC488 serves (manual 2)."""
+"""Frames per second that a MIC488 serves (manual 2)."""
 
 
 def modbus_exchanger(
     place: LineAddress, frames_per_second: float | None, log: Callable[[str], object] | None
 ) -> tuple[Exchanger[Query, bytes], dict[str, object]]:
-    """The exchanges of a Modbus line, and what its drivers find in its notes. ``frames_per_second`` to each device; None: any."""
+    """The exchanger of a Modbus line, and the notes of its drivers. ``frames_per_second`` to each device; None: any."""
     if frames_per_second is not None and frames_per_second <= 0.0:
         raise Misuse(f"{frames_per_second:g} frames per second: must be above 0")
     interval: Nanos = 0 if frames_per_second is None else round(SECOND / frames_per_second)
@@ -63,7 +63,7 @@ class AsyncModbusLine(TaskLine[Query, bytes]):
 
 
 class ThreadModbusLine(ThreadLine[Query, bytes]):
-    """The same for threads; `steptwin.drivers.mic488.sync.ModbusLine` is its face."""
+    """The same for threads, used by `steptwin.drivers.mic488.sync.ModbusLine`."""
 
     def __init__(
         self,

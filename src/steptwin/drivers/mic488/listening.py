@@ -1,4 +1,4 @@
-"""Listening in on Modbus between two others: frames cut out of what is heard, and put into words. No I/O."""
+"""Decode the Modbus traffic between two other devices. No I/O."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.wire.slave import FrameDirection
 
 
 class RtuListener:
-    """A line on which requests and answers come from the same wire; which is which follows from the frames."""
+    """Decodes requests and answers on one wire; the frames show which is which."""
 
     def __init__(self, words: FrameWords, gap_ns: Nanos = BURSTY_GAP_NS) -> None:
         self._words = words
@@ -21,11 +21,11 @@ class RtuListener:
         self._take(self._framer.feed(data, now), now)
 
     def deadline(self) -> Nanos | None:
-        """When `expire` has something to do if nothing else comes."""
+        """The time at which `expire` must be called if no byte arrives before, ns."""
         return self._framer.deadline()
 
     def expire(self, now: Nanos) -> None:
-        """Nothing has come for a while."""
+        """End the present frame after a silence."""
         deadline = self._framer.deadline()
         if deadline is not None and deadline <= now:
             self._take(self._framer.expire(now), now)
@@ -43,7 +43,7 @@ class RtuListener:
 
 
 class TcpListener:
-    """The two directions of a Modbus TCP connection."""
+    """Decodes the two directions of a Modbus TCP connection."""
 
     def __init__(self, words: FrameWords) -> None:
         self._words = words

@@ -1,4 +1,4 @@
-"""Motions as a driver sees them: how long they last, and why they ended.
+"""Motions: their computed durations and the reasons of their ends.
 
 Suffixes: ``_u`` configured units (u, u/s, u/s²), ``_s`` seconds.
 """
@@ -17,7 +17,7 @@ from steptwin.motion import MotionState, plan_position
 MOVING = frozenset({AxisStatus.VELOCITY, AxisStatus.POSITION, AxisStatus.HOMING, AxisStatus.CORRECTION})
 
 _SCALE = 2**20
-"""Pulses a distance is taken as when its length in pulses is not known: plenty for a duration."""
+"""Pulses per unit assumed for a duration if GEAR is unknown; the result hardly depends on it."""
 
 
 class Reason(enum.Enum):
@@ -48,7 +48,7 @@ _REASONS: dict[int, Reason] = {
 
 
 class MotionKind(enum.Enum):
-    """What an axis was told."""
+    """Kinds of motion commands."""
 
     POSITION = "position"
     DISTANCE = "distance"
@@ -68,7 +68,7 @@ class MotionCommand:
 
 @dataclass(frozen=True, slots=True)
 class MoveEnd:
-    """How a motion of ``axis`` ended. ``ok``: as it was meant to."""
+    """The end of a motion of ``axis``. ``ok``: it ended as intended."""
 
     axis: int
     reason: Reason
@@ -92,14 +92,14 @@ def status_text(code: int) -> str:
 
 
 def reason_of(status: int, motion: MotionCommand | None) -> Reason:
-    """Why an axis that does not move any more stands: rest is all there is to say without a motion or after a velocity of 0."""
+    """Why an axis is at rest; `Reason.REST` without a known motion or after a velocity of 0."""
     if status == AxisStatus.ON and (motion is None or (motion.kind is MotionKind.VELOCITY and motion.value_u == 0.0)):
         return Reason.REST
     return _REASONS.get(status, Reason.STOPPED)
 
 
 def travel_s(distance_u: float, velocity_u: float, acc_u: float, dec_u: float, vmax_u: float) -> float | None:
-    """How long a position move over ``distance_u`` takes that begins with ``velocity_u``; None where no plan is possible."""
+    """The duration (s) of a position move over ``distance_u`` that begins at ``velocity_u``; None if no plan is possible."""
     try:
         reach = max(abs(distance_u), velocity_u * velocity_u / (2.0 * dec_u))
         if reach == 0.0:

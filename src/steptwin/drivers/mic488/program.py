@@ -1,4 +1,4 @@
-"""The program in the controller: choose, start, pause, stop."""
+"""The program in the controller: select, start, pause, stop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steptwin.mic488.status import ProgramState
 
 
 class AsyncMic488Program:
-    """The program of a controller. Programs get into it with the vendor's tool; Modbus has no function for that."""
+    """The program of a controller. Programs are downloaded with the vendor's tool; Modbus has no function for that."""
 
     def __init__(self, unit: Unit) -> None:
         self._unit = unit
@@ -20,13 +20,14 @@ class AsyncMic488Program:
         return ProgramState((await self._unit.control()).program)
 
     async def select(self, program_bank: int, position_bank: int | None = None) -> None:
-        """Choose what the next start runs. Raises `Misuse` for a bank the firmware does not have."""
+        """Select the program for the next start. Raises `Misuse` for a bank the firmware does not have."""
         await self._unit.write(self._unit.item("PROG_BANK_SEL"), program_bank)
         if position_bank is not None:
             await self._unit.write(self._unit.item("POS_BANK_SEL"), position_bank)
 
     async def start(self) -> None:
-        """Start the chosen program, or go on with a paused one. Sent once only: a lost answer leaves it open whether it runs."""
+        """Start the selected program, or continue a paused one. Sent only once: after a lost answer it is unknown whether it
+        runs."""
         permission = self._unit.permission(*range(1, AXES + 1))
         try:
             await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
@@ -38,7 +39,7 @@ class AsyncMic488Program:
         await self._unit.write(self._unit.item("PROGRAM_CTRL"), ProgramState.PAUSED, urgent=True)
 
     async def stop(self) -> None:
-        """End the program, which switches drives and outputs off (MIC-31). Goes before everything that waits for the line."""
+        """End the program, which switches drives and outputs off (MIC-31). It precedes all waiting requests."""
         unit = self._unit
         for axis in range(1, AXES + 1):
             unit.notes.stops[axis] += 1

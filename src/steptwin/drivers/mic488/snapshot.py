@@ -1,7 +1,7 @@
-"""Everything the registers let one read and write, as data, and putting it back.
+"""A snapshot of all registers that can be read and written, and its restoration.
 
-Not part of it is what acts rather than holds: triggers and PROGRAM_CTRL. Counters (positions, encoders) and outputs are kept
-but put back only on demand: after a counter is written the machine stands where it stood, and an output moves something.
+Triggers and PROGRAM_CTRL, which act when written, are not part of it. Counters (positions, encoders) and outputs are
+included but restored only on demand: writing a counter does not move the machine, and an output may move something.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _OUTPUTS = ("OUT",)
 
 @dataclass(frozen=True, slots=True)
 class Mic488Snapshot:
-    """Values by name, as they travelled with ``data_type``; user registers as words, without zeros at their end."""
+    """Values by name, in the form of ``data_type``; user registers as words, without trailing zeros."""
 
     firmware: str
     data_type: DataType
@@ -66,7 +66,7 @@ def _checked(name: str, value: Any, kind: Any) -> Any:
 
 
 class SnapshotChange(NamedTuple):
-    """What putting a snapshot back changes: ``old`` is None when it is not comparable (another DATA_TYPE)."""
+    """A change by restoring a snapshot; ``old`` is None if not comparable (another DATA_TYPE)."""
 
     item: RegisterItem
     old: Value | None
@@ -85,7 +85,7 @@ def _kept(register: Register) -> bool:
 
 
 async def take(unit: Unit) -> Mic488Snapshot:
-    """Read everything."""
+    """Take a snapshot."""
     data_type = (await unit.control()).data_type
     items = [RegisterItem(register) for register in unit.registers if _kept(register)]
     values = await unit.read(items, data_type)
@@ -97,7 +97,7 @@ async def take(unit: Unit) -> Mic488Snapshot:
 
 
 async def changes(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outputs: bool) -> list[SnapshotChange]:
-    """What `put_back` would write. Raises `Misuse` for a snapshot of another firmware, or with values that are not taken."""
+    """The changes that `put_back` would write. Raises `Misuse` for a snapshot of another firmware, or with invalid values."""
     if snapshot.firmware != unit.registers.firmware.name:
         raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {unit.registers.firmware.name}")
     memory = unit.registers.of("USER_REGISTER")
@@ -126,7 +126,7 @@ async def changes(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outpu
 
 
 async def put_back(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outputs: bool) -> list[SnapshotChange]:
-    """Write what differs, and read it back. Raises `NotReady` while an axis moves, or when a value was not kept."""
+    """Write the differences and verify them. Raises `NotReady` while an axis moves, or if a value was not kept."""
     control = await unit.control()
     moving = [f"M{axis} ({status_text(code)})" for axis, code in enumerate(control.axes, start=1) if code in MOVING]
     if moving:
@@ -144,7 +144,7 @@ async def put_back(unit: Unit, snapshot: Mic488Snapshot, *, counters: bool, outp
 
 
 def _runs(changed: list[SnapshotChange]) -> list[tuple[int, list[Value]]]:
-    """Neighbouring user registers together."""
+    """Groups of consecutive user registers."""
     runs: list[tuple[int, list[Value]]] = []
     for change in changed:
         if runs and runs[-1][0] + len(runs[-1][1]) == change.item.cell:

@@ -25,11 +25,11 @@ from steptwin.wire import pdu
 from steptwin.world import script as steps
 
 MOST_NAMED = 9
-"""Points in a message."""
+"""Most points listed in a message."""
 
 
 class Mic488Part:
-    """Positions are in configured units where the driver has the configuration; else pulses per unit are unknown."""
+    """Positions are in configured units if the driver has the configuration; else pulses per unit are unknown."""
 
     line_kind = "modbus"
 
@@ -54,7 +54,7 @@ class Mic488Part:
     # ------------------------------------------------------------------ points
 
     async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
-        """Those of a data sheet that a register shows; what a pin or a short name has no register for is unknown."""
+        """The values of the data sheet that a register shows; the others are unknown."""
         registers = {point: self._register(point) for point in points}
         names = tuple(dict.fromkeys(name for name in registers.values() if name is not None))
         shown = await self._mic.get_shown(*names) if names else {}
@@ -64,7 +64,7 @@ class Mic488Part:
         }
 
     def _register(self, path: str) -> str | None:
-        """The name of the register that shows a point, None where there is none. Raises `Misuse`."""
+        """The name of the register that shows a point, None without one. Raises `Misuse` for an unknown point."""
         item = item_of(self._registers, path)
         if item is not None:
             return item.name if item.register.reads else None
@@ -125,7 +125,7 @@ class Mic488Part:
         return [{"axis": n, "counts": await self._mic.axis(n).encoder(), "turned_by": None} for n in ALL_AXES]
 
     async def _write(self, wanted: steps.Write) -> None:
-        """One after the other; names are checked before the first is written."""
+        """Write registers one after the other; names are checked before the first is written."""
         for _, name, _ in wanted.values:
             if not named(self._registers, name).register.accepts:
                 raise Misuse(f"{name} can only be read")
@@ -170,7 +170,7 @@ def _edges(before: Mic488Status, status: Mic488Status) -> list[Payload]:
 
 
 def _changes(before: Mic488Status, status: Mic488Status) -> list[Payload]:
-    """Of the registers that say what the controller does."""
+    """Changes of the registers that show the state of the controller."""
     found: list[Payload] = [
         StatusPayload("axis-status", f"M{axis}: {status_text(new)}", (("axis", axis), ("status", new)))
         for axis, (old, new) in enumerate(zip(before.axes, status.axes, strict=True), start=1)

@@ -1,6 +1,6 @@
 """The MIC488 driver for threads: the methods of the asynchronous one as ordinary calls.
 
-Calls may come from any thread. While one waits for the controller, a stop from another goes before whatever waits.
+Calls may come from any thread. A stop precedes all waiting requests of other threads.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class ModbusLine(Blocking):
 
     @property
     def line(self) -> ThreadModbusLine:
-        """The line as drivers use it."""
+        """The line that drivers use."""
         return self._driver
 
     open = blocking(ThreadModbusLine.open)
@@ -68,12 +68,12 @@ class Mic488Jog(Blocking):
 
     @property
     def end(self) -> MoveEnd | None:
-        """Why the axis does not run any more."""
+        """Why the axis has stopped; None while it runs."""
         return self._driver.end
 
     @property
     def reach_u(self) -> float:
-        """How far the axis goes at most after it was held last, in u."""
+        """The longest distance the axis moves after the last `hold`, in u."""
         return self._driver.reach_u
 
     hold = blocking(AsyncMic488Jog.hold)
@@ -102,7 +102,7 @@ class Mic488Axis(Blocking):
         return self._driver.unit
 
     def jog(self, velocity_u: float, *, hold_s: float = HOLD_S) -> Mic488Jog:
-        """Run at a velocity for as long as it is held: a dead-man's switch. See `AsyncMic488Axis.jog`."""
+        """Run at a velocity (u/s) while it is held: a dead-man's switch. See `AsyncMic488Axis.jog`."""
         return Mic488Jog(self._driver.jog(velocity_u, hold_s=hold_s))
 
     status = blocking(AsyncMic488Axis.status)
@@ -229,8 +229,8 @@ class Mic488(Blocking):
         return self._axes[self._driver.axis(number).number]
 
     def subject(self, name: str = "mic488", *, period_s: float = PERIOD_S) -> DeviceSubject:
-        """The device, once it was opened, with the commands, points and events of a twin. It is polled for events while there are
-        followers, at most once in ``period_s``."""
+        """The open device with the commands, points and events of a twin. It is polled for events while there are followers, at
+        most once per ``period_s``."""
         return DeviceSubject(AsyncDeviceSubject(name, Mic488Part(self._driver), period_s))
 
     open = blocking(AsyncMic488.open)

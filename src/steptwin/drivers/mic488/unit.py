@@ -1,4 +1,4 @@
-"""One controller on a line: reading and writing values, what drivers of the same controller must agree on.
+"""One controller on a line: reading and writing values, and the state that drivers of the same controller share.
 
 Suffixes: ``_u`` configured units, ``_p`` pulses, ``_ns`` nanoseconds, ``_s`` seconds.
 """
@@ -27,20 +27,20 @@ from steptwin.wire import pdu
 
 QUERIES_KEPT = 256
 URGENT_TRIES = 5
-"""How often a stop is sent before it is given up."""
+"""Number of attempts for a stop."""
 PATIENCE_NS: Nanos = 5 * SECOND
-"""What changes something is sent at most so long after it was asked for."""
+"""A request that changes something is sent at most this long after the call, ns."""
 
 
 class Control(NamedTuple):
-    """The control registers that say what the controller is doing; ``at`` is a moment before they were read."""
+    """The control registers, which show the state of the controller; ``at``: a moment (ns) before they were read."""
 
     at: Nanos
     data_type: DataType
     program: int
     """PROGRAM_CTRL: 0 stopped, 1 running, 2 paused."""
     triggered: bool
-    """AXIS_CTR_MODE is TRIGGER: motion registers wait for their trigger."""
+    """Whether AXIS_CTR_MODE is TRIGGER: motion registers then wait for their trigger."""
     controller: int | None
     """M_STATUS, None where the firmware has none."""
     axes: tuple[int, ...]
@@ -48,18 +48,18 @@ class Control(NamedTuple):
 
 
 class UnitNotes:
-    """What all drivers of one controller on one line share."""
+    """The state that all drivers of one controller on one line share."""
 
     def __init__(self) -> None:
         self.stops = [0] * (AXES + 1)
-        """How often each axis (from 1) was stopped: a motion asked for before must not begin after."""
+        """Number of stops of each axis (from 1): a motion requested before a stop must not begin after it."""
         self.control: Control | None = None
 
 
 class Unit:
     """The controller with slave address ``number`` on ``line``.
 
-    ``config`` gives units and GEAR. Reads are tried ``tries`` times, writes too where that cannot move anything twice.
+    ``config`` gives units and GEAR. Reads are tried ``tries`` times, and so are writes that cannot move anything twice.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class Unit:
         self.use(registers)
 
     def use(self, registers: RegisterMap) -> None:
-        """Talk to a controller of that firmware."""
+        """Use the register map of that firmware."""
         self.registers = registers
         axes = self.config.axes if self.config is not None else ()
         self.wording = Wording(registers, [AxisScale(axis.unit_name, axis.gear) for axis in axes])
@@ -106,11 +106,11 @@ class Unit:
     # ------------------------------------------------------------------ scales
 
     def unit_name(self, axis: int) -> str:
-        """The configured unit of an axis; ``u`` where it is not known."""
+        """The configured unit of an axis; ``u`` if unknown."""
         return self.config.axes[axis - 1].unit_name if self.config is not None else "u"
 
     def gear(self, axis: int) -> float | None:
-        """Pulses per unit; None where they are not known."""
+        """Pulses per unit; None if unknown."""
         return self.config.axes[axis - 1].gear if self.config is not None else None
 
     # ------------------------------------------------------------------ exchanges
@@ -124,7 +124,7 @@ class Unit:
         timeout_ns: Nanos | None = None,
         most: int | None = None,
     ) -> bytes:
-        """The answer PDU. Raises `ModbusRefusal` or a `LineFailure`."""
+        """Send a request and return the answer PDU. Raises `ModbusRefusal` or a `LineFailure`."""
         if most is None:
             most = self.tries if repeatable(self.registers, request) else 1
         if permission is None and moves(self.registers, request):
@@ -141,7 +141,7 @@ class Unit:
             raise ModbusRefusal(self.place, query, exception) from None
 
     async def look(self, function: int, address: int, count: int) -> bytes:
-        """The answer to a read."""
+        """Send a read and return its answer."""
         key = (function, address, count)
         query = self._queries.get(key)
         if query is None:
@@ -159,7 +159,7 @@ class Unit:
         return [self.item(key, axis) for axis in range(1, AXES + 1)]
 
     async def read(self, items: Iterable[RegisterItem], data_type: DataType = DataType.REAL) -> dict[RegisterItem, Value]:
-        """The values as they travel with ``data_type``, in as few frames as there can be."""
+        """Read values in the form of ``data_type``, in as few frames as possible."""
         wanted = tuple(items)
         blocks = self._plans.get(wanted)
         if blocks is None:
@@ -188,13 +188,13 @@ class Unit:
         timeout_ns: Nanos | None = None,
         most: int | None = None,
     ) -> None:
-        """Write a value as it travels with ``data_type``."""
+        """Write a value in the form of ``data_type``."""
         axis = item.register.axis
         request = encoded(item, value, data_type, self.unit_name(axis) if axis else "u")
         await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most=most)
 
     async def read_user(self, number: int, view: View, count: int) -> list[Value]:
-        """``count`` user registers from ``number`` on, seen as ``view``."""
+        """Read ``count`` user registers from ``number`` on, as ``view``."""
         first = user_item(self.registers, number, view, count)
         items = [first.at(number + view.size * n) for n in range(count)]
         values = await self.read(items)
@@ -213,7 +213,7 @@ class Unit:
     # ------------------------------------------------------------------ units
 
     def shown(self, item: RegisterItem, value: Value, data_type: DataType) -> tuple[Value, str]:
-        """A value that travelled with ``data_type`` in units where they can be told, and its unit."""
+        """A value in the form of ``data_type``, converted into units if these are known, and its unit."""
         register = item.register
         axis = register.axis or (register.index if register.type is Type.VALUE else None)
         name = self.unit_name(axis) if axis else "u"
@@ -225,7 +225,7 @@ class Unit:
         return value, register.unit(data_type, name)
 
     def travelling(self, item: RegisterItem, value_u: float, data_type: DataType) -> float:
-        """A value in units as it travels with ``data_type``. Raises `NotReady` where that needs an unknown GEAR."""
+        """A value in units, converted into the form of ``data_type``. Raises `NotReady` if that needs an unknown GEAR."""
         axis = item.register.axis
         if item.register.type is not Type.VALUE or data_type is DataType.REAL or axis is None:
             return value_u
@@ -255,7 +255,7 @@ class Unit:
     # ------------------------------------------------------------------ what it is doing
 
     async def control(self, after: Nanos | None = None, timeout_ns: Nanos | None = None) -> Control:
-        """The control registers, read now, or by somebody else since ``after``."""
+        """The control registers, read now, or by another driver since ``after``."""
         known = self.notes.control
         if after is not None and known is not None and known.at >= after:
             return known
@@ -272,7 +272,7 @@ class Unit:
         return control
 
     async def ready(self, *axes: int) -> Control:
-        """The control registers, unless the controller would not make a motion now. Raises `NotReady`."""
+        """The control registers. Raises `NotReady` if the controller would not execute a motion now."""
         control = await self.control()
         if control.triggered:
             raise NotReady(
@@ -285,11 +285,11 @@ class Unit:
         return control
 
     def lock(self) -> AbstractAsyncContextManager[object]:
-        """For exchanges that nobody else's motion commands may come between."""
+        """A lock for exchanges that no other motion command may interrupt."""
         return self.line.lock(("mic488", self.number))
 
     def permission(self, *axes: int, patience_ns: Nanos | None = None) -> Permission:
-        """Permission for what is asked for now, until one of the axes is stopped or it is too late."""
+        """Permission for a request made now. It ends with a stop of one of the axes, or after `PATIENCE_NS`."""
         stops = self.notes.stops
         before = [stops[axis] for axis in axes]
         if patience_ns is None:
@@ -298,7 +298,7 @@ class Unit:
 
     @asynccontextmanager
     async def stopping_if_late(self, *axes: int) -> AsyncGenerator[None]:
-        """Stop the axes when what moves them was sent too late (`SentLate`)."""
+        """Stop the axes if their motion was sent too late (`SentLate`)."""
         try:
             yield
         except SentLate:
@@ -306,7 +306,7 @@ class Unit:
             raise
 
     async def stop(self, axes: Sequence[int], key: str = "M_STOP", what: str = "stopped") -> None:
-        """Stop axes in the same instant, before everything that waits for the line. Raises `Unconfirmed`."""
+        """Stop axes in the same instant, before all waiting requests. Raises `Unconfirmed`."""
         for axis in axes:
             self.notes.stops[axis] += 1
         try:
@@ -316,7 +316,7 @@ class Unit:
 
 
 def axis_mask(axes: Iterable[int]) -> int:
-    """Axes as the bits of M_STOP and its like."""
+    """Axes as bits of M_STOP and similar registers."""
     return sum(1 << check_axis(axis) - 1 for axis in set(axes))
 
 

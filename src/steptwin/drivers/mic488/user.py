@@ -12,7 +12,7 @@ from steptwin.mic488.values import View
 Number = TypeVar("Number", int, float)
 
 MEMORY_NS: Nanos = 3000 * MILLISECOND
-"""Non-volatile memory takes its time."""
+"""Time for non-volatile memory, ns."""
 
 
 class AsyncUserView(Generic[Number]):

@@ -1,4 +1,4 @@
-"""Waiting until axes have come to rest, and telling why they have."""
+"""Waiting until axes are at rest, and finding why they stopped."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from steptwin.mic488.status import AxisStatus
 
 POLL_S = 0.05
 SHARED_NS: Nanos = 30 * MILLISECOND
-"""Several who wait for the same controller are content with a status of this age."""
+"""Oldest status that several waits for the same controller share, ns."""
 SETTLE_NS: Nanos = 100 * MILLISECOND
-"""So long after a command a status may still be the one of before."""
+"""Time after a command during which the status may still be the earlier one, ns."""
 MARGIN_S = 1.0
 MARGIN = 1.2
 """A motion is overdue after this many times its computed duration, and the other margin."""
 UNKNOWN_S = 60.0
-"""Time-out of a motion whose end nobody can compute: a homing, or one that somebody else has begun."""
+"""Time-out of a motion whose duration cannot be computed, s: homing, or a motion begun by another program."""
 CORRECTION_S = 5.0
 """Time for a correction of the position after a motion. The controller itself gives up sooner: 2 s without progress (ERR_TIME),
 unless its configuration says otherwise."""
 
 
 class AxisWait:
-    """Waits for one axis. ``motion`` is what it was told last, if we told it."""
+    """Waits for one axis. ``motion``: its last command, if this driver sent it."""
 
     def __init__(self, unit: Unit, axis: int, motion: MotionCommand | None, timeout_s: float | None) -> None:
         self._unit = unit
@@ -40,11 +40,11 @@ class AxisWait:
 
     @property
     def after(self) -> Nanos:
-        """Statuses read before tell nothing."""
+        """The time (ns) from which statuses are valid."""
         return self._begin if self._motion is None else self._motion.at
 
     async def judge(self, control: Control) -> MoveEnd | None:
-        """How the motion ended, None while it goes on."""
+        """The end of the motion; None while it lasts."""
         status = control.axes[self._axis - 1]
         motion = self._motion
         if status in MOVING:
@@ -78,7 +78,7 @@ class AxisWait:
         return MoveEnd(axis, reason, float(position), name, (unit.line.now() - self._begin) / SECOND, detail)
 
     async def _time_out_s(self, status: int) -> float:
-        """How long the motion may take from now on."""
+        """Longest remaining time of the motion, s."""
         unit, axis, motion = self._unit, self._axis, self._motion
         if status == AxisStatus.CORRECTION:
             known = unit.config.axes[axis - 1] if unit.config is not None else None
@@ -99,7 +99,7 @@ class AxisWait:
 
 
 async def dynamics(unit: Unit, axis: int) -> tuple[float, float, float, float, float]:
-    """Position, velocity, ACC, DEC, VMAX of an axis: in units where they can be told, else in pulses."""
+    """Position, velocity, ACC, DEC, VMAX of an axis: in units if these are known, else in pulses."""
     items = [unit.item(key, axis) for key in ("POS_ACT", "VEL_ACT", "ACC", "DEC", "VMAX")]
     data_type = unit.wording.data_type
     values = await unit.read(items, data_type)
@@ -108,9 +108,9 @@ async def dynamics(unit: Unit, axis: int) -> tuple[float, float, float, float, f
 
 
 async def wait_for(unit: Unit, watches: dict[int, AxisWait], *, check: bool) -> dict[int, MoveEnd]:
-    """Until all axes have ended, or with ``check`` until one has ended otherwise than meant: then its `MoveFailed` is raised.
+    """Wait until all axes are at rest, or with ``check`` until one motion fails: then its `MoveFailed` is raised.
 
-    A line that fails ends the waiting: with ``check`` as the failure, else as the end of all who still move.
+    A failing line ends the wait: with ``check`` it is raised, else it is the end of all axes that still move.
     """
     ends: dict[int, MoveEnd] = {}
     after = max(watch.after for watch in watches.values())
