@@ -523,7 +523,7 @@ SECOND_AXIS = (command.Move("drum", 2, to=9.0), command.Jog("drum", 2, 50.0), co
         (command.Jog("drum", 1, 0.0), Misuse, "the sign of the velocity is the direction"),
         *((wanted, Misuse, "axis = 2: an M1486 has axis 1 only") for wanted in SECOND_AXIS),
         (command.StopAxes("drun"), Misuse, "no machine is called 'drun' .did you mean 'drum'.*; there are drum"),
-        (do.Write((("drun", "X", 1.0),)), Refusal, "write cannot be done with this device"),
+        (do.Write((("drun", "X", 1.0),)), Refusal, "write is not possible for this device"),
         (command.ReadPoints(("drum.B99",)), Misuse, "'B99' is not a point of an M1486: there are position"),
     ],
 )

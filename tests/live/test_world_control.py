@@ -60,7 +60,7 @@ def test_a_command_is_done_at_the_present_moment_and_recorded(run: Run) -> None:
         rig.control.do(do.PowerCycle("table"))
         rig.control.do(do.Turn("table", 2, 12))
         assert rig.control.do(command.Encoders("table")).value[1] == {"axis": 2, "counts": 12, "turned_by": "drive"}
-        assert rig.control.do(command.State("drum")).value["controller"] == "M1486"
+        assert rig.control.do(command.State("drum")).value["kind"] == "m1486"
         assert rig.control.do(do.SetFault(read_fault("busy unit=1"))).value == {"name": "busy"}
         rig.control.do(do.ClearFault("busy"))
         assert rig.control.do(command.ListFaults()).value == []

@@ -170,7 +170,7 @@ def test_axes_that_were_stopped_before_they_were_to_begin_leave_no_trace() -> No
             moving = asyncio.create_task(mic.move_together({1: 10.0, 3: 20.0}))
             await asyncio.sleep(0)
             await mic.axis(3).stop()
-            with pytest.raises(Overtaken, match=r"AXIS_CTR_MODE = TRIGGER .1.' was not sent: a stop was given meanwhile"):
+            with pytest.raises(Overtaken, match=r"AXIS_CTR_MODE = TRIGGER .1.' was not sent: a stop was requested meanwhile"):
                 await moving
 
     run_virtual(wire, main())
@@ -192,7 +192,7 @@ def test_what_may_move_is_not_written_when_the_line_was_busy_for_too_long(act: s
 
     request = encoded(named(register_map("1.70"), "M1_VEL_ABS"), 5.0, DataType.REAL)
     keep_the_line()
-    with pytest.raises(TooLate, match=r"M1_VEL_ABS.* was not sent: it was asked for more than 5 s ago"):
+    with pytest.raises(TooLate, match=r"M1_VEL_ABS.* was not sent: it was requested more than 5 s ago"):
         mic.set("M1_VEL_ABS", 5.0) if act == "set" else mic.request(request)
     assert not wire.moving()
     keep_the_line()
