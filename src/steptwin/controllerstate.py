@@ -108,6 +108,20 @@ def details_of(rows: Iterable[DetailRow[M]], machine: M, now: Nanos) -> dict[str
     return {row.detail.name: row.read(machine, now) for row in rows}
 
 
+def detail_text(value: DetailValue) -> str:
+    """For people."""
+    match value:
+        case None:
+            return "-"
+        case bool():
+            return "yes" if value else "no"
+        case tuple():
+            return " ".join(map(str, value)) or "none"
+        case str() | int() | float():
+            return str(value)
+    return ", ".join(f"{name} = {number}" for name, number in value.items()) or "none"
+
+
 def read_state(data: Mapping[str, Any]) -> ControllerState:
     """The state in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what is none."""
     lists: dict[str, Any] = {

@@ -168,6 +168,8 @@ class Detail:
     meaning: str
     type: FactType
     unit: str = ""
+    is_brief: bool = False
+    """Whether short views show it, too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,7 +214,7 @@ def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
         "points": tuple(map(_read_point, data["points"])),
         "commands": tuple(map(_read_command, data["commands"])),
         "events": tuple(map(_read_event, data["events"])),
-        "details": tuple(Detail(one["name"], one["meaning"], FactType(one["type"]), one["unit"]) for one in data["details"]),
+        "details": tuple(map(_read_detail, data["details"])),
     }
     return Datasheet(**{**data, **lists})
 
@@ -254,6 +256,10 @@ def _read_event(data: Mapping[str, Any]) -> EventDescription:
         for one in data["facts"]
     )
     return EventDescription(code=data["code"], meaning=data["meaning"], facts=facts)
+
+
+def _read_detail(data: Mapping[str, Any]) -> Detail:
+    return Detail(data["name"], data["meaning"], FactType(data["type"]), data["unit"], data["is_brief"])
 
 
 def _read_limits(data: Mapping[str, Any] | None) -> Limits | None:

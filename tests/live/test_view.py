@@ -55,20 +55,22 @@ def demo(*units: int) -> World:
 
 
 def test_the_whole_screen(run: Run) -> None:
-    assert screen(run, demo(), 80, 24, ENABLE, MOVE_M1, MOVE_M2, READ_STATUS) == [
+    assert screen(run, demo(), 80, 26, ENABLE, MOVE_M1, MOVE_M2, READ_STATUS) == [
         "twin: MIC488, unit 1, firmware 1.70   Ctrl-C ends",
         "  Modbus RTU  /run/mic488",
         "  Modbus TCP  127.0.0.1:5020",
         "  non-volatile memory is lost at the end of this process (--state DIR keeps it)",
         "",
         "mic488        2.0 s  ok",
+        "program stopped",
         "           position        velocity         encoder   status",
         "M1         43.75 mm      25.00 mm/s             546   3 moving to position",
         "M2          0.00 mm       0.00 mm/s               0   0 off",
         "M3          0.00 mm       0.00 mm/s               0   0 off",
         "M4          0.00 mm       0.00 mm/s               0   0 off",
-        "IN  1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20",
-        "OUT 1 2 3 4 5 6 7 8   AIN 0.00 V  0.00 V  ERR",
+        "IN  1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20  AIN 0.00 V  0.00 V",
+        "OUT 1 2 3 4 5 6 7 8   M1_EN M2_EN M3_EN M4_EN ERR",
+        "data_type REAL  axis_control_mode DIRECT",
         "",
         "events",
         "    0.000000 s  mic488     position command ignored: M2 is not enabled",
@@ -99,7 +101,7 @@ def test_low_terminals_are_never_overfilled(run: Run) -> None:
     for height in (10, 16, 20, 24, 60):
         lines = screen(run, demo(), 80, height, ENABLE, MOVE_M1, *[READ_STATUS] * 50)
         assert len(lines) <= height
-    assert sum("M1_STATUS" in line for line in lines) == 60 - 15
+    assert sum("M1_STATUS" in line for line in lines) == 60 - 17
 
 
 def test_several_controllers_one_after_the_other_as_far_as_there_is_room(run: Run) -> None:
@@ -138,11 +140,12 @@ def test_the_program_and_where_it_is(run: Run) -> None:
 
 def test_a_chip_its_memory_and_its_lines(run: Run) -> None:
     world = World.from_toml(m1486_world(Whole(name="twin"), [7], {"variant": "B"}))
-    shown = screen(run, world, 80, 24, b"s70\ra1000\rf6400\ru16\rr\r", kind="raw")
-    assert "chip7        2.0 s  has nothing to do" in shown
-    assert any(line.startswith("position      6400   true      6400") for line in shown)
+    shown = screen(run, world, 80, 30, b"s70\ra1000\rf6400\ru16\rr\r", kind="raw")
+    assert shown[shown.index("chip7        2.0 s  ok") + 1] == "program has nothing to do"
+    assert "M1   6400 microstep   0 microstep/s  at rest" in shown
+    assert any("counter 6400 microstep" in line for line in shown)
     assert any("chip7" not in line and "U16" in line for line in shown)
-    assert any(line.startswith("B 1 2 3") for line in shown)
+    assert any(line.startswith("B   1 2 3") for line in shown)
 
 
 def test_loads_that_are_not_where_their_drives_are(run: Run) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from toy.kind import TOY, registered
@@ -14,10 +15,15 @@ from typer.testing import CliRunner
 from steptwin.cli import app
 from steptwin.commands.up_world import UpOptions, up
 from steptwin.datasheet import plain
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
+from steptwin.live import twins
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.output import Output
+from steptwin.live.view import LiveView
 from steptwin.live.world import LiveWorld, PlacePort, announced
 from steptwin.live.world_frames import follow_frames
 from steptwin.subject.commands import Advance, Describe, Home, Move, ReadPins, State
@@ -175,6 +181,44 @@ def test_a_program_outside_talks_to_it() -> None:
     live.advance(200_000_000)
     assert port.exchange(b"P\0", 200_000_000) == b"P\x02"
     assert announced(live.world) == [{"line": "bus", "name": "t", "kind": "toy"}]
+
+
+def test_the_live_view_shows_it(run: Callable[..., Any]) -> None:
+    async def scene() -> list[str]:
+        live = LiveWorld(World.from_toml(TEXT))
+        view = LiveView(live, Cell(live, Clock()), Output(None))
+        live.advance(100_000_000)
+        return [line.plain for line in view.lines(80, 40)]
+
+    shown = run(scene())
+    assert any(line.startswith("t  ") and line.endswith("ok") for line in shown)
+    assert "M1          5 pulse     100 pulse/s  busy" in shown
+    assert " STOP BUSY" in shown
+    assert "commands 1" in shown
+
+
+def test_its_end_of_a_run_is_printed_and_is_json(tmp_path: Path) -> None:
+    place = tmp_path / "toys.toml"
+    free = TEXT.partition("[[axis]]")[0] + "[[script]]" + TEXT.partition("[[script]]")[2].partition("  { expect")[0] + "]\n"
+    place.write_text(free, "utf-8")
+    shown = CliRunner().invoke(app, ["run", str(place), "--for", "2"])
+    assert "t.M1           100.0000 pulse" in shown.output
+    data = json.loads(CliRunner().invoke(app, ["run", str(place), "--for", "2", "--json"]).output)
+    assert data["controllers"]["t"]["axes"][0]["position"] == 100.0
+    assert data["controllers"]["t"]["details"] == {"commands": 1}
+
+
+def test_a_running_one_is_found_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(twins, "running", lambda: ["toys"])
+    points = [{"kind": "tcp", "protocol": "toys", "line": "bus", "host": "127.0.0.1", "port": 5020}]
+    told = {"name": "toys", "pid": 1, "file": None, "end_points": points, "controllers": announced(World.from_toml(TEXT))}
+    monkeypatch.setattr(twins, "ask", lambda name, command, timeout_s: told)
+    (found,) = twins.running_twins()[0].controllers
+    assert (found.full_name, found.kind, found.selection, found.places) == ("toys.t", "toy", "", ("tcp://127.0.0.1:5020",))
+    assert twins.find_controller("toys.t") == ("toys", "t")
+    with pytest.raises(LineFailure, match=r"toys\.t is of kind toy, for which there is no driver"):
+        twins.find_device("toys.t")
 
 
 def test_up_serves_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

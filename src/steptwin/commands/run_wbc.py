@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 from steptwin.commands.descriptions import Named, print_world
 from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, changes_of, limit_of, run_on, world_of, write
-from steptwin.commands.program_watch import ProgramEvent, ProgramWatch
 from steptwin.commands.travels import Placed, Travel, place_switches
 from steptwin.datasheet import plain
 from steptwin.diagnostics import Severity, render, visible
@@ -39,6 +38,7 @@ from steptwin.wbc.dialect import DEFAULT, dialect_for
 from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.real import real_text
 from steptwin.wbc.usage import homing_sides
+from steptwin.world.kinds.mic488.program_watch import ProgramEvent, ProgramWatch
 from steptwin.world.overrides import NO_OVERRIDES
 from steptwin.world.small import Whole, mic488_world
 from steptwin.world.trace import TraceRecord

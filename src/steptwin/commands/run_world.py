@@ -11,7 +11,8 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from steptwin.commands.program_watch import ProgramEvent, ProgramWatch
+from steptwin.controllerstate import ControllerState
+from steptwin.datasheet import plain
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import begin_world, set_faults
@@ -22,6 +23,7 @@ from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.live.interrupts import FirstInterrupt
 from steptwin.machine import SECOND, Nanos
 from steptwin.world import script as do
+from steptwin.world.kind import ProgramAct, ProgramReport
 from steptwin.world.records import describe, is_shown
 from steptwin.world.references import check_step
 
@@ -108,13 +110,13 @@ def _run_and_report(world: World, options: WorldRun, say: Print) -> bool:
     return not world.failures and (in_time or not options.strict)
 
 
-def _watched(world: World) -> dict[str, ProgramWatch]:
-    """Watches for the programs of all controllers."""
-    return {
-        name: ProgramWatch(view.device, world.plan.kernel_of[name], name)
-        for name, view in world.mic488.items()
-        if view.device.program.programs
+def _watched(world: World) -> dict[str, ProgramReport]:
+    """Watches for the programs of all controllers that have any."""
+    found = {
+        name: world.kind(name).watch_program(machine, world.plan.kernel_of[name], name)
+        for name, machine in world.machines.items()
     }
+    return {name: watch for name, watch in found.items() if watch is not None}
 
 
 def _run(world: World, until: str | None, limit: Nanos, progress: Progress) -> str | None:
@@ -191,7 +193,7 @@ def _write_trace(world: World, where: Path) -> list[Path]:
 # ---------------------------------------------------------------------- output
 
 
-def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramWatch], say: Print) -> None:
+def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramReport], say: Print) -> None:
     """Print in order of time what happened in the world, and what programs did with the statements that caused it."""
     shown: list[tuple[Nanos, str]] = []
     for record in filter(is_shown, world.trace):
@@ -205,7 +207,7 @@ def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str,
         say(text)
 
 
-def _with_statement(controller: str, happening: ProgramEvent) -> str:
+def _with_statement(controller: str, happening: ProgramAct) -> str:
     return f"{happening.time / SECOND:12.6f} s  {controller:<10} {happening.text:<34}  {happening.place}".rstrip()
 
 
@@ -214,14 +216,11 @@ def _print_end(world: World, outcome: WorldRunResult, say: Print) -> None:
     for name, axis in world.axis.items():
         lost = f"   {axis.lost} pulses lost" if axis.lost else ""
         say(f"{name:<10} {axis.position:12.4f} {axis.unit}{lost}")
-    for name, view in world.mic488.items():
-        free = [n for n in view.axis if not any(fitted.spec.drive == (name, f"M{n}") for fitted in world.axes.values())]
-        for number in free:
-            axis_view = view.axis[number]
-            if axis_view.position or axis_view.enabled:
-                say(f"{name + f'.M{number}':<10} {axis_view.position:12.4f} {axis_view.unit}")
-    for name, chip in world.m1486.items():
-        say(f"{name:<10} {chip.position:12d} minimum microsteps")
+    driven = {fitted.spec.drive for fitted in world.axes.values()}
+    for name, state in _states(world).items():
+        for axis in state.axes:
+            if (name, axis.name) not in driven and (axis.position or axis.enabled):
+                say(f"{f'{name}.{axis.name}':<10} {axis.position or 0.0:12.4f} {axis.unit}")
     ended = "" if outcome.reason is None else f", ended by: {outcome.reason}"
     begun = f", from {outcome.began / SECOND:g} s on" if outcome.began else ""
     say(f"{world.time:g} s of {world.spec.name}{begun} in {outcome.wall_s:.2f} s{ended}")
@@ -240,6 +239,10 @@ def _print_end(world: World, outcome: WorldRunResult, say: Print) -> None:
     say(f"digest {outcome.digest}")
 
 
+def _states(world: World) -> dict[str, ControllerState]:
+    return {name: world.kind(name).state(machine, world.now) for name, machine in world.machines.items()}
+
+
 def _json(world: World, outcome: WorldRunResult, say: Print) -> None:
     data: dict[str, Any] = {
         "version": JSON_VERSION,
@@ -255,11 +258,7 @@ def _json(world: World, outcome: WorldRunResult, say: Print) -> None:
             name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}
             for name, axis in world.axis.items()
         },
-        "controllers": {
-            name: {"status": view.status, "positions": [axis.position for axis in view.axis.values()]}
-            for name, view in world.mic488.items()
-        },
-        "chips": {name: {"position": chip.position, "counter": chip.counter} for name, chip in world.m1486.items()},
+        "controllers": {name: plain(state) for name, state in _states(world).items()},
         "files": [str(path) for path in outcome.written],
         "digest": outcome.digest,
     }

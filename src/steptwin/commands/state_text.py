@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from steptwin.controllerstate import ControllerState, DetailValue, StateAxis
+from steptwin.controllerstate import ControllerState, StateAxis, detail_text
 from steptwin.datasheet import Datasheet, Pin
-from steptwin.mic488.encoding import shortest_real
 
 
 def lines(state: ControllerState, sheet: Datasheet) -> Iterator[str]:
@@ -14,13 +13,13 @@ def lines(state: ControllerState, sheet: Datasheet) -> Iterator[str]:
     yield f"{sheet.title} {state.variant}".rstrip() + f"{since}: {state.status.text}"
     yield f"program {state.program.text}"
     if state.program.variables:
-        named = (f"{name} = {shortest_real(value)}" for name, value in state.program.variables.items())
+        named = (f"{name} = {value:.7g}" for name, value in state.program.variables.items())
         yield f"variables: {', '.join(named)}"
     yield from map(_axis, state.axes)
     yield from _pins(state, sheet.pins)
     width = max((len(detail.name) for detail in sheet.details), default=0)
     for detail in sheet.details:
-        yield f"{detail.name:<{width}} {_text(state.details.get(detail.name))} {detail.unit}".rstrip()
+        yield f"{detail.name:<{width}} {detail_text(state.details.get(detail.name))} {detail.unit}".rstrip()
 
 
 def _axis(axis: StateAxis) -> str:
@@ -37,16 +36,3 @@ def _pins(state: ControllerState, pins: tuple[Pin, ...]) -> Iterator[str]:
     if any(pin.is_active_low for pin in pins):
         low = [pin.name for pin in pins if pin.is_active_low and state.pins.get(pin.name) == 0]
         yield f"low: {', '.join(low) or 'nothing'}"
-
-
-def _text(value: DetailValue) -> str:
-    match value:
-        case None:
-            return "-"
-        case bool():
-            return "yes" if value else "no"
-        case tuple():
-            return " ".join(map(str, value)) or "none"
-        case str() | int() | float():
-            return str(value)
-    return ", ".join(f"{name} = {number}" for name, number in value.items()) or "none"

@@ -26,6 +26,8 @@ from steptwin.drivers.address import DeviceAddress, device_at, split_device
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.live.remote import START, ask, running
 from steptwin.subject.commands import EndPoints
+from steptwin.world.kind import Selection
+from steptwin.world.kinds import KINDS
 
 PATIENCE_S = 2.0
 """How long a twin may take to describe what it serves."""
@@ -43,9 +45,8 @@ _SERIAL_PORT = re.compile(r"COM\d+", re.IGNORECASE)
 class TwinController:
     """A controller of a running twin.
 
-    ``address`` is what a driver selects it by on its line: its unit, or the address of the chip; None where it is on no line.
-    ``type``: the firmware of a MIC488, the type of an M1486. ``places`` are addresses of the line from this computer, the fastest
-    first.
+    ``address`` is what a driver selects it by on its line; None where it is on no line. ``type``: its variant. ``places`` are
+    addresses of the line from this computer, the fastest first.
     """
 
     twin: str
@@ -63,25 +64,24 @@ class TwinController:
     @property
     def selection(self) -> str:
         """``unit=1`` or ``chip=F``."""
-        if self.address is None:
-            return ""
-        return f"chip={self.address:X}" if self.kind == "m1486" else f"unit={self.address}"
+        how = _selection(self.kind)
+        return "" if how is None or self.address is None else f"{how.option}={how.show(self.address)}"
 
     def is_meant(self, options: Mapping[str, Any]) -> bool:
         """Whether it is what options behind a name select."""
-        kind = options.get("kind", "m1486" if "chip" in options else "mic488" if "unit" in options else self.kind)
-        selected = options.get("chip" if kind == "m1486" else "unit", self.address)
-        return kind == self.kind and selected == self.address
+        how = _selection(self.kind)
+        if options.get("kind", self.kind) != self.kind or options.keys() & _other_options(how):
+            return False
+        return how is None or options.get(how.option, self.address) == self.address
 
     def device(self, text: str, options: Mapping[str, Any]) -> DeviceAddress:
         """Where a driver reaches it; ``text`` is how it was named. Raises `LineFailure` where no driver can."""
         if not self.places:
             raise LineFailure(f"{self.full_name} is on no line that this computer can open: {self._why()}")
-        known: dict[str, Any] = {"kind": self.kind}
-        if self.kind == "m1486":
-            known |= {"chip": self.address, "variant": self.type}
-        else:
-            known |= {"unit": self.address, "firmware": self.type}
+        how = _selection(self.kind)
+        if how is None:
+            raise LineFailure(f"{self.full_name} is of kind {self.kind}, for which there is no driver")
+        known: dict[str, Any] = {"kind": self.kind, how.option: self.address, how.variant: self.type}
         return device_at(text, self.places[0], {**known, **options})
 
     def _why(self) -> str:
@@ -142,14 +142,21 @@ def _place(point: Mapping[str, Any]) -> str:
 
 
 def _controller(twin: str, announced: Mapping[str, Any], places: Mapping[str, str]) -> TwinController:
-    line = announced["line"]
-    address: int | None = announced.get("unit")
-    if "chip" in announced:
-        address = int(announced["chip"], 16)
+    line, how = announced["line"], _selection(announced["kind"])
+    address = None if how is None or how.option not in announced else how.read(str(announced[how.option]))
     reached = () if line is None else tuple(place for place, there in places.items() if there == line)
-    return TwinController(
-        twin, announced["name"], announced["kind"], line, address, announced.get("variant") or announced.get("firmware"), reached
-    )
+    variant = None if how is None else announced.get(how.variant)
+    return TwinController(twin, announced["name"], announced["kind"], line, address, variant, reached)
+
+
+def _selection(kind: str) -> Selection | None:
+    """None for a kind without drivers, or one that only the other process knows."""
+    return KINDS[kind].selection if kind in KINDS else None
+
+
+def _other_options(how: Selection | None) -> set[str]:
+    """Options that select controllers of other kinds."""
+    return {kind.selection.option for kind in KINDS.values() if kind.selection is not None} - ({how.option} if how else set())
 
 
 # ---------------------------------------------------------------------- which one is meant
@@ -169,13 +176,18 @@ def find_device(text: str | None, *, whole_line: bool = False) -> DeviceAddress:
         there = _controllers_at(address) if "kind" not in options else ()
         return device_at(shown, address, {**({"kind": there[0].kind} if there else {}), **options})
     meant = [each for each in of_twin if each.is_meant(options)]
-    if whole_line and len(meant) > 1 and {each.kind for each in meant} == {"m1486"} and len({each.line for each in meant}) == 1:
+    if whole_line and len(meant) > 1 and len({each.line for each in meant}) == 1 and all(map(_may_be_open, meant)):
         types = {each.type for each in meant}
         line = replace(meant[0], address=None, type=types.pop() if len(types) == 1 else None)
         return line.device(shown, options)
     if len(meant) != 1:
         raise _unclear(shown, of_twin, meant)
     return meant[0].device(shown, options)
+
+
+def _may_be_open(controller: TwinController) -> bool:
+    how = _selection(controller.kind)
+    return how is not None and how.may_be_open
 
 
 def controller_of(text: str | None) -> TwinController | None:

@@ -13,8 +13,7 @@ from rich.text import Text
 from steptwin.live.cell import Cell
 from steptwin.live.output import Output
 from steptwin.live.server import Server
-from steptwin.live.view_m1486 import chip_lines
-from steptwin.live.view_mic488 import controller_lines
+from steptwin.live.view_controller import controller_lines
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_frames import follow_frames
 from steptwin.machine import SECOND
@@ -96,10 +95,12 @@ class LiveView:
         """The lines of each controller, then those of the axes of the world."""
         world = self._live.world
         world.settle_all()
-        now = world.now
-        controllers = [controller_lines(name, view.device, now, width) for name, view in world.mic488.items()]
-        chips = [chip_lines(name, view.chip, now) for name, view in world.m1486.items()]
-        return [*controllers, *chips, *self._axes()]
+        return [*(self._controller(name, width) for name in world.machines), *self._axes()]
+
+    def _controller(self, name: str, width: int) -> list[Text]:
+        world = self._live.world
+        kind, machine = world.kind(name), world.machines[name]
+        return controller_lines(name, kind.state(machine, world.now), kind.datasheet(machine), width)
 
     def _axes(self) -> list[list[Text]]:
         """Where the loads of axes are that need not be where their drives have counted to."""

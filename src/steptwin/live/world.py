@@ -13,7 +13,6 @@ from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.machine import Nanos
-from steptwin.mic488.vision import VisionReceiver
 from steptwin.subject.world import WorldSubject
 from steptwin.world.actions import Bytes, Leave, Outside, See
 from steptwin.world.kernel import Kernel
@@ -180,17 +179,17 @@ def _size(what: Outside) -> int:
 
 
 class VisionPort:
-    """A connection of a vision system to a MIC488: its records are inputs of the world."""
+    """A connection of a vision system to a controller: its records are inputs of the world."""
 
     broken = None
 
     def __init__(self, live: LiveWorld, machine: str) -> None:
         self._live = live
         self._machine = machine
-        self._receiver = VisionReceiver()
+        self._records = live.world.vision(machine).records()
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        for record in self._receiver.feed(data):
+        for record in self._records(data):
             self._live.outside(See(self._machine, *record))
             self._live.stale = True
         return b""

@@ -50,6 +50,7 @@ _SETTINGS: dict[str, Callable[[ChipDrive], int]] = {
     "N": lambda drive: drive.characteristic,
 }
 """By the command that makes it."""
+BRIEF = frozenset({"listens", "memory_used", "input_waiting", "counter", "counter_valid", "variable", "flags_on", "functions_on"})
 _TEXT, _WHOLE, _TRUTH = FactType.TEXT, FactType.WHOLE, FactType.TRUTH
 
 
@@ -57,7 +58,7 @@ def _rows() -> Iterator[DetailRow[M1486Chip]]:
     def row(
         name: str, meaning: str, kind: FactType, read: Callable[[M1486Chip, Nanos], DetailValue], unit: str = ""
     ) -> DetailRow[M1486Chip]:
-        return DetailRow(Detail(name, meaning, kind, unit), read)
+        return DetailRow(Detail(name, meaning, kind, unit, name in BRIEF), read)
 
     yield row("address", "Address on its line, hexadecimal", _TEXT, lambda chip, now: f"{chip.address:X}")
     yield row("interface", "Driver interface", _TEXT, lambda chip, now: chip.interface.name)

@@ -8,11 +8,13 @@ from steptwin.mic488.device import Mic488Device
 
 DETAILS: tuple[DetailRow[Mic488Device], ...] = (
     DetailRow(
-        Detail("data_type", "Type of positions and velocities in registers: REAL or DINT", FactType.TEXT),
+        Detail("data_type", "Type of positions and velocities in registers: REAL or DINT", FactType.TEXT, is_brief=True),
         lambda device, now: "DINT" if device.data_type else "REAL",
     ),
     DetailRow(
-        Detail("axis_control_mode", "Whether motions begin at once (DIRECT) or by a trigger (TRIGGER)", FactType.TEXT),
+        Detail(
+            "axis_control_mode", "Whether motions begin at once (DIRECT) or by a trigger (TRIGGER)", FactType.TEXT, is_brief=True
+        ),
         lambda device, now: "TRIGGER" if device.trigger_mode else "DIRECT",
     ),
     DetailRow(

@@ -84,6 +84,19 @@ class Terminals:
             raise Misuse(f"{name} is not {article} {kind}: {kind}s of {name.machine!r} are {there}")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection:
+    """How options behind an address of a device select a controller on its line (``,unit=2``), and name its variant. Running
+    twins announce both under the same names."""
+
+    option: str
+    variant: str
+    show: Callable[[int], str] = str
+    read: Callable[[str], int] = int
+    may_be_open: bool = False
+    """Whether a driver may hold the line without selecting one of its controllers."""
+
+
 class Service(NamedTuple):
     """Where a controller is served."""
 
@@ -130,6 +143,8 @@ class Vision(Generic[S, M]):
     address: Callable[[S], str | None]
     """HOST:PORT where a running world takes records."""
     see: Callable[[M, tuple[float, float, float, float], Nanos], None]
+    records: Callable[[], Callable[[bytes], Sequence[tuple[float, float, float, float]]]]
+    """For each connection: what cuts records out of the bytes that come."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +175,10 @@ class ControllerKind(Generic[S, M, V]):
     """Have a function called with its non-volatile memory whenever that has changed; at once, where it differs from what is kept
     already."""
     announced: Callable[[M, int], dict[str, object]]
-    """How drivers reach it at present: ``kind``, address, type. The number is its address on the line, as it was built."""
+    """How drivers reach it at present: ``kind``, and what ``selection`` names. The number is its address on the line, as it was
+    built."""
+    selection: Selection | None = None
+    """None where there are no drivers for it."""
     line: LineKind
     """What it is connected to."""
     address: Callable[[S, M], int]
@@ -198,11 +216,33 @@ class ControllerKind(Generic[S, M, V]):
     """What can fail of it; shafts are those of the mechanics of its axes, by number."""
     keeps_memory: Callable[[M], bool]
     """Whether it has non-volatile memory."""
+    watch_program: Callable[[M, Kernel, str], ProgramReport | None] = lambda machine, kernel, name: None
+    """Watch the programs of the machine, which has that name in its kernel; None without any."""
     remarks: Callable[[str, M], Sequence[str]] = lambda name, machine: ()
     """What a person who starts it, under a name, should know."""
     encoders: Encoders[M] | None = None
     registers: NamedRegisters[M] | None = None
     vision: Vision[S, M] | None = None
+
+
+class ProgramAct(Protocol):
+    """Something that a program did."""
+
+    @property
+    def time(self) -> Nanos: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def place(self) -> str:
+        """Line and text of the statement; empty where none did it."""
+        ...
+
+
+class ProgramReport(Protocol):
+    """What programs have done since they were watched, in order of time."""
+
+    @property
+    def happened(self) -> Sequence[ProgramAct]: ...
 
 
 AnyKind: TypeAlias = ControllerKind[Any, Any, Any]

@@ -149,7 +149,7 @@ DATASHEET = Datasheet(
     points=(POSITION,),
     commands=(),
     events=(),
-    details=(Detail("commands", "Commands that it has taken", FactType.WHOLE),),
+    details=(Detail("commands", "Commands that it has taken", FactType.WHOLE, is_brief=True),),
 )
 
 

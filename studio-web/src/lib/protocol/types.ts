@@ -363,6 +363,7 @@ export type Description = {
       meaning: string;
       type: "whole number" | "number" | "true or false" | "text" | "whole numbers" | "whole numbers by name";
       unit: string;
+      is_brief: boolean;
     })[];
   })[];
 };

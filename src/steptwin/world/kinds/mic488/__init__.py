@@ -11,10 +11,11 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.present import empty_banks, state_of, statement_of
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.status import ProgramState
-from steptwin.mic488.vision import VisionRecord
-from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Terminals, Vision
+from steptwin.mic488.vision import VisionReceiver, VisionRecord
+from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Selection, Terminals, Vision
 from steptwin.world.kinds.mic488 import axes, build, control, faults, line, table
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
+from steptwin.world.kinds.mic488.program_watch import watch_program
 from steptwin.world.kinds.mic488.table import Mic488Spec
 from steptwin.world.kinds.mic488.view import Mic488View
 from steptwin.world.kinds.mic488.words import ModbusWords
@@ -75,6 +76,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     watch_events=_watch_events,
     keep_memory=_keep_memory,
     announced=lambda device, unit: {"kind": "mic488", "unit": unit, "firmware": device.firmware.name},
+    selection=Selection(option="unit", variant="firmware"),
     line=MODBUS,
     address=_address,
     terminals=Terminals(
@@ -94,6 +96,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     lanes=axes.lanes,
     body=faults.body,
     keeps_memory=lambda device: device.firmware.stored_user_registers is not None,
+    watch_program=watch_program,
     remarks=empty_banks,
     encoders=axes.ENCODERS,
     registers=NamedRegisters(
@@ -101,5 +104,5 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
         dialect=lambda device: (device.firmware.name, device.data_type),
         execute=lambda device, pdu, now: device.execute(pdu, now),
     ),
-    vision=Vision(address=lambda spec: spec.vision, see=_see),
+    vision=Vision(address=lambda spec: spec.vision, see=_see, records=lambda: VisionReceiver().feed),
 )

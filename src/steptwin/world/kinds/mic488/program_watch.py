@@ -40,6 +40,11 @@ class ProgramEvent(NamedTuple):
         return f"{source.position(found.start)[0]:>4}  {visible(source.text[found.start : found.end].strip())}"
 
 
+def watch_program(device: Mic488Device, kernel: Kernel, name: str) -> ProgramWatch | None:
+    """See `steptwin.world.kind.ControllerKind.watch_program`."""
+    return ProgramWatch(device, kernel, name) if device.program.programs else None
+
+
 class ProgramWatch:
     """Observes the programs in the banks of a controller, as a part of its kernel. ``happened`` is in order of time.
 
