@@ -156,7 +156,7 @@ def test_an_output_whose_number_was_cut_short_by_a_semicolon_is_in_doubt() -> No
     chip = chip_driver(wire)
     chip.set_output(1, False)
     wire.put(Fault("to chip", len("u20|") + len("t1"), "semicolon"))
-    with pytest.raises(Garbled, match="it is not known whether the chip has") as caught:
+    with pytest.raises(Garbled, match="it is unknown whether the chip has") as caught:
         chip.set_output(16, True)
     assert caught.value.uncertain
     assert wire.faults[0].met
