@@ -38,6 +38,9 @@ export class Watch {
 export class Watches {
   private readonly open = new Map<Watch, number | null>();
   private readonly byNumber = new Map<string, Watch>();
+  /** Values that came before the answer that names their watch had been dealt with: both may be in one batch. */
+  private readonly early = new Map<string, [number, number | null][]>();
+  private asked = 0;
 
   constructor(private readonly ask: Ask) {}
 
@@ -56,20 +59,31 @@ export class Watches {
   }
 
   take(values: ValuesMessage["values"]): void {
-    for (const [number, changes] of Object.entries(values)) this.byNumber.get(number)?.take(changes);
+    for (const [number, changes] of Object.entries(values)) {
+      const watch = this.byNumber.get(number);
+      if (watch !== undefined) watch.take(changes);
+      else if (this.asked > 0) this.early.set(number, [...(this.early.get(number) ?? []), ...changes]);
+    }
   }
 
   private begin(watch: Watch): void {
+    this.asked++;
     this.ask("watch", { points: [...watch.points], rate: watch.rate })
-      .then(({ watch: number }) => {
-        if (!this.open.has(watch)) {
-          this.forget(number);
-          return;
-        }
-        this.open.set(watch, number);
-        this.byNumber.set(String(number), watch);
-      })
-      .catch(() => undefined);
+      .then(({ watch: number }) => this.begun(watch, number))
+      .catch(() => undefined)
+      .finally(() => {
+        if (--this.asked === 0) this.early.clear();
+      });
+  }
+
+  private begun(watch: Watch, number: number): void {
+    if (!this.open.has(watch)) {
+      this.forget(number);
+      return;
+    }
+    this.open.set(watch, number);
+    this.byNumber.set(String(number), watch);
+    watch.take(this.early.get(String(number)) ?? []);
   }
 
   private end(watch: Watch): void {

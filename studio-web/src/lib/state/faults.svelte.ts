@@ -1,0 +1,40 @@
+import type { Studio } from "./studio.svelte";
+
+/** A fault that is set: its name, and its text such as `stuck pin=IN3 value=1`. */
+export interface ActiveFault {
+  name: string;
+  fault: string;
+  seen: number;
+  happened: number;
+}
+
+const READ_MS = 1000;
+
+/** The faults that are set, read once a second for as long as a panel shows them. */
+export class ActiveFaults {
+  list = $state.raw<readonly ActiveFault[]>([]);
+
+  constructor(private readonly studio: Studio) {}
+
+  /** Gives what ends it. */
+  follow(): () => void {
+    if (!this.studio.may("faults")) return () => undefined;
+    void this.read();
+    const timer = setInterval(() => void this.read(), READ_MS);
+    return () => clearInterval(timer);
+  }
+
+  async read(): Promise<void> {
+    try {
+      this.list = (await this.studio.ask("faults", {})) as ActiveFault[];
+    } catch {
+      // The connection says what is wrong with it.
+    }
+  }
+}
+
+/** What a fault was given: `stuck pin=IN3 value=1` is kind stuck with pin and value. */
+export function readFault(text: string): { kind: string; given: Readonly<Record<string, string>> } {
+  const [kind = "", ...rest] = text.split(" ");
+  return { kind, given: Object.fromEntries(rest.map((part) => part.split("=", 2) as [string, string])) };
+}
