@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable, Mapping
 from functools import partial
 from io import TextIOWrapper
 from itertools import pairwise
@@ -49,16 +50,61 @@ from steptwin.cli import (
 )
 from steptwin.errors import Misuse, SourceErrors, SteptwinError
 
-GROUPS = {
-    "Twins": ("serve", "up", "twins", "state", "pin", "encoder", "power-cycle", "fault", "pause", "step", "resume", "save"),
-    "Programs and runs": ("check", "fmt", "build", "decompile", "run", "replay", "export", "lsp"),
-    "Devices and twins": (
-        "ports", "scan", "info", "get", "set", "watch", "enable", "disable", "home", "seek", "move", "jog", "stop", "send",
-        "terminal", "monitor", "sniff", "record", "diff",
-    ),
-    "Reference": ("registers", "commands", "datasheet"),
-}  # fmt: skip
-"""The commands as ``--help`` lists them."""
+COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
+    "Twins": {
+        "up": up.up,
+        "twins": twins.twins,
+        "state": twin.state,
+        "pin": twin.pin,
+        "encoder": twin.encoder,
+        "power-cycle": twin.power_cycle,
+        "fault": fault.fault,
+        "pause": pace.pause,
+        "step": pace.step,
+        "resume": pace.resume,
+        "save": pace.save,
+    },
+    "Programs and runs": {
+        "check": check.check,
+        "fmt": fmt.fmt,
+        "build": build.build,
+        "decompile": decompile.decompile,
+        "run": run.run,
+        "replay": replay.replay,
+        "export": export.export,
+        "lsp": lsp.lsp,
+    },
+    "Devices and twins": {
+        "ports": scan.ports,
+        "scan": scan.scan,
+        "info": info.info,
+        "get": get.get,
+        "set": get.set_,
+        "watch": watch.watch,
+        "enable": move.enable,
+        "disable": move.disable,
+        "home": move.home,
+        "seek": move.seek,
+        "move": move.move,
+        "jog": move.jog,
+        "stop": move.stop,
+        "send": send.send,
+        "terminal": terminal.terminal,
+        "monitor": monitor.monitor,
+        "sniff": sniff.sniff,
+        "record": record.record,
+        "diff": record.diff,
+    },
+    "Reference": {
+        "registers": registers.registers,
+        "commands": commands.commands,
+        "datasheet": datasheet.datasheet,
+    },
+}
+"""By group and name, in the order of ``--help``. ``serve``, a group of commands itself, comes before them."""
+GROUPS = {title: tuple(group) for title, group in COMMANDS.items()}
+GROUPS["Twins"] = ("serve", *GROUPS["Twins"])
+"""Names, as ``--help`` lists them."""
 LONGEST_SUMMARY = 200
 NOT_DONE, MISUSED = 1, 2
 """Exit codes."""
@@ -101,47 +147,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(serve.app, name="serve", cls=_Commands)
-app.command()(registers.registers)
-app.command()(commands.commands)
-app.command()(datasheet.datasheet)
-app.command()(check.check)
-app.command()(fmt.fmt)
-app.command()(lsp.lsp)
-app.command()(build.build)
-app.command()(decompile.decompile)
-app.command()(run.run)
-app.command()(up.up)
-app.command()(replay.replay)
-app.command()(export.export)
-app.command()(twins.twins)
-app.command()(twin.pin)
-app.command()(twin.encoder)
-app.command("power-cycle")(twin.power_cycle)
-app.command()(twin.state)
-app.command()(fault.fault)
-app.command()(pace.pause)
-app.command()(pace.step)
-app.command()(pace.resume)
-app.command()(pace.save)
-app.command()(info.info)
-app.command()(get.get)
-app.command("set")(get.set_)
-app.command()(watch.watch)
-app.command()(move.enable)
-app.command()(move.disable)
-app.command()(move.home)
-app.command()(move.seek)
-app.command()(move.move)
-app.command()(move.jog)
-app.command()(move.stop)
-app.command()(monitor.monitor)
-app.command()(scan.ports)
-app.command()(scan.scan)
-app.command()(send.send)
-app.command()(sniff.sniff)
-app.command()(terminal.terminal)
-app.command()(record.record)
-app.command()(record.diff)
+for _group in COMMANDS.values():
+    for _name, _command in _group.items():
+        app.command(_name)(_command)
 
 
 def _show_version(wanted: bool) -> None:
