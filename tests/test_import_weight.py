@@ -6,9 +6,11 @@ import pkgutil
 import subprocess
 import sys
 
+from pure_packages import pure_packages
+
 import steptwin
 
-PURE = ("world", "mic488", "m1486", "wbc", "wire", "motion", "machine", "diagnostics", "errors")
+PURE = pure_packages()
 PROJECTIONS = {"steptwin.motion.pulses"}
 HEAVY = {
     "anyio",
@@ -31,7 +33,8 @@ HEAVY = {
 
 def modules_of(*packages: str) -> list[str]:
     names = (module.name for module in pkgutil.walk_packages(steptwin.__path__, "steptwin."))
-    return [name for name in names if name.split(".")[1] in packages and name not in PROJECTIONS]
+    wanted = tuple(f"steptwin.{package}." for package in packages)
+    return [name for name in names if f"{name}.".startswith(wanted) and name not in PROJECTIONS]
 
 
 def brought_by(modules: list[str]) -> set[str]:

@@ -6,7 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-PURE = ("motion", "wire", "wbc", "mic488", "m1486", "world", "subject", "access")
+from pure_packages import packages_up_to, pure_packages
+
+PURE = pure_packages()
 BLOCKED = (
     "fastcrc", "numpy", "serialx", "typer", "rich",
     "asyncio", "concurrent", "multiprocessing", "queue", "select", "selectors", "signal", "socket", "ssl", "subprocess",
@@ -33,7 +35,7 @@ import importlib, pkgutil, pathlib
 
 for package in PURE:
     root = importlib.import_module(f"steptwin.{package}")
-    for module in pkgutil.walk_packages(root.__path__, f"steptwin.{package}."):
+    for module in pkgutil.walk_packages(root.__spec__.submodule_search_locations or (), f"steptwin.{package}."):
         if module.name not in PROJECTIONS:
             importlib.import_module(module.name)
 
@@ -52,6 +54,10 @@ plant.settle_all()
 print(plant.trace.digest())
 print(sorted(name for name in sys.modules if name.partition(".")[0] in BLOCKED))
 """
+
+
+def test_every_package_from_access_down_is_pure_but_those_that_ask_the_system() -> None:
+    assert packages_up_to("access") - {"inputfiles", "system"} <= set(PURE)
 
 
 def test_worlds_and_programs_run_without_wheels_clocks_sockets_and_threads() -> None:
