@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jsonschema
+import jsonschema_rs
 import pytest
 
 from steptwin import World
@@ -50,7 +50,7 @@ def state(subject: WorldSubject, name: str) -> dict[str, Any]:
 @pytest.mark.parametrize("path", WORLDS, ids=lambda path: path.stem)
 def test_states_of_a_running_world_are_as_schema_and_data_sheet_say(path: Path) -> None:
     defs: dict[str, Any] = definitions()
-    schema = jsonschema.Draft202012Validator({**defs["(state)"], "$defs": defs})
+    schema = jsonschema_rs.Draft202012Validator({**defs["(state)"], "$defs": defs})
     with World.load(path) as world:
         subject = WorldSubject(world)
         for _ in range(20):
