@@ -7,19 +7,12 @@ from collections.abc import Iterator
 import pytest
 from m1486_rig import Bench
 
-from steptwin.m1486.commands import TABLE, ArgType, CommandSpec, When, find, takes_variable
+from steptwin.m1486.commands import TABLE, ArgType, CommandSpec, When, find, memory_bits, takes_variable
 from steptwin.m1486.encoding import decode
 from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
 from steptwin.machine import MILLISECOND
 
-#: Bits of memory by the manual's rule (chapter II, Memory) for the largest argument of its command pages.
-BITS = (
-    dict.fromkeys("EDHR.", 8)
-    | dict.fromkeys(["L", "U", "J", "'", ")", "(", "C", "T", "O", "Z", "M", "Q", "N", "+", "-", "*", "/", ">", "<", "?", "!"], 16)
-    | dict.fromkeys("ASPV", 24)
-    | dict.fromkeys(["I", "W", "B", "F", "G", "G+", "G-", "=", ":"], 32)
-)
 QUEUED = [spec for spec in TABLE if spec.when is When.QUEUED]
 
 every_variant = pytest.mark.parametrize("v", VARIANTS, ids=lambda v: v.name)
@@ -58,7 +51,7 @@ def test_a_permitted_command_takes_its_bits_of_the_memory(v: Variant) -> None:
             bench.send("[", str(command).lower())
             memory = bench.chip.memory
             assert (command, bench.wrong) == (command, [])
-            assert (command, 8 * memory.write) == (command, BITS[spec.key])
+            assert (command, 8 * memory.write) == (command, memory_bits(spec.key))
             assert decode(memory.fetch(0)) == (command, memory.write)
 
 

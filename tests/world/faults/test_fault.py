@@ -37,18 +37,6 @@ def test_the_addresses_that_a_request_touches(pdu: str, touched: range | None) -
     assert addresses(bytes.fromhex(pdu)) == touched
 
 
-WANTED = {
-    Layer.BYTES: {"flip", "drop", "insert", "gap", "split", "noise"},
-    Layer.FRAMES: {"delay", "no-answer", "late", "wrong-unit", "crc", "echo"},
-    Layer.PROTOCOL: {"exception", "busy"},
-    Layer.PHYSICS: {"stall", "lost-steps", "master-error", "stuck", "bounce", "slip", "supply-drop", "power-cut", "wear"},
-}
-
-
-def test_there_is_a_kind_for_each_thing_that_goes_wrong_at_each_layer() -> None:
-    assert {layer: {kind.name for kind in KINDS.values() if kind.layer is layer} for layer in Layer} == WANTED
-
-
 def values(parameter: Parameter) -> st.SearchStrategy[object]:
     least, most = parameter.least, parameter.most
     match parameter.form:
