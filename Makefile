@@ -26,7 +26,7 @@ INSTALL := $(UV) pip install --quiet --python $(BIN)/python
 PEER_PACKAGES := chromium mbpoll libmodbus-dev gcc libc6-dev pkg-config make ser2net
 
 .DEFAULT_GOAL := help
-.PHONY: help run test soak extras page lint format types imports bench mutants docs peers lock clean
+.PHONY: help run test golden soak extras page lint format types imports bench mutants docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -36,6 +36,9 @@ run: $(RUN_STAMP)  ## Start a virtual MIC488 with home switches (ARGS="--firmwar
 
 test: $(DEV_STAMP) $(PAGE)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto $(ARGS)
+
+golden: $(DEV_STAMP)  ## Make the golden files of tests anew (ARGS=tests/mic488/test_registers_golden.py): read the diff
+	@for test in $(ARGS); do PYTHONPATH=tests/support $(BIN)/python $$test || exit 1; done
 
 soak: $(DEV_STAMP)  ## Run the soak tests at full length (STEPTWIN_SOAK=0.1 for a tenth)
 	STEPTWIN_SOAK=$${STEPTWIN_SOAK:-1} $(BIN)/pytest -n auto -m soak tests/soak $(ARGS)
