@@ -104,7 +104,7 @@ def test_function_58_takes_the_operand_from_a_register() -> None:
 def test_registers_9_and_10_are_no_operands(command: str) -> None:
     bench = Bench()
     bench.do(":7", "t58", command)
-    assert "no operand register" in bench.wrong[0]
+    assert "operand register, and function 58 is ON" in bench.wrong[0]
     assert bench.variable == 7
 
 

@@ -181,8 +181,8 @@ def test_what_cannot_be_read_is_pointed_at(text: str, found: list[tuple[str, str
 @pytest.mark.parametrize(
     ("text", "message", "hint"),
     [
-        ("Wlong", "long is no number", "a number, or the end of the line for the internal variable"),
-        ("@one", "one is no number", "a number"),
+        ("Wlong", "long is not a number", "a number, or the end of the line for the internal variable"),
+        ("@one", "one is not a number", "a number"),
         ("F-640", "-640 has a sign", "F moves in positive, B in negative direction"),
         ("V-640", "-640 has a sign", "numbers have no sign"),
         ("F" + "1" * 5000, "a number of 5000 digits", "no number has more than 8"),
