@@ -182,8 +182,13 @@ def test_an_answer_that_comes_at_once_is_in_the_result_of_a_request() -> None:
     later.do(command.Advance(duration=SECOND))
     frames = [event.payload.plain() for event in following.take().events]
     assert frames[:2] == [
-        {"client": "script", "direction": "in", "data": READ_POSITION.hex()},
-        {"client": "script", "direction": "out", "data": with_crc(bytes.fromhex("01 03 04 00 00 00 00")).hex()},
+        {"client": "script", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"},
+        {
+            "client": "script",
+            "direction": "out",
+            "data": with_crc(bytes.fromhex("01 03 04 00 00 00 00")).hex(),
+            "words": "read M1_POS_ACT = 0 mm",
+        },
     ]
 
 
@@ -230,11 +235,37 @@ def test_frames_are_followed_on_connections_that_are_there_and_where_nothing_is_
     world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
     frames = [plain for event in following.take().events if (plain := event.payload.plain())["client"] == "tcp-1"]
-    assert frames[0] == {"client": "tcp-1", "direction": "in", "data": READ_POSITION.hex()}
+    assert frames[0] == {"client": "tcp-1", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"}
     assert [frame["direction"] for frame in frames] == ["in", "out"]
     following.close()
     world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     assert following.take().events == []
+
+
+def test_bytes_that_belong_to_no_frame_are_counted_among_the_frames() -> None:
+    world = feeder()
+    following = of(world).follow(filter_of(["frame"], ["bus"]), 99)
+    world.outside(Bytes("bus", "tcp-1", "rtu", b"\x55\x55\x55"))
+    world.run(for_=5)
+    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    world.run(for_=0.5)
+    frames = [event.payload.plain() for event in following.take().events]
+    rubbish = [str(frame["words"]).split(maxsplit=1) for frame in frames if not frame["data"]]
+    assert sum(int(count) for count, _ in rubbish) == 3
+    assert {what for _, what in rubbish} <= {"byte that belongs to no frame", "bytes that belong to no frame"}
+
+
+def test_frames_of_chips_are_lines_and_characters() -> None:
+    text = "[[m1486]]\nname = 'drum'\nline = 'bus'\naddress = 7\n[[line]]\nname = 'bus'\nkind = 'm1486'\n"
+    world = World.from_toml(text)
+    following = of(world).follow(filter_of(["frame"]), 99)
+    world.outside(Bytes("bus", "tcp-1", "raw", b"X7\rU3\r"))
+    world.run(for_=1)
+    assert [event.payload.plain() for event in following.take().events] == [
+        {"client": "tcp-1", "direction": "in", "data": b"X7\r".hex(), "words": "X7  indeX 7"},
+        {"client": "tcp-1", "direction": "in", "data": b"U3\r".hex(), "words": "U3  Upload 3"},
+        {"client": "line", "direction": "out", "data": "00", "words": "U3 position, high byte = 0"},
+    ]
 
 
 def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:

@@ -106,20 +106,24 @@ class EdgePayload:
 
 @dataclass(frozen=True, slots=True)
 class FramePayload:
-    """Bytes on a line, from (``in``) or to (``out``) a client."""
+    """A frame, or characters, on a line, from (``in``) or to (``out``) a client. ``words`` have its meaning, in a running world.
+
+    Bytes that belong to no frame have words alone.
+    """
 
     kind: ClassVar[str] = "frame"
     axis: ClassVar[None] = None
     client: str
     direction: str
     data: bytes
+    words: str = ""
 
     @property
     def text(self) -> str:
-        return f"{self.client} {self.direction}: {self.data.hex(' ')}"
+        return f"{self.client} {self.direction}: {self.words or self.data.hex(' ')}"
 
     def plain(self) -> dict[str, object]:
-        return {"client": self.client, "direction": self.direction, "data": self.data.hex()}
+        return {"client": self.client, "direction": self.direction, "data": self.data.hex(), "words": self.words}
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,7 +423,7 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "sample": lambda data: SamplePayload(data["axis"], data["position"], data["unit"]),
         "load": _read_load,
         "edge": lambda data: EdgePayload(data["pin"], data["level"]),
-        "frame": lambda data: FramePayload(data["client"], data["direction"], bytes.fromhex(data["data"])),
+        "frame": lambda data: FramePayload(data["client"], data["direction"], bytes.fromhex(data["data"]), data["words"]),
         "statement": lambda data: StatementPayload(data["program"], data["line"]),
         "status": lambda data: StatusPayload(data["code"], data["text"], tuple(data["facts"].items())),
         "note": lambda data: NotePayload(data["note"]),

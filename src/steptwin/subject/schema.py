@@ -65,7 +65,12 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
             "pieces": {"type": "array", "items": members({"time_ns": _MOMENT, "follows": _FLAG, "pulses": _WHOLE})},
         },
         "edge": {"pin": _TEXT, "level": _REAL},
-        "frame": {"client": _TEXT, "direction": {"enum": ["in", "out"]}, "data": {**_TEXT, "description": "Hexadecimal."}},
+        "frame": {
+            "client": _TEXT,
+            "direction": {"enum": ["in", "out"]},
+            "data": {**_TEXT, "description": "Hexadecimal; empty for bytes that belong to no frame."},
+            "words": {**_TEXT, "description": "Its meaning."},
+        },
         "statement": {"program": _TEXT, "line": _WHOLE},
         "status": {"code": _TEXT, "axis": _TEXT_OR_NULL, "facts": {"type": "object"}},
         "note": {"note": _TEXT},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from math import isfinite
 from typing import Any, get_args
 
@@ -16,12 +17,14 @@ from steptwin.subject.dispatch import Action, Dispatcher
 from steptwin.subject.events import Event, FramePayload, Numbering, PacePayload, Payload, PlanPayload, payload_of
 from steptwin.subject.following import Filter, Followers, Following
 from steptwin.subject.time import advance
-from steptwin.wire.slave import FrameDirection
+from steptwin.words.frames import FrameLine
 from steptwin.world import script as steps
 from steptwin.world.actions import Outside, See
 from steptwin.world.control import ControllerCommand, Jog
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
+from steptwin.world.kinds import line_kinds
+from steptwin.world.lines import LineWords
 from steptwin.world.plant import WORLD, Plant
 from steptwin.world.trace import TraceRecord
 
@@ -43,7 +46,7 @@ class WorldSubject:
         self._numbering = Numbering(lines)
         self.followers = Followers(self._followed)
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
-        self._frames: dict[str, _Frames] = {}
+        self._words: dict[str, LineWords] = {}
         self._is_watching = False
 
     def _actions(self) -> dict[Any, Action]:
@@ -206,6 +209,10 @@ class WorldSubject:
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "frame":  # they come from the lines, whether they are recorded or not
             return
+        if self._words:
+            line, _ = self.world.plan.line_of.get(record.machine, (None, 0))
+            if line is not None:
+                self._words[line.name].recorded(record)
         payload = payload_of(record)
         if isinstance(payload, PlanPayload):
             payload = self._with_origin(record.machine, payload)
@@ -225,25 +232,15 @@ class WorldSubject:
             else:
                 watchers.remove(self._recorded)
         wanted = "frame" in self.followers.kinds
-        if wanted is bool(self._frames):
+        if wanted is bool(self._words):
             return
-        for line in self.world.lines.values():
+        for spec in self.world.spec.lines:
+            line = self.world.lines[spec.name]
             if wanted:
-                self._frames[line.name] = _Frames(self._publish, line.name)
-                line.follow_frames(self._frames[line.name])
+                self._words[line.name] = line_kinds()[spec.kind].words(line, "", partial(self._framed, line.name))
+                line.follow_frames(self._words[line.name])
             else:
-                line.unfollow_frames(self._frames.pop(line.name))
+                line.unfollow_frames(self._words.pop(line.name))
 
-
-class _Frames:
-    """The frames of a line as events."""
-
-    def __init__(self, publish: Callable[[Nanos, str, Payload], None], line: str) -> None:
-        self._publish = publish
-        self._line = line
-
-    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
-        self._publish(now, self._line, FramePayload(place, direction.value, data))
-
-    def rubbish(self, now: Nanos, place: str, count: int) -> None:
-        """Bytes that belong to no frame are no frame."""
+    def _framed(self, line: str, frame: FrameLine) -> None:
+        self._publish(frame.time, line, FramePayload(frame.link, frame.direction.value, frame.raw, frame.meaning))

@@ -56,7 +56,8 @@ class FrameLog:
 
     def rubbish(self, now: Nanos, link: str, count: int) -> None:
         """Bytes came that belong to no frame."""
-        line = FrameLine(now, link, FrameDirection.IN, b"", f"{count} byte{'s' if count > 1 else ''} that belong to no frame")
+        words = "1 byte that belongs to no frame" if count == 1 else f"{count} bytes that belong to no frame"
+        line = FrameLine(now, link, FrameDirection.IN, b"", words)
         for sink in self.sinks:
             sink(line)
 

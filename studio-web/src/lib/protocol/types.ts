@@ -114,8 +114,10 @@ export type SubjectEvent = {
   kind: "frame";
   client: string;
   direction: "in" | "out";
-  /** Hexadecimal. */
+  /** Hexadecimal; empty for bytes that belong to no frame. */
   data: string;
+  /** Its meaning. */
+  words: string;
   /** The command or the event that led to it. */
   cause: number | null;
   /** As text; it adds nothing to the rest. */
