@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.world.reader import flag, number, pair, pin_name, points, positive_time, text_value, whole, word
+from steptwin.world.values import flag, number, pair, pin_name, points, positive_time, text_value, whole, word
 
 
 @pytest.mark.parametrize(

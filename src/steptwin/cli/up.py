@@ -124,7 +124,7 @@ def sections() -> list[PageSection]:
 
 
 def _default(key: Key) -> str:
-    from steptwin.world.reader import positive_time, time_value
+    from steptwin.world.values import positive_time, time_value
 
     value = key.default
     if value is None or value == ():

@@ -5,8 +5,8 @@ from __future__ import annotations
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import Description, LinePart, MachinePart, MechanicsPart
 from steptwin.subject.controls import controls_of
+from steptwin.world.elements.axis import MECHANICS
 from steptwin.world.plant import Plant
-from steptwin.world.signals import MECHANICS
 
 
 def describe(world: Plant) -> Description:

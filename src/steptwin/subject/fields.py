@@ -16,7 +16,7 @@ from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
 from steptwin.world.faults import Fault
 from steptwin.world.faults import read as read_fault
-from steptwin.world.reader import pin_name
+from steptwin.world.values import pin_name
 
 LONGEST_TEXT = 4096
 """Characters of a text; the longest that are meant are paths."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from steptwin.errors import Misuse
+from steptwin.world.element import AnyElement, ElementSpec
+from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults import Fault, parse
 from steptwin.world.kinds import KINDS
 from steptwin.world.links import LINK_KEYS
@@ -16,19 +18,8 @@ from steptwin.world.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.world.reader import TomlText, read_table
 from steptwin.world.script import STEPS, read_steps
 from steptwin.world.sense import check_sense
-from steptwin.world.spec import (
-    AxisSpec,
-    ButtonSpec,
-    EncoderSpec,
-    LineSpec,
-    MotorSpec,
-    ScriptSpec,
-    SourceSpec,
-    SwitchSpec,
-    WireSpec,
-    WorldSpec,
-)
-from steptwin.world.tables import KEYS, SEED, all_keys
+from steptwin.world.spec import LineSpec, ScriptSpec, WorldSpec
+from steptwin.world.tables import KEYS, SEED, tables
 
 
 def read_world(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
@@ -44,10 +35,12 @@ def read_world(name: str, text: str, seed: int | None = None, overrides: Overrid
 def describe(name: str, text: str, seed: int | None = None, overrides: Overrides = NO_OVERRIDES) -> WorldSpec:
     """As `read_world`, but raises `WorldError` only for text that is not TOML. Other errors are kept in ``text`` of the result,
     because building the world may find more."""
-    toml = TomlText(name, text, tuple(KINDS))
+    named = ("line", *(element.name for element in ELEMENTS.values() if element.is_named))
+    toml = TomlText(name, text, tuple(KINDS), named)
     data = toml.data
     override(data, overrides)
-    known = [key for key in all_keys() if key not in ("switch", "encoder", "motor")]
+    inner = {key for element in ELEMENTS.values() for key in element.inner}
+    known = [key for key in tables() if key not in inner]
     for key in data:
         if key not in known and key != "fault":
             near = toml.near(key, [*known, "fault"])
@@ -62,16 +55,13 @@ def describe(name: str, text: str, seed: int | None = None, overrides: Overrides
             for kind in KINDS.values()
             for row, table in _tables(toml, kind.name, kind.inner_tables)
         ),
-        axes=tuple(_axis(toml, row, table) for row, table in _tables(toml, "axis", ("switch", "encoder", "motor"))),
-        wires=tuple(WireSpec(**row) for row in _rows(toml, "wire")),
-        buttons=tuple(ButtonSpec(**row) for row in _rows(toml, "button")),
-        sources=tuple(SourceSpec(**row) for row in _rows(toml, "source")),
+        elements={element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()},
         scripts=(*_events(toml), *_scripts(toml)),
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),
     )
-    check_names(spec)
+    check_names(spec, [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])])
     return spec if seed is None else replace(spec, seed=_seed(seed))
 
 
@@ -85,18 +75,18 @@ def _seed(value: object) -> int:
 def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
     """Values of every ``[[kind]]`` that has all it needs, and the table itself."""
     found: list[tuple[dict[str, Any], Mapping[str, Any]]] = []
-    keys = all_keys()[kind]
-    tables = toml.data.get(kind, [])
-    if not isinstance(tables, list):
+    rows = tables()[kind]
+    given = toml.data.get(kind, [])
+    if not isinstance(given, list):
         toml.wrong((kind,), "D002", f"[{kind}] stands once", f"expected [[{kind}]], for there may be several")
-        tables = []
+        given = []
     names: set[str] = set()
-    for number_, table in enumerate(tables):
+    for number_, table in enumerate(given):
         path = (kind, number_)
-        values = read_table(toml, path, table, keys, also)
-        if any(key.is_required and (key.attribute or key.name) not in values for key in keys):
+        values = read_table(toml, path, table, rows.keys, also)
+        if any(key.is_required and (key.attribute or key.name) not in values for key in rows.keys):
             continue
-        check_sense(toml, path, kind, table)
+        check_sense(toml, path, rows, table)
         if values.get("name") is not None and values["name"] in names:
             toml.wrong((*path, "name"), "D006", f"there is a [[{kind}]] named {values['name']!r} already")
         names.add(values.get("name", ""))
@@ -108,39 +98,14 @@ def _rows(toml: TomlText, kind: str) -> list[dict[str, Any]]:
     return [row for row, _ in _tables(toml, kind)]
 
 
+def _elements(toml: TomlText, element: AnyElement) -> Iterator[ElementSpec]:
+    for row, table in _tables(toml, element.name, tuple(element.inner)):
+        yield element.read(toml, row, table)
+
+
 def _line(row: dict[str, Any]) -> LineSpec:
     found = {key.name: row.pop(key.name) for key in LINK_KEYS}
     return LineSpec(**row, links={name: value for name, value in found.items() if value is not None})
-
-
-def _axis(toml: TomlText, row: dict[str, Any], table: Mapping[str, Any]) -> AxisSpec:
-    path = row["path"]
-    switches: list[SwitchSpec] = []
-    given = table.get("switch", [])
-    for n, switch in enumerate(given if isinstance(given, list) else [given]):
-        place = (*path, "switch", n)
-        values = read_table(toml, place, switch, KEYS["switch"])
-        if "target" in values:
-            check_sense(toml, place, "switch", switch)
-            spec = SwitchSpec(**values, path=place)
-            if sum(key in switch for key in ("below", "above", "position")) != 1:
-                toml.wrong(place, "D007", "a switch needs one of below, above and position")
-            switches.append(spec)
-    encoder = motor = None
-    if "encoder" in table:
-        encoder = EncoderSpec(**read_table(toml, (*path, "encoder"), table["encoder"], KEYS["encoder"]), path=(*path, "encoder"))
-        check_sense(toml, encoder.path, "encoder", table["encoder"])
-    if "motor" in table:
-        values = read_table(toml, (*path, "motor"), table["motor"], KEYS["motor"])
-        if "torque" in values:
-            motor = MotorSpec(**values, path=(*path, "motor"))
-            check_sense(toml, motor.path, "motor", table["motor"], table.get("kind", "linear"))
-            if motor.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in motor.torque):
-                toml.wrong((*path, "motor", "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
-    is_known = row["travel"] is not None and not toml.is_wrong((*path, "start"))
-    if is_known and not row["travel"][0] <= row["start"] <= row["travel"][1]:
-        toml.wrong((*path, "start"), "D007", f"start = {row['start']:g} is outside travel = {list(row['travel'])}")
-    return AxisSpec(**row, switches=tuple(switches), encoder=encoder, motor=motor)
 
 
 def _events(toml: TomlText) -> list[ScriptSpec]:

@@ -18,7 +18,7 @@ from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.mechanics import EncoderReader
 from steptwin.world.reader import Key, TomlText
 from steptwin.world.scale import DriveScale
-from steptwin.world.spec import AxisSpec, ControllerSpec, LineSpec, WorldSpec
+from steptwin.world.spec import ControllerSpec, LineSpec, WorldSpec
 
 if TYPE_CHECKING:
     from steptwin.controllerstate import ControllerState
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from steptwin.points import LivePoint
     from steptwin.words.frames import FrameLine
     from steptwin.world.control import ControllerCommand, Jog
+    from steptwin.world.elements.axis import AxisSpec
     from steptwin.world.faults import AxisLoad, Body, Faults
     from steptwin.world.heldjog import HeldJog
     from steptwin.world.lanes import AxisLane

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from steptwin.world.reader import address_value, optional, text_value
+from steptwin.world.reader import optional
+from steptwin.world.values import address_value, text_value
 
 LINK_KEYS = (
     optional(text_value, "pty", "path of a pseudo terminal for a live client"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
+    from steptwin.world.element import NamedSpec
     from steptwin.world.spec import WorldSpec
 
 
@@ -29,11 +31,11 @@ RESERVED = {
 """Names that mean something already."""
 
 
-def check_names(spec: WorldSpec) -> None:
-    """Report names of lines, machines, axes and buttons that hide each other. The command line ignores case."""
+def check_names(spec: WorldSpec, elements: Iterable[NamedSpec]) -> None:
+    """Report names of lines, machines and elements that hide each other. The command line ignores case."""
     text = spec.text
     taken: dict[str, str] = {}
-    for one in (*spec.lines, *spec.controllers, *spec.axes, *spec.buttons):
+    for one in (*spec.lines, *spec.controllers, *elements):
         path = (*one.path, "name")
         kind = one.path[0]
         key = one.name.lower()

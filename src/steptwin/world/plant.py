@@ -19,8 +19,9 @@ from steptwin.machine import MotionController, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.world import script as do
 from steptwin.world.actions import Outside, act
-from steptwin.world.build import Files, Fitted, Keep, WorldParts, build
+from steptwin.world.build import Files, Keep, build
 from steptwin.world.contacts import Button
+from steptwin.world.elements.axis import Fitted
 from steptwin.world.expression import SignalCondition
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
@@ -28,6 +29,7 @@ from steptwin.world.kind import AnyKind, Encoders, NamedRegisters, Values, Visio
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
 from steptwin.world.overrides import Overrides
+from steptwin.world.parts import WorldParts
 from steptwin.world.references import check_faults, check_scripts, check_step
 from steptwin.world.reports import Reports, ReportsState
 from steptwin.world.rigging import Rigging

@@ -6,26 +6,19 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from math import isnan
 from typing import Any
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
-from steptwin.durations import duration
 from steptwin.errors import Misuse, SourceErrors
 from steptwin.nearmiss import NearMiss
-from steptwin.world.addresses import parse_address
 from steptwin.world.names import Unknown
 from steptwin.world.tomlplaces import Path, TooMuch, find_places
+from steptwin.world.values import Word
 
 _MISSING: Any = object()
-NAMED = ("line", "axis", "button")
-"""Tables with names that others refer to, besides those of controllers."""
 MOST_FINDINGS = 100
 """Most errors that are reported."""
 _LONGEST_MESSAGE = 400
-MOST = 1e300
-"""Numbers beyond it would overflow in products."""
 _WHOLE = range(-(1 << 63), 1 << 63)
 
 
@@ -47,10 +40,12 @@ class WorldError(SourceErrors):
 class TomlText:
     """A TOML text that knows where its keys are, and collects what is wrong with them."""
 
-    def __init__(self, name: str, text: str, controllers: Sequence[str] = ()) -> None:
-        """``controllers`` are the tables that describe one. Raises `WorldError` for a text that is not TOML."""
+    def __init__(self, name: str, text: str, controllers: Sequence[str] = (), named: Sequence[str] = ()) -> None:
+        """``controllers`` are the tables that describe one, ``named`` the others with names that tables refer to. Raises
+        `WorldError` for a text that is not TOML."""
         self.source = SourceText(name, text)
         self.controllers = tuple(controllers)
+        self.named = (*named, *controllers)
         self.findings: list[Diagnostic] = []
         self._in_files: list[str] = []
         """Errors in files that the description names, rendered."""
@@ -147,7 +142,7 @@ class TomlText:
             return True
         for kind, number in {(wrong[0], wrong[1]) for wrong in self._wrong if len(wrong) > 1}:
             found = self._name_of(kind, number)
-            if found == name or (kind in (*NAMED, *self.controllers) and found is None):
+            if found == name or (kind in self.named and found is None):
                 return True
         return False
 
@@ -255,117 +250,3 @@ def _listed(known: Iterable[str], also: Iterable[str]) -> str:
 def _what(path: Path) -> str:
     names = [str(part) for part in path if isinstance(part, str)]
     return f"[{'.'.join(names)}]" if names else "the file"
-
-
-# ---------------------------------------------------------------------- kinds of values
-
-
-def text_value(value: Any) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise Misuse(f"{value!r}: expected a text{' that is not empty' if isinstance(value, str) else ''}")
-    return value
-
-
-def address_value(value: Any) -> str:
-    """HOST:PORT as it is written; whether it may be reached by others is decided where it is opened."""
-    parse_address(text_value(value), listen_any=True)
-    return value
-
-
-_NAME = re.compile(r"[A-Za-z_][\w-]*\Z", re.ASCII)
-
-
-def name_value(value: Any) -> str:
-    if not isinstance(value, str) or not _NAME.match(value):
-        raise Misuse(f"{value!r} is not a name: expected a letter from A to Z, then letters, digits, '-' and '_'")
-    return value
-
-
-def flag(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise Misuse(f"{value!r}: expected true or false")
-    return value
-
-
-def number(least: float | None = None, most: float | None = None, *, above: bool = False) -> Callable[[Any], float]:
-    """A number from ``least`` (not itself with ``above``) to ``most``."""
-
-    def read(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or (isinstance(value, float) and isnan(value)):
-            raise Misuse(f"{value!r}: expected a number")
-        if abs(value) > MOST:
-            raise Misuse(f"{value!r}: permitted are numbers from {-MOST:g} to {MOST:g}")
-        low = least is not None and (value <= least if above else value < least)
-        if low or (most is not None and value > most):
-            bounds = (f"above {least:g}" if above else f"from {least:g}") if least is not None else ""
-            raise Misuse(f"{value!r}: permitted are numbers {bounds}{f' to {most:g}' if most is not None else ''}")
-        return float(value)
-
-    return read
-
-
-def whole(least: int, most: int) -> Callable[[Any], int]:
-    def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise Misuse(f"{value!r}: permitted are whole numbers from {least} to {most}")
-        return value
-
-    return read
-
-
-@dataclass(frozen=True, slots=True)
-class Word:
-    """One of a few words."""
-
-    words: tuple[str, ...]
-
-    def __call__(self, value: Any) -> str:
-        if value not in self.words:
-            hint = NearMiss().hint(value, self.words) if isinstance(value, str) else ""
-            raise Misuse(f"{value!r}{hint}: permitted are {', '.join(self.words)}")
-        return value
-
-    def near(self, value: object) -> str | None:
-        """The word that was probably meant."""
-        return NearMiss().of(value, self.words) if isinstance(value, str) else None
-
-
-def word(*words: str) -> Word:
-    return Word(words)
-
-
-def time_value(value: Any) -> int:
-    return duration(value)
-
-
-def positive_time(value: Any) -> int:
-    found = duration(value)
-    if found == 0:
-        raise Misuse(f"{value!r}: must be more than 0")
-    return found
-
-
-def pair(value: Any) -> tuple[float, float]:
-    if not isinstance(value, list) or len(value) != 2:
-        raise Misuse(f"{value!r}: expected [low, high]")
-    low, high = (number()(item) for item in value)
-    if low >= high:
-        raise Misuse(f"{value!r}: the first must be below the second")
-    return low, high
-
-
-def points(value: Any) -> tuple[tuple[float, float], ...]:
-    if not isinstance(value, list) or not value or any(not isinstance(item, list) or len(item) != 2 for item in value):
-        raise Misuse(f"{value!r}: expected [[x, y], [x, y], ...]")
-    found = tuple((number()(x), number()(y)) for x, y in value)
-    if any(a[0] >= b[0] for a, b in pairwise(found)):
-        raise Misuse(f"{value!r}: the first numbers must grow")
-    return found
-
-
-def pin_name(value: Any) -> tuple[str, str]:
-    """``MACHINE.PIN``."""
-    machine, dot, pin = value.partition(".") if isinstance(value, str) else ("", "", "")
-    if not dot or not machine or not pin:
-        raise Misuse(f"{value!r}: expected MACHINE.PIN, such as 'table.IN3'")
-    return machine, pin.upper()

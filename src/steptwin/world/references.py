@@ -45,7 +45,7 @@ def check_faults(plant: Plant, faults: Sequence[Fault | None]) -> None:
 def _is_on_something_broken(plant: Plant, fault: Fault) -> bool:
     """Whether a fault is, or may be, on a machine or line with something wrong in its own table."""
     text = plant.spec.text
-    named = [str(name) for key in ("machine", "line") if (name := fault.get(key)) is not None]
+    named = [str(name) for key in ("machine", "line", "element") if (name := fault.get(key)) is not None]
     return any(map(text.may_be_broken, named)) if named else text.is_any_wrong(*text.controllers, "line", "axis")
 
 

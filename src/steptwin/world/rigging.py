@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from steptwin.machine import Nanos
-from steptwin.world.build import WorldParts
 from steptwin.world.faults import Active, Fault, RequestRoute, check_place, rig
 from steptwin.world.faults.table import Layer, OfRequest
 from steptwin.world.kind import Service
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
+from steptwin.world.parts import WorldParts
 
 
 class Rigging:

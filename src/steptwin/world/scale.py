@@ -6,11 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from math import floor
+from typing import TYPE_CHECKING
 
 from steptwin.errors import Misuse
 from steptwin.motion.trig import PI
 from steptwin.world.motor import StepperMotor
-from steptwin.world.spec import AxisSpec, MotorSpec
+
+if TYPE_CHECKING:
+    from steptwin.world.elements.axis import AxisSpec
+    from steptwin.world.elements.motor import MotorSpec
 
 FULL_STEPS = 200
 """Of a motor that is not described."""

@@ -17,18 +17,8 @@ from steptwin.machine import Nanos
 from steptwin.world.expression import parse
 from steptwin.world.faults import Fault
 from steptwin.world.faults import parse as parse_fault
-from steptwin.world.reader import (
-    Key,
-    Path,
-    TomlText,
-    name_value,
-    number,
-    pin_name,
-    read_table,
-    text_value,
-    time_value,
-    whole,
-)
+from steptwin.world.reader import Key, Path, TomlText, read_table
+from steptwin.world.values import name_value, number, pin_name, text_value, time_value, whole
 
 COUPLINGS = ("drive", "free", "blocked")
 """What can turn the encoder shaft of an axis."""

@@ -1,64 +1,69 @@
-"""Keys of a description that mean nothing where they stand, beside or without others."""
+"""The rows of a table of a description, with keys that mean nothing where they stand, beside or without others."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from steptwin.world.kinds import KINDS, line_kinds
-from steptwin.world.reader import Path, TomlText
-
-_NEED: Mapping[str, Mapping[str, str]] = {
-    "switch": {"width": "position", "period": "position", "bounces": "bounce"},
-    "button": {"bounces": "bounce"},
-    "encoder": {"offset": "index", "index_width": "index"},
-    "event": {"once": "when"},
-}
-"""Keys that mean nothing without another."""
-_EXCLUDE: Mapping[str, tuple[tuple[str, str], ...]] = {
-    "axis": (("pulses_per_unit", "pitch"),),
-    "encoder": (("counts_per_rev", "counts_per_unit"),),
-}
-"""Keys that exclude each other: two ways of giving the same value."""
-_ONLY: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "source": {
-        "value": ("constant", "sine"),
-        "amplitude": ("sine",),
-        "frequency": ("sine",),
-        "phase": ("sine",),
-        "points": ("table",),
-        "begin": ("ramp",),
-        "end": ("ramp",),
-        "over": ("ramp",),
-        "repeat": ("ramp", "table"),
-        "period": ("ramp", "sine", "table"),
-    },
-    "motor": {"mass": ("linear",), "friction_force": ("linear",), "force": ("linear",)},
-}
-"""Keys that some kinds only have."""
-_USUAL = {"line": "modbus", "source": "constant"}
+from steptwin.errors import Misuse
+from steptwin.tables import IncompleteTable
+from steptwin.world.kinds import line_kinds
+from steptwin.world.reader import Key, Path, TomlText
 
 
-def check_sense(text: TomlText, path: Path, name: str, table: object, kind: object = None) -> None:
-    """Report keys without effect in a table called ``name``. ``kind`` is what its keys depend on, unless given there."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableRows:
+    """A table of a description. `IncompleteTable` where what is said of a key is of none that it has."""
+
+    written: str
+    """How it is written: ``[[axis.switch]]``."""
+    keys: tuple[Key, ...]
+    need: Mapping[str, str] = field(default_factory=dict)
+    """Keys that mean nothing without another."""
+    exclude: tuple[tuple[str, str], ...] = ()
+    """Keys that exclude each other: two ways of giving the same value."""
+    only: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Keys that some kinds only have: those whose ``kind`` has one of these values."""
+
+    def __post_init__(self) -> None:
+        known = {key.name for key in self.keys}
+        spoken_of = {*self.need, *self.need.values(), *self.only, *(key for pair in self.exclude for key in pair)}
+        if strange := sorted(spoken_of - known):
+            raise IncompleteTable(f"{self.written} has no key {', '.join(strange)}")
+        if len(known) < len(self.keys):
+            raise Misuse(f"{self.written}: two keys have one name")
+
+    @property
+    def attributes(self) -> tuple[str, ...]:
+        """What the keys become."""
+        return tuple(key.attribute or key.name for key in self.keys)
+
+    @property
+    def usual(self) -> object:
+        """The kind of a table that does not give one."""
+        return next((key.default for key in self.keys if key.name == "kind" and not key.is_required), None)
+
+
+def check_sense(text: TomlText, path: Path, rows: TableRows, table: object, kind: object = None) -> None:
+    """Report keys without effect in a table. ``kind`` is what its keys depend on, unless given there."""
     if not isinstance(table, Mapping):
-        return  # told already
-    for key, other in _NEED.get(name, {}).items():
+        return  # reported already
+    for key, other in rows.need.items():
         if key in table and other not in table:
             text.wrong((*path, key), "D007", f"{key} means nothing without {other}")
-    controller = KINDS.get(name)
-    for one, other in _EXCLUDE.get(name, () if controller is None else controller.exclusive):
+    for one, other in rows.exclude:
         if one in table and other in table:
             text.wrong((*path, other), "D007", f"{one} and {other} exclude each other")
     owner = path if kind is None else path[:-1]
-    kind = table.get("kind", _USUAL.get(name)) if kind is None else kind
+    kind = table.get("kind", rows.usual) if kind is None else kind
     if text.is_wrong((*owner, "kind")):
         return
-    for key, kinds in (_of_lines() if name == "line" else _ONLY.get(name, {})).items():
+    for key, kinds in rows.only.items():
         if key in table and kind not in kinds:
             text.wrong((*path, key), "D007", f"{key} means nothing for kind = {kind!r}", f"it is for {' and '.join(kinds)}")
 
 
-def _of_lines() -> Mapping[str, tuple[str, ...]]:
+def of_lines() -> Mapping[str, tuple[str, ...]]:
     """Keys of a line that not all kinds of lines have, and the kinds that do."""
     lines = line_kinds().values()
     keys = {key: None for kind in lines for key in (*kind.links, *kind.keys)}

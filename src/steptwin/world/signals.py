@@ -10,21 +10,17 @@ from typing import TYPE_CHECKING, TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, MotionController, Nanos
-from steptwin.motion.divisions import profile_of
 from steptwin.nearmiss import NearMiss
-from steptwin.points import turns_of
 from steptwin.world.kernel import Kernel
 from steptwin.world.names import Unknown
 
 if TYPE_CHECKING:
-    from steptwin.world.build import Fitted, WorldParts
     from steptwin.world.kind import AnyKind
     from steptwin.world.lines import Line
+    from steptwin.world.parts import WorldParts
 
 T = TypeVar("T")
 
-MECHANICS = ("position", "lost", "stalled")
-"""What there is of the mechanics of an axis."""
 MOST_NAMED = 8
 """Points in a message."""
 
@@ -129,14 +125,12 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     if name == "idle":
         return Idle(plan)
     owner, _, rest = name.partition(".")
-    if owner in plan.axes:
-        return _of_axis(plan.axes[owner], rest, name)
-    if owner in plan.buttons:
-        button, kernel = plan.buttons[owner]
-        return _chosen({"pressed": SignalOf((kernel,), lambda now: float(button.pressed))}, rest, name)
+    of_element = plan.element_signals(owner)
+    if of_element is not None:
+        return _chosen(of_element, rest, name)
     machine = plan.machines.get(owner)
     if machine is None:
-        known = [*plan.machines, *plan.axes, *plan.buttons, "time", "idle"]
+        known = [*plan.machines, *plan.element_names, "time", "idle"]
         hint = NearMiss().hint(owner, known)
         raise Unknown(owner, f"no signal {name!r}: nothing is called {owner!r}{hint}; there are {', '.join(known)}")
     return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner], rest, name)
@@ -177,20 +171,3 @@ def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Mi
     return Misuse(
         f"no signal {name!r}{NearMiss().hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}"
     )
-
-
-def _of_axis(axis: Fitted, rest: str, name: str) -> SignalOf:
-    mechanism = axis.mechanism
-
-    def turning(now: Nanos) -> Iterator[Nanos]:
-        course = mechanism.course(now)
-        ends = set(turns_of(lambda: profile_of(course.plan))(now)) | {piece.begin for piece in course.pieces}
-        yield from sorted(moment for moment in ends if moment > now)
-
-    kernel = (axis.kernel,)
-    known = {
-        "position": SignalOf(kernel, lambda now: axis.units(mechanism.place(now)), turning, mechanism.version, axis.scale.unit),
-        "lost": SignalOf(kernel, lambda now: float(mechanism.lost(now)), turning, mechanism.version),
-        "stalled": SignalOf(kernel, lambda now: float(mechanism.at(now).stalled), turning, mechanism.version),
-    }
-    return _chosen(known, rest, name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -12,7 +11,6 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.motion.trig import sine
 from steptwin.state import Stateful
 from steptwin.world.kernel import Kernel, PinName
-from steptwin.world.spec import SourceSpec
 
 LOWEST_V, HIGHEST_V = 0.0, 10.0
 RESOLUTION_V = 0.001
@@ -132,28 +130,3 @@ class AnalogSource(Stateful):
 
     def deadline(self) -> Nanos | None:
         return self._due
-
-
-def _repeat_s(spec: SourceSpec) -> float | None:
-    return None if spec.repeat is None else spec.repeat / SECOND
-
-
-def _ramp(spec: SourceSpec) -> Waveform:
-    if spec.ramp_time <= 0:
-        raise Misuse("a ramp needs 'over': how long it takes")
-    return TableWaveform(((0.0, spec.begin), (spec.ramp_time / SECOND, spec.end)), _repeat_s(spec))
-
-
-def _table(spec: SourceSpec) -> Waveform:
-    if not spec.points:
-        raise Misuse("a table needs points")
-    return TableWaveform(spec.points, _repeat_s(spec))
-
-
-WAVEFORMS: Mapping[str, Callable[[SourceSpec], Waveform]] = {
-    "constant": lambda spec: ConstantWaveform(spec.value),
-    "ramp": _ramp,
-    "sine": lambda spec: SineWaveform(spec.value, spec.amplitude, spec.frequency, spec.phase),
-    "table": _table,
-}
-"""By ``kind`` of ``[[source]]``. They raise `Misuse` for values that are missing."""

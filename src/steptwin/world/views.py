@@ -13,7 +13,7 @@ from steptwin.world.actions import Bytes
 
 if TYPE_CHECKING:
     from steptwin.controllerstate import ControllerState
-    from steptwin.world.build import Fitted
+    from steptwin.world.elements.axis import Fitted
     from steptwin.world.plant import Plant
 
 View = TypeVar("View")

@@ -17,15 +17,17 @@ from steptwin.wire.slave import FrameDirection as Way
 from steptwin.words.frames import FrameLine
 from steptwin.world import script as do
 from steptwin.world.control import Move, StopAxes
+from steptwin.world.elements.axis import AxisSpec
 from steptwin.world.faults import AxisLoad, Faults
 from steptwin.world.kernel import Kernel
 from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LinkKind, Member, Row, Service, Terminals
 from steptwin.world.kinds import KINDS, register
 from steptwin.world.lanes import AxisLane, plain_view
-from steptwin.world.reader import Key, TomlText, name_value, optional, whole
+from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.scale import FULL_STEPS, DriveScale
-from steptwin.world.spec import AxisSpec, ControllerSpec, LineSpec
+from steptwin.world.spec import ControllerSpec, LineSpec
 from steptwin.world.trace import Recorder, TraceRecord
+from steptwin.world.values import name_value, whole
 from steptwin.world.views import MachineView
 from toy.faults import ToyBody
 from toy.line import ToyLine

@@ -9,7 +9,7 @@ from steptwin.world.kind import AnyKind
 from steptwin.world.lanes import AxisLane, AxisViews, Mechanics
 
 if TYPE_CHECKING:
-    from steptwin.world.build import Fitted
+    from steptwin.world.elements.axis import Fitted
     from steptwin.world.plant import Plant
 
 

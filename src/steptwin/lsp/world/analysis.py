@@ -21,7 +21,7 @@ from steptwin.symbols import Role, Symbol, SymbolKind, Use
 from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
 from steptwin.world.names import RESERVED
-from steptwin.world.reader import name_value
+from steptwin.world.values import name_value
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=")
 _FILE = re.compile(r"""(["'])([^"'\n]+\.(?:prg|csv|cfg|m1486|wbc))\1""", re.IGNORECASE)

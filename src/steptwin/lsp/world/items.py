@@ -11,9 +11,10 @@ from steptwin.lsp.world.outline import Outline, Table
 from steptwin.symbols import SymbolKind
 from steptwin.world.kind import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, AnyKind
 from steptwin.world.kinds import KINDS
-from steptwin.world.reader import Key, Word, flag
+from steptwin.world.reader import Key
 from steptwin.world.script import ACTIONS
 from steptwin.world.tables import all_keys, written
+from steptwin.world.values import Word, flag
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]*)\Z")
 _VALUE = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*([\"']?)([^\"'=,#]*)\Z")

@@ -14,6 +14,7 @@ from steptwin.world.faults.table import Layer
 from steptwin.world.trace import Recorder, TraceRecord
 
 if TYPE_CHECKING:
+    from steptwin.world.faults.element import FaultyElement
     from steptwin.world.faults.machine import FaultyMachine
     from steptwin.world.faults.port import FaultyPort
 
@@ -142,8 +143,8 @@ class Faults(Stateful):
     same set of faults.
     """
 
-    __slots__ = ("active", "link", "machines", "ports", "seed", "sinks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"link", "machines", "ports", "seed", "sinks"})
+    __slots__ = ("active", "elements", "link", "machines", "ports", "seed", "sinks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"elements", "link", "machines", "ports", "seed", "sinks"})
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
@@ -151,6 +152,8 @@ class Faults(Stateful):
         self.sinks: list[Recorder] = []
         self.machines: dict[str, FaultyMachine] = {}
         """Machines whose physics can go wrong."""
+        self.elements: dict[str, FaultyElement] = {}
+        """Elements that can."""
         self.link = ""
         """The link whose request is being served."""
         self.ports: WeakSet[FaultyPort] = WeakSet()
@@ -161,27 +164,32 @@ class Faults(Stateful):
         if fault.name and self._named(fault.name) is not None:
             raise Misuse(f"there is a fault {fault.name!r} already")
         active = Active(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
-        machine = self.check(fault)
+        failing = self.check(fault)
         self.active = (*self.active, active)
-        if machine is not None:
-            machine.begin(active)
+        if failing is not None:
+            failing.begin(active)
         self._changed()
         return active
 
-    def check(self, fault: Fault) -> FaultyMachine | None:
-        """The machine whose physics go wrong, if any. `Misuse` for a machine, pin or axis that is not there."""
-        if fault.kind.layer is not Layer.PHYSICS:
-            return None
-        machine = self._machine(fault)
-        machine.check(fault)
-        return machine
+    def check(self, fault: Fault) -> FaultyMachine | FaultyElement | None:
+        """The machine or element that goes wrong, if any. `Misuse` for a machine, pin, axis or element that is not there."""
+        failing = self._failing(fault)
+        if failing is not None:
+            failing.check(fault)
+        return failing
+
+    def _failing(self, fault: Fault) -> FaultyMachine | FaultyElement | None:
+        if fault.kind.layer is Layer.ELEMENT:
+            return self._element(fault)
+        return self._machine(fault) if fault.kind.layer is Layer.PHYSICS else None
 
     def remove(self, name: str, now: Nanos) -> None:
         """Take a fault away; what it holds is let go. `Misuse` with the names there are."""
         active = self.called(name)
         self.active = tuple(a for a in self.active if a is not active)
-        if active.fault.kind.layer is Layer.PHYSICS:
-            self._machine(active.fault).end(active, now)
+        failing = self._failing(active.fault)
+        if failing is not None:
+            failing.end(active, now)
         self._changed()
 
     def called(self, name: str) -> Active:
@@ -216,6 +224,18 @@ class Faults(Stateful):
         if machine is None:
             raise Misuse(f"fault {fault.kind.name}: machine = {wanted!r}: there are {there}")
         return machine
+
+    def _element(self, fault: Fault) -> FaultyElement:
+        wanted = fault.get("element")
+        found = self.elements.get(str(wanted))
+        if found is None:
+            there = ", ".join(self.elements) or "none"
+            raise Misuse(f"fault {fault.kind.name}: element = {wanted!r}: those that can fail are {there}")
+        return found
+
+    def of_element(self, name: str) -> list[Active]:
+        """The faults of an element."""
+        return [active for active in self.active if active.fault.get("element") == name]
 
     def of(self, machine: str) -> list[Active]:
         """The faults of physics of a machine."""

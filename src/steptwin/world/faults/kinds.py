@@ -3,7 +3,7 @@ with its effect in the file of its layer."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from steptwin.world.faults.kinds_bytes import BYTES
 from steptwin.world.faults.kinds_frames import FRAMES
@@ -11,6 +11,17 @@ from steptwin.world.faults.kinds_physics import PHYSICS
 from steptwin.world.faults.table import WHEN, WHERE, FaultKind, Layer, Occasion, Parameter, checked
 
 KINDS = checked((*BYTES, *FRAMES, *PHYSICS))
+
+
+def add_kinds(kinds: Sequence[FaultKind]) -> None:
+    """Faults of an element that descriptions may have from now on. Raises as `checked`."""
+    KINDS.update(checked((*KINDS.values(), *kinds)))
+
+
+def remove_kinds(kinds: Sequence[FaultKind]) -> None:
+    """Undo `add_kinds`."""
+    for kind in kinds:
+        del KINDS[kind.name]
 
 
 def rows(*layers: Layer) -> Iterator[FaultKind]:
@@ -21,8 +32,9 @@ def rows(*layers: Layer) -> Iterator[FaultKind]:
 def shared() -> list[tuple[Parameter, str]]:
     """What kinds have in common: each parameter, and the layers or occasions that have it."""
     found: dict[Parameter, list[str]] = {}
+    layers = {kind.layer for kind in KINDS.values()}
     for layer, where in WHERE.items():
-        for parameter in where:
+        for parameter in where if layer in layers else ():
             found.setdefault(parameter, []).append(layer.value)
     lasting = [kind.name for kind in KINDS.values() if kind.occasion is Occasion.ALWAYS]
     for occasion, when in WHEN.items():

@@ -46,7 +46,7 @@ class RequestRoute(NamedTuple):
 def check_place(fault: Fault, wires: Sequence[RequestRoute]) -> None:
     """Raises `Misuse` for a fault of bytes, frames or protocol that none of ``wires`` can show."""
     kind, link, unit = fault.kind, fault.get("link"), fault.get("unit")
-    if kind.layer is Layer.PHYSICS:
+    if kind.layer in (Layer.PHYSICS, Layer.ELEMENT):
         return
     line = fault.get("line")
     if line is not None:

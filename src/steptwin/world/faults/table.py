@@ -30,6 +30,8 @@ class Layer(enum.StrEnum):
     FRAMES = "frames"
     PROTOCOL = "protocol"
     PHYSICS = "physics"
+    ELEMENT = "element"
+    """What is around controllers: elements bring their own."""
 
 
 class Occasion(enum.StrEnum):
@@ -185,6 +187,13 @@ class OfSave:
     act: Callable[[Active, FaultyMachine, bytes, bytearray, Nanos], None]
 
 
+@dataclass(frozen=True, slots=True)
+class OfElement:
+    """``act`` takes what was built of the element, and whether the fault begins or ends; gives what it did, in words."""
+
+    act: Callable[[Active, Any, bool, Nanos], str]
+
+
 _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {
     Occasion.BYTE: ((Layer.BYTES,), (OfByte,)),
     Occasion.DELIVERY: ((Layer.BYTES,), (BeforeDelivery, InPieces)),
@@ -193,7 +202,7 @@ _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {
     Occasion.MOMENT: ((Layer.PHYSICS,), (OfMoment,)),
     Occasion.CHANGE: ((Layer.PHYSICS,), (OfChange,)),
     Occasion.SAVE: ((Layer.PHYSICS,), (OfSave,)),
-    Occasion.ALWAYS: ((Layer.PHYSICS,), (OfWindow,)),
+    Occasion.ALWAYS: ((Layer.PHYSICS, Layer.ELEMENT), (OfWindow, OfElement)),
 }
 """The layers that have an occasion, and the effects of which one is needed there."""
 
@@ -288,6 +297,7 @@ WHERE: dict[Layer, tuple[Parameter, ...]] = {
     Layer.FRAMES: _ADDRESSED,
     Layer.PROTOCOL: _ADDRESSED,
     Layer.PHYSICS: (_MACHINE,),
+    Layer.ELEMENT: (Parameter("element", ParameterForm.TEXT, "Which element, by its name.", is_required=True),),
 }
 WHEN: dict[Occasion, tuple[Parameter, ...]] = {
     **dict.fromkeys((Occasion.BYTE, Occasion.DELIVERY, Occasion.ANSWER, Occasion.REQUEST, Occasion.CHANGE, Occasion.SAVE), _HITS),
@@ -312,8 +322,8 @@ def checked(kinds: Sequence[FaultKind]) -> dict[str, FaultKind]:
         names = [parameter.name for parameter in kind.parameters]
         if len(set(names)) < len(names) or {"kind", "name"} & set(names):
             raise Misuse(f"fault {kind.name}: a parameter is given twice: {', '.join(names)}")
-        if bool(kind.lines) == (kind.layer is Layer.PHYSICS):
-            raise Misuse(f"fault {kind.name}: lines belong to all faults but those of physics")
+        if bool(kind.lines) == (kind.layer in (Layer.PHYSICS, Layer.ELEMENT)):
+            raise Misuse(f"fault {kind.name}: lines belong to all faults but those of physics and elements")
         _check_effect(kind)
         for parameter in kind.parameters:
             where = f"fault {kind.name}, parameter {parameter.name}"
@@ -326,12 +336,15 @@ def checked(kinds: Sequence[FaultKind]) -> dict[str, FaultKind]:
 
 def _check_effect(kind: FaultKind) -> None:
     layers, effects = _FITTING[kind.occasion]
+    if kind.occasion is Occasion.ALWAYS:
+        effects = (OfElement,) if kind.layer is Layer.ELEMENT else (OfWindow,)
+    fits = isinstance(kind.effect, effects)
     needed = " or ".join(effect.__name__ for effect in effects)
     if kind.layer not in layers:
         raise IncompleteTable(f"fault {kind.name}: nothing of layer {kind.layer} waits for the occasion {kind.occasion}")
     if kind.effect is None:
         raise IncompleteTable(f"fault {kind.name} lacks its effect: {needed}")
-    if not isinstance(kind.effect, effects):
+    if not fits:
         raise IncompleteTable(f"fault {kind.name} needs the effect {needed}, not {type(kind.effect).__name__}")
     if kind.layer is Layer.FRAMES and kind.effect.answer is None:
         raise IncompleteTable(f"fault {kind.name} lacks what it does to answers")

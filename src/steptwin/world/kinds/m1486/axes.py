@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.world.scale import FULL_STEPS, DriveScale
-from steptwin.world.spec import AxisSpec
+
+if TYPE_CHECKING:
+    from steptwin.world.elements.axis import AxisSpec
 
 
 def scale(spec: AxisSpec, chip: M1486Chip, number: int) -> DriveScale:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from steptwin.machine import Nanos
 from steptwin.mic488.core import check_turn
@@ -13,7 +14,9 @@ from steptwin.mic488.inputs import index_input
 from steptwin.world.kind import Encoders
 from steptwin.world.lanes import AxisLane, plain_view
 from steptwin.world.scale import FULL_STEPS, DriveScale
-from steptwin.world.spec import AxisSpec
+
+if TYPE_CHECKING:
+    from steptwin.world.elements.axis import AxisSpec
 
 
 def scale(spec: AxisSpec, device: Mic488Device, number: int) -> DriveScale:

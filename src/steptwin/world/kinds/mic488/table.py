@@ -12,21 +12,9 @@ from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, NO_INPUT, Conf
 from steptwin.mic488.registers import AXES, FIRMWARES
 from steptwin.wire.rtu import MAX_UNIT
 from steptwin.world.kind import Row
-from steptwin.world.reader import (
-    Key,
-    Path,
-    TomlText,
-    address_value,
-    flag,
-    name_value,
-    optional,
-    read_table,
-    text_value,
-    time_value,
-    whole,
-    word,
-)
+from steptwin.world.reader import Key, Path, TomlText, optional, read_table
 from steptwin.world.spec import ControllerSpec
+from steptwin.world.values import address_value, flag, name_value, text_value, time_value, whole, word
 
 Banks: TypeAlias = tuple[tuple[int, str], ...]
 """Numbers of banks and the files that are for them."""

@@ -1,0 +1,169 @@
+"""``[[axis]]``: what a drive moves, with its stops, play, motor, switches and encoder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.motion.divisions import profile_of
+from steptwin.points import turns_of
+from steptwin.world.course import Build
+from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.elements.encoder import ENCODER, EncoderSpec, fit_encoder, read_encoder
+from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
+from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches
+from steptwin.world.kernel import Kernel
+from steptwin.world.mechanics import Mechanism
+from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.scale import Scale, motor_of, scale_of
+from steptwin.world.sense import TableRows
+from steptwin.world.signals import SignalOf
+from steptwin.world.site import Site, Terminal
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import flag, name_value, number, pair, pin_name, text_value, whole, word
+
+MECHANICS = ("position", "lost", "stalled")
+"""What there is of the mechanics of an axis."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisSpec(NamedSpec):
+    drive: Terminal
+    kind: str
+    unit: str | None
+    pulses_per_unit: float | None
+    pitch: float | None
+    pulses_per_rev: int | None
+    inverted: bool
+    travel: tuple[float, float] | None
+    start: float
+    backlash: float
+    switches: tuple[SwitchSpec, ...]
+    encoder: EncoderSpec | None
+    motor: MotorSpec | None
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """An axis with its mechanics."""
+
+    spec: AxisSpec
+    kernel: Kernel
+    mechanism: Mechanism
+    scale: Scale
+
+    def units(self, pulses: int) -> float:
+        scale = self.scale.pulses_per_unit
+        return pulses * scale.denominator / scale.numerator
+
+
+def _read(text: TomlText, row: Row, table: Table) -> AxisSpec:
+    path = row["path"]
+    spec = AxisSpec(
+        **row,
+        switches=tuple(read_switches(text, path, table)),
+        encoder=read_encoder(text, path, table),
+        motor=read_motor(text, path, table),
+    )
+    is_known = spec.travel is not None and not text.is_wrong((*path, "start"))
+    if is_known and spec.travel is not None and not spec.travel[0] <= spec.start <= spec.travel[1]:
+        text.wrong((*path, "start"), "D007", f"start = {spec.start:g} is outside travel = {list(spec.travel)}")
+    return spec
+
+
+def _refers(spec: AxisSpec, world: WorldSpec) -> Iterator[Reference]:
+    yield Reference(spec.drive[0], spec.drive[0], (*spec.path, "drive"))
+    for switch in spec.switches:
+        yield Reference(spec.drive[0], switch.target[0], (*switch.path, "to"))
+    if spec.encoder is not None and spec.encoder.follows is not None:
+        drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+        if spec.encoder.follows in drives:
+            yield Reference(spec.drive[0], drives[spec.encoder.follows], (*spec.encoder.path, "follows"))
+
+
+def _build(spec: AxisSpec, site: Site) -> Fitted:
+    machine, drive = spec.drive
+    number = int(drive[1:]) if drive.startswith("M") and drive[1:].isdecimal() else 0
+    axes = len(site.machine(machine).axes)
+    if not 1 <= number <= axes:
+        raise Misuse(f"drive = '{machine}.{drive}': {machine} has {', '.join(f'M{n}' for n in range(1, axes + 1))}")
+    taken = [axis.spec.name for axis in site.parts.built(AXIS).values() if axis.spec.drive == spec.drive]
+    if taken:
+        raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
+    kernel = site.kernel(machine)
+    scale = scale_of(spec, site.kind(machine).scale(spec, site.machine(machine), number))
+    pulses = scale.nearest
+    build = Build(
+        sign=-1 if spec.inverted else 1,
+        zero=pulses(spec.start),
+        low=None if spec.travel is None else pulses(spec.travel[0]),
+        high=None if spec.travel is None else pulses(spec.travel[1]),
+        play=pulses(spec.backlash),
+        period_p=scale.period_p,
+        motor=None if spec.motor is None else motor_of(spec.motor, spec.kind, scale),
+    )
+    mechanism = Mechanism(kernel, machine, number, build, spec.name)
+    kernel.add_part(mechanism)
+    fitted = Fitted(spec, kernel, mechanism, scale)
+    for n, switch in enumerate(spec.switches, start=1):
+        site.unless_wrong(switch.path, partial(put_switch, fitted, switch, lane_of(spec.name, n), site))
+    return fitted
+
+
+def _connect(spec: AxisSpec, fitted: Fitted, site: Site) -> None:
+    fit_encoder(fitted, spec.encoder, site.parts.built(AXIS), site)
+
+
+def _signals(fitted: Fitted) -> Mapping[str, SignalOf]:
+    mechanism = fitted.mechanism
+
+    def turning(now: Nanos) -> Iterator[Nanos]:
+        course = mechanism.course(now)
+        ends = set(turns_of(lambda: profile_of(course.plan))(now)) | {piece.begin for piece in course.pieces}
+        yield from sorted(moment for moment in ends if moment > now)
+
+    kernel, version = (fitted.kernel,), mechanism.version
+    position = SignalOf(kernel, lambda now: fitted.units(mechanism.place(now)), turning, version, fitted.scale.unit)
+    lost = SignalOf(kernel, lambda now: float(mechanism.lost(now)), turning, version)
+    stalled = SignalOf(kernel, lambda now: float(mechanism.at(now).stalled), turning, version)
+    return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
+
+
+AXIS: Element[AxisSpec, Fitted] = Element(
+    name="axis",
+    spec=AxisSpec,
+    rows=TableRows(
+        written="[[axis]]",
+        keys=(
+            Key("name", name_value, "how scripts and conditions name it"),
+            Key("drive", pin_name, "what drives it: MACHINE.M1 to M4 of a MIC488, MACHINE.M1 of an M1486"),
+            optional(word("linear", "rotary"), "kind", "linear or rotary", "linear"),
+            optional(
+                text_value, "unit", "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's"
+            ),
+            optional(
+                number(0.0, above=True),
+                "pulses_per_unit",
+                "pulses (M1486: minimum microsteps) per unit; else by pitch, by revolution, by gear",
+            ),
+            optional(number(0.0, above=True), "pitch", "units per motor revolution, instead of pulses_per_unit"),
+            optional(whole(1, 10**7), "pulses_per_rev", "pulses per motor revolution; default mot_resol; M1486: 64 × full_steps"),
+            optional(flag, "inverted", "whether positive pulses go down", False),
+            optional(pair, "travel", "[low, high]: hard stops"),
+            optional(number(), "start", "where it stands when the world begins", 0.0),
+            optional(number(0.0), "backlash", "play between motor and load", 0.0),
+        ),
+        exclude=(("pulses_per_unit", "pitch"),),
+    ),
+    inner={"switch": SWITCH, "encoder": ENCODER, "motor": MOTOR},
+    inner_attributes={"switch": "switches"},
+    read=_read,
+    refers=_refers,
+    build=_build,
+    connect=_connect,
+    signals=_signals,
+    lanes=lambda spec: tuple(lane_of(spec.name, n) for n in range(1, len(spec.switches) + 1)),
+)

@@ -1,0 +1,76 @@
+"""``[[button]]``: a contact that a person presses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from steptwin.machine import Nanos
+from steptwin.world.contacts import Button
+from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.elements.contact import CONTACT_KEYS
+from steptwin.world.kernel import Kernel
+from steptwin.world.reader import Key, TomlText
+from steptwin.world.sense import TableRows
+from steptwin.world.signals import SignalOf
+from steptwin.world.site import Site, Terminal
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import name_value, pin_name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ButtonSpec(NamedSpec):
+    target: Terminal
+    contact: str
+    join: str | None
+    bounce: Nanos
+    bounces: int
+
+
+def _read(text: TomlText, row: Row, table: Table) -> ButtonSpec:
+    return ButtonSpec(**row)
+
+
+def _refers(spec: ButtonSpec, world: WorldSpec) -> Iterator[Reference]:
+    yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
+
+
+def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Kernel]:
+    kernel = site.kernel(spec.target[0])
+    circuit = site.circuit(kernel, spec.target, spec.path, spec.join)
+    button = Button(
+        circuit,
+        normally_closed=spec.contact == "NC",
+        bounce_ns=spec.bounce,
+        bounces=spec.bounces,
+        chance=site.bounce_of(circuit),
+        lane=spec.name,
+    )
+    button.rest_at(spec.contact == "NC")
+    kernel.add_part(button)
+    return button, kernel
+
+
+def _signals(built: tuple[Button, Kernel]) -> Mapping[str, SignalOf]:
+    button, kernel = built
+    return {"pressed": SignalOf((kernel,), lambda now: float(button.pressed))}
+
+
+BUTTON: Element[ButtonSpec, tuple[Button, Kernel]] = Element(
+    name="button",
+    spec=ButtonSpec,
+    rows=TableRows(
+        written="[[button]]",
+        keys=(
+            Key("name", name_value, "how scripts name it"),
+            Key("to", pin_name, "the input: MACHINE.PIN", attribute="target"),
+            *CONTACT_KEYS,
+        ),
+        need={"bounces": "bounce"},
+    ),
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+    lanes=lambda spec: (spec.name,),
+)

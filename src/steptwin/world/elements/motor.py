@@ -1,0 +1,61 @@
+"""``[axis.motor]``: the motor of an axis, which loses steps where its torque does not suffice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from steptwin.world.element import Table
+from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.sense import TableRows, check_sense
+from steptwin.world.tomlplaces import Path
+from steptwin.world.values import number, points, whole
+
+_not_negative = number(0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorSpec:
+    """Torques in N·m at the motor, speeds in rev/min; for linear axes mass in kg and forces in N as well."""
+
+    torque: tuple[tuple[float, float], ...]
+    inertia: float
+    mass: float
+    friction: float
+    friction_force: float
+    load: float
+    force: float
+    start_speed: float | None
+    full_steps: int | None
+    path: Path = ()
+
+
+MOTOR = TableRows(
+    written="[axis.motor]",
+    keys=(
+        Key("torque", points, "pull-out torque: [[rev/min, N·m], ...] from 0 on; none above the last speed"),
+        optional(_not_negative, "inertia", "kg·m² of rotor and load, at the motor", 0.0),
+        optional(_not_negative, "mass", "kg moved by a linear axis", 0.0),
+        optional(_not_negative, "friction", "N·m against motion", 0.0),
+        optional(_not_negative, "friction_force", "N against motion of a linear axis", 0.0),
+        optional(number(), "load", "constant N·m; positive pulls towards lower positions", 0.0),
+        optional(number(), "force", "constant N on a linear axis; positive pulls towards lower positions", 0.0),
+        optional(_not_negative, "start_speed", "rev/min it starts with at once and is caught at; default any, caught at rest"),
+        optional(whole(4, 10_000), "full_steps", "full steps per revolution; default 200"),
+    ),
+    only={"mass": ("linear",), "friction_force": ("linear",), "force": ("linear",)},
+)
+
+
+def read_motor(text: TomlText, axis: Path, table: Table) -> MotorSpec | None:
+    """The motor in the table of an axis; None where there is none, or it is wrong."""
+    if "motor" not in table:
+        return None
+    path = (*axis, "motor")
+    values = read_table(text, path, table["motor"], MOTOR.keys)
+    if "torque" not in values:
+        return None
+    motor = MotorSpec(**values, path=path)
+    check_sense(text, path, MOTOR, table["motor"], table.get("kind", "linear"))
+    if motor.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in motor.torque):
+        text.wrong((*path, "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
+    return motor

@@ -1,0 +1,113 @@
+"""``[[source]]``: a voltage at an analog input, as `steptwin.world.sources` computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.world.element import Element, ElementSpec, Reference, Row, Table
+from steptwin.world.kind import ANALOG_INPUT
+from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.sense import TableRows
+from steptwin.world.site import Site, Terminal
+from steptwin.world.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import number, pin_name, points, positive_time, time_value, word
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceSpec(ElementSpec):
+    target: Terminal
+    kind: str
+    value: float
+    amplitude: float
+    frequency: float
+    phase: float
+    points: tuple[tuple[float, float], ...]
+    begin: float
+    end: float
+    ramp_time: Nanos
+    repeat: Nanos | None
+    period: Nanos
+
+
+def _repeat_s(spec: SourceSpec) -> float | None:
+    return None if spec.repeat is None else spec.repeat / SECOND
+
+
+def _ramp(spec: SourceSpec) -> Waveform:
+    if spec.ramp_time <= 0:
+        raise Misuse("a ramp needs 'over': how long it takes")
+    return TableWaveform(((0.0, spec.begin), (spec.ramp_time / SECOND, spec.end)), _repeat_s(spec))
+
+
+def _table(spec: SourceSpec) -> Waveform:
+    if not spec.points:
+        raise Misuse("a table needs points")
+    return TableWaveform(spec.points, _repeat_s(spec))
+
+
+WAVEFORMS: Mapping[str, Callable[[SourceSpec], Waveform]] = {
+    "constant": lambda spec: ConstantWaveform(spec.value),
+    "ramp": _ramp,
+    "sine": lambda spec: SineWaveform(spec.value, spec.amplitude, spec.frequency, spec.phase),
+    "table": _table,
+}
+"""By ``kind``. They raise `Misuse` for values that are missing."""
+
+
+def _read(text: TomlText, row: Row, table: Table) -> SourceSpec:
+    return SourceSpec(**row)
+
+
+def _refers(spec: SourceSpec, world: WorldSpec) -> Iterator[Reference]:
+    yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
+
+
+def _build(spec: SourceSpec, site: Site) -> AnalogSource:
+    kernel = site.kernel(spec.target[0])
+    target = site.input(spec.target, spec.path, ANALOG_INPUT)
+    source = AnalogSource(kernel, target, WAVEFORMS[spec.kind](spec), spec.period)
+    kernel.add_part(source)
+    return source
+
+
+SOURCE: Element[SourceSpec, AnalogSource] = Element(
+    name="source",
+    spec=SourceSpec,
+    rows=TableRows(
+        written="[[source]]",
+        keys=(
+            Key("to", pin_name, "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
+            optional(word(*WAVEFORMS), "kind", "constant, ramp, sine or table", "constant"),
+            optional(number(), "value", "volts; of a sine its mean", 0.0),
+            optional(number(), "amplitude", "sine: volts", 0.0),
+            optional(number(0.0), "frequency", "sine: Hz", 1.0),
+            optional(number(), "phase", "sine: degrees", 0.0),
+            optional(points, "points", "table: [[seconds, volts], ...]", ()),
+            optional(number(), "begin", "ramp: volts at first", 0.0),
+            optional(number(), "end", "ramp: volts in the end", 0.0),
+            optional(time_value, "over", "ramp: how long it takes", 0, "ramp_time"),
+            optional(positive_time, "repeat", "ramp, table: begins anew after this time"),
+            optional(positive_time, "period", "how often the voltage is renewed", 10 * MILLISECOND),
+        ),
+        only={
+            "value": ("constant", "sine"),
+            "amplitude": ("sine",),
+            "frequency": ("sine",),
+            "phase": ("sine",),
+            "points": ("table",),
+            "begin": ("ramp",),
+            "end": ("ramp",),
+            "over": ("ramp",),
+            "repeat": ("ramp", "table"),
+            "period": ("ramp", "sine", "table"),
+        },
+    ),
+    read=_read,
+    refers=_refers,
+    build=_build,
+    lanes=lambda spec: (),
+)

@@ -1,0 +1,109 @@
+"""``[[axis.switch]]``: a contact that is on where its axis stands in its zone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from steptwin.machine import Nanos
+from steptwin.world.contacts import Switch, Zone
+from steptwin.world.element import Table
+from steptwin.world.elements.contact import CONTACT_KEYS
+from steptwin.world.reader import Key, TomlText, optional, read_table
+from steptwin.world.scale import Scale
+from steptwin.world.sense import TableRows, check_sense
+from steptwin.world.site import Site, Terminal
+from steptwin.world.tomlplaces import Path
+from steptwin.world.values import number, pin_name
+
+if TYPE_CHECKING:
+    from steptwin.world.elements.axis import Fitted
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SwitchSpec:
+    """On at and below ``below``, at and above ``above``, or around ``position`` over ``width``, again after each ``period``.
+
+    Units of the axis.
+    """
+
+    target: Terminal
+    below: float | None
+    above: float | None
+    position: float | None
+    width: float
+    period: float | None
+    hysteresis: float
+    contact: str
+    join: str | None
+    bounce: Nanos
+    bounces: int
+    path: Path = ()
+
+
+SWITCH = TableRows(
+    written="[[axis.switch]]",
+    keys=(
+        Key("to", pin_name, "the input: MACHINE.PIN", attribute="target"),
+        optional(number(), "below", "on at and below this position"),
+        optional(number(), "above", "on at and above this position"),
+        optional(number(), "position", "on around this position, with width"),
+        optional(number(0.0), "width", "how wide the zone around position is", 0.0),
+        optional(
+            number(0.0, above=True), "period", "the zone comes again after each; default a turn of a rotary axis in degree or rev"
+        ),
+        optional(number(0.0), "hysteresis", "how much further it stays on", 0.0),
+        *CONTACT_KEYS,
+    ),
+    need={"width": "position", "period": "position", "bounces": "bounce"},
+)
+
+
+def read_switches(text: TomlText, axis: Path, table: Table) -> Iterator[SwitchSpec]:
+    """The switches in the table of an axis that have all they need."""
+    given = table.get("switch", [])
+    for n, switch in enumerate(given if isinstance(given, list) else [given]):
+        path = (*axis, "switch", n)
+        values = read_table(text, path, switch, SWITCH.keys)
+        if "target" in values:
+            check_sense(text, path, SWITCH, switch)
+            if sum(key in switch for key in ("below", "above", "position")) != 1:
+                text.wrong(path, "D007", "a switch needs one of below, above and position")
+            yield SwitchSpec(**values, path=path)
+
+
+def lane_of(axis: str, number: int) -> str:
+    """Under which a switch of an axis is recorded; they count from 1."""
+    return f"{axis}.switch{number}"
+
+
+def put_switch(axis: Fitted, spec: SwitchSpec, lane: str, site: Site) -> None:
+    """Put a switch where an axis runs over it."""
+    circuit = site.circuit(axis.kernel, spec.target, (*spec.path, "to"), spec.join)
+    part = Switch(
+        circuit,
+        axis.mechanism,
+        _zone(spec, axis.scale, is_rotary=axis.spec.kind == "rotary"),
+        axis.kernel.now,
+        normally_closed=spec.contact == "NC",
+        bounce_ns=spec.bounce,
+        bounces=spec.bounces,
+        chance=site.bounce_of(circuit),
+        lane=lane,
+    )
+    axis.kernel.add_part(part)
+
+
+def _zone(spec: SwitchSpec, scale: Scale, *, is_rotary: bool) -> Zone:
+    pulses = scale.nearest
+    if spec.below is not None:
+        return Zone(None, pulses(spec.below), pulses(spec.hysteresis))
+    if spec.above is not None:
+        return Zone(pulses(spec.above), None, pulses(spec.hysteresis))
+    if spec.position is None:
+        return Zone(None, None)
+    half = 0.5 * spec.width
+    usual = scale.turn if is_rotary else None
+    period = usual if spec.period is None else scale.pulses(spec.period)
+    return Zone(pulses(spec.position - half), pulses(spec.position + half), pulses(spec.hysteresis), period)

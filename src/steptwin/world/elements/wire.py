@@ -1,0 +1,59 @@
+"""``[[wire]]``: from an output to an input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from steptwin.machine import Nanos
+from steptwin.world.element import Element, ElementSpec, Reference, Row, Table
+from steptwin.world.kernel import Wire
+from steptwin.world.kind import OUTPUT
+from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.sense import TableRows
+from steptwin.world.site import Site, Terminal
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import flag, pin_name, time_value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WireSpec(ElementSpec):
+    source: Terminal
+    target: Terminal
+    inverted: bool
+    delay: Nanos
+
+
+def _read(text: TomlText, row: Row, table: Table) -> WireSpec:
+    return WireSpec(**row)
+
+
+def _refers(spec: WireSpec, world: WorldSpec) -> Iterator[Reference]:
+    yield Reference(spec.source[0], spec.target[0], spec.path)
+
+
+def _build(spec: WireSpec, site: Site) -> Wire:
+    kernel = site.kernel(spec.source[0])
+    source = site.terminal(spec.source, OUTPUT)
+    wire = Wire(source, site.input(spec.target, spec.path), spec.inverted, spec.delay)
+    kernel.connect(wire)
+    return wire
+
+
+WIRE: Element[WireSpec, Wire] = Element(
+    name="wire",
+    spec=WireSpec,
+    rows=TableRows(
+        written="[[wire]]",
+        keys=(
+            Key("from", pin_name, "the output: MACHINE.PIN", attribute="source"),
+            Key("to", pin_name, "the input: MACHINE.PIN", attribute="target"),
+            optional(flag, "inverted", "whether the level is turned round", False),
+            optional(time_value, "delay", "how much later it arrives", 0),
+        ),
+    ),
+    read=_read,
+    refers=_refers,
+    build=_build,
+    lanes=lambda spec: (),
+)

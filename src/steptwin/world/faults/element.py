@@ -1,0 +1,66 @@
+"""Elements of a world that can go wrong: each of their faults lasts from a moment to another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+from steptwin.world.faults.table import FaultKind
+
+if TYPE_CHECKING:
+    from steptwin.world.faults.active import Active, Faults
+    from steptwin.world.faults.fault import Fault
+    from steptwin.world.kernel import Kernel
+
+
+class FaultyElement(Stateful):
+    """Stands beside an element in its kernel, as a part of it, and gives what was built of it to the effects of its faults."""
+
+    __slots__ = ("_faults", "_kernel", "_kinds", "_lasting", "_part", "name")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_faults", "_kernel", "_kinds", "_part", "name"})
+
+    def __init__(self, kernel: Kernel, name: str, faults: Faults, kinds: Iterable[FaultKind], part: Any) -> None:
+        self.name = name
+        self._kernel = kernel
+        self._faults = faults
+        self._kinds = tuple(kinds)
+        self._part = part
+        self._lasting: tuple[str, ...] = ()
+        """Names of the faults that have begun."""
+
+    def check(self, fault: Fault) -> None:
+        """`Misuse` for a fault of another kind of element."""
+        if fault.kind not in self._kinds:
+            there = ", ".join(kind.name for kind in self._kinds) or "none"
+            raise Misuse(f"fault {fault.kind.name}: element = {self.name!r}, whose faults are {there}")
+
+    def begin(self, active: Active) -> None:
+        """A fault has been set."""
+        self._kernel.mark()
+
+    def end(self, active: Active, now: Nanos) -> None:
+        """A fault has been removed."""
+        if active.name in self._lasting:
+            self._turn(active, now, begins=False)
+        self._kernel.mark()
+
+    def look(self, now: Nanos) -> None:
+        for active in self._faults.of_element(self.name):
+            lasts = active.begin <= now and (active.end is None or now < active.end)
+            if lasts is not (active.name in self._lasting):
+                self._turn(active, now, begins=lasts)
+
+    def _turn(self, active: Active, now: Nanos, *, begins: bool) -> None:
+        others = tuple(name for name in self._lasting if name != active.name)
+        self._lasting = (*others, active.name) if begins else others
+        if begins:
+            active.struck += 1
+        self._faults.report(active, self.name, now, active.fault.kind.effect.act(active, self._part, begins, now))
+
+    def deadline(self) -> Nanos | None:
+        now = self._kernel.now
+        moments = (moment for active in self._faults.of_element(self.name) for moment in (active.begin, active.end))
+        return min((moment for moment in moments if moment is not None and moment > now), default=None)

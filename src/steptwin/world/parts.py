@@ -1,0 +1,67 @@
+"""Everything a world is made of, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+from steptwin.machine import MotionController
+from steptwin.world.contacts import Button
+from steptwin.world.element import B, Element, S
+from steptwin.world.elements import ELEMENTS
+from steptwin.world.elements.axis import AXIS, Fitted
+from steptwin.world.elements.button import BUTTON
+from steptwin.world.faults import Faults
+from steptwin.world.kernel import Kernel
+from steptwin.world.kind import AnyKind
+from steptwin.world.lines import Line
+from steptwin.world.signals import SignalOf
+from steptwin.world.spec import WorldSpec
+from steptwin.world.trace import Recorder
+
+
+@dataclass(slots=True)
+class WorldParts:
+    """What was built of a description."""
+
+    spec: WorldSpec
+    faults: Faults
+    record: Recorder
+    kernels: list[Kernel] = field(default_factory=list)
+    kernel_of: dict[str, Kernel] = field(default_factory=dict)
+    """Of machines and lines."""
+    machines: dict[str, MotionController] = field(default_factory=dict)
+    kind_of: dict[str, AnyKind] = field(default_factory=dict)
+    """Of machines."""
+    lines: dict[str, Line] = field(default_factory=dict)
+    line_of: dict[str, tuple[Line, int]] = field(default_factory=dict)
+    """Line and unit (or address) of a machine."""
+    elements: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """What was built of named elements: by the name of the kind, then by their own."""
+    warnings: list[str] = field(default_factory=list)
+    """Warnings about the files that the description names."""
+
+    def built(self, element: Element[S, B]) -> Mapping[str, B]:
+        """What was built of a kind of element with names, by name."""
+        return cast("Mapping[str, B]", self.elements.get(element.name, {}))
+
+    @property
+    def element_names(self) -> list[str]:
+        return [name for built in self.elements.values() for name in built]
+
+    def element_signals(self, name: str) -> Mapping[str, SignalOf] | None:
+        """What conditions may speak of; None where no element has the name."""
+        for kind, built in self.elements.items():
+            signals = ELEMENTS[kind].signals
+            if name in built and signals is not None:
+                return signals(built[name])
+        return None
+
+    @property
+    def axes(self) -> Mapping[str, Fitted]:
+        return self.built(AXIS)
+
+    @property
+    def buttons(self) -> Mapping[str, tuple[Button, Kernel]]:
+        return self.built(BUTTON)

@@ -1,0 +1,119 @@
+"""An element that the source does not know: a lamp at an output, which needs a while to light up and may burn out."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.elements import forget, register
+from steptwin.world.faults import Active, FaultKind, Layer, Occasion
+from steptwin.world.faults.table import OfElement
+from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kind import OUTPUT
+from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.sense import TableRows
+from steptwin.world.signals import SignalOf
+from steptwin.world.site import Site, Terminal
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import flag, name_value, pin_name, time_value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LampSpec(NamedSpec):
+    source: Terminal
+    inverted: bool
+    warms: Nanos
+
+
+class Lamp(Stateful):
+    """Lit when its output has been on for ``warms``, unless it has burnt out. Its edges are recorded under its name."""
+
+    __slots__ = ("_due", "_is_on", "_spec", "burnt", "kernel", "lit", "source")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_spec", "kernel", "source"})
+
+    def __init__(self, spec: LampSpec, kernel: Kernel, source: PinName) -> None:
+        self._spec = spec
+        self.kernel = kernel
+        self.source = source
+        self._is_on = False
+        self._due: Nanos | None = None
+        self.burnt = False
+        self.lit = False
+
+    def look(self, now: Nanos) -> None:
+        level = self.kernel.machines[self.source.machine].pins()[self.source.pin]
+        is_on = bool(level) is not self._spec.inverted
+        if is_on is not self._is_on:
+            self._is_on = is_on
+            self._due = now + self._spec.warms if is_on else None
+        if self._due is not None and self._due <= now:
+            self._due = None
+        self._show(is_on and self._due is None and not self.burnt)
+
+    def _show(self, lit: bool) -> None:
+        if lit is not self.lit:
+            self.lit = lit
+            self.kernel.report(self.source.machine, "edge", self._spec.name, float(lit))
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+
+def _read(text: TomlText, row: Row, table: Table) -> LampSpec:
+    return LampSpec(**row)
+
+
+def _refers(spec: LampSpec, world: WorldSpec) -> Iterator[Reference]:
+    yield Reference(spec.source[0], spec.source[0], (*spec.path, "from"))
+
+
+def _build(spec: LampSpec, site: Site) -> Lamp:
+    lamp = Lamp(spec, site.kernel(spec.source[0]), site.terminal(spec.source, OUTPUT))
+    lamp.kernel.add_part(lamp)
+    return lamp
+
+
+def _signals(lamp: Lamp) -> Mapping[str, SignalOf]:
+    return {"lit": SignalOf((lamp.kernel,), lambda now: float(lamp.lit))}
+
+
+def _burn(active: Active, lamp: Lamp, begins: bool, now: Nanos) -> str:
+    lamp.burnt = begins
+    lamp.kernel.mark()
+    return "it is burnt out" if begins else "it has been replaced"
+
+
+LAMP: Element[LampSpec, Lamp] = Element(
+    name="lamp",
+    spec=LampSpec,
+    rows=TableRows(
+        written="[[lamp]]",
+        keys=(
+            Key("name", name_value, "how conditions and faults name it"),
+            Key("from", pin_name, "the output: MACHINE.PIN", attribute="source"),
+            optional(flag, "inverted", "whether it is lit while the output is off", False),
+            optional(time_value, "warms", "how long it needs to light up", 0),
+        ),
+    ),
+    read=_read,
+    refers=_refers,
+    build=_build,
+    signals=_signals,
+    lanes=lambda spec: (spec.name,),
+    faults=(FaultKind("burnt-out", Layer.ELEMENT, Occasion.ALWAYS, "A lamp stays dark.", effect=OfElement(_burn)),),
+)
+
+
+@contextmanager
+def registered() -> Generator[None]:
+    """Descriptions may have lamps meanwhile."""
+    register(LAMP)
+    try:
+        yield
+    finally:
+        forget(LAMP)
