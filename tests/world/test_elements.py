@@ -109,10 +109,10 @@ def test_its_faults_are_recorded_set_and_cleared() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ('"t.BUSY"', '"t.STOP"', "t.STOP is no output: outputs of 't' are BUSY"),
+        ('"t.BUSY"', '"t.STOP"', "t.STOP is not an output: outputs of 't' are BUSY"),
         ('"t.BUSY"', '"u.BUSY"', "nothing is called 'u'"),
         ('warms = "50 ms"', 'warm = "50 ms"', r"\[lamp\] has no 'warm' \(did you mean 'warms'\?\)"),
-        ('warms = "50 ms"', 'warms = "soon"', "warms: 'soon' is no time"),
+        ('warms = "50 ms"', 'warms = "soon"', "warms: 'soon' is not a time"),
         ('name = "busy"', 'name = "t"', r"'t' is taken by \[\[toy\]\] 't'"),
         ('element = "busy"', 'element = "bus"', "element = 'bus': those that can fail are busy"),
         ("busy.lit == 0", "busy.light == 0", "no signal 'busy.light'"),

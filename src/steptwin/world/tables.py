@@ -114,4 +114,5 @@ def all_keys() -> dict[str, tuple[Key, ...]]:
 
 def written(table: str) -> str:
     """How a table is written."""
-    return tables()[table].written
+    rows = tables().get(table)
+    return f"[[{table}]]" if rows is None else rows.written
