@@ -54,6 +54,8 @@ class AxisDescription:
     """Of its positions; velocities are in it per second."""
     pulses_per_unit: float | None
     """None where it is not known: of a device without its configuration."""
+    round_p: int | None = None
+    """The shown position is a number of pulses from -round_p/2 to round_p/2 - 1, and begins anew beyond; None: it does not."""
     positions: Limits | None = None
     """To which it can be sent; None where that is not known, as below."""
     distances: Limits | None = None

@@ -127,3 +127,21 @@ def test_a_follower_that_was_too_slow_begins_anew(scene: Scene, monkeypatch: pyt
 def test_a_controller_that_is_not_there(scene: Scene) -> None:
     with pytest.raises(Misuse, match="mic488 has no controller 'mic'"):
         TwinWatch(scene.watching, "mic", PATHS)
+
+
+def test_a_chip_that_moves_is_watched_without_a_command(serve_m1486: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    served = serve_m1486("--variant", "B")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(served.directory))
+    paths = ("position", "velocity", "counter", "variable")
+    with RemoteSubject("m1486") as twin, RemoteSubject("m1486") as watching:
+        twin.do(command.Pause())
+        (chip,) = (part.name for part in twin.description.machines)
+        watch = TwinWatch(watching, chip, paths, lambda: 0)
+        twin.do(command.Move(chip, 1, by=64_000))
+        seen = set()
+        for _ in range(8):
+            twin.do(command.Advance(duration=100 * MILLISECOND))
+            found = tuple(value for value, _ in watch.look().values())
+            assert found == pytest.approx([reading.value for reading in twin.read(*(f"{chip}.{path}" for path in paths))])
+            seen.add(found[0])
+        assert len(seen) > 4

@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 
 from steptwin.files.world import World
+from steptwin.subject.commands import Enable, Move
 from steptwin.subject.events import read_event
 from steptwin.subject.following import filter_of
 from steptwin.subject.motion import Motions
 from steptwin.subject.world import WorldSubject
+from steptwin.world.script import Write
 
 FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
 
@@ -33,3 +35,24 @@ def test_they_are_those_of_the_world(machine: str, axis: str) -> None:
         assert motions.velocity("1", world.now) == pytest.approx(world.read(f"{machine}.{axis}velocity"), abs=1e-9)
         moved += motions.is_moving(world.now)
     assert moved > 5
+
+
+def test_a_coordinate_begins_anew_as_that_of_the_controller() -> None:
+    world = World.from_toml(
+        '[[mic488]]\nname = "m"\n[mic488.M1]\nunit = "mm"\ngear = 100.0\nacc = 1000.0\ndec = 1000.0\nvel = 500.0\n'
+    )
+    subject = WorldSubject(world)
+    what = filter_of(["plan", "coordinate"])
+    motions = Motions(subject.description.machines[0], subject.plans(what))
+    following = subject.follow(what, 100)
+    subject.do(Enable("m", 1))
+    subject.do(Write((("m", "M1_POS_ACT", 21_474_835.0),)))
+    subject.do(Move("m", 1, by=10.0))
+    shown = set()
+    for _ in range(20):
+        world.run(for_=0.02)
+        for event in following.take().events:
+            motions.take(event)
+        assert motions.position("1", world.now) == world.read("m.M1.position")
+        shown.add(world.read("m.M1.position") > 0)
+    assert shown == {True, False}

@@ -21,6 +21,10 @@ from steptwin.errors import Misuse
 
 Look = Callable[[], dict[str, tuple[Any, str]]]
 CHIP_NAMES = ("POSITION", "VARIABLE", "FLAGS")
+ONLY_OF_DRIVER = frozenset({"POSITION", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES"})
+"""What a driver of an M1486 reads and is no point of its data sheet, or in another unit and from another origin."""
+CHIP_POINTS = ("position", "velocity", "counter", "variable")
+"""Of a twin."""
 DEFAULT_NAMES = ("M?_POS_ACT", "M?_VEL_ACT", "M?_STATUS")
 MOST_HZ = 50.0
 LEAST_WIDTH = 10
@@ -65,11 +69,14 @@ def _reading(device: str | None, names: list[str] | None, *, log_frames: bool) -
     from steptwin.mic488.registers import DEFAULT_FIRMWARE, register_map
 
     twin = None if log_frames else controller_of(device)
-    if twin is not None and twin.kind == "mic488":
+    if twin is not None:
         with RemoteSubject(twin.twin) as subject:
-            wanted = expanded(register_map(twin.type or DEFAULT_FIRMWARE), names or DEFAULT_NAMES)
-            if all(isinstance(one, str) for one in wanted):
-                yield TwinWatch(subject, twin.name, [str(one) for one in wanted]).look
+            wanted: Sequence[object] = names or CHIP_POINTS
+            if twin.kind == "mic488":
+                wanted = expanded(register_map(twin.type or DEFAULT_FIRMWARE), names or DEFAULT_NAMES)
+            paths = [one for one in wanted if isinstance(one, str) and one.upper() not in ONLY_OF_DRIVER]
+            if len(paths) == len(wanted):
+                yield TwinWatch(subject, twin.name, paths).look
                 return
     address = find(device)
     if address.kind == "m1486":

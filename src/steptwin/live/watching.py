@@ -74,14 +74,14 @@ class TwinWatch:
 
     def look(self) -> dict[str, tuple[Value, str]]:
         """Values and units, by path."""
+        if not self._speed:
+            self._ask_time()  # first, so that what has happened by then is among the events
         missed, events = self._following.take()
         if missed:
             self._following.close()
             self._begin()
         for event in events:
             self._take(event)
-        if not self._speed:
-            self._ask_time()
         now = self.now()
         was_moving, moving = self._was_moving, self._motions.is_moving(now)
         self._was_moving = moving
@@ -124,9 +124,12 @@ def _computed(point: Point | None, part: MachinePart) -> tuple[str, Callable[[Mo
     """The axis of a point that follows from its plan, and how."""
     if point is None:
         return None
-    for axis in part.datasheet.axes:
-        of = _COMPUTED.get(point.path.upper().removeprefix(axis.name)[1:])
-        if of is not None and point.path.upper().startswith(axis.name):
+    path, axes = point.path.upper(), part.datasheet.axes
+    if path in _COMPUTED and len(axes) == 1:
+        return str(axes[0].number), _COMPUTED[path]
+    for axis in axes:
+        of = _COMPUTED.get(path.removeprefix(axis.name)[1:])
+        if of is not None and path.startswith(axis.name):
             return str(axis.number), of
     return None
 

@@ -47,7 +47,7 @@ def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = D
 
 def _axis(number: int, unit: str, gear: float | None) -> AxisDescription:
     """Coordinates are whole numbers of 32 bits with a sign, in pulses (MIC-7); a distance may wrap (MIC-42)."""
-    axis = AxisDescription(number=number, name=f"M{number}", unit=unit, pulses_per_unit=gear)
+    axis = AxisDescription(number=number, name=f"M{number}", unit=unit, pulses_per_unit=gear, round_p=2 * COORDINATES)
     if gear is None:
         return axis
     coordinates = Limits(-COORDINATES / gear, (COORDINATES - 1) / gear)

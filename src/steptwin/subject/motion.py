@@ -16,6 +16,7 @@ class Motions:
     def __init__(self, machine: MachinePart, plans: Iterable[Event]) -> None:
         self._machine = machine.name
         self._scales = {str(axis.number): axis.pulses_per_unit or 1.0 for axis in machine.datasheet.axes}
+        self._rounds = {str(axis.number): axis.round_p for axis in machine.datasheet.axes}
         self._plans: dict[str, Plan] = {}
         self._origins: dict[str, int] = {}
         for plan in plans:
@@ -34,7 +35,10 @@ class Motions:
 
     def position(self, axis: str, now: Nanos) -> float:
         """Counted, as the controller shows it, in units of the axis."""
-        return (self._plans[axis].count(now) + self._origins.get(axis, 0)) / self._scales[axis]
+        count, round_p = self._plans[axis].count(now) + self._origins.get(axis, 0), self._rounds[axis]
+        if round_p is not None:
+            count = (count + round_p // 2) % round_p - round_p // 2
+        return count / self._scales[axis]
 
     def velocity(self, axis: str, now: Nanos) -> float:
         return profile_of(self._plans[axis]).velocity(now) / self._scales[axis]

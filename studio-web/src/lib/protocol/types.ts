@@ -282,6 +282,7 @@ export type Description = {
       name: string;
       unit: string;
       pulses_per_unit: number | null;
+      round_p: number | null;
       positions: {
         low: number | null;
         high: number | null;
