@@ -1,4 +1,4 @@
-"""Which inputs happen at one moment: those that were found ready together, a batch."""
+"""Batches: inputs that were found ready together happen at one moment."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 
 
 class Batches:
-    """Of an event loop. Only links that see what is ready together make batches (`steptwin.live.descriptors`)."""
+    """The batches of an event loop. Only links on an epoll set make batches (`steptwin.live.descriptors`)."""
 
     __slots__ = ("current",)
 
@@ -20,5 +20,5 @@ _of_loops: WeakKeyDictionary[asyncio.AbstractEventLoop, Batches] = WeakKeyDictio
 
 
 def batches() -> Batches:
-    """Those of the running loop, which live as long as the loop."""
+    """The batches of the running event loop."""
     return _of_loops.setdefault(asyncio.get_running_loop(), Batches())

@@ -11,14 +11,14 @@ from steptwin.live.clock import Clock
 from steptwin.machine import MILLISECOND, Nanos
 
 LONGEST_WAIT_S = 3600.0
-"""Event loops take no arbitrarily distant timer; a longer wait is waited in parts."""
+"""Longest timer, s: event loops do not accept arbitrarily distant ones; longer waits are divided."""
 
 LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
-"""Something due that is done later than this on the wall has not jittered: the process was stopped or cannot keep up."""
+"""Delay of a deadline, in real time, above which the process was stopped or cannot keep up, ns; below it is jitter."""
 
 
 class Advancing(Protocol):
-    """What a cell keeps up with real time: a kernel, or a whole world. As in `Kernel`."""
+    """What a cell advances in real time: a kernel or a whole world. The methods are those of `Kernel`."""
 
     stale: bool
 
@@ -29,10 +29,9 @@ class Advancing(Protocol):
 
 
 class Cell:
-    """Machines that are advanced together: at their deadlines, and when a client or an input arrives.
+    """Machines in real time, advanced together at their deadlines and when an input arrives.
 
-    When the process is held up, virtual time is held up with it, so that nothing has to be caught up with; ``on_lag`` is
-    called with the delay.
+    While the process does not run, virtual time stands still, so that there is no backlog; ``on_lag`` is called with the delay.
     """
 
     __slots__ = ("_armed_for", "_batch", "_batches", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
@@ -44,19 +43,19 @@ class Cell:
         self._loop = asyncio.get_running_loop()
         self._batches = batches()
         self._batch = 0
-        """That the machines have been brought to the present for."""
+        """The batch for which the machines were advanced to the present."""
         self.moments = 0
-        """Counts on whenever the machines are brought to the present: time may have passed, signals have settled."""
+        """Counts the advances to the present: with each, time may have passed and signals have settled."""
         self._timer: asyncio.TimerHandle | None = None
         self._armed_for: Nanos | None = None
 
     def start(self) -> None:
-        """Follow the clock from now on, also without any input: what machines do by themselves happens when it is due."""
+        """Follow the clock from now on: machines act at their deadlines, also without inputs."""
         self.enter()
         self._arm(self.kernel.deadline())
 
     def enter(self) -> Nanos:
-        """Bring the machines to the present; inputs may be applied at the moment returned, then call `leave`."""
+        """Advance the machines to the present. Apply inputs at the moment returned, then call `leave`."""
         batch = self._batches.current
         if batch and batch == self._batch:
             return self.kernel.now
@@ -70,13 +69,13 @@ class Cell:
         return now
 
     def leave(self) -> None:
-        """Let signals settle after an input and wake up for what it leads to."""
+        """Let signals settle after an input, and set the timer for the next deadline."""
         if self.kernel.stale:
             self._batch = 0  # something may be due at once
             self._arm(self.kernel.deadline())
 
     def _held_up(self, due: Nanos, now: Nanos) -> Nanos:
-        """Go on where the delay began."""
+        """Continue at the moment at which the delay began."""
         resumed = max(due, self.kernel.now)
         self.clock.lag(now - resumed)
         if self.on_lag is not None:

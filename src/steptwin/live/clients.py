@@ -1,4 +1,4 @@
-"""TCP clients of a process, however they are served."""
+"""The TCP clients of a process and their limit."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from steptwin.world.addresses import Address
 
 BACKLOG = 1024
 RETRY_S = 1.0
-"""How long no client is accepted when the system has no room for one more."""
+"""Pause before the next client is accepted if the system has no room for one more, s."""
 
 
 class Client(Protocol):
     @property
     def waiting(self) -> int:
-        """Bytes for which the client has no room."""
+        """Number of bytes for which the client has no room."""
         ...
 
     def write(self, data: bytes) -> None:
-        """Send; what finds no room waits for it."""
+        """Send bytes; those without room wait."""
         ...
 
     def close(self) -> None: ...
@@ -35,7 +35,7 @@ def _unnoticed(text: str) -> None:
 class Clients:
     """All TCP clients of a process. Every one is an open file, so there is a limit: ``most``.
 
-    ``notice`` is called for clients that were turned away or made no sense.
+    ``notice`` is called for clients that were refused or closed because of invalid data.
     """
 
     most: int = 65536
@@ -43,7 +43,7 @@ class Clients:
     present: set[Client] = field(default_factory=set)
 
     def have_room(self) -> bool:
-        """Whether one more client may connect; it is a notice if not."""
+        """Whether one more client may connect; if not, a notice is given."""
         if len(self.present) < self.most:
             return True
         self.notice(f"more than {self.most} clients at once are turned away")
@@ -54,7 +54,7 @@ class Clients:
 
 
 def listening(address: Address) -> socket.socket:
-    """A socket that listens. Raises `OSError`, or `UnicodeError` for what is not a name of a host."""
+    """A listening socket. Raises `OSError`, or `UnicodeError` for an invalid host name."""
     family = socket.getaddrinfo(*address, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0][0]
     listener = socket.create_server(address, family=family, backlog=BACKLOG)
     listener.setblocking(False)
@@ -63,6 +63,6 @@ def listening(address: Address) -> socket.socket:
 
 
 def set_up(connection: socket.socket) -> None:
-    """Small answers leave at once, and clients that are gone are noticed."""
+    """Set options of a socket: send small answers at once, detect lost clients."""
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)

@@ -1,4 +1,4 @@
-"""Wall time and virtual time."""
+"""Real time and virtual time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steptwin.machine import SECOND, Nanos
 
 
 class Clock:
-    """Virtual time that runs ``speed`` times as fast as the wall's, from ``begin`` on; it can be stopped.
+    """Virtual time that runs ``speed`` times as fast as real time, from ``begin`` (ns) on; it can be stopped.
 
     ``wall_ns`` must never go back; the monotonic clock, which is the default, does not.
     """
@@ -30,23 +30,23 @@ class Clock:
         return self._from_ns + (passed if self.speed == 1.0 else int(passed * self.speed))
 
     def wait_s(self, moment: Nanos) -> float:
-        """Wall seconds until virtual ``moment``, at least 0; for ever while the clock is stopped."""
+        """Real seconds until virtual ``moment``, at least 0; infinite while the clock is stopped."""
         ahead = moment - self.now()
         if self.is_stopped:
             return inf if ahead > 0 else 0.0
         return max(ahead / self.speed, 0) / SECOND
 
     def lag(self, by: Nanos) -> None:
-        """From now on virtual time is ``by`` behind what it would have been; the time taken back must not have been observed."""
+        """Set virtual time back by ``by``, ns; the time taken back must not have been observed."""
         self._from_ns -= by
 
     def stop(self, moment: Nanos) -> None:
-        """Stand at ``moment``. No observed time may be later."""
+        """Stop at ``moment``. No observed time may be later."""
         self._from_ns = moment
         self.is_stopped = True
 
     def run(self, speed: float) -> None:
-        """Go on at ``speed`` from the moment at which the clock was made or stopped. Raises `Misuse` for an impossible one."""
+        """Run at ``speed`` from the moment at which the clock was made or stopped. Raises `Misuse` for an invalid speed."""
         if not 0.0 < speed < inf:
             raise Misuse(f"speed = {speed:g}: must be finite and greater than 0")
         self.speed = speed

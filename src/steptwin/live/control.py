@@ -1,8 +1,8 @@
 """The control endpoint of a running twin: a shell around its dispatcher, over a local socket or over TCP on this computer.
 
-Messages are lines of JSON, as ``docs/control.md`` describes them. Every request has exactly one answer, in order; events of a
-``follow`` come after its answer, with its id. A local socket can be opened by the user who started the twin alone; over TCP the
-first line is a token that only this user can read. Everything is bounded: requests, what waits to be sent, clients.
+Messages are lines of JSON, as ``docs/control.md`` describes them. Every request has exactly one answer, in order; events of
+a ``follow`` come after its answer, with its id. Only the user who started the twin can open the local socket; over TCP the
+first line is a token that only this user can read. Requests, waiting events and clients are bounded.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from steptwin.world.addresses import Address
 
 HAS_LOCAL_SOCKETS = hasattr(socket, "AF_UNIX")
 TIMEOUT_S = 10.0
-"""For a request to be complete, for a client to ask at all, and for one that reads nothing to go on reading."""
+"""Time-out of a request, of a client without requests, and of a client that does not read, s."""
 MOST_CLIENTS = 64
 MOST_FOLLOWED = 16
 """Follows of one client."""
 MOST_WAITING_BYTES = 1 << 18
-"""Of answers and events that a client has not read yet: no more is written before it has."""
+"""Unread answers and events of a client above which nothing more is written, bytes."""
 EVENTS_AT_ONCE = 200
-"""Written to one client before others are served."""
+"""Events written to one client before others are served."""
 SOCKET, ANNOUNCEMENT = ".control", ".twin"
 """Suffixes in the runtime directory: a local socket; a file with the address and token of an endpoint over TCP."""
 TOKEN_BYTES = 16
 
 
 class Controlled(Protocol):
-    """What an endpoint is a shell of."""
+    """The subject behind an endpoint."""
 
     def do(self, wanted: Command) -> Result: ...
     def follow(self, what: Filter, bound: int) -> Following: ...
@@ -51,7 +51,7 @@ class Controlled(Protocol):
 
 
 class ControlEndpoint:
-    """Listens for requests and has ``subject`` do them; over TCP where there is an ``address``, or no other way."""
+    """Listens for requests and passes them to ``subject``; over TCP if there is an ``address`` or no local socket."""
 
     def __init__(self, name: str, subject: Controlled, address: Address | None = None) -> None:
         self.name = name
@@ -65,10 +65,10 @@ class ControlEndpoint:
         self._clients: set[_Conversation] = set()
         self._token = ""
         self.listening: Address | None = None
-        """Where it listens on TCP."""
+        """The TCP address on which it listens."""
 
     async def open(self) -> Path:
-        """Listen. Raises `Misuse` when a twin of this name is running already."""
+        """Open the endpoint. Raises `Misuse` if a twin of this name is running."""
         try:
             private_directory(self.path.parent)
             self._owned = Ownership(self.path.with_suffix(".lock"))
@@ -88,7 +88,7 @@ class ControlEndpoint:
         return self.path
 
     async def _open_tcp(self, address: Address) -> None:
-        """Listen on TCP, and leave address and token where this user alone can read them."""
+        """Listen on TCP, and write address and token to a file that only this user can read."""
         self._token = secrets.token_hex(TOKEN_BYTES)
         loop = asyncio.get_running_loop()
         server = await loop.create_server(lambda: self._conversation(self._token), address.host, address.port)
@@ -120,19 +120,19 @@ class ControlEndpoint:
 
 
 class _Conversation(asyncio.Protocol):
-    """One client: its requests in order, an answer to each, and the events that it follows."""
+    """One client: its requests in order, their answers, and the events of its subscriptions."""
 
     def __init__(self, subject: Controlled, clients: set[_Conversation], token: str) -> None:
         self._subject = subject
         self._clients = clients
         self._token = token
-        """What the first line has to be; empty: nothing."""
+        """The required first line; empty: none."""
         self._received = b""
         self._has_asked = False
         self._has_ended = False
-        """The client sends no more."""
+        """Whether the client has closed its sending side."""
         self._is_full = False
-        """The client has to read what was written first."""
+        """Whether writing waits for the client to read."""
         self._following: dict[object, Following] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._is_due = False
@@ -149,7 +149,7 @@ class _Conversation(asyncio.Protocol):
         self._wait()
 
     def _wait(self) -> None:
-        """Some time from now on a client must have asked, finished its request, or read on."""
+        """Start the time-out within which the client must send, complete its request, or read."""
         self._calm()
         self._timer = asyncio.get_running_loop().call_later(TIMEOUT_S, self._late)
 
@@ -179,7 +179,7 @@ class _Conversation(asyncio.Protocol):
         self._transport.abort()
 
     def eof_received(self) -> bool:
-        """The client sends no more, or has gone: what is left is answered, and nothing is followed any more."""
+        """Answer the remaining requests after the client has closed its sending side, and end its subscriptions."""
         self._has_ended = True
         self._unfollow_all()
         if self._received and not self._is_full:
@@ -274,7 +274,7 @@ class _Conversation(asyncio.Protocol):
         self._transport.write(json.dumps(message).encode() + b"\n")
 
     def _end(self, message: Message) -> None:
-        """The last answer; what comes then is not read."""
+        """Send the last answer; further input is not read."""
         self._received = b""
         self._write(message)
         self._wait()
@@ -286,7 +286,7 @@ class _Conversation(asyncio.Protocol):
             asyncio.get_running_loop().call_soon(self._send_events)
 
     def _send_events(self) -> None:
-        """Write events until the client has to read first; what waits then is bounded by its follow."""
+        """Write events until the client has to read first; the bound of each subscription limits the rest."""
         self._is_due = False
         for identity, following in self._following.items():
             if self._is_full or self._transport.is_closing():

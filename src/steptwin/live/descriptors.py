@@ -1,7 +1,7 @@
-"""What the links of a process wait for on Linux: file descriptors in one epoll set, served in turns.
+"""The file descriptors of all links of a process in one epoll set, served in turns (Linux).
 
-An event loop takes a transport, a handle and often a sleep for every request. Here a loop is woken once, then everything that
-is ready is served until nothing is, so that a request costs little more than reading it and writing its answer.
+An event loop needs a transport, a handle and often a sleep for every request. Here the loop is woken once, and all ready
+descriptors are served until none is left, so that a request costs little more than its read and write.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ Serve: TypeAlias = Callable[[], None]
 """Called while a descriptor is ready, again and again; it may await or forget any descriptor, and must not block."""
 
 TURN_NS = 1_000_000
-"""After this long a loop's timers and other descriptors have their turn too."""
+"""Longest time before timers and other descriptors of the loop are served, ns."""
 BATCH = 128
-"""Descriptors served before the others are asked for."""
+"""Descriptors served per call of epoll."""
 LINGER_NS = 50_000
 """A client often sends its next request right after an answer: polling that long without sleeping saves the wake-up."""
 MOST_SKIPPED = 1023
 
 
 class Descriptors:
-    """The set of an event loop. One descriptor is awaited for one thing at a time: input, or room for output."""
+    """The epoll set of an event loop. A descriptor is awaited either for input or for room for output."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, batches: Batches) -> None:
         self._batches = batches
@@ -57,7 +57,7 @@ class Descriptors:
         self._serve[descriptor] = serve
 
     def forget(self, descriptor: int) -> None:
-        """No longer await anything of a descriptor, which is still open; nothing when it was not awaited."""
+        """Stop awaiting an open descriptor; no effect if it was not awaited."""
         if self._serve.pop(descriptor, None) is not None:
             self._epoll.unregister(descriptor)
 
@@ -98,7 +98,7 @@ _of_loops: WeakKeyDictionary[asyncio.AbstractEventLoop, Descriptors] = WeakKeyDi
 
 
 def descriptors() -> Descriptors:
-    """The set of the running loop, which lives as long as the loop."""
+    """The epoll set of the running event loop."""
     loop = asyncio.get_running_loop()
     found = _of_loops.get(loop)
     if found is None:

@@ -1,4 +1,4 @@
-"""The directory in which running twins of a user are found: control endpoints, links to pseudo terminals, locks."""
+"""The runtime directory of a user: control endpoints, links to pseudo terminals, locks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steptwin.system import is_own, user
 
 
 def runtime_directory() -> Path:
-    """Where control endpoints and pty links of this user's twins lie; it need not exist.
+    """The directory of control endpoints and pty links of this user's twins; it need not exist.
 
     ``XDG_RUNTIME_DIR`` on Linux, ``LOCALAPPDATA`` on Windows, which are private to the user; otherwise, as on macOS, a directory
     for temporary files.
@@ -26,7 +26,7 @@ def runtime_directory() -> Path:
 
 
 def private_directory(path: Path) -> Path:
-    """Make ``path`` for this user alone. Raises `Misuse` where it is something else or belongs to another user."""
+    """Make ``path`` private to this user. Raises `Misuse` if it is not a directory or belongs to another user."""
     path.mkdir(mode=0o700, parents=True, exist_ok=True)
     if permissions(path) & 0o077:
         path.chmod(0o700)
@@ -36,7 +36,7 @@ def private_directory(path: Path) -> Path:
 def permissions(path: Path) -> int:
     """The permission bits of a directory; 0o700 where they mean nothing (Windows: access follows the directory above).
 
-    Raises `Misuse` for what is not a directory, or of another user.
+    Raises `Misuse` if it is not a directory or belongs to another user.
     """
     found = path.lstat()
     if not stat.S_ISDIR(found.st_mode):

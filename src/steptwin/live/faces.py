@@ -1,4 +1,4 @@
-"""How a running world appears to a person: a line for each thing, or a live view on a terminal."""
+"""The output of a running world: lines of text, or a live view on a terminal."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from steptwin.world.trace import TraceRecord
 
 
 class Face(Protocol):
-    """What shows a world while it runs."""
+    """The output of a running world."""
 
     def notice(self, text: str) -> None:
-        """Something the person should know."""
+        """Show a notice."""
         ...
 
     def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
-        """Show ``head`` (`banner`), what has happened when the world was made, and what happens from now on."""
+        """Show ``head`` (`banner`), the records so far, and all further ones."""
         ...
 
     async def show(self, server: Server) -> None:
-        """Until the server ends."""
+        """Show the world until the server ends."""
         ...
 
 
 class Lines:
-    """Records and notices, and with ``frames`` every frame."""
+    """Prints records and notices as lines, and with ``frames`` every frame."""
 
     def __init__(self, live: LiveWorld, output: Output, *, frames: bool) -> None:
         self._live = live
@@ -56,14 +56,14 @@ class Lines:
 
 
 def banner(world: World, end_points: Sequence[EndPoint], remarks: Sequence[str]) -> list[str]:
-    """What runs, where it listens, and what to know about it."""
+    """The first lines: world, end points, remarks."""
     width = max((len(end_point.protocol) for end_point in end_points), default=0)
     places = [f"  {end_point.protocol:<{width}}  {end_point.place}" for end_point in end_points]
     return [title_of(world), *places, *(f"  {remark}" for remark in remarks), "Ctrl-C ends"]
 
 
 def title_of(world: World) -> str:
-    """The world and its controllers, in a line."""
+    """The name of the world and its controllers, in a line."""
     titles = {name: _titled(world, name) for name in world.machines}
     if len(titles) == 1:
         return f"{world.spec.name}: {next(iter(titles.values()))}"
@@ -78,7 +78,7 @@ def _titled(world: World, name: str) -> str:
 
 
 def remarks_on(world: World, *, listen_any: bool) -> list[str]:
-    """What the person who started it should know."""
+    """Remarks about risks: open addresses, memory that is not kept."""
     found = [remark for name, machine in world.machines.items() for remark in world.kind(name).remarks(name, machine)]
     if listen_any:
         found.append("the lines have no authentication: any client that reaches these addresses can move the axes")

@@ -1,4 +1,4 @@
-"""How many files this process may have open: every client is one."""
+"""The limit of open files of this process; every client is one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ except ImportError:  # Windows has no such limit for sockets
     resource = None
 
 MOST_FILES = 65536
-"""The usual limit of 1024 is for programs with few."""
+"""Open files to permit; the usual limit of 1024 is too low for many clients."""
 
 
 def allow_many_files() -> int:

@@ -1,4 +1,4 @@
-"""Ctrl-C, where what has been done so far is to be kept."""
+"""Ctrl-C for commands that keep their results so far."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any, Self
 
 
 class FirstInterrupt:
-    """While this lasts the first SIGINT only sets ``came``; the second one ends the process as ever.
+    """A context in which the first SIGINT only sets ``came``; the second one ends the process as usual.
 
-    In other threads than the main one, which get none, nothing changes.
+    It has no effect outside the main thread.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Byte streams and the ports behind them: what every kind of link has in common."""
+"""Byte streams and their ports: the common part of all links."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.live.cell import Cell
 from steptwin.machine import Nanos, Port, TalkingPort
 
 SLICE_BYTES = 2048
-"""A client that sends more at once is served this much at a time, so that it cannot keep others waiting."""
+"""Bytes of one client that are served at once, so that others do not wait."""
 
 
 class Writer(Protocol):
@@ -18,7 +18,7 @@ class Writer(Protocol):
 
 
 class Feed:
-    """Between a stream of bytes and a port: bytes in, answers out, timers for what is due later."""
+    """Connects a stream of bytes with a port: input, answers, and timers for later output."""
 
     __slots__ = ("_cell", "_loop", "_port", "_talks", "_timer", "_writer", "is_read")
 
@@ -29,7 +29,7 @@ class Feed:
         self._loop = asyncio.get_running_loop()
         self._timer: asyncio.Handle | None = None
         self.is_read = True
-        """Whether the other end takes what is written. Unasked output is lost otherwise, as on a wire."""
+        """Whether the other end reads. If not, unsolicited output is lost, as on a wire."""
         self._talks: TalkingPort | None = None
         if isinstance(port, TalkingPort):
             self._talks = port  # announces its output: it is not asked when there will be some
@@ -78,13 +78,13 @@ class Feed:
 
 
 class Link(Protocol):
-    """Something that connects a port with the outside."""
+    """A connection of a port to other programs."""
 
     async def close(self) -> None: ...
 
 
 class PlacedLink(Link, Protocol):
-    """One that has a path."""
+    """A link with a path."""
 
     @property
     def path(self) -> Path: ...

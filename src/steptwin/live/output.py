@@ -1,7 +1,7 @@
-"""Text for whoever watches a served twin.
+"""Text output of a served twin.
 
-A pager that is not scrolled, a terminal held by Ctrl-S: the reader of our output may stop for a while, and a write to it then
-blocks. So a thread writes, and the twin goes on.
+The reader of the output may stop (a pager, a terminal held by Ctrl-S), and a write then blocks. So a thread writes, and the
+twin continues.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ import threading
 from typing import TextIO
 
 MOST_WAITING = 10_000
-"""Pieces kept for a reader that has stopped; later ones are left out."""
+"""Pieces of text kept for a reader that has stopped; later ones are dropped."""
 PATIENCE_S = 1.0
-"""How long the end waits for the reader."""
+"""Time that the end waits for the reader, s."""
 
 
 class Output:
     """Writes to ``stream``'s descriptor, in order, from a thread of its own. Also a file that rich can draw on.
 
-    A reader that has closed its end gets no more output; that is not an error.
+    After the reader has closed its end, output is dropped without an error.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -49,7 +49,7 @@ class Output:
         return len(text)
 
     def flush(self) -> None:
-        """Nothing is held back."""
+        """No effect: nothing is buffered here."""
 
     def isatty(self) -> bool:
         return self._stream is not None and self._stream.isatty()
@@ -64,7 +64,7 @@ class Output:
         self._thread = None
 
     def close(self) -> None:
-        """Write what is queued, as long as it is read."""
+        """Write the queued text, as long as it is read."""
         thread = self._thread
         if thread is not None:
             with contextlib.suppress(queue.Full):

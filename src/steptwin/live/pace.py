@@ -1,6 +1,6 @@
 """Control of the time of a live world: pause, step, another speed, and saving the session.
 
-Nothing of this is seen in the world, whose time just goes on later: a session replays whatever was done to its pace.
+The world is not affected, because its time only advances later: a session replays independently of its pace.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
     from steptwin.live.world import LiveWorld
 
 SLICE_NS: Nanos = 10 * SECOND
-"""Without a clock a world runs this much at a time, so that others are served."""
+"""Virtual time per slice without a clock, ns, so that clients are served between slices."""
 PART_S = 0.1
-"""A step that takes longer is taken in parts, one for each request."""
+"""Longest real time of a part of a step, s; each request executes one part."""
 
 
 def read_speed(text: str, least: float = SLOWEST) -> float:
-    """Virtual seconds in a second; infinite for ``max``. Raises `Misuse`."""
+    """Parse a speed, virtual seconds per second; infinite for ``max``. Raises `Misuse`."""
     if text == "max":
         return inf
     try:
@@ -56,11 +56,11 @@ _STANDS = events.PacePayload(paused=True, speed=None)
 
 
 class Pace:
-    """How the time of a live world goes; at first it is paused. ``show`` is called with notices for the user."""
+    """The pace of a live world; at first it is paused. ``show`` is called with notices for the user."""
 
     def __init__(self, live: LiveWorld, cell: Cell, show: Callable[[str], None], *, has_clients: bool) -> None:
         self.speed = 1.0
-        """Virtual seconds in a second, once it goes; infinite: as many as there can be."""
+        """Virtual seconds per second while it runs; infinite: as fast as possible."""
         self.is_paused = True
         self._live = live
         self._cell = cell
@@ -70,7 +70,7 @@ class Pace:
         cell.clock.stop(live.now)
 
     def begin(self, speed: float) -> None:
-        """Time begins to go at ``speed``; with 0 it stands until it is resumed."""
+        """Start time at ``speed``; 0: paused."""
         if speed:
             self.speed = speed
             self.is_paused = False
@@ -79,14 +79,14 @@ class Pace:
             self._say(self._goes() if speed else _STANDS)
 
     def pause(self) -> None:
-        """Time stands from now on."""
+        """Pause."""
         self._halt()
         if not self.is_paused:
             self.is_paused = True
             self._say(_STANDS)
 
     def resume(self, speed: float | None = None) -> None:
-        """Time goes on, at another speed where one is given; while it goes, only that changes. Raises `Misuse`."""
+        """Continue, at ``speed`` if given; while time runs, only the speed changes. Raises `Misuse`."""
         if speed == inf and self._has_clients:
             raise Misuse("--speed max: this world has lines with external clients, which need real time")
         changes = self.is_paused or speed not in (None, self.speed)
@@ -107,7 +107,7 @@ class Pace:
         self._live.subject.paced(pace)
 
     def _halt(self) -> None:
-        """Bring the world to the present and stop the clock there."""
+        """Advance the world to the present and stop the clock there."""
         self.close()
         self._cell.enter()
         self._cell.clock.stop(self._live.now)
@@ -121,7 +121,7 @@ class Pace:
         self._cell.start()
 
     def _run_freely(self) -> None:
-        """Without a clock, in slices."""
+        """Run without a clock, in slices."""
         world = self._live.world
         world.run(for_=SLICE_NS / SECOND)
         self._cell.clock.stop(world.now)
@@ -136,9 +136,10 @@ class Pace:
     # ------------------------------------------------------------------ steps
 
     def step(self, end: Nanos, condition: SignalCondition | None, following: Following) -> bool | None:
-        """Go on to the moment ``end``, or until a condition is true; gives whether that ended it, None for not there yet.
+        """Advance to the moment ``end``, or until a condition is true; returns whether the condition ended it, None if
+        unfinished.
 
-        A part ends, too, when as much has happened as fits into ``following``.
+        A part also ends when ``following`` is full.
         """
         live = self._live
         world = live.world
@@ -162,7 +163,7 @@ class Pace:
     # ------------------------------------------------------------------ commands
 
     def actions(self) -> dict[type, Action]:
-        """Commands that bring the world to the present themselves."""
+        """Commands that advance the world to the present themselves."""
         return {
             command.Pause: self._pause,
             command.Resume: self._resume,
@@ -171,7 +172,7 @@ class Pace:
         }
 
     def where(self) -> dict[str, object]:
-        """The present moment, and how time goes."""
+        """The present moment and pace."""
         speed = "max" if self.speed == inf else self.speed
         return {**self._live.subject.time(), "paused": self.is_paused, "speed": speed}
 
@@ -184,7 +185,7 @@ class Pace:
         return self.where()
 
     def _advance(self, wanted: command.Advance) -> object:
-        """A step, or its next part: ``to_ns`` of the answer, where there is one, is for the request for that."""
+        """A step, or its next part: ``to_ns`` of the answer, if present, is the argument for the next part."""
         live = self._live
         condition = None if wanted.until is None else live.world.condition(wanted.until)
         self.pause()
@@ -205,7 +206,7 @@ class Pace:
         }
 
     def _statements(self) -> dict[str, str]:
-        """Where the programs of controllers are that run or are paused, by controller."""
+        """The current statements of running and paused programs, by controller."""
         world = self._live.world
         found = {name: world.kind(name).statement(machine) for name, machine in world.machines.items()}
         return {name: text for name, text in found.items() if text is not None}

@@ -1,4 +1,4 @@
-"""Where a device could be: serial ports of this system, and what the twins of this user offer."""
+"""Possible addresses of devices: serial ports of this system, and pseudo terminals of this user's twins."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from steptwin.subject.commands import EndPoints
 
 @dataclass(frozen=True, slots=True)
 class FoundPort:
-    """An address as every command takes it, and what is known of it."""
+    """An address as commands take it, and its description."""
 
     address: str
     what: str
 
 
 def serial_ports() -> list[FoundPort]:
-    """The serial ports of this system, those of USB adapters with their maker's words."""
+    """The serial ports of this system; USB adapters with their descriptions."""
     import serialx
 
     found = []
@@ -33,7 +33,7 @@ def serial_ports() -> list[FoundPort]:
 
 
 def twin_ports() -> list[FoundPort]:
-    """The pseudo terminals of running twins, as far as they answer."""
+    """The pseudo terminals of running twins that respond."""
     found = []
     for name in running():
         with contextlib.suppress(LineFailure, Refusal):  # gone meanwhile

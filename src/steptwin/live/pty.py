@@ -18,16 +18,16 @@ from steptwin.machine import Port
 from steptwin.system import HAS_EPOLL, reason
 
 DEVICES = ("/dev/pts/", "/dev/ttys")
-"""What links to pseudo terminals lead to, on Linux and on macOS."""
+"""Path prefixes of pseudo terminals on Linux and macOS."""
 LOOK_S = 0.02
-"""How often it is seen whether a program has come, where there is no epoll."""
+"""Interval at which a newly connected program is detected without epoll, s."""
 
 
 class PtyLink:
     """A pty whose far end is reached through the symbolic link ``path``.
 
-    A program that opens it meets a new port: what one that went away had begun or had not read is not there for the next. (Where
-    the next is there before the hang-up has been noticed, within a fraction of a millisecond, they cannot be distinguished.)
+    Each program that opens it gets a new port: unfinished requests and unread data of the previous program are dropped. (A
+    program that opens it within a fraction of a millisecond after the previous one cannot be distinguished from it.)
     """
 
     def __init__(self, cell: Cell, path: Path, make_port: Callable[[], Port]) -> None:
@@ -42,10 +42,10 @@ class PtyLink:
         self._next_look: asyncio.Handle | None = None
         self._feed: Feed | None = None
         self._quiet = True
-        """Nothing has been sent since the last program closed it."""
+        """Whether nothing has been sent since the last program closed it."""
 
     async def open(self) -> Path:
-        """Make the pty and its link. Raises `LineFailure`, or `Misuse` where the path is taken."""
+        """Make the pty and its link. Raises `LineFailure`, or `Misuse` if the path is in use."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._take_path()
@@ -68,7 +68,7 @@ class PtyLink:
         return self.path
 
     def _take_path(self) -> None:
-        """Own the path, unless something lies there that is not what a twin left behind."""
+        """Take the path, unless something other than the link of an ended twin exists there."""
         if self.path.exists() and not self.path.is_symlink():
             raise Misuse(f"{self.path} exists and is not a link to a pseudo terminal: choose another --pty")
         self._owned = Ownership(self.path.with_name(f".{self.path.name}.lock"))
@@ -80,7 +80,7 @@ class PtyLink:
                 raise Misuse(f"{self.path} is an existing link to {target}: choose another --pty")
 
     def write(self, data: bytes) -> None:
-        """Send; what finds no room or no program there is lost, as on a serial line whose other end does not listen."""
+        """Send bytes; without room or without a program at the other end they are lost, as on a serial line."""
         if self._quiet and (self._stirring is None or _is_hung_up(self._master)):
             return
         try:
@@ -93,7 +93,7 @@ class PtyLink:
     # the terminal is read from time to time.
 
     def _left(self) -> None:
-        """The last program closed the line: it is made ready for the next one, which meets a new port."""
+        """Prepare the line for the next program after the last one has closed it."""
         self._make_raw()
         if self._feed is not None:
             self._feed.close()
@@ -107,7 +107,7 @@ class PtyLink:
             self._next_look = self._loop.call_later(LOOK_S, self._look_again)
 
     def _make_raw(self) -> None:
-        """Raw again, and emptied of what the last program had not read."""
+        """Set raw mode again and discard unread data."""
         slave = os.open(self._device, os.O_RDWR | os.O_NOCTTY)
         try:
             # The next program may be quick: its settings and what it has sent already must not be touched.
@@ -122,7 +122,7 @@ class PtyLink:
             self._left()
 
     def _look(self, stirring: select.epoll) -> bool:
-        """Whether there is something to read; it is read then."""
+        """Read pending input; returns whether there was any."""
         if not any(events & select.EPOLLIN for _, events in stirring.poll(0)):
             return False
         self._quiet = False
@@ -131,7 +131,7 @@ class PtyLink:
         return True
 
     def _look_again(self) -> None:
-        """Whether a program has come since: what no program has open cannot be read."""
+        """Check whether a program has opened the line."""
         self._next_look = None
         try:
             data = self._read()
@@ -159,7 +159,7 @@ class PtyLink:
             self._left()
 
     def _read(self) -> bytes:
-        """What has come; nothing when no program has the line open. Raises `BlockingIOError`."""
+        """The received bytes; empty if no program has the line open. Raises `BlockingIOError`."""
         try:
             return os.read(self._master, SLICE_BYTES)
         except BlockingIOError:

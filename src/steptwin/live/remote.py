@@ -1,4 +1,4 @@
-"""A world in another process as a subject: the client of its control endpoint, and how running twins are found."""
+"""A world in another process as a subject: the client of its control endpoint; and the search for running twins."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ START = "start one with 'steptwin serve mic488 --demo', 'steptwin serve m1486' o
 
 
 def running() -> list[str]:
-    """Names of the twins of this user that answer. Raises `Misuse` where others could have put up their own."""
+    """Names of the running twins of this user. Raises `Misuse` if other users can write to the runtime directory."""
     directory = runtime_directory()
     try:
         if permissions(directory) & 0o022:
@@ -54,7 +54,7 @@ def _answers(name: str) -> bool:
 
 
 def _connected(name: str, timeout_s: float) -> socket.socket:
-    """A connection to the twin ``name``, past its token. Raises `OSError`, `ValueError`, `LookupError`."""
+    """An authenticated connection to the twin ``name``. Raises `OSError`, `ValueError`, `LookupError`."""
     directory = runtime_directory()
     local = directory / f"{name}{SOCKET}"
     if HAS_LOCAL_SOCKETS and local.exists():
@@ -83,7 +83,7 @@ def _connected_by_tcp(announcement: Path, timeout_s: float) -> socket.socket:
 
 
 def choose(name: str | None) -> str:
-    """The running twin ``name``; None: the only one. Raises `LineFailure` or `Misuse` where it is not clear which."""
+    """The running twin ``name``; None: the only one. Raises `LineFailure` without any, `Misuse` if there are several."""
     names = running()
     if name is None:
         if not names:
@@ -102,7 +102,7 @@ def choose(name: str | None) -> str:
 class RemoteSubject:
     """The twin ``name`` that runs in another process; None: the only one that runs.
 
-    Raises `LineFailure` where it does not answer within ``timeout_s``, `Misuse` and `Refusal` as the twin itself does.
+    Raises `LineFailure` if it does not answer within ``timeout_s``; `Misuse` and `Refusal` as the twin itself.
     """
 
     def __init__(self, name: str | None = None, *, timeout_s: float = TIMEOUT_S) -> None:
@@ -183,7 +183,7 @@ class RemoteSubject:
             raise self._silent(error) from error
 
     def pump(self, timeout_s: float = 0.0) -> None:
-        """Take the events that have come; wait for some where there are none."""
+        """Take the received events; wait if there are none."""
         for message in self._messages(timeout_s):
             self._take_event(message)
             if not self._has_more():
@@ -193,7 +193,7 @@ class RemoteSubject:
         return b"\n" in self._received or bool(select.select([self._socket], [], [], 0)[0])
 
     def _messages(self, timeout_s: float) -> Iterator[dict[str, Any]]:
-        """Messages as they come; ends when none has come for ``timeout_s``. Raises `LineFailure`."""
+        """Messages as they arrive; ends after ``timeout_s`` without one. Raises `LineFailure`."""
         while True:
             while b"\n" not in self._received:
                 if len(self._received) > LONGEST_ANSWER:
@@ -232,7 +232,7 @@ def _result(message: Mapping[str, Any]) -> Result:
 
 
 class _RemoteFollowing(Following):
-    """Events that come over a connection: they are fetched when they are taken."""
+    """Events of a connection, which are fetched when they are taken."""
 
     __slots__ = ("_remote",)
 
@@ -246,6 +246,6 @@ class _RemoteFollowing(Following):
 
 
 def ask(name: str | None, wanted: command.Command, *, timeout_s: float = TIMEOUT_S) -> Any:
-    """What the twin ``name`` (None: the only one running) answers to one command. Raises as `RemoteSubject`."""
+    """The answer of the twin ``name`` (None: the only one running) to one command. Raises as `RemoteSubject`."""
     with contextlib.closing(RemoteSubject(name, timeout_s=timeout_s)) as subject:
         return subject.do(wanted).value

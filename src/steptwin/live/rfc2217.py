@@ -1,7 +1,7 @@
 """A serial port over the network, the server's side (RFC 2217 over telnet, RFC 854). No I/O.
 
-`over_network` puts it around the port of a twin: the client sees a serial port whose settings it may change. Settings that do not
-fit the line of the twin (`TwinLine`) are an event; where line timing is real nothing gets through then, in either direction.
+`over_network` wraps the port of a twin: the client sees a serial port with settings. Settings that do not match the line of
+the twin (`TwinLine`) are reported; with real line timing no data pass then, in either direction.
 """
 
 from __future__ import annotations
@@ -59,10 +59,10 @@ class TwinLine:
 
 
 class Telnet:
-    """Takes a client's stream apart: data for the device, and what is to be answered about the port.
+    """Parses a client's stream into data for the device and commands about the port, with their answers.
 
-    ``baud``, ``data_bits``, ``parity`` (1 none, 2 odd, 3 even, 4 mark, 5 space) and ``stop_bits`` (1, 2, 3 for 1.5) are what the
-    client has set; before that those of the line.
+    ``baud``, ``data_bits``, ``parity`` (1 none, 2 odd, 3 even, 4 mark, 5 space) and ``stop_bits`` (1, 2, 3 for 1.5) are set by
+    the client; at first they are those of the line.
     """
 
     def __init__(self, baud: int = 38400) -> None:
@@ -76,7 +76,7 @@ class Telnet:
 
     @property
     def settings(self) -> str:
-        """What the client has set, such as ``9600 bit/s 8E1``."""
+        """The client's settings, such as ``9600 bit/s 8E1``."""
         sizes = self._sizes
         parity, stop = sizes[PARITY], sizes[STOP_SIZE]
         return f"{self.baud} bit/s {sizes[DATA_SIZE]}{_PARITIES.get(parity, '?')}{_STOP_BITS.get(stop, '?')}"
@@ -87,7 +87,7 @@ class Telnet:
         return abs(self.baud - baud) <= BAUD_TOLERANCE * baud and (sizes[DATA_SIZE], sizes[PARITY]) == (8, 1)
 
     def receive(self, data: bytes) -> tuple[bytes, bytes]:
-        """The data in it, and the answer to the rest."""
+        """The data in the received bytes, and the answer to the commands in them."""
         if not self._command and IAC not in data:
             return data, b""
         plain = bytearray()
@@ -121,7 +121,7 @@ class Telnet:
             self._command = b""
 
     def _negotiated(self, kind: int, option: int) -> bytes:
-        """Agree to what is known, refuse the rest, and answer nothing where the state is unchanged."""
+        """Accept known options, refuse others; no answer if the state is unchanged."""
         side, agree, refuse = (self._ours, WILL, WONT) if kind in (DO, DONT) else (self._theirs, DO, DONT)
         if kind in (DO, WILL):
             if option not in OPTIONS:
@@ -205,7 +205,7 @@ class Rfc2217Port:
         return [(at, escaped(data)) for at, data in sent] if sent and self._passes() else []
 
     def _passes(self) -> bool:
-        """Whether characters get through with the present settings; an event when they do not fit."""
+        """Whether characters pass with the present settings; a notice if the settings do not match."""
         line, telnet = self._line, self._telnet
         baud = line.baud()
         if telnet.fits(baud):
@@ -226,7 +226,7 @@ class Rfc2217Port:
 
 
 class TalkingRfc2217Port(Rfc2217Port):
-    """The same of a port that speaks unasked."""
+    """The same for a port with unsolicited output."""
 
     def __init__(self, port: TalkingPort, line: TwinLine) -> None:
         super().__init__(port, line)

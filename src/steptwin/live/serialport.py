@@ -15,13 +15,13 @@ from steptwin.machine import Port
 from steptwin.system import reason
 
 RETRY_S = 1.0
-"""How often a device that has disappeared is looked for."""
+"""Interval of attempts to reopen a lost device, s."""
 
 
 class SerialLink:
-    """A serial port that a port answers on.
+    """A real serial port in front of a twin's port.
 
-    When the device disappears (a USB adapter is pulled out) it is looked for until it is back; ``notice`` is called for both.
+    If the device disappears (a USB adapter is unplugged), it is reopened when it is back; ``notice`` is called for both.
     """
 
     def __init__(self, cell: Cell, device: str, baud: int, make_port: Callable[[], Port], notice: Callable[[str], None]) -> None:
@@ -73,7 +73,7 @@ class SerialLink:
 
 
 class _Line(asyncio.Protocol):
-    """While the other end does not take what is sent, nothing is read either."""
+    """The protocol of the serial port. While the other end does not accept output, no input is read."""
 
     def __init__(self, cell: Cell, port: Port, lost: Callable[[Exception | None], None]) -> None:
         self._cell = cell

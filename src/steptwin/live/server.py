@@ -1,4 +1,4 @@
-"""A served twin: its cell, its links, its control endpoint, from start to clean end."""
+"""A served twin: its cell, links and control endpoint, from start to clean end."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from steptwin.system import process_exists, reason
 from steptwin.world.addresses import Address
 
 OTHER_FILES = 32
-"""Files that are no clients."""
+"""Open files other than clients."""
 REPEAT_S = 1.0
-"""The same notice is not given again within this time."""
+"""Time within which the same notice is not repeated, s."""
 
 
 UNTIMED = TwinLine()
@@ -42,7 +42,8 @@ MIC488, ``chip`` (a hexadecimal digit) of an M1486."""
 
 @dataclass(frozen=True, slots=True)
 class EndPoint:
-    """Where a twin listens. ``kind``: pty, serial, tcp, rtu-tcp, rfc2217, vision. ``line``: the name of the one reached there."""
+    """An address on which a twin listens. ``kind``: pty, serial, tcp, rtu-tcp, rfc2217, vision. ``line``: the name of the one
+    reached there."""
 
     kind: str
     place: str
@@ -51,7 +52,7 @@ class EndPoint:
     line: str | None = None
 
     def announced(self) -> dict[str, object]:
-        """As clients see it, in JSON."""
+        """The announcement in JSON."""
         return {"kind": self.kind, "protocol": self.protocol, "line": self.line, **self.details}
 
 
@@ -80,7 +81,7 @@ class Server:
         self._clients = Clients(max(1, allow_many_files() - OTHER_FILES), self.notice)
 
     def notice(self, text: str) -> None:
-        """Show a notice to the user, but not the same one again and again."""
+        """Show a notice to the user, but not the same one repeatedly."""
         now = asyncio.get_running_loop().time()
         self._told = {told: at for told, at in self._told.items() if now - at < REPEAT_S}
         if text not in self._told:
@@ -98,7 +99,7 @@ class Server:
         wire: TwinLine = UNTIMED,
         listen_any: bool = False,
     ) -> None:
-        """Let programs outside reach the ports that are made: ``where`` is as the transport takes it.
+        """Open a link to the ports that ``make_port`` makes; ``where`` is the value for the transport.
 
         Raises `LineFailure`, or `Misuse` for a place that is not permitted.
         """
@@ -117,7 +118,7 @@ class Server:
         file: Path | None = None,
         address: Address | None = None,
     ) -> None:
-        """Open the control endpoint of ``subject``, which was made from ``file``; over TCP too where there is an ``address``."""
+        """Open the control endpoint of ``subject``, made from ``file``; also over TCP if there is an ``address``."""
         self._name, self._controllers, self._file = name, controllers, file
         endpoint = ControlEndpoint(name, subject, address)
         await endpoint.open()
@@ -126,7 +127,7 @@ class Server:
             self.end_points.append(EndPoint("control", str(endpoint.listening), "control", {"file": str(endpoint.announcement)}))
 
     def announcement(self) -> dict[str, object]:
-        """The twin for programs that look for it: name, process, file it was made from, controllers, end points."""
+        """The announcement of the twin: name, process, file, controllers, end points."""
         return {
             "name": self._name,
             "pid": os.getpid(),
@@ -136,7 +137,7 @@ class Server:
         }
 
     def write_ready_file(self, path: Path) -> None:
-        """The `announcement` as a JSON file; whole or not there at all, removed when the server ends."""
+        """Write the `announcement` to a JSON file, atomically; it is removed when the server ends."""
         text = json.dumps(self.announcement(), indent=2) + "\n"
         fresh = path.with_name(f".{path.name}.{os.getpid()}")
         try:
@@ -149,11 +150,11 @@ class Server:
         self._ready_file = path, text
 
     def end(self) -> None:
-        """End the server because what it serves is over."""
+        """End the server normally."""
         self._ended.set()
 
     def fail(self, reason: str) -> None:
-        """End the server because it cannot go on."""
+        """End the server with an error."""
         self._failure = self._failure or reason
         self._ended.set()
 
@@ -168,7 +169,7 @@ class Server:
         self.notice(f"this process did not run for {by / SECOND:.1f} s; the time of the twin stood still meanwhile")
 
     def _trouble(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Errors without a caller: the end where machines cannot go on, else a notice."""
+        """Handle an error without a caller: end the server if machines cannot continue, else give a notice."""
         error = context.get("exception")
         if isinstance(error, SteptwinError):
             self.fail(str(error))
@@ -200,9 +201,9 @@ class Server:
 
 
 def clear_ready_file(path: Path) -> None:
-    """Remove what an ended server left behind, so that a waiting program does not take it for the new one's.
+    """Remove the ready file of an ended server, so that a waiting program does not mistake it for the new one.
 
-    Raises `Misuse` where the path is taken by another kind of file.
+    Raises `Misuse` if another kind of file is at the path.
     """
     try:
         data = read_bytes(path)

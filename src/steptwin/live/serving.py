@@ -1,4 +1,4 @@
-"""What the commands that serve twins have in common: options that mean the same for all, the choice of a face."""
+"""The common options of commands that serve twins."""
 
 from __future__ import annotations
 

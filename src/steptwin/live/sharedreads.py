@@ -1,4 +1,4 @@
-"""What one client reads at a moment, another need not have computed again."""
+"""Reads that several clients make at one moment are computed once."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steptwin.wire.slave import Device
 
 
 class _SharedReads:
-    """A unit whose answers to reads hold until time passes, signals settle or anything but a read is executed."""
+    """A unit that keeps its answers to reads until time passes, signals settle or another request is executed."""
 
     __slots__ = ("_answers", "_cell", "_execute", "_moment")
 

@@ -12,11 +12,11 @@ ENDING = tuple(
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     if (number := getattr(signal, name, None)) is not None
 )  # fmt: skip
-"""Those the system has: SIGHUP is POSIX', SIGBREAK (Ctrl-Break) is Windows'."""
+"""The ending signals of this system: SIGHUP on POSIX, SIGBREAK (Ctrl-Break) on Windows."""
 
 
 def on_end(loop: asyncio.AbstractEventLoop, act: Callable[[], object]) -> None:
-    """Call ``act`` in ``loop`` for every signal that ends a process, but for those that are ignored (nohup).
+    """Call ``act`` in ``loop`` for every signal that ends a process, except ignored ones (nohup).
 
     Where loops take no signals (Windows), the handlers are those of the process and outlive the loop.
     """

@@ -49,14 +49,14 @@ class AsyncioListener:
 
 
 class _TurnedAway(asyncio.Protocol):
-    """A client for which there is no room."""
+    """A refused client."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         cast(asyncio.Transport, transport).abort()
 
 
 class Connection(asyncio.Protocol):
-    """One client of a port. While it does not read its answers no request of it is read; its flood is served in slices."""
+    """One client of a port. While it does not read its answers, its requests are not read; large input is served in slices."""
 
     def __init__(self, cell: Cell, port: Port, clients: Clients) -> None:
         self._cell = cell
@@ -64,14 +64,14 @@ class Connection(asyncio.Protocol):
         self._clients = clients
         self._loop = asyncio.get_running_loop()
         self._received = b""
-        """What is served later: the rest of a flood, or of a client that does not read."""
+        """Input to be served later."""
         self._next: asyncio.Handle | None = None
         self._is_open = False
         clients.present.add(self)
 
     @property
     def waiting(self) -> int:
-        """Bytes that the client has no room for."""
+        """Number of bytes for which the client has no room."""
         return self._transport.get_write_buffer_size() if self._is_open else 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -95,7 +95,7 @@ class Connection(asyncio.Protocol):
             self._serve()
 
     def _serve(self) -> None:
-        """A slice of what has been received; others have their turn before the next one."""
+        """Serve a slice of the input; other clients are served before the next one."""
         self._next = None
         data, self._received = self._received[:SLICE_BYTES], self._received[SLICE_BYTES:]
         if data:
@@ -115,7 +115,7 @@ class Connection(asyncio.Protocol):
             self._transport.close()  # when its last answers have found room
 
     def write(self, data: bytes) -> None:
-        """Send; what finds no room waits for it."""
+        """Send bytes; those without room wait."""
         self._transport.write(data)
 
     def pause_writing(self) -> None:

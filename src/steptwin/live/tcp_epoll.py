@@ -17,11 +17,11 @@ from steptwin.system import reason
 from steptwin.world.addresses import Address
 
 AT_ONCE = 64
-"""Clients that are accepted before those that are there are served."""
+"""Clients accepted before the existing ones are served."""
 
 
 class Connection:
-    """One client of a port. While it does not read its answers no request of it is read; its flood is served in slices."""
+    """One client of a port. While it does not read its answers, its requests are not read; large input is served in slices."""
 
     __slots__ = (
         "__weakref__",
@@ -53,7 +53,7 @@ class Connection:
 
     @property
     def waiting(self) -> int:
-        """Bytes that the client has no room for."""
+        """Number of bytes for which the client has no room."""
         return len(self._unsent)
 
     def _serve(self) -> None:
@@ -74,7 +74,7 @@ class Connection:
                 self.close()
 
     def write(self, data: bytes) -> None:
-        """Send; what finds no room waits for it."""
+        """Send bytes; those without room wait."""
         if self._unsent:
             self._unsent += data
             return

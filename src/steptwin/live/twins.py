@@ -1,4 +1,4 @@
-"""Which device is meant: running twins and their controllers by name, by file and by the addresses they listen on.
+"""Find a device by text: running twins and their controllers by name, file or address.
 
 | text | means |
 |---|---|
@@ -6,7 +6,7 @@
 | ``mic488`` | the twin of this name |
 | ``machine.table`` | the controller ``table`` of the twin ``machine`` |
 | ``machine.toml`` | the twin that was started from this file |
-| ``127.0.0.1:5021``, ``/run/…/mic488`` | an address; of a running twin, what listens there is known |
+| ``127.0.0.1:5021``, ``/run/…/mic488`` | an address; at that of a running twin, its controllers are known |
 | ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:502`` | an address of a device |
 
 Options stand behind each of them: ``mic488,unit=2``.
@@ -30,11 +30,11 @@ from steptwin.world.kind import Selection
 from steptwin.world.kinds import KINDS
 
 PATIENCE_S = 2.0
-"""How long a twin may take to describe what it serves."""
+"""Time-out of the description of a twin, s."""
 _PREFERRED = ("tcp", "rtu-tcp", "rfc2217", "pty")
 """Links that a driver on this computer can open, the fastest first."""
 _HERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
-"""Where a twin that listens on all interfaces is reached from this computer."""
+"""Local addresses of a twin that listens on all interfaces."""
 _DESCRIPTIONS = (".toml", ".json")
 _NAME = re.compile(r"[\w-]+(\.[\w-]+)?")
 _HOST_PORT = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[\w.-]+):\d+")
@@ -45,8 +45,8 @@ _SERIAL_PORT = re.compile(r"COM\d+", re.IGNORECASE)
 class TwinController:
     """A controller of a running twin.
 
-    ``address`` is what a driver selects it by on its line; None where it is on no line. ``type``: its variant. ``places`` are
-    addresses of the line from this computer, the fastest first.
+    ``address``: its address on the line; None without a line. ``type``: its variant. ``places``: addresses of the line from
+    this computer, the fastest first.
     """
 
     twin: str
@@ -68,14 +68,15 @@ class TwinController:
         return "" if how is None or self.address is None else f"{how.option}={how.show(self.address)}"
 
     def is_meant(self, options: Mapping[str, Any]) -> bool:
-        """Whether it is what options behind a name select."""
+        """Whether the options behind a name select it."""
         how = _selection(self.kind)
         if options.get("kind", self.kind) != self.kind or options.keys() & _other_options(how):
             return False
         return how is None or options.get(how.option, self.address) == self.address
 
     def device(self, text: str, options: Mapping[str, Any]) -> DeviceAddress:
-        """Where a driver reaches it; ``text`` is how it was named. Raises `LineFailure` where no driver can."""
+        """The device address for a driver; ``text``: the user's input, for messages. Raises `LineFailure` if no driver can
+        reach it."""
         if not self.places:
             raise LineFailure(f"{self.full_name} is on no line that this computer can open: {self._why()}")
         how = _selection(self.kind)
@@ -92,7 +93,7 @@ class TwinController:
 
 @dataclass(frozen=True, slots=True)
 class Twin:
-    """A running twin as it announces itself. ``places``: addresses on this computer, with the line that is reached there."""
+    """A running twin, from its announcement. ``places``: addresses on this computer, with their lines."""
 
     name: str
     pid: int
@@ -112,7 +113,7 @@ class Twin:
 
 
 def running_twins() -> list[Twin]:
-    """The twins of this user that answer, by name. Raises `Misuse` as `running`."""
+    """The running twins of this user, by name. Raises `Misuse` as `running`."""
     found = []
     for name in running():
         with contextlib.suppress(LineFailure, Refusal):  # ended meanwhile, or suspended
@@ -150,7 +151,7 @@ def _controller(twin: str, announced: Mapping[str, Any], places: Mapping[str, st
 
 
 def _selection(kind: str) -> Selection | None:
-    """None for a kind without drivers, or one that only the other process knows."""
+    """The option that selects a controller; None for a kind without drivers, or one that only the other process knows."""
     return KINDS[kind].selection if kind in KINDS else None
 
 
@@ -163,10 +164,10 @@ def _other_options(how: Selection | None) -> set[str]:
 
 
 def find_device(text: str | None, *, whole_line: bool = False) -> DeviceAddress:
-    """Where a driver reaches the device that ``text`` names; None: the controller of the only running twin.
+    """The address of the device that ``text`` names; None: the controller of the only running twin.
 
-    ``whole_line``: where several chips of one line may be meant, none of them is selected.
-    Raises `Misuse` where it is not clear which one is meant, `LineFailure` where there is none.
+    ``whole_line``: for commands to several chips of one line, of which none is selected. Raises `Misuse` if several fit,
+    `LineFailure` if none does.
     """
     place, options = (None, dict[str, Any]()) if text is None else split_device(text)
     shown = text or ""
@@ -224,7 +225,7 @@ def find_controller(text: str | None) -> tuple[str, str | None]:
 
 
 def _named(place: str | None) -> Sequence[TwinController] | None:
-    """The controllers that a name or a file stands for; None where it is neither. Asks no other twin than the one named."""
+    """The controllers of the twin with this name or file; None if it is neither. Only that twin is queried."""
     if place is None:
         names = running()
         if len(names) > 1:
@@ -250,7 +251,7 @@ def _named(place: str | None) -> Sequence[TwinController] | None:
 
 
 def _address(place: str) -> str:
-    """The address that ``place`` is. Raises `LineFailure` for what can only be a name."""
+    """Parse ``place`` as an address. Raises `LineFailure` for text that can only be a name."""
     if "://" in place:
         return place.replace("//localhost:", "//127.0.0.1:")
     if _HOST_PORT.fullmatch(place):
@@ -263,7 +264,7 @@ def _address(place: str) -> str:
 
 
 def _is_here(address: str) -> bool:
-    """Whether a twin of this computer could be there. For other addresses no twin is asked, because one that is suspended would
+    """Whether a twin of this computer could have this address. For others no twin is queried, because a suspended one would
     delay a stop."""
     if "://" not in address:
         return os.path.realpath(address).startswith("/dev/pts/")

@@ -24,7 +24,7 @@ from steptwin.world.trace import TraceRecord
 
 REFRESH_S = 0.1
 LINES_KEPT = 200
-"""Of events and of frames; as many as the terminal has room for are shown."""
+"""Lines of events and of frames that are kept; the terminal may have room for fewer."""
 EVENTS_SHOWN = 5
 FEWEST_FRAMES = 4
 
@@ -75,7 +75,7 @@ class LiveView:
         screen.update(page(self.lines(width, height)), refresh=True)
 
     def lines(self, width: int, height: int) -> list[Text]:
-        """What the screen shows, from top to bottom: as much as it has room for."""
+        """The lines of the screen, from top to bottom, as far as there is room."""
         lines = [*self._head, Text()]
         blocks = self._blocks(width)
         for left, block in zip(range(len(blocks), 0, -1), blocks, strict=True):
@@ -103,7 +103,7 @@ class LiveView:
         return controller_lines(name, kind.state(machine, world.now), kind.datasheet(machine), width)
 
     def _axes(self) -> list[list[Text]]:
-        """Where the loads of axes are that need not be where their drives have counted to."""
+        """The positions of loads that can differ from the counts of their drives."""
         world = self._live.world
         own = {name: axis for name, axis in world.axis.items() if not world.axes[name].mechanism.build.ideal}
         if not own:

@@ -1,4 +1,4 @@
-"""A controller in the live view, whatever its kind: from its state and its data sheet."""
+"""A controller of any kind in the live view, from its state and data sheet."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def controller_lines(name: str, state: ControllerState, sheet: Datasheet, width:
 
 
 def _program(program: StateProgram) -> Text:
-    """The place in it where that is known; the next statement where only that is."""
+    """The current place in the program if known, else the next statement."""
     if program.file is not None and program.state is not None:
         where = f"{Path(program.file).name}:{program.line}  {program.statement}"
         return Text(f"program {program.state.value}, {where}", style="cyan")
@@ -80,7 +80,7 @@ def _group(prefix: str, pins: Iterable[Pin], state: ControllerState) -> Text:
 
 
 def _wrapped(parts: Iterable[Text], width: int) -> Iterator[Text]:
-    """Parts beside each other, as many in a line as it has room for."""
+    """Parts joined to lines, as many as fit."""
     line = Text()
     for part in parts:
         if line.cell_len and line.cell_len + 2 + part.cell_len > width:

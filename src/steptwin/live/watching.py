@@ -22,12 +22,12 @@ from steptwin.world.plant import WORLD
 
 BOUND = 10_000
 SETTLING_NS: Nanos = 100 * MILLISECOND
-"""What an event leads to that is none itself, as through the filter of an input, has happened so long after it."""
+"""Time after an event within which its consequences, such as through the filter of an input, have happened, ns."""
 Value: TypeAlias = bool | int | float | None
 
 
 class TwinWatch:
-    """The points ``paths`` of the controller ``machine``. ``subject`` is asked by nothing else meanwhile."""
+    """The points ``paths`` of the controller ``machine``. ``subject`` must not be used by others meanwhile."""
 
     def __init__(
         self, subject: RemoteSubject, machine: str, paths: Sequence[str], wall_ns: Callable[[], Nanos] = time.monotonic_ns
@@ -45,7 +45,7 @@ class TwinWatch:
         self._values: dict[str, tuple[Value, str]] = {}
         self._was_moving = False
         self._due: Nanos | None = None
-        """The moment of the twin until which points are read at every look; None: no more."""
+        """The moment of the twin until which points are read every time; None: no more."""
         self._begin()
 
     def _begin(self) -> None:
@@ -62,8 +62,7 @@ class TwinWatch:
         self._set_clock(int(there["time_ns"]), 0.0 if there["paused"] else there["speed"])
 
     def _set_clock(self, now: Nanos, speed: float | str | None) -> None:
-        """From now on the time of the twin goes at ``speed``. Where it stands, or goes as fast as can be, the moment is
-        asked for at every look."""
+        """Set the speed of the twin's time. If it is paused, or runs as fast as possible, the moment is read every time."""
         self._at, self._speed, self._wall = now, speed if isinstance(speed, float | int) else 0.0, self._wall_ns()
 
     def now(self) -> Nanos:
@@ -121,7 +120,7 @@ _COMPUTED = {"POS_ACT": _position, "POSITION": _position, "VEL_ACT": _velocity, 
 
 
 def _computed(point: Point | None, part: MachinePart) -> tuple[str, Callable[[Motions, str, Nanos], float]] | None:
-    """The axis of a point that follows from its plan, and how."""
+    """The axis of a point that is computed from a plan, and the function."""
     if point is None:
         return None
     path, axes = point.path.upper(), part.datasheet.axes
@@ -135,7 +134,7 @@ def _computed(point: Point | None, part: MachinePart) -> tuple[str, Callable[[Mo
 
 
 def _typed(point: Point | None, value: float | None) -> Value:
-    """Switches and whole numbers as such."""
+    """A value as bool or int if the point is of that type."""
     if value is None or point is None or not point.addresses:
         return value
     kind = point.addresses[0].type

@@ -1,4 +1,4 @@
-"""A world in real time, and the places of its lines for programs outside."""
+"""A world in real time, and the ports of its lines for other programs."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from steptwin.world.lines import LineEndPoint
 
 MOST_INPUTS = 200_000
 MOST_INPUT_BYTES = 16 << 20
-"""Where a recorded session ends, so that its memory and its file stay bounded."""
+"""Size at which a recorded session ends, so that memory and file stay bounded."""
 
 
 def announced(world: World) -> list[dict[str, object]]:
-    """The controllers of a world for programs that look for them: name, kind, line and present address there."""
+    """The announced controllers of a world: name, kind, line and present address."""
     found: list[dict[str, object]] = []
     for name, machine in world.machines.items():
         kind, on = world.kind(name), world.plan.line_of.get(name)
@@ -34,53 +34,53 @@ def announced(world: World) -> list[dict[str, object]]:
 
 
 class Companion(Protocol):
-    """What acts on a world from outside at moments of its own, exactly at these: `advance` is called with the world there."""
+    """Acts on a world from outside at exact moments: `advance` is called when the world has reached them."""
 
     def deadline(self) -> Nanos | None: ...
     def advance(self, now: Nanos) -> None: ...
 
 
 class LiveWorld:
-    """A world as a `Cell` keeps it up with real time."""
+    """A world that a `Cell` advances in real time."""
 
     def __init__(self, world: World, show: Callable[[str], None] = lambda _: None) -> None:
         self.world = world
         self.show = show
-        """Called with what the person watching should know."""
+        """Called with notices for the user."""
         self._recorded_bytes = sum(_size(given.what) for given in world.inputs)
         self._full: sessions.Session | None = None
         self.stale = True
-        """Something has happened since the deadline was found last, or may have: it has to be found anew."""
+        """Whether the deadline must be computed again, because something may have happened."""
         self._next: Nanos | None = None
-        """The deadline that was found last."""
+        """The deadline computed last, ns."""
         self._dues = _Dues(world.kernels)
         world.watch_kernels(self._changed)
         self.ring: Ring | None = None
-        """The last records, where they are kept."""
+        """The ring of last records, if kept."""
         self.subject = WorldSubject(world, self.outside)
         self.companion: Companion | None = None
         """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
-        """Called when a script has stopped it: nothing happens by itself from then on."""
+        """Called when a script has stopped the world."""
 
     @property
     def now(self) -> Nanos:
         return self.world.now
 
     def share_reads(self, cell: Cell) -> None:
-        """From now on clients that ``cell`` serves at one moment share what they read."""
+        """Let clients that ``cell`` serves at one moment share their reads."""
         for line in self.world.lines.values():
             line.serve_by(lambda devices: share_reads(devices, cell))
 
     # ------------------------------------------------------------------ what comes from outside
 
     def outside(self, what: Outside) -> None:
-        """Do something from outside at the present moment, recorded where a session was asked for. Raises `Misuse`."""
+        """Apply an input at the present moment; it is recorded if there is a session. Raises `Misuse`."""
         self.make_room(what)
         self.world.outside(what)
 
     def make_room(self, what: Outside) -> None:
-        """End the session where it has no room for one more input."""
+        """End the session if it has no room for one more input."""
         world = self.world
         if world.keeps_inputs:
             if len(world.inputs) >= MOST_INPUTS or self._recorded_bytes >= MOST_INPUT_BYTES:
@@ -96,7 +96,7 @@ class LiveWorld:
         self.show(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
 
     def session(self) -> sessions.Session:
-        """The session up to now, or up to where it was full. Raises `Misuse` where none is recorded."""
+        """The session up to now, or to the moment at which it was full. Raises `Misuse` if none is recorded."""
         if self._full is not None:
             return self._full
         if not self.world.keeps_inputs:
@@ -141,9 +141,9 @@ class LiveWorld:
 
 
 class _Dues:
-    """When something is due next in any of many kernels, without a look at each of them.
+    """The next deadline of many kernels, kept without a scan of all of them.
 
-    ``changed`` are those in which something has happened since.
+    ``changed``: kernels in which something has happened since.
     """
 
     def __init__(self, kernels: list[Kernel]) -> None:
@@ -167,7 +167,7 @@ class _Dues:
         return queue[0][0] if queue else None
 
     def advance(self, now: Nanos) -> None:
-        """Advance the kernels in which something is due by ``now``, in their order."""
+        """Advance the kernels with deadlines up to ``now``, in order."""
         while (due := self.first()) is not None and due <= now:
             kernel = self._queue[0][2]
             kernel.advance(now)
@@ -179,7 +179,7 @@ def _size(what: Outside) -> int:
 
 
 class VisionPort:
-    """A connection of a vision system to a controller: its records are inputs of the world."""
+    """A connection of a vision system; its records are inputs of the world."""
 
     broken = None
 
@@ -205,7 +205,7 @@ class VisionPort:
 
 
 class PlacePort:
-    """A place on a line for a program outside, which talks to the port of the line directly."""
+    """A port of a line for another program, which uses the line directly."""
 
     def __init__(self, live: LiveWorld, line: str, place: str, kind: str) -> None:
         world = live.world
@@ -252,7 +252,7 @@ class PlacePort:
         return answer
 
     def _recorded(self, place: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        """An exchange that goes into the session and the trace, unless it changes nothing."""
+        """An exchange that is recorded in session and trace, unless it changes nothing."""
         world, line = self._live.world, self._line
         if line.is_idle_read(place, data):
             return line.exchange_unrecorded(self._name, place, data, now)

@@ -1,4 +1,4 @@
-"""A live world as a subject: every command at the present moment, and its time, its files and its end points besides."""
+"""A live world as a subject: commands at the present moment, and commands for its time, files and end points."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 class WorldControl:
-    """What can be done with a live world. ``end_points`` are its addresses."""
+    """The commands of a live world. ``end_points``: its addresses."""
 
     def __init__(self, cell: Cell, live: LiveWorld, pace: Pace, end_points: Callable[[], object]) -> None:
         self._cell = cell
@@ -47,7 +47,7 @@ class WorldControl:
         return self._at_present(lambda: self.subject.plans(what))
 
     def _at_present(self, action: Callable[[], T]) -> T:
-        """Do something with the world at the present moment, and wake it up for what it leads to."""
+        """Apply a command at the present moment, and set the timer for its consequences."""
         self._cell.enter()
         try:
             return action()

@@ -1,4 +1,4 @@
-"""What goes over the lines of a world in words: ``up --log-frames``."""
+"""The decoded traffic of a world's lines, for ``up --log-frames``."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from steptwin.world.trace import TraceRecord
 
 
 def follow_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:
-    """Put what is exchanged on every line into words for ``sink``; ports that are made from now on are followed.
+    """Decode the traffic of every line for ``sink``; ports opened from now on are included.
 
-    Where there are several lines, a link is shown with its line: ``bus/tcp-1``.
+    With several lines, a link is shown with its line: ``bus/tcp-1``.
     """
     world = live.world
     for spec in world.spec.lines:

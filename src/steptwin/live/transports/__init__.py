@@ -1,4 +1,4 @@
-"""Transports: how programs outside reach a line. Each is a file here and a row in `steptwin.world.links`."""
+"""Transports: the ways in which programs reach a line. Each is a file here and a row in `steptwin.world.links`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a transport is: a way in which programs outside reach a line, one for each key in `steptwin.world.links`."""
+"""The contract of a transport, a way in which programs reach a line; one for each key in `steptwin.world.links`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steptwin.machine import Port
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Opening:
-    """What is to be opened."""
+    """The arguments for opening a link."""
 
     where: str
     """The value of the key: an address, a path, a device."""
@@ -23,11 +23,11 @@ class Opening:
     line: TwinLine
     """Present rate and timing of the line, and where events of the link are shown."""
     cell: Cell
-    """In which bytes that come are inputs."""
+    """The cell that takes received bytes as inputs."""
     clients: Clients
     """All clients over TCP, of which there is a limit."""
     listen_any: bool = False
-    """Whether addresses are permitted that others can reach."""
+    """Whether addresses that other computers can reach are permitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +46,6 @@ class Transport:
     is_address: bool
     """Whether the value of its key is an address on which it listens."""
     has_several: bool
-    """Whether any number of programs may use it at once; else one after the other."""
+    """Whether several programs may use it at once; else one after the other."""
     open: Callable[[Opening], Awaitable[Opened]]
-    """Raises `LineFailure`, or `Misuse` for a value that is not permitted or what the system has not."""
+    """Opens the link. Raises `LineFailure`, or `Misuse` for an invalid value or a kind of link that the system lacks."""
