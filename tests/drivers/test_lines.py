@@ -9,7 +9,8 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
-from host_rig import INTERVAL, MemoryEndpoint, Wire, async_driver, driver, run_virtual, task_line, thread_line
+from host_rig import INTERVAL, Wire, async_driver, driver, run_virtual, task_line, thread_line
+from line_rig import MemoryChannel, MemoryEndpoint, MemoryTransport
 
 from steptwin.drivers import LineLost, Mic488, NoAnswer, Overtaken, Unconfirmed
 from steptwin.drivers.blocking import finish
@@ -130,6 +131,104 @@ def test_a_waiting_motion_is_not_begun_after_a_stop() -> None:
         motion.result()
     assert [frame[:4].hex() for _, frame in wire.sent[-2:]] == ["010507d4", "01030000"]
     assert not wire.moving()
+
+
+def test_a_line_that_cannot_be_opened_says_so_when_it_is_opened() -> None:
+    wire = Wire()
+    wire.gone = "no such port"
+    with pytest.raises(LineLost, match="cannot open memory: no such port"):
+        finish(thread_line(wire).open())
+    with pytest.raises(LineLost, match="cannot open memory: no such port"):
+        run_virtual(wire, task_line(wire).open())
+
+
+def test_a_line_that_nobody_has_opened_is_opened_by_the_first_exchange() -> None:
+    wire = Wire()
+    assert words(finish(thread_line(wire).exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))) == (0,)
+    assert words(run_virtual(wire, task_line(wire).exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))) == (0,)
+    assert wire.opened == 2
+
+
+class Held(MemoryEndpoint):
+    """A port that one program has at a time."""
+
+    def __init__(self, wire: Wire) -> None:
+        super().__init__(wire)
+        self.free = 1
+
+    def open(self) -> MemoryChannel:
+        self.free -= 1
+        assert self.free == 0, "it is open already"
+        channel = super().open()
+
+        def close() -> None:
+            self.free += 1
+
+        channel.close = close  # type: ignore[method-assign]
+        return channel
+
+
+def test_a_port_is_given_back_when_its_line_is_closed_or_lost() -> None:
+    wire = Wire()
+    line = thread_line(wire)
+    line._endpoint = endpoint = Held(wire)
+    for _ in range(2):
+        finish(line.open())
+        finish(line.open())
+        finish(line.close())
+        assert endpoint.free == 1
+    finish(line.open())
+    wire.gone = "unplugged"
+    with pytest.raises(LineLost):
+        finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+    wire.gone = None
+    endpoint.free = 1
+    finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+    assert endpoint.free == 0
+
+
+def test_a_line_that_is_closed_during_an_exchange_ends_it() -> None:
+    """From another thread, while this one waits for its answer."""
+    wire = Wire()
+    line = thread_line(wire)
+    finish(line.open())
+    wire.severed = True
+    waited = []
+
+    def close() -> None:
+        waited.append(line._engine.in_flight)
+        wire.before_read = None
+        finish(line.close())
+
+    wire.before_read = close
+    with pytest.raises(LineLost, match="the line memory was closed"):
+        finish(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+    assert waited == [True]
+    assert not line._engine.busy
+
+
+def test_a_thread_that_waits_for_a_lock_says_so_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("steptwin.drivers.threads.LOCK_SLICE_S", 0.001)
+    line = thread_line(Wire())
+    said = threading.Semaphore(0)
+    entered = threading.Event()
+
+    async def enter() -> None:
+        async with line.lock("turn", said.release):
+            entered.set()
+
+    async def hold() -> None:
+        async with line.lock("turn"):
+            thread.start()
+            for _ in range(3):
+                assert said.acquire(timeout=60)
+            assert not entered.is_set()
+
+    thread = threading.Thread(target=lambda: finish(enter()))
+    finish(hold())
+    thread.join(60)
+    assert entered.is_set()
+    finish(enter())  # it was given back
 
 
 def test_what_is_refused_is_refused_at_once_whoever_else_waits() -> None:
@@ -344,8 +443,12 @@ def test_a_lost_connection_is_made_again_for_those_who_wait() -> None:
             endpoint = line._endpoint
             assert isinstance(endpoint, MemoryEndpoint)
             assert endpoint.transport is not None
-            endpoint.transport.lose(ConnectionResetError(104, "Connection reset by peer"))
+            lost, begin = endpoint.transport, line.now()
+            lost.lose(ConnectionResetError(104, "Connection reset by peer"))
             assert await asyncio.gather(*reads) == [(n,) for n in range(5)]
+            assert line.now() - begin < 10 * INTERVAL, "at once, not when the time-out is over"
+            lost._protocol.data_received(b"HTTP/1.0 400 Bad Request\r\n")  # what an old connection says is not heard
+            assert await mic.registers(7, 1) == (7,)
 
     run_virtual(wire, main())
     assert wire.opened == 2
@@ -378,8 +481,13 @@ def test_what_is_no_modbus_ends_the_connection_and_a_new_one_serves() -> None:
 
     async def main() -> None:
         async with async_driver(line, wire) as mic:
+            endpoint = line._endpoint
+            assert isinstance(endpoint, MemoryEndpoint)
+            useless = endpoint.transport
+            assert useless is not None
             wire.inject(b"HTTP/1.0 400 Bad Request\r\n")
             assert await mic.registers(0, 1) == (0,)
+            assert useless.is_closing()
 
     run_virtual(wire, main())
     assert wire.opened == 2
@@ -438,3 +546,102 @@ def test_timers_do_not_pile_up() -> None:
             return most
 
     assert run_virtual(wire, main()) <= 4
+
+
+def test_a_line_that_is_closed_while_it_waits_for_an_answer_gives_up_in_time_when_it_is_opened_again() -> None:
+    wire = Wire()
+    line = task_line(wire)
+
+    async def main() -> None:
+        await line.open()
+        wire.severed = True
+        for _ in range(2):
+            asked = asyncio.create_task(line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT)))
+            await asyncio.sleep(0.01)
+            await line.close()
+            with pytest.raises(LineLost):
+                await asked
+            await line.open()
+        begin = line.now()
+        with pytest.raises(NoAnswer):
+            await line.exchange(Job(Query(1, ReadRequest(3, 0, 1)), TIMEOUT))
+        assert line.now() - begin == pytest.approx(TIMEOUT, abs=INTERVAL)
+
+    run_virtual(wire, main())
+
+
+class Slow(MemoryEndpoint):
+    """It takes a second to open, and may never say that it has been closed."""
+
+    is_silent = False
+
+    async def connect(self, make: Callable[[], asyncio.Protocol]) -> MemoryTransport:
+        await asyncio.sleep(1.0)
+        transport = await super().connect(make)
+        if self.is_silent:
+            transport.close = lambda: None  # type: ignore[method-assign]
+        return transport
+
+
+def test_a_line_that_is_closed_while_it_is_opened_is_not_open() -> None:
+    wire = Wire()
+    line = task_line(wire)
+    line._endpoint = endpoint = Slow(wire)
+
+    async def main() -> None:
+        opening = asyncio.create_task(line.open())
+        await asyncio.sleep(0.5)
+        await line.close()
+        await opening
+        assert endpoint.transport is not None
+        assert endpoint.transport.is_closing()
+
+    run_virtual(wire, main())
+
+
+@pytest.mark.parametrize(("is_silent", "seconds"), [(False, 0.0), (True, 1.0)])
+def test_the_other_end_is_given_a_second_to_close(is_silent: bool, seconds: float) -> None:
+    wire = Wire()
+    line = task_line(wire)
+    line._endpoint = endpoint = Slow(wire)
+    endpoint.is_silent = is_silent
+
+    async def main() -> None:
+        await line.open()
+        begin = line.now()
+        await line.close()
+        assert line.now() - begin == round(seconds * SECOND)
+        assert endpoint.transport is not None
+        assert endpoint.transport.is_closing()
+
+    run_virtual(wire, main())
+
+
+@pytest.mark.parametrize("ticks", range(6))
+def test_a_task_that_is_cancelled_while_it_waits_for_a_lock_does_not_keep_it(ticks: int) -> None:
+    """Whether it has just been given the lock or not."""
+    line = task_line(Wire())
+    entered: list[str] = []
+    said: list[int] = []
+
+    async def enter(name: str) -> None:
+        async with line.lock("turn", lambda: said.append(line.now())):
+            entered.append(name)
+
+    async def main() -> None:
+        async with line.lock("turn"):
+            waiting = asyncio.create_task(enter("cancelled"))
+            await asyncio.sleep(3.5)
+        for _ in range(ticks):
+            await asyncio.sleep(0)
+        if waiting.done():
+            return
+        waiting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await waiting
+        assert entered == []
+        await enter("another")
+        assert entered == ["another"]
+
+    run_virtual(Wire(), main())
+    assert len(said) == 3, "each second"

@@ -9,7 +9,7 @@ import pytest
 from steptwin.drivers.exchange import LineLost, SendNext
 from steptwin.drivers.modbus import LATE_NS, NOISE_NS, QUIET_NS, Query, RtuMaster, TcpMaster, bits, check_unit, words
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND
+from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
 from steptwin.wire import mbap, rtu
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import (
@@ -382,3 +382,23 @@ def test_units() -> None:
     for unit, tcp in ((0, False), (248, False), (256, True), (-1, True)):
         with pytest.raises(Misuse, match=f"unit {unit} is outside"):
             check_unit(unit, tcp=tcp)
+
+
+def test_tcp_an_answer_in_pieces_is_observed_too() -> None:
+    heard: list[tuple[int, FrameDirection, bytes]] = []
+    master = TcpMaster(on_frame=lambda now, way, data: heard.append((now, way, data)))
+    query = Query(1, ReadRequest(3, 0, 1))
+    sent = master.start(query, 10, urgent=False)
+    answer = sent[:4] + bytes.fromhex("0005 01 03 02 00 07")
+    assert master.receive(answer[:5], 11) is None
+    assert master.receive(answer[5:], 12) == bytes.fromhex("03020007")
+    assert heard == [(10, FrameDirection.IN, sent), (12, FrameDirection.OUT, answer)]
+
+
+def test_rtu_noise_keeps_the_line_for_a_fifth_of_a_second_at_most() -> None:
+    master = RtuMaster()
+    master.start(Query(1, ReadRequest(3, 0, 1)), 0, urgent=False)
+    master.abandon(0)
+    for now in range(0, SECOND, 5 * MILLISECOND):
+        master.stray(b"x", now)
+    assert master.free_ns == SECOND // 5

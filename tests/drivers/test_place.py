@@ -25,7 +25,8 @@ def test_addresses() -> None:
     assert (str(found.endpoint), found.framed) == ("rtu-tcp://[::1]:5021", False)
     found = parse_line_address("/dev/ttyUSB0", 9600)
     assert (found.endpoint, found.framed, found.serial) == (SerialEndpoint("/dev/ttyUSB0", 9600), False, SerialLine(9600))
-    assert str(parse_line_address("rfc2217://127.0.0.1:2217", 9600).endpoint) == "rfc2217://127.0.0.1:2217"
+    found = parse_line_address("rfc2217://127.0.0.1:2217", 9600)
+    assert (str(found.endpoint), found.framed, found.serial) == ("rfc2217://127.0.0.1:2217", False, SerialLine(9600))
     assert str(parse_line_address("COM3", 9600).endpoint) == "COM3"
 
 
@@ -88,6 +89,8 @@ def test_a_socket_is_read_with_a_time_out(
     def talk(client: socket.socket) -> None:
         assert client.recv(9) == b"ask"
         client.sendall(b"answer")
+        assert client.recv(9) == b"again"
+        client.sendall(b"another")
         go.wait(60)
 
     channel = parse_line_address(listener(talk), 38400).endpoint.open()
@@ -95,7 +98,11 @@ def test_a_socket_is_read_with_a_time_out(
     assert channel.read(0.01) == b""
     channel.write(b"ask")
     assert channel.read(60.0) == b"answer"
+    channel.write(b"again")
+    assert channel.read(30.0) == b"another"
     assert channel.read(-1.0) == b""
+    assert channel._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+    assert channel._socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
     with pytest.raises(LineLost, match="the other end takes nothing any more"):
         channel.write(bytes(100 << 20))
     go.set()
@@ -136,4 +143,30 @@ def test_a_port_is_read_with_a_time_out() -> None:
                 channel.read(0.1)
         channel.close()
     finally:
+        os.close(slave)
+
+
+def test_a_port_is_used_by_tasks() -> None:
+    master, slave = os.openpty()
+    heard = bytearray()
+    whole = asyncio.Event()
+
+    class Hears(asyncio.Protocol):
+        def data_received(self, data: bytes) -> None:
+            heard.extend(data)
+            if heard == b"answer":
+                whole.set()
+
+    async def main() -> None:
+        transport = await parse_line_address(os.ttyname(slave), 38400).endpoint.connect(Hears)
+        transport.write(b"ask")
+        assert await asyncio.to_thread(os.read, master, 9) == b"ask"
+        os.write(master, b"answer")
+        await asyncio.wait_for(whole.wait(), 60)
+        transport.close()
+
+    try:
+        asyncio.run(main())
+    finally:
+        os.close(master)
         os.close(slave)

@@ -31,7 +31,7 @@ class TaskLine(Generic[Q, A]):
         self._ended = asyncio.Event()  # set when that is no more
         self._opening: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._timer_ns: Nanos = 0
+        self._timer_ns: Nanos  # when it comes
         self._closed = False
         self._locks: dict[Hashable, asyncio.Lock] = {}
 
@@ -58,7 +58,6 @@ class TaskLine(Generic[Q, A]):
         connection = self._connection = _LineConnection(self)
         self._ended.clear()
         transport = await self._endpoint.connect(lambda: connection)
-        self._loop = asyncio.get_running_loop()
         if self._closed:
             transport.abort()
         else:

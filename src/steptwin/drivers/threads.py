@@ -99,15 +99,15 @@ class ThreadLine(Generic[Q, A]):
             self._drop(error)
 
     def _turn(self, job: Job[Q, A]) -> None:
-        engine = self._engine
-        channel = self._channel
         if self._closed:
             self._end()
-            return
-        if channel is None:
-            channel = self._reopened()
-            if channel is None:
-                return
+        elif self._channel is None:
+            self._reopen()
+        else:
+            self._exchange(self._channel, job)
+
+    def _exchange(self, channel: Channel, job: Job[Q, A]) -> None:
+        engine = self._engine
         now = self.now()
         data = engine.step(now)
         if data:
@@ -124,13 +124,12 @@ class ThreadLine(Generic[Q, A]):
         if received:
             engine.receive(received, self.now())
 
-    def _reopened(self) -> Channel | None:
-        """Open the line again; on failure end all jobs with the error. Returns whether it is open."""
+    def _reopen(self) -> None:
+        """Open the line again; on failure end all jobs with the error."""
         try:
             self._channel = self._endpoint.open()
         except LineLost as error:
             self._engine.fail_all(error)
-        return self._channel
 
     def _drop(self, error: LineLost) -> None:
         channel, self._channel = self._channel, None

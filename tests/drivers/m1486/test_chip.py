@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 from chip_rig import ChipWire, Fault, chip_driver, chip_line
@@ -228,30 +226,6 @@ def test_a_shared_line_stays_open_when_a_driver_of_it_is_closed() -> None:
         pass
     with M1486(line, 7) as chip:
         assert chip.counter() == 0
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"timeout_s": 0.0}, "a time-out of 0 s is outside 0 to 60 s"),
-        ({"timeout_s": 60.5}, "a time-out of 60.5 s is outside"),
-        ({"timeout_s": math.nan}, "a time-out of nan s is outside"),
-        ({"address": 16}, "address 16: permitted are 0 to 15"),
-        ({"address": -1}, "address -1: permitted are 0 to 15"),
-        ({"steps_per_unit": 0.0}, "steps_per_unit = 0: must be above 0"),
-        ({"steps_per_unit": math.inf}, "steps_per_unit = inf: must be above 0"),
-        ({"steps_per_unit": -math.inf}, "steps_per_unit = -inf: must be above 0"),
-        ({"origin_u": -1}, "origin_u = -1: permitted are 0 to 16000000 minimum microsteps"),
-        ({"origin_u": 16_000_001}, "origin_u = 16000001: permitted are"),
-        ({"variant": "Z"}, "'Z'"),
-    ],
-)
-def test_what_no_chip_has_is_refused_before_anything_is_opened(options: dict[str, Any], message: str) -> None:
-    wire = ChipWire("B")
-    with pytest.raises(Misuse, match=message):
-        M1486(chip_line(wire), **options)
-    for kept in ({"timeout_s": 60.0}, {"address": 0}, {"address": 15}, {"origin_u": 0}, {"origin_u": 16_000_000}):
-        M1486(chip_line(wire), **kept)  # type: ignore[arg-type]
 
 
 def test_the_type_of_a_chip_that_is_not_there_any_more_is_to_be_found_anew() -> None:

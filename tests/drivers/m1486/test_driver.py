@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import pytest
-from chip_rig import ChipWire, chip_driver, chip_line
+from chip_rig import ChipWire, Fault, chip_driver, chip_line
 
 from steptwin.drivers import Unconfirmed
 from steptwin.drivers.m1486 import (
@@ -21,9 +22,11 @@ from steptwin.drivers.m1486 import (
     PositionUnknown,
     Restarted,
 )
+from steptwin.drivers.m1486.settings import after_reset
 from steptwin.drivers.m1486.sync import download_to
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.errors import LineFailure, Misuse
+from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.machine import SECOND
 
@@ -197,7 +200,193 @@ def test_a_move_that_is_late_is_overdue() -> None:
     assert chip.wait().reason is ChipReason.TARGET
 
 
+def test_a_move_of_nothing_is_over_at_once_and_types_nothing() -> None:
+    """R would make the move before once more."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.move_by(700.0)
+    chip.wait()
+    wire.sent.clear()
+    for move in (lambda: chip.move_by(0.0), lambda: chip.move_to(700.0)):
+        move()
+        end = chip.wait()
+        assert (end.reason, end.position) == (ChipReason.TARGET, 700.0)
+    assert not {"r", "h"} & set(typed(wire).split())
+    assert wire.true() == 700 * 64
+
+
+def test_settings_typed_by_hand_are_known_again() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    function = chip._driver._unit.notes.function
+    chip.configure(**KNOWN)
+    chip.command("s300")
+    assert (chip.settings.start_stop, chip.settings.velocity) == (300, KNOWN["velocity"])
+    chip.set_variable(400)
+    chip.command("v")
+    assert chip.settings.velocity is None, "it is what the variable was"
+    for text, on in (("c51", False), ("t51", True), ("c52", True)):
+        chip.command(text)
+        assert function(51) is on, text
+    assert function(52) is False
+
+
+@pytest.mark.parametrize(("command", "is_once"), [("+5", True), (":5", False)])
+def test_a_command_whose_cr_may_have_been_heard_is_typed_again_where_that_does_no_harm(command: str, is_once: bool) -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    wire.put(Fault("to host", len("u20|B") + len(command), "drop"))
+    if is_once:
+        with pytest.raises(LineFailure, match="it is not known whether"):
+            chip.command(command)
+    else:
+        chip.command(command)
+    assert wire.faults[0].met
+    assert chip.variable() == 5
+
+
+def test_what_is_reset_by_force_brakes_before() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.run(1)
+    wire.sent.clear()
+    chip.reset(force=True)
+    assert typed(wire).split()[0] == "k"
+    assert not wire.moving()
+
+
+def test_a_block_that_is_one_command_too_large() -> None:
+    """2032 bits, of which eight are the end of the file and eight are kept free."""
+    chip = chip_driver(ChipWire("B"))
+    most = (2032 - 8 - 8 - memory_bits("U")) // memory_bits("R")
+    with pytest.raises(Misuse, match="the block is larger than the command memory"):
+        chip.run_block(["r"] * (most + 1))
+
+
 # ---------------------------------------------------------------------- programs
+
+
+def test_a_program_whose_chip_was_recovered_is_not_held_any_more() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.set_function(51, False)
+    chip.download("[\n@3\nF64000\nR\nJ3\n]")
+    wire.sleep(0.3)
+    chip.stop()
+    wire.sleep(1.0)
+    with pytest.raises(Busy, match="is held by Kill because its function 51 is OFF"):
+        chip.counter()
+    chip.recover()
+    with pytest.raises(Busy, match="is not done with a block of commands"):
+        chip.counter()
+
+
+@pytest.mark.parametrize(("function", "is_recovered"), [(True, False), (False, True), (None, True)])
+def test_a_program_that_is_ended_is_recovered_unless_the_chip_does_so_itself(function: bool | None, is_recovered: bool) -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    if function is not None:
+        chip.set_function(51, function)
+    chip.download("[\n@3\nF640\nR\nJ3\n]")
+    wire.sleep(1.0)
+    if function is None:
+        chip._driver._unit.notes.functions = None
+    wire.sent.clear()
+    chip.stop_program()
+    assert ("c75" in typed(wire).split()) is is_recovered
+    wire.sleep(5.0)
+    assert not wire.moving()
+    assert not chip.is_busy()
+
+
+def test_a_program_that_wrong_data_does_not_end_is_told_in_the_time_given() -> None:
+    """Function 44 ON."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.set_function(44, True)
+    chip.set_function(51, False)
+    chip.download("[\n@3\nF640\nR\nW100\nJ3\n]")
+    wire.sleep(1.0)
+    for options, seconds in (({}, 10.0), ({"timeout_s": 3.0}, 3.0)):
+        begin = wire.now
+        with pytest.raises(Busy, match="memory: the chip continues: function 44 is ON, LIMIT is low, or it is still braking"):
+            chip.stop_program(**options)
+        assert seconds <= (wire.now - begin) / SECOND < seconds + 0.95
+    with pytest.raises(Busy, match="the chip does not answer yet"):
+        chip.counter()
+
+
+@pytest.mark.parametrize("kind", ["A", "B"])
+def test_questions_between_commands_come_when_the_buffer_may_be_full_and_not_before(kind: str) -> None:
+    """What may lie in the input buffer leaves room for a question and three characters more."""
+    wire = ChipWire(kind)
+    chip = chip_driver(wire)
+    room = chip.variant.input_bits // 8 - 3 - len("u20|")
+    lines = [f"f{10**n * 64 // 64 * 64}" if n % 2 else "t80" for n in (0, 1, 2, 3, 1, 2, 0, 0, 3, 1, 0, 2, 2, 1, 3, 0, 0, 1)] * 3
+    wire.sent.clear()
+    chip.download("\n".join(lines))
+    pieces = [piece.split() for piece in typed(wire).split("u20 ")[1:]]
+    assert [line for piece in pieces for line in piece] == lines
+    for piece, following in pairwise(pieces):
+        held = sum(len(line) + 1 for line in piece)
+        assert held <= room or len(piece) == 1
+        assert held + len(following[0]) + 1 > room
+
+
+def test_a_program_may_stop_the_motor_at_once() -> None:
+    """K is not put behind what waits in the chip."""
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.download("g+\nr\nk\n")
+    wire.sleep(2.0)
+    assert not wire.moving()
+    assert typed(wire).split()[-1] == "k"
+
+
+def test_a_program_that_resets_the_chip_waits_for_what_it_does_and_leaves_it_as_at_power_up() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.configure(**KNOWN)
+    chip.download("f640\nr\n\\\nt80")
+    assert wire.codes().count("moves") == 1
+    assert wire.true() == 640
+    assert chip.counter() == 0
+    assert chip.flags()[80]
+
+
+def test_settings_after_a_reset_are_those_of_power_up() -> None:
+    chip = chip_driver(ChipWire("B", interface=DUAL_DAC))
+    chip.configure(**KNOWN)
+    chip.reset()
+    assert chip.settings == after_reset(chip.variant, DUAL_DAC)
+    assert chip.settings != ChipSettings()
+
+
+def test_a_chip_that_takes_no_more_for_a_minute_is_told() -> None:
+    wire = ChipWire("A")
+    chip = chip_driver(wire)
+    begin = wire.now
+    with pytest.raises(Busy, match="memory: the chip takes no more: it is not done with a block of commands"):
+        chip.download("g+\nr\n" + "f64\n" * 10)
+    assert 60.0 <= (wire.now - begin) / SECOND < 65.0
+
+
+def test_a_program_is_not_typed_into_a_chip_that_moves() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.run(1)
+    wire.sent.clear()
+    with pytest.raises(Busy):
+        chip.download("t80")
+    assert "t80" not in typed(wire)
+
+
+def test_a_byte_that_came_in_time_is_taken_at_the_end_of_the_time() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.download("[\nW1000\nU2\n]")
+    wire.sleep(5.0)
+    assert chip.uploaded(1, timeout_s=0.0) == b"\0"
 
 
 def test_a_block_is_done_when_its_last_command_is() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import pytest
 from host_rig import Wire, driver, spindles
@@ -301,3 +302,49 @@ def test_a_ramp_that_no_axis_has_is_refused_before_it_is_sent() -> None:
     assert wire.sent == []
     mic.axis(1).set_ramp(velocity=640.0)
     assert mic.get("M1_VMAX") == {"M1_VMAX": 640.0}
+
+
+def test_drives_are_switched_one_by_one_and_together() -> None:
+    wire = Wire()
+    mic = driver(wire)
+
+    def on() -> list[bool]:
+        return [axis.status != AxisStatus.OFF for axis in wire.twin.axes]
+
+    mic.axis(2).enable()
+    assert on() == [False, True, False, False]
+    mic.enable(1, 4)
+    assert on() == [True, True, False, True]
+    mic.axis(2).disable()
+    mic.disable(4)
+    assert on() == [True, False, False, False]
+    mic.enable()
+    assert on() == [True] * 4
+    mic.disable()
+    assert on() == [False] * 4
+
+
+def test_whatever_stops_goes_before_what_waits_and_is_sent_five_times() -> None:
+    _, mic = ready()
+    unit = mic._driver._unit
+    asked: list[tuple[str, bool, int | None]] = []
+    inner = unit.write
+
+    async def write(item: Any, value: Any, **options: Any) -> None:
+        asked.append((item.name, options.get("urgent", False), options.get("most")))
+        await inner(item, value, **options)
+
+    unit.write = write  # type: ignore[method-assign]
+    mic.axis(1).stop()
+    mic.axis(1).disable()
+    mic.axis(1).jog_bit(1, on=False)
+    mic.stop_all()
+    mic.disable(1, 2)
+    assert [(urgent, most) for _, urgent, most in asked] == [(True, 5)] * 5, asked
+
+
+@pytest.mark.parametrize("velocity", [-640.0, 640.0])
+def test_the_fastest_motions_that_there_are(velocity: float) -> None:
+    wire, mic = ready()
+    mic.axis(1).move_velocity(velocity)
+    assert wire.moving()

@@ -144,7 +144,11 @@ def test_axes_begin_together() -> None:
     mic.move_together({1: 10.0, 3: 20.0})
     starts = {axis: wire.twin.axes[axis - 1].profile.start for axis in (1, 3)}
     assert starts[1] == starts[3]
-    assert {end.position_u for end in mic.wait(1, 3).values()} == {10.0, 20.0}
+    ends = mic.wait(1, 3)
+    assert {axis: (end.reason, end.position_u) for axis, end in ends.items()} == {
+        1: (Reason.TARGET, 10.0),
+        3: (Reason.TARGET, 20.0),
+    }
     mic.move_together_by({1: 1.0, 3: -1.0})
     mic.wait()
     mic.run_together({1: 2.0, 3: -2.0})
@@ -333,6 +337,9 @@ def test_who_is_what() -> None:
     assert (mic.place, mic.unit, mic.firmware, mic.config) == ("memory", 1, "1.70", spindles())
     with pytest.raises(Misuse, match="unit 0 is outside 1 to 247"):
         Mic488(thread_line(Wire()), 0)
+    with pytest.raises(Misuse, match="unit 256 is outside 0 to 255"):
+        Mic488(thread_line(Wire(tcp=True)), 256)
+    assert [Mic488(thread_line(Wire(tcp=True)), unit).unit for unit in (0, 255)] == [0, 255]
     with pytest.raises(Misuse, match="a time-out of 0 s is outside"):
         Mic488(thread_line(Wire()), timeout_s=0.0)
     assert driver(Wire(config=ControllerConfig()), config=None).config is None
@@ -428,3 +435,16 @@ def test_a_jog_that_is_released_too_late_does_not_stop_what_another_master_moves
     assert str(jog.end).startswith("M1: not held (5.")
     wire.rest()
     assert wire.position() == 2000
+
+
+@pytest.mark.parametrize("output", [1, 8])
+def test_outputs_from_the_first_to_the_last(output: int) -> None:
+    wire = Wire()
+    mic = driver(wire)
+    mic.set_output(output, True)
+    assert [number for number, on in enumerate(wire.twin.outputs, start=1) if on] == [output]
+    assert mic.outputs()[output - 1]
+    with pytest.raises(Misuse, match="9"):
+        mic.set_output(9, True)
+    with pytest.raises(Misuse, match="0"):
+        mic.set_output(0, True)

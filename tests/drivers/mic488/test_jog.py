@@ -134,6 +134,88 @@ def test_one_lost_frame_is_not_felt() -> None:
                 assert speed(wire) == pytest.approx(5.0)
 
 
+def test_a_line_cut_when_it_is_to_begin_leaves_it_in_doubt() -> None:
+    wire, mic = ready()
+
+    def cut(frame: bytes) -> None:
+        wire.severed = wire.severed or (frame[1] == 16 and "VMAX" not in mic._driver._unit.wording.request(frame[1:-2]))
+
+    wire.before_each = cut
+    jog = mic.axis(1).jog(5.0)
+    with pytest.raises(Unconfirmed, match=rf"^M1 may have begun to jog: .*most {REACH:g} mm after it was held last, 0.00 s ago"):
+        jog.__enter__()
+    wire.before_each, wire.severed = None, False
+    wire.rest()
+    assert not wire.moving()
+
+
+def test_one_that_was_not_released_in_time_is_not_stopped_afterwards() -> None:
+    """It is at rest by then, and may be moved by another program."""
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        wire.sleep(5.0)
+        wire.sent.clear()
+    assert jog.end is not None
+    assert (jog.end.reason, jog.end.axis, jog.end.unit) == (Reason.NOT_HELD, 1, "mm")
+    assert jog.end.after_s == pytest.approx(5.0, abs=0.2)
+    assert str(jog.end) == f"M1: not held ({jog.end.after_s:.2f} s since it was held)"
+    assert all("VEL_ABS" not in mic._driver._unit.wording.request(frame[1:-2]) for _, frame in wire.sent)
+
+
+def test_one_that_another_program_has_moved_on_is_not_held_any_more() -> None:
+    _, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        assert jog.hold()
+        mic.set("M1_POS_REL", 0.0)
+        assert mic.axis(1).wait().ok
+        assert not jog.hold()
+    assert jog.end is not None
+    assert jog.end.reason is Reason.NOT_HELD
+
+
+def test_what_goes_wrong_in_the_block_does_not_hide_that_it_cannot_be_stopped() -> None:
+    wire, mic = ready()
+
+    def cut() -> None:
+        with mic.axis(1).jog(5.0):
+            wire.severed = True
+            raise ValueError("in the block")
+
+    with pytest.raises(Unconfirmed, match="M1 cannot be stopped") as caught:
+        cut()
+    context = caught.value.__context__
+    while context is not None and not isinstance(context, ValueError):
+        context = context.__context__
+    assert str(context) == "in the block"
+
+
+def test_after_a_jog_that_was_left_alone_its_end_can_be_waited_for() -> None:
+    wire, mic = ready()
+    jog = mic.axis(1).jog(5.0)
+    jog.__enter__()
+    end = mic.axis(1).wait()
+    assert end.reason is Reason.TARGET
+    assert end.position_u == pytest.approx(REACH)
+    assert not wire.moving()
+
+
+@pytest.mark.parametrize("hold_s", [0.2, 2.0])
+def test_hold_times(hold_s: float) -> None:
+    wire, mic = ready()
+    jog = mic.axis(1).jog(5.0, hold_s=hold_s)
+    jog.__enter__()
+    wire.rest()
+    assert wire.position() == pytest.approx((5.0 * hold_s + 5.0**2 / (2 * 50.0)) * 100, abs=1)
+
+
+@pytest.mark.parametrize("hold_s", [0.19, 2.01, float("nan")])
+def test_hold_times_that_are_none(hold_s: float) -> None:
+    _, mic = ready()
+    with pytest.raises(Misuse, match=r"a hold time of .* s is outside 0.2 to 2 s"):
+        mic.axis(1).jog(5.0, hold_s=hold_s)
+
+
 def test_a_limit_ends_it() -> None:
     wire, mic = ready()
     with mic.axis(1).jog(-20.0) as jog:
