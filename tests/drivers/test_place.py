@@ -101,6 +101,7 @@ def test_a_socket_is_read_with_a_time_out(
     channel.write(b"again")
     assert channel.read(30.0) == b"another"
     assert channel.read(-1.0) == b""
+    assert isinstance(channel, SocketChannel)
     assert channel._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
     assert channel._socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
     with pytest.raises(LineLost, match="the other end takes nothing any more"):

@@ -237,7 +237,7 @@ def test_a_command_whose_cr_may_have_been_heard_is_typed_again_where_that_does_n
     chip = chip_driver(wire)
     wire.put(Fault("to host", len("u20|B") + len(command), "drop"))
     if is_once:
-        with pytest.raises(LineFailure, match="it is not known whether"):
+        with pytest.raises(LineFailure, match="it is unknown whether"):
             chip.command(command)
     else:
         chip.command(command)
@@ -366,7 +366,7 @@ def test_a_chip_that_takes_no_more_for_a_minute_is_told() -> None:
     wire = ChipWire("A")
     chip = chip_driver(wire)
     begin = wire.now
-    with pytest.raises(Busy, match="memory: the chip takes no more: it is not done with a block of commands"):
+    with pytest.raises(Busy, match="memory: the chip takes no more characters: it is not done with a block of commands"):
         chip.download("g+\nr\n" + "f64\n" * 10)
     assert 60.0 <= (wire.now - begin) / SECOND < 65.0
 
