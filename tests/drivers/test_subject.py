@@ -473,8 +473,8 @@ def test_of_an_m1486_only_what_was_asked_for_is_followed(drum: DeviceSubject, ri
     rig.time.sleep(1.0)
     states.take()
     asked = "".join(event.text for event in frames.take().events)
-    assert "75 32 30" in asked, "u20: is it at rest"
-    assert "75 31" not in asked, "u1: the counter is of no use to whoever follows states"
+    assert "U20 " in asked, "is it at rest"
+    assert "U1 " not in asked, "the counter is of no use to whoever follows states"
 
 
 def test_an_m1486_that_begins_to_move_while_it_is_looked_at(
