@@ -1,4 +1,4 @@
-"""Where ``steptwin serve`` listens without being told."""
+"""Where ``steptwin serve`` listens: as its options say, or without any."""
 
 from __future__ import annotations
 
@@ -10,23 +10,29 @@ from typer.testing import CliRunner
 
 from steptwin.cli import app
 
+ANYWHERE = "127.0.0.1:0"
+
 
 @pytest.mark.parametrize(
     ("device", "option", "expected"),
     [
-        ("mic488", [], ("mic488", "127.0.0.1:5020", "127.0.0.1:5021")),
-        ("mic488", ["--listen-any"], ("mic488", "0.0.0.0:5020", "0.0.0.0:5021")),
-        ("mic488", ["--tcp", "127.0.0.1:0"], (None, "127.0.0.1:0", None)),
-        ("m1486", [], ("m1486", "127.0.0.1:5022", None)),
-        ("m1486", ["--listen-any"], ("m1486", "0.0.0.0:5022", None)),
+        ("mic488", [], {"pty": "mic488", "tcp": "127.0.0.1:5020", "rtu_tcp": "127.0.0.1:5021"}),
+        ("mic488", ["--listen-any"], {"pty": "mic488", "tcp": "0.0.0.0:5020", "rtu_tcp": "0.0.0.0:5021"}),
+        ("mic488", ["--tcp", ANYWHERE], {"tcp": ANYWHERE}),
+        ("mic488", ["--rtu-tcp", ANYWHERE, "--pty", "here/line"], {"rtu_tcp": ANYWHERE, "pty": "line"}),
+        ("mic488", ["--rfc2217", ANYWHERE], {"rfc2217": ANYWHERE}),
+        ("mic488", ["--serial", "COM3"], {"serial": "COM3"}),
+        ("m1486", [], {"pty": "m1486", "tcp": "127.0.0.1:5022"}),
+        ("m1486", ["--listen-any"], {"pty": "m1486", "tcp": "0.0.0.0:5022"}),
+        ("m1486", ["--rfc2217", ANYWHERE], {"rfc2217": ANYWHERE}),
+        ("m1486", ["--serial", "COM3", "--tcp", ANYWHERE], {"serial": "COM3", "tcp": ANYWHERE}),
     ],
 )
-def test_end_points_without_addresses(
-    monkeypatch: pytest.MonkeyPatch, device: str, option: list[str], expected: tuple[str | None, ...]
+def test_links_are_those_of_the_options_or_the_usual_ones(
+    monkeypatch: pytest.MonkeyPatch, device: str, option: list[str], expected: dict[str, str]
 ) -> None:
     served: list[Any] = []
     monkeypatch.setattr(f"steptwin.commands.serve.serve_{device}", served.append)
     assert CliRunner().invoke(app, ["serve", device, *option]).exit_code == 0
-    (options,) = served
-    pty: Path | None = options.pty
-    assert (pty and pty.name, options.tcp, getattr(options, "rtu_tcp", None)) == expected
+    links = served[0].links.items()
+    assert {key: Path(value).name if key == "pty" else value for key, value in links if value is not None} == expected

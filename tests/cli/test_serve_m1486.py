@@ -143,7 +143,7 @@ def test_a_program_to_switch_on_with(serve_m1486: Serve, tmp_path: Path) -> None
         ({"line_timing": "fast"}, "--line-timing fast: permitted are 'real' and 'off'"),
         ({"wires": ("B1=B3",)}, "--wire B1=B3: expected FROM=TO"),
         ({"name": "a b"}, "--name 'a b': permitted are"),
-        ({"tcp": "0.0.0.0:0"}, "0.0.0.0 is not a loopback address"),
+        ({"links": {"tcp": "0.0.0.0:0"}}, "0.0.0.0 is not a loopback address"),
         ({"program": Path("nowhere.m1486")}, "cannot read nowhere.m1486: no such file or directory"),
     ],
 )

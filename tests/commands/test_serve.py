@@ -34,11 +34,11 @@ CONFIG = "[Axis0]\nUnit=3\nGear=50\n[AIN0]\nID=9\n"
         ({"line_timing": "fast"}, r"--line-timing fast: permitted are 'real', 'strict' and 'off'"),
         ({"programs": ("9=a.prg",)}, r"--program 9=a\.prg: permitted are banks 0 to 5"),
         (
-            {"listen_any": True, "tcp": "127.0.0.1:0"},
+            {"listen_any": True, "links": {"tcp": "127.0.0.1:0"}},
             r"--listen-any .* \(addresses: 127\.0\.0\.1:0\); 0\.0\.0\.0:PORT",
         ),
-        ({"listen_any": True, "pty": Path("p")}, r"--listen-any .* there is none \(addresses: none\)"),
-        ({"tcp": "0.0.0.0:0"}, r"0\.0\.0\.0 is not a loopback address: .* --listen-any permits it"),
+        ({"listen_any": True, "links": {"pty": "p"}}, r"--listen-any .* there is none \(addresses: none\)"),
+        ({"links": {"tcp": "0.0.0.0:0"}}, r"0\.0\.0\.0 is not a loopback address: .* --listen-any permits it"),
         ({"config": Path("nowhere.cfg")}, r"cannot read nowhere\.cfg"),
     ],
 )
@@ -53,11 +53,13 @@ def test_every_option_is_a_key_of_the_description() -> None:
             name="cell",
             firmware="1.40",
             units="2,7",
-            tcp="127.0.0.1:0",
-            rtu_tcp="127.0.0.1:1",
-            rfc2217="127.0.0.1:2",
-            pty=Path("line"),
-            serial="/dev/ttyS9",
+            links={
+                "tcp": "127.0.0.1:0",
+                "rtu_tcp": "127.0.0.1:1",
+                "rfc2217": "127.0.0.1:2",
+                "pty": "line",
+                "serial": "/dev/ttyS9",
+            },
             baud=9600,
             config=Path("a b.cfg"),
             programs=("main.prg", "3=other.prg"),
@@ -126,7 +128,7 @@ def test_a_saved_description_has_the_files_it_names_beside_it(tmp_path: Path, ca
     config = tmp_path / "here" / "machine.cfg"
     config.write_text(CONFIG)
     target = tmp_path / "there" / "machine.toml"
-    options = ServeMic488(config=config, tcp="127.0.0.1:0", save_world=target)
+    options = ServeMic488(config=config, links={"tcp": "127.0.0.1:0"}, save_world=target)
     serve_mic488(options)
     assert capsys.readouterr().out == f"wrote {tmp_path / 'there' / 'machine.cfg'}\nwrote {target}\n"
     with World.load(target) as world:
@@ -143,7 +145,7 @@ def test_a_printed_description_tells_of_files_elsewhere(
     (tmp_path / "folder").mkdir()
     (tmp_path / "machine.cfg").write_text(CONFIG)
     monkeypatch.chdir(tmp_path / "folder")
-    serve_mic488(ServeMic488(config=Path("../machine.cfg"), tcp="127.0.0.1:0", print_world=True))
+    serve_mic488(ServeMic488(config=Path("../machine.cfg"), links={"tcp": "127.0.0.1:0"}, print_world=True))
     shown = capsys.readouterr()
     assert tomllib.loads(shown.out)["mic488"][0]["config"] == "../machine.cfg"
     assert shown.err.startswith("../machine.cfg is outside this folder: --save-world FILE copies it")

@@ -44,6 +44,17 @@ def _default_host(listen_any: bool) -> str:
     return "0.0.0.0" if listen_any else "127.0.0.1"
 
 
+def _default_pty(name: str) -> str | None:
+    from steptwin.live.directory import runtime_directory
+    from steptwin.system import HAS_PTYS
+
+    return str(runtime_directory() / name) if HAS_PTYS else None
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)
+
+
 @app.command()
 def mic488(
     firmware: Annotated[
@@ -115,23 +126,16 @@ def mic488(
     from steptwin.commands.serve import ServeMic488, serve_mic488
     from steptwin.files.timedinputs import parse_duration
 
-    if not (pty or serial or tcp or rtu_tcp or rfc2217):
-        from steptwin.live.directory import runtime_directory
-        from steptwin.system import HAS_PTYS
-
+    links = {"pty": _text(pty), "serial": serial, "tcp": tcp, "rtu_tcp": rtu_tcp, "rfc2217": rfc2217}
+    if not any(links.values()):
         host = _default_host(listen_any)
-        pty = runtime_directory() / name if HAS_PTYS else None
-        tcp, rtu_tcp = f"{host}:{MODBUS_TCP_PORT}", f"{host}:{RTU_TCP_PORT}"
+        links = {"pty": _default_pty(name), "tcp": f"{host}:{MODBUS_TCP_PORT}", "rtu_tcp": f"{host}:{RTU_TCP_PORT}"}
     serve_mic488(
         ServeMic488(
             firmware=firmware,
             units=units,
-            pty=pty,
-            serial=serial,
+            links=links,
             baud=baud,
-            tcp=tcp,
-            rtu_tcp=rtu_tcp,
-            rfc2217=rfc2217,
             config=config,
             programs=tuple(program or ()),
             positions=tuple(positions or ()),
@@ -198,23 +202,17 @@ def m1486(
     """
     from steptwin.commands.serve import ServeM1486, serve_m1486
 
-    if not (pty or serial or tcp or rfc2217):
-        from steptwin.live.directory import runtime_directory
-        from steptwin.system import HAS_PTYS
-
-        pty = runtime_directory() / name if HAS_PTYS else None
-        tcp = f"{_default_host(listen_any)}:{M1486_TCP_PORT}"
+    links = {"pty": _text(pty), "serial": serial, "tcp": tcp, "rfc2217": rfc2217}
+    if not any(links.values()):
+        links = {"pty": _default_pty(name), "tcp": f"{_default_host(listen_any)}:{M1486_TCP_PORT}"}
     serve_m1486(
         ServeM1486(
             variant=variant,
             chain=chain,
             interface=interface,
             wires=tuple(wire or ()),
-            pty=pty,
-            serial=serial,
+            links=links,
             baud=baud,
-            tcp=tcp,
-            rfc2217=rfc2217,
             state=state,
             trace=trace,
             program=program,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from steptwin.files.programbanks import parse_banks
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.serving import check_line_timing, check_name
+from steptwin.live.transports import TRANSPORTS
 from steptwin.m1486.lines import interface
 from steptwin.m1486.pins import baud_pins
 from steptwin.m1486.variants import DEFAULT, variant
@@ -35,11 +37,9 @@ class ServeOptions:
     """The options common to both controllers; see ``steptwin serve mic488 --help``."""
 
     name: str
-    pty: Path | None = None
-    serial: str | None = None
+    links: Mapping[str, str | None] = field(default_factory=dict)
+    """Where it is reached, by keys of ``[[line]]``."""
     baud: int | None = None
-    tcp: str | None = None
-    rfc2217: str | None = None
     state: Path | None = None
     trace: str | None = None
     line_timing: str = "off"
@@ -52,11 +52,10 @@ class ServeOptions:
     save_world: Path | None = None
 
     def whole(self, **line: object) -> Whole:
-        own = {"tcp": self.tcp, "rfc2217": self.rfc2217, "serial": self.serial, "baud": self.baud, **line}
         timing = None if self.line_timing == "off" else self.line_timing
         return Whole(
             name=self.name,
-            line={"pty": None if self.pty is None else str(self.pty), **own, "timing": timing},
+            line={**self.links, "baud": self.baud, **line, "timing": timing},
             seed=self.seed,
             state=None if self.state is None else str(self.state),
             trace=self.trace,
@@ -71,7 +70,6 @@ class ServeMic488(ServeOptions):
     name: str = "mic488"
     firmware: str = "1.70"
     units: str | None = None
-    rtu_tcp: str | None = None
     config: Path | None = None
     programs: tuple[str, ...] = ()
     positions: tuple[str, ...] = ()
@@ -96,14 +94,19 @@ class ServeM1486(ServeOptions):
 
 def serve_mic488(options: ServeMic488) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
-    check_addresses((options.tcp, options.rtu_tcp, options.rfc2217, options.vision), listen_any=options.listen_any)
+    _check_addresses(options, options.vision)
     _serve(options, partial(describe_mic488, options), describe_mic488(replace(options, faults=())))
 
 
 def serve_m1486(options: ServeM1486) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
-    check_addresses((options.tcp, options.rfc2217), listen_any=options.listen_any)
+    _check_addresses(options)
     _serve(options, partial(describe_m1486, options), describe_m1486(replace(options, faults=())))
+
+
+def _check_addresses(options: ServeOptions, *others: str | None) -> None:
+    links = (options.links.get(key) for key, transport in TRANSPORTS.items() if transport.is_address)
+    check_addresses((*links, *others), listen_any=options.listen_any)
 
 
 def _serve(options: ServeOptions, describe: Describe, text: str) -> None:
@@ -161,7 +164,7 @@ def describe_mic488(options: ServeMic488, named: Named = str) -> str:
         "lenient": options.lenient or None,
         "vision": options.vision,
     }
-    return mic488_world(options.whole(rtu_tcp=options.rtu_tcp, gap=gap), units, values, demo=options.demo)
+    return mic488_world(options.whole(gap=gap), units, values, demo=options.demo)
 
 
 def describe_m1486(options: ServeM1486, named: Named = str) -> str:
