@@ -154,6 +154,23 @@ def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
     assert (device.pins()["IN3"], button.pressed) == (0.0, True)
 
 
+@pytest.mark.parametrize(("bounces", "levels"), [(0, [1.0]), (1, [1.0, 0.0, 1.0]), (2, [1.0, 0.0, 1.0, 0.0, 1.0])])
+def test_a_contact_bounces_so_often(bounces: int, levels: list[float]) -> None:
+    edges: list[TraceRecord] = []
+    kernel = Kernel(record=edges.append)
+    kernel.add("m", Mic488Device(controller()))
+    circuit = Circuit(kernel, PinName("m", "IN3"))
+    button = Button(circuit, normally_closed=False, bounce_ns=MILLISECOND, bounces=bounces, chance=Chance(0, "b"))
+    kernel.add_part(button)
+    circuit.close()
+    kernel.advance(SECOND)
+    edges.clear()
+    button.press(True, SECOND)
+    kernel.settle()
+    kernel.advance(SECOND + MILLISECOND)
+    assert [record.value for record in edges if record.subject == "IN3"] == levels
+
+
 def test_the_bouncing_of_a_contact_that_changes_nothing_for_its_input_is_awaited_all_the_same() -> None:
     """Beside a closed contact: the input stays 1, and the lane of the contact shows it."""
     edges: list[TraceRecord] = []

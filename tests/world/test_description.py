@@ -36,6 +36,8 @@ def wrong(text: str) -> str:
     ("text", "message"),
     [
         ("[world\n", "w.toml:1:7: error D001: this is not TOML"),
+        ("[world]\nseed = 1\nname = = 2\n", "w.toml:3:8: error D001: this is not TOML"),
+        (AXIS + "travel = [0, 1]\nstart = 5\n", "w.toml:7:1: error D007: start = 5 is outside travel = [0.0, 1.0]"),
         ("[worlds]\n", "w.toml:1:1: error D004: the file has no [worlds] (did you mean 'world'?)"),
         (TABLE + "[[axs]]\n", "w.toml:3:1: error D004: the file has no [axs]"),
         (TABLE + '[[fault]]\nkind = "crc"\nprobability = 2\n', "w.toml:5:1: error D003: [[fault]] (crc): probability = 2"),
@@ -206,6 +208,25 @@ def wrong(text: str) -> str:
 )
 def test_what_is_wrong_is_told_with_its_place(text: str, message: str) -> None:
     assert message in wrong(text)
+
+
+def places(text: str) -> list[str]:
+    return [line.split(": ")[0] for line in wrong(text).splitlines() if ": error " in line]
+
+
+def test_only_what_is_wrong_is_reported_not_what_follows_from_it() -> None:
+    """The controller is wrong; the axis has no drive because of that, and the event no axis."""
+    event = '[[event]]\nwhen = "x.position > 1"\nsteps = []\n'
+    assert places(AXIS.replace("[[axis]]", "unit = 300\n[[axis]]") + event) == ["w.toml:3:1"]
+
+
+def test_a_fault_that_is_no_table_leaves_the_others_their_places() -> None:
+    assert places('fault = [\n3,\n{ kind = "stall", machine = "b" },\n]\n' + TABLE) == ["w.toml:2:1", "w.toml:3:1"]
+
+
+def test_a_description_that_is_wrong_is_not_read() -> None:
+    with pytest.raises(WorldError, match="unit: 300"):
+        read_world("w", TABLE + "unit = 300\n")
 
 
 def test_all_problems_are_told_at_once_in_order() -> None:

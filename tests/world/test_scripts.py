@@ -99,6 +99,33 @@ def test_operators_in_python_yield_steps_and_are_sent_what_they_give() -> None:
     assert list(world.overdue) == []  # code is sent that it was in vain, and decides
 
 
+def test_a_signal_that_is_not_there_is_named_where_a_script_waits_for_it() -> None:
+    def operator() -> Steps:
+        yield do.Wait(SECOND)
+        yield do.Until("x.nothing > 1")
+
+    world = small()
+    world.script(operator)
+    with pytest.raises(Misuse, match=r"no signal 'x\.nothing'; there are position, lost, stalled"):
+        world.run(for_=5)
+    assert world.now == SECOND
+
+
+def test_what_begins_in_a_restored_world_does_not_take_the_place_of_what_goes_on_there() -> None:
+    world = small()
+    world.press("go", 2.0)
+    world.run(for_=0.5)
+    snapshot = world.snapshot()
+    other = small()
+    other.restore(snapshot)
+    other.do_later("note it", (do.Wait(SECOND // 2), do.Note("noted")))
+    other.run(for_=1)
+    assert [(r.time, r.value) for r in other.trace.events("world")] == [(SECOND, "noted")]
+    assert other.read("go.pressed") == 1.0
+    other.run(for_=1)
+    assert other.read("go.pressed") == 0.0
+
+
 def test_scripts_that_take_no_time_for_ever_are_a_runaway() -> None:
     def forever() -> Steps:
         while True:

@@ -224,9 +224,7 @@ class Scripts:
         return (ScriptWait(step.time) if step.time > self._plant.now else None), None
 
     def _wait_for_condition(self, step: do.Until, script: Script) -> Taken:
-        plant = self._plant
-        plant.condition(step.condition)  # raises `Misuse` here
-        return ScriptWait(None if step.within is None else plant.now + step.within, step.condition), None
+        return ScriptWait(None if step.within is None else self._plant.now + step.within, step.condition), None
 
     def _stop(self, step: do.Stop, script: Script) -> Taken:
         plant = self._plant

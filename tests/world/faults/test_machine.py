@@ -101,6 +101,15 @@ def test_lost_steps_leave_the_shaft_behind() -> None:
     assert encoder == 4 * (pulses - 14)
 
 
+def test_a_slip_that_comes_again_keeps_its_period() -> None:
+    rig = FaultRig("slip counts=5 at_s=1 period_s=0.3 count=3", config=axis())
+    seen = []
+    for _ in range(30):
+        rig.wait(0.1)
+        seen.append(counts(rig)[1])
+    assert seen == [0] * 9 + [5] * 3 + [10] * 3 + [15] * 15
+
+
 def test_slip_turns_the_encoder_alone() -> None:
     rig = moving("slip at_s=0.5 counts=-3")
     rig.wait(1.0)

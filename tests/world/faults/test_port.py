@@ -420,3 +420,11 @@ def test_records_keep_their_order_where_answers_are_fetched_late() -> None:
     rig.now += 500 * MILLISECOND
     rig.send(REQUEST)
     assert [record.subject for record in trace] == ["flip", "crc"]
+
+
+def test_a_request_that_comes_on_no_known_link_meets_the_faults_of_every_link() -> None:
+    """As a request of a script does, also after one on a link."""
+    rig = FaultRig("busy link=link-2")
+    assert rig.ask() == ANSWER
+    refused = rig.faults.machines["1"].refusal(1, "", READ, rig.now)
+    assert refused == bytes.fromhex("83 06")

@@ -48,12 +48,12 @@ def _lose_request(active: Active) -> tuple[int, str]:
 
 def _lose_answer(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     report(active, f"lost on its way: {sent.answer.hex(' ')}")
-    return sent._replace(delay=0, answer=b"")
+    return sent._replace(answer=b"")
 
 
 def _hold_back(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     report(active, f"held back: {sent.answer.hex(' ')}")
-    return sent._replace(delay=0, answer=b"", later=sent.answer)
+    return sent._replace(answer=b"", later=sent.answer)
 
 
 def _answer_as(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
