@@ -31,8 +31,9 @@ PEER_PACKAGES := chromium mbpoll libmodbus-dev gcc libc6-dev pkg-config make ser
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-run: $(RUN_STAMP)  ## Start a virtual MIC488 with home switches (ARGS="--firmware 1.23 ...")
-	@exec $(BIN)/steptwin serve mic488 --demo $(ARGS)
+run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --speed 0.5 ...": options of steptwin studio)
+	@$(MAKE) --no-print-directory page || echo "the page of the studio could not be built; the service runs without it" >&2
+	@exec $(BIN)/steptwin studio $(ARGS)
 
 test: $(DEV_STAMP) $(PAGE)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto $(ARGS)

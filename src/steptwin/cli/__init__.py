@@ -42,6 +42,7 @@ from steptwin.cli import (
     send,
     serve,
     sniff,
+    studio,
     terminal,
     twin,
     twins,
@@ -52,6 +53,7 @@ from steptwin.errors import Misuse, SourceErrors, SteptwinError
 
 COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "Twins": {
+        "studio": studio.studio,
         "up": up.up,
         "twins": twins.twins,
         "state": twin.state,

@@ -11,6 +11,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli.commands import PageFormat, PageSection, show
+from steptwin.cli.worldoptions import (
+    AllowOutside,
+    Begin,
+    Control,
+    Faults,
+    ListenAny,
+    LogFrames,
+    Name,
+    ReadyFile,
+    Seed,
+    SessionFile,
+    Speed,
+    State,
+    Strict,
+    Trace,
+)
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -23,48 +39,20 @@ def up(
         Path | None,
         typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a session (.json) to continue."),
     ] = None,
-    speed: Annotated[
-        str,
-        typer.Option(help="Virtual seconds per second: 0.1, 1, 10; 'max' for worlds without external clients; 0 starts paused."),
-    ] = "1",
-    name: Annotated[str | None, typer.Option(help="Name by which --device finds it. Default: that of the file.")] = None,
-    session: Annotated[Path | None, typer.Option(help="Write a session for 'steptwin replay' when it ends.")] = None,
-    trace: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write a trace to a file or into a directory; 'ring N' keeps the last N records for 'save'; 'off' keeps none. "
-            "Default: that of the description.",
-        ),
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(help="Fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Random seed. Default: that of the description.")] = None,
-    state: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Directory of the non-volatile memory. Default: that of the description, or none."),
-    ] = None,
-    begin: Annotated[
-        str | None,
-        typer.Option("--from", metavar="TIME", help="Session: continue from this moment, such as 2.5s. Default: its end."),
-    ] = None,
-    ready_file: Annotated[
-        Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")
-    ] = None,
-    control: Annotated[
-        str | None,
-        typer.Option(metavar="HOST:PORT", help="Also open the control endpoint on this loopback TCP address."),
-    ] = None,
-    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")] = False,
-    log_frames: Annotated[
-        bool, typer.Option("--log-frames", help="Print the traffic of every line with time, direction, bytes and meaning.")
-    ] = False,
-    strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 also for a wait that timed out.")] = False,
-    allow_outside: Annotated[
-        bool, typer.Option("--allow-outside", help="Permit files outside the folder of the description.")
-    ] = False,
+    speed: Speed = "1",
+    name: Name = None,
+    session: SessionFile = None,
+    trace: Trace = None,
+    fault: Faults = None,
+    seed: Seed = None,
+    state: State = None,
+    begin: Begin = None,
+    ready_file: ReadyFile = None,
+    control: Control = None,
+    listen_any: ListenAny = False,
+    log_frames: LogFrames = False,
+    strict: Strict = False,
+    allow_outside: AllowOutside = False,
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
     form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
 ) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from math import inf
 from pathlib import Path
+from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
@@ -20,7 +21,7 @@ from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
-from steptwin.live.faces import Face, Lines, banner, remarks_on
+from steptwin.live.faces import Face, Lines, Notices, banner, remarks_on
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
 from steptwin.live.rfc2217 import TwinLine
@@ -68,7 +69,21 @@ class UpOptions:
     """Files of the description may lie anywhere."""
 
 
-def up(options: UpOptions) -> bool:
+@dataclass(frozen=True, slots=True)
+class Running:
+    """A world that is about to run, for what is served beside its lines."""
+
+    server: Server
+    live: LiveWorld
+    pace: Pace
+    control: WorldControl
+
+
+Addition: TypeAlias = Callable[[Running], Awaitable[None]]
+"""Serves something else of the world; what it opens it gives to the server, which closes it. Then no records are printed."""
+
+
+def up(options: UpOptions, addition: Addition | None = None) -> bool:
     """Run a world until SIGINT, SIGTERM or SIGHUP, or until a script stops it. Returns whether all expectations held.
 
     Raises `Misuse` or another `SteptwinError` with a text for the user.
@@ -87,10 +102,10 @@ def up(options: UpOptions) -> bool:
         allow_outside=options.allow_outside,
         state=options.state,
     ) as world:
-        return up_with(world, options)
+        return up_with(world, options, addition)
 
 
-def up_with(world: World, options: UpOptions) -> bool:
+def up_with(world: World, options: UpOptions, addition: Addition | None = None) -> bool:
     """As `up`, with an existing world."""
     name = options.name or (world.spec.name if options.world is None else options.world.stem)
     speed = read_speed(options.speed, least=0)
@@ -113,7 +128,7 @@ def up_with(world: World, options: UpOptions) -> bool:
         check_session_target(options.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
-    asyncio.run(_serve(replace(options, name=name), world, past, kept))
+    asyncio.run(_serve(replace(options, name=name), world, past, kept, addition))
     return not world.failures and not (options.strict and world.overdue)
 
 
@@ -124,13 +139,14 @@ def _send_away(world: World) -> None:
             world.outside(Leave(line.name, place))
 
 
-async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], kept: Kept) -> None:
+async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], kept: Kept, addition: Addition | None) -> None:
     with ExitStack() as stack:
         output = Output(sys.stdout)
         stack.callback(output.close)
         live = LiveWorld(world)
         cell = Cell(live, Clock(begin=world.now))
-        face = _face(live, cell, output, log_frames=options.log_frames)
+        quiet = addition is not None
+        face = Notices(live, output, frames=options.log_frames) if quiet else _face(live, cell, output, options.log_frames)
         live.show = face.notice
         server = Server(cell, face.notice)
         live.share_reads(cell)
@@ -138,7 +154,7 @@ async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], 
         live.on_stop = server.end
         begun, recorder = False, None
         try:
-            await _open(server, live, pace, options, options.name or world.spec.name)
+            await _open(server, live, pace, options, addition)
             recorder = _recorder(live, kept)
             begun = True
             face.begin(banner(world, server.end_points, remarks_on(world, listen_any=options.listen_any)), past)
@@ -152,7 +168,7 @@ async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], 
                 _keep(options, live, output, recorder, kept)
 
 
-def _face(live: LiveWorld, cell: Cell, output: Output, *, log_frames: bool) -> Face:
+def _face(live: LiveWorld, cell: Cell, output: Output, log_frames: bool) -> Face:
     if not shows_live_view(output, log_frames=log_frames):
         return Lines(live, output, frames=log_frames)
     from steptwin.live.view import LiveView
@@ -216,7 +232,8 @@ def _write_trace(recorder: TraceFile, where: Path, ended: Nanos) -> list[Path]:
 # ---------------------------------------------------------------------- links
 
 
-async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, name: str) -> None:
+async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, addition: Addition | None) -> None:
+    name = options.name or live.world.spec.name
     control = WorldControl(server.cell, live, pace, server.announcement)
     address = None if options.control is None else parse_address(options.control, listen_any=False)
     await server.open_control(name, control, partial(announced, live.world), options.world, address)
@@ -225,6 +242,8 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     for controller, where in live.world.spec.vision_addresses():
         make_port = partial(VisionPort, live, controller)
         await server.open(VISION, where, f"vision records, {controller}", make_port, listen_any=options.listen_any)
+    if addition is not None:
+        await addition(Running(server, live, pace, control))
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

@@ -55,6 +55,25 @@ class Lines:
             self._output.line(describe(record))
 
 
+class Notices:
+    """What runs, and notices; no records. With ``frames`` every frame."""
+
+    def __init__(self, live: LiveWorld, output: Output, *, frames: bool) -> None:
+        self._output = output
+        if frames:
+            follow_frames(live, lambda frame: output.line(str(frame)))
+
+    def notice(self, text: str) -> None:
+        self._output.line(text)
+
+    def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
+        for text in head:
+            self._output.line(text)
+
+    async def show(self, server: Server) -> None:
+        await server.until_ended()
+
+
 def banner(world: World, end_points: Sequence[EndPoint], remarks: Sequence[str]) -> list[str]:
     """The first lines: world, end points, remarks."""
     width = max((len(end_point.protocol) for end_point in end_points), default=0)

@@ -42,8 +42,8 @@ MIC488, ``chip`` (a hexadecimal digit) of an M1486."""
 
 @dataclass(frozen=True, slots=True)
 class EndPoint:
-    """An address on which a twin listens. ``kind``: pty, serial, tcp, rtu-tcp, rfc2217, vision. ``line``: the name of the one
-    reached there."""
+    """An address on which a twin listens. ``kind``: pty, serial, tcp, rtu-tcp, rfc2217, vision, control, http. ``line``: the name
+    of the one reached there."""
 
     kind: str
     place: str
@@ -125,6 +125,11 @@ class Server:
         self._links.append(endpoint)
         if endpoint.listening is not None:
             self.end_points.append(EndPoint("control", str(endpoint.listening), "control", {"file": str(endpoint.announcement)}))
+
+    def join(self, link: Link, end_point: EndPoint) -> None:
+        """A link that is open already; it is closed with the others."""
+        self._links.append(link)
+        self.end_points.append(end_point)
 
     def announcement(self) -> dict[str, object]:
         """The announcement of the twin: name, process, file, controllers, end points."""

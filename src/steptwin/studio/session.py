@@ -63,7 +63,8 @@ class Session:
         self.is_rest = entered is not None
         self.viewer = entered or Viewer(hub.number(), peer, Role.VIEWER)
         """Until it has said hello: somebody who may look, and whom nobody sees."""
-        self._has_entered = self.is_rest
+        self.has_entered = self.is_rest
+        """Whether it has said hello."""
         self.is_refused = False
         """Whether it is to be cut off: it had a wrong token."""
         self._limit = RateLimit(RATE, BURST)
@@ -146,7 +147,7 @@ class Session:
 
     def _do(self, wanted: Wanted, identity: Identity) -> Result:
         name = wanted.name
-        if not self._has_entered and name not in STOPS and name != "hello":
+        if not self.has_entered and name not in STOPS and name != "hello":
             raise Refusal(f"{name}: the first request is hello")
         if self.is_rest and name in OF_CONNECTION:
             raise Refusal(f"{name} is about a connection: ask it over the WebSocket")
@@ -176,7 +177,7 @@ class Session:
     # ------------------------------------------------------------------ who it is
 
     def _hello(self, wanted: ask.Hello) -> object:
-        if self._has_entered:
+        if self.has_entered:
             raise Misuse("hello: this connection has said hello already; resync asks for the state again")
         try:
             role, of_token = self._hub.around.gate.enter(wanted.token)
@@ -186,7 +187,7 @@ class Session:
         name = (wanted.name or of_token or f"viewer {self.viewer.number}")[:LONGEST_NAME]
         viewer = Viewer(self.viewer.number, name, role)
         self._hub.join(viewer)
-        self.viewer, self._has_entered, self._needs_hello = viewer, True, True
+        self.viewer, self.has_entered, self._needs_hello = viewer, True, True
         return {"viewer": viewer.number, "name": name, "role": role.title}
 
     def _resync(self, _: ask.Resync) -> None:
@@ -199,9 +200,9 @@ class Session:
         if self._place is not None:
             self._hub.streams.leave(self._place)
             self._place = None
-        if self._has_entered and not self.is_rest:
+        if self.has_entered and not self.is_rest:
             self._hub.leave(self.viewer)
-        self._has_entered = False
+        self.has_entered = False
 
     # ------------------------------------------------------------------ what it is sent
 
@@ -256,7 +257,7 @@ class Session:
 
     def has_news(self, now: Nanos) -> bool:
         """Whether `take` gives something."""
-        if not self._has_entered or self.is_rest:
+        if not self.has_entered or self.is_rest:
             return False
         return self._needs_hello or self._has_changes() or self._has_events(now) or self._has_values(now)
 
@@ -272,7 +273,7 @@ class Session:
 
     def take(self, now: Nanos) -> list[str]:
         """What is to be sent now. Call it when what it gave last has been sent."""
-        if not self._has_entered or self.is_rest:
+        if not self.has_entered or self.is_rest:
             return []
         found: list[str] = []
         if self._needs_hello:

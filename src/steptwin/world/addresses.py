@@ -27,7 +27,7 @@ def parse_address(text: str, *, listen_any: bool) -> Address:
         host = LOOPBACK  # one address: port 0 would be two ports on the two that "localhost" has
     if not colon or not number.isdecimal() or int(number) > 65535:
         raise Misuse(f"{text!r} is not an address: expected HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:5020")
-    if not listen_any and not _is_loopback(host):
+    if not listen_any and not is_loopback(host):
         raise Misuse(
             f"{host} is not a loopback address: the protocols served here have no authentication, whoever reaches the port "
             "moves the axes; --listen-any permits it"
@@ -38,7 +38,7 @@ def parse_address(text: str, *, listen_any: bool) -> Address:
 def check_addresses(given: Iterable[str | None], *, listen_any: bool) -> None:
     """Raises `Misuse` for what `parse_address` refuses, and for ``--listen-any`` where no address needs it."""
     addresses = [parse_address(text, listen_any=listen_any) for text in given if text is not None]
-    if listen_any and all(_is_loopback(address.host) for address in addresses):
+    if listen_any and all(is_loopback(address.host) for address in addresses):
         where = ", ".join(map(str, addresses)) or "none"
         raise Misuse(
             f"--listen-any permits addresses that others can reach, but there is none (addresses: {where}); "
@@ -46,7 +46,8 @@ def check_addresses(given: Iterable[str | None], *, listen_any: bool) -> None:
         )
 
 
-def _is_loopback(host: str) -> bool:
+def is_loopback(host: str) -> bool:
+    """Whether an address is reached from this computer alone."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

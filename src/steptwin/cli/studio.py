@@ -1,0 +1,101 @@
+"""``steptwin studio``: a world, or a device, in a browser. Exit code 1 if an expectation of the world's scripts did not hold.
+
+From another program: the WebSocket and REST, which docs/studio.md explains.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from steptwin.cli.worldoptions import (
+    AllowOutside,
+    Begin,
+    Control,
+    Faults,
+    ListenAny,
+    LogFrames,
+    Name,
+    ReadyFile,
+    Seed,
+    SessionFile,
+    Speed,
+    State,
+    Strict,
+    Trace,
+)
+from steptwin.errors import Misuse
+
+
+def studio(
+    world: Annotated[
+        Path | None,
+        typer.Argument(metavar="MACHINE.toml", help="The description of a world, or a session (.json). Default: a demo machine."),
+    ] = None,
+    http: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Where the page is. Default: 127.0.0.1:8488, or the next free port."),
+    ] = None,
+    remote: Annotated[
+        bool, typer.Option("--remote", help="Permit an --http address that others can reach, without TLS; with tokens.")
+    ] = False,
+    certificate: Annotated[Path | None, typer.Option(metavar="FILE", help="TLS: the certificate (PEM).")] = None,
+    key: Annotated[Path | None, typer.Option(metavar="FILE", help="TLS: its key (PEM).")] = None,
+    tokens: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Lines ROLE NAME TOKEN; roles are viewer, operator, engineer. Default: new tokens."),
+    ] = None,
+    audit: Annotated[Path | None, typer.Option(metavar="FILE", help="Append who did what to a file of JSON lines.")] = None,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page where there is a desktop.")] = True,
+    speed: Speed = "1",
+    name: Name = None,
+    session: SessionFile = None,
+    trace: Trace = None,
+    fault: Faults = None,
+    seed: Seed = None,
+    state: State = None,
+    begin: Begin = None,
+    ready_file: ReadyFile = None,
+    control: Control = None,
+    listen_any: ListenAny = False,
+    log_frames: LogFrames = False,
+    strict: Strict = False,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Run a world in real time and show it in a browser, until Ctrl-C.
+
+    Its lines are open as with 'steptwin up', for any other program. The page can move axes, so only this computer reaches
+    it unless another address is permitted.
+    """
+    try:
+        from steptwin.commands.studio import StudioOptions
+        from steptwin.commands.studio import studio as run_studio
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] not in ("fastapi", "uvicorn", "websockets", "starlette"):
+            raise
+        raise Misuse("the studio needs the extra 'studio': pip install 'steptwin[studio]'") from None
+    from steptwin.commands.up_world import UpOptions
+    from steptwin.files.timedinputs import parse_duration
+
+    own = StudioOptions(http=http, remote=remote, certificate=certificate, key=key, tokens=tokens, audit=audit, browser=browser)
+    options = UpOptions(
+        world=world,
+        moment=None if begin is None else parse_duration(begin, "--from"),
+        seed=seed,
+        state=state,
+        speed=speed,
+        name=name,
+        session=session,
+        trace=trace,
+        faults=tuple(fault or ()),
+        ready_file=ready_file,
+        control=control,
+        listen_any=listen_any,
+        log_frames=log_frames,
+        strict=strict,
+        allow_outside=allow_outside,
+    )
+    if not run_studio(own, options):
+        raise typer.Exit(1)

@@ -1,0 +1,51 @@
+"""The audit log of the studio in a file: lines of JSON. A file that is full is kept until the next one is."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TextIO
+
+from steptwin.access.audit import Entry
+from steptwin.errors import Misuse
+from steptwin.system import reason
+
+MOST_BYTES = 8 << 20
+
+
+class AuditFile:
+    """Appends to ``path``, which only its owner can read. The file before it is ``path`` with ``.1`` behind its name."""
+
+    def __init__(self, path: Path, most_bytes: int = MOST_BYTES) -> None:
+        self._path = path
+        self._most = most_bytes
+        self._file: TextIO | None = None
+
+    def __enter__(self) -> Self:
+        """Raises `Misuse` where it cannot be written."""
+        self._file = self._open()
+        return self
+
+    def _open(self) -> TextIO:
+        try:
+            descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        except OSError as error:
+            raise Misuse(f"--audit {self._path}: {reason(error)}") from error
+        return os.fdopen(descriptor, "a", encoding="utf-8")
+
+    def add(self, entry: Entry) -> None:
+        if self._file is None:
+            return
+        self._file.write(json.dumps(entry.plain(), ensure_ascii=False) + "\n")
+        self._file.flush()
+        if self._file.tell() > self._most:
+            self._file.close()
+            self._path.replace(self._path.with_name(f"{self._path.name}.1"))
+            self._file = self._open()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file = None

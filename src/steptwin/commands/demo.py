@@ -1,0 +1,47 @@
+"""The demo machine: what `steptwin studio` shows where no other world is named."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from steptwin.commands.up_world import UpOptions
+from steptwin.files.world import World
+from steptwin.inputfiles import read_bytes
+from steptwin.live.directory import runtime_directory
+from steptwin.system import HAS_PTYS
+from steptwin.textcodec import decode
+from steptwin.world.description import read_world
+
+FOLDER = Path(__file__).with_name("demo_machine")
+NAME = "demo"
+HOST = "127.0.0.1"
+BUS_TCP, BUS_RTU_TCP, CHIPS_TCP = 5020, 5021, 5022
+"""Ports, as those of `steptwin serve`."""
+
+
+def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
+    """At its beginning. ``free_ports``: on any free ports and without pseudo terminals, for tests."""
+    text = describe_demo(free_ports=free_ports)
+    files = {name: read_bytes(FOLDER / name) for name, _ in read_world(NAME, text).files()}
+    return World.from_toml(
+        text,
+        files,
+        name=NAME,
+        seed=options.seed,
+        keep_inputs=options.session is not None,
+        state=None if options.state is None else str(options.state),
+    )
+
+
+def describe_demo(*, free_ports: bool = False) -> str:
+    """The description with its ports."""
+    text = decode(read_bytes(FOLDER / "demo.toml"), "demo.toml").text
+    ports = (0, 0, 0) if free_ports else (BUS_TCP, BUS_RTU_TCP, CHIPS_TCP)
+    tcp, rtu_tcp, chips = (f"{HOST}:{port}" for port in ports)
+    ptys = HAS_PTYS and not free_ports
+    bus = {"pty": str(runtime_directory() / "mic488") if ptys else None, "tcp": tcp, "rtu_tcp": rtu_tcp}
+    line = {"pty": str(runtime_directory() / "m1486") if ptys else None, "tcp": chips}
+    for mark, keys in (("# ports of bus", bus), ("# ports of chips", line)):
+        text = text.replace(mark, "\n".join(f"{key} = {json.dumps(value)}" for key, value in keys.items() if value is not None))
+    return text

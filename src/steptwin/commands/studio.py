@@ -1,0 +1,164 @@
+"""`steptwin studio`: a world in real time with a page for it; its lines are open as with `steptwin up`."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import secrets
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from math import inf
+from pathlib import Path
+
+from steptwin import __version__
+from steptwin.access.audit import Audit
+from steptwin.access.origin import Origins
+from steptwin.access.roles import Role
+from steptwin.access.tokens import Gate, Token, read_tokens
+from steptwin.commands.auditfile import AuditFile
+from steptwin.commands.demo import demo_world
+from steptwin.commands.up_world import Running, UpOptions, up, up_with
+from steptwin.errors import Misuse
+from steptwin.inputfiles import read_bytes
+from steptwin.live.server import EndPoint
+from steptwin.studio.hub import Hub, Moment, Surroundings
+from steptwin.studio.jogs import WorldJogs
+from steptwin.studio.service import Service, Tls, listen
+from steptwin.textcodec import decode
+from steptwin.world.addresses import Address, is_loopback, parse_address
+
+DEFAULT = Address("127.0.0.1", 8488)
+ANY = ("0.0.0.0", "::")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudioOptions:
+    """The command's own options as given; see ``steptwin studio --help``."""
+
+    http: str | None = None
+    remote: bool = False
+    """Whether others may reach it without TLS."""
+    certificate: Path | None = None
+    key: Path | None = None
+    tokens: Path | None = None
+    audit: Path | None = None
+    browser: bool = True
+
+
+def studio(own: StudioOptions, options: UpOptions) -> bool:
+    """Run a world, by default the demo machine, with its page; whether all expectations of its scripts held.
+
+    Raises `Misuse` or another `SteptwinError` with a text for the user.
+    """
+    entrance = _entrance(own)
+    with ExitStack() as stack:
+        audit = Audit(_now) if own.audit is None else Audit(_now, stack.enter_context(AuditFile(own.audit)).add)
+        listening = stack.enter_context(listen(entrance.address, is_fixed=own.http is not None))
+        shown = _Shown(own, entrance, listening, audit)
+        if options.world is not None:
+            return up(options, shown.open)
+        with demo_world(options) as world:
+            return up_with(world, options, shown.open)
+
+
+@dataclass(frozen=True, slots=True)
+class _Entrance:
+    """Where the studio is, and who may come in."""
+
+    address: Address
+    tls: Tls | None
+    tokens: tuple[Token, ...]
+
+    @property
+    def gate(self) -> Gate:
+        return Gate(self.tokens) if self.tokens else Gate(open_to=Role.ENGINEER)
+
+
+def _entrance(own: StudioOptions) -> _Entrance:
+    """Raises `Misuse` for options that do not go together."""
+    if (own.certificate is None) is not (own.key is None):
+        raise Misuse("--certificate and --key go together: both or none")
+    tls = None if own.certificate is None or own.key is None else Tls(certificate=own.certificate, key=own.key)
+    address = DEFAULT if own.http is None else parse_address(own.http, listen_any=True)
+    is_local = is_loopback(address.host)
+    if not is_local and tls is None and not own.remote:
+        raise Misuse(
+            f"--http {address}: others can reach this address, and tokens and commands would go there unencrypted: "
+            "give --certificate and --key, or permit it with --remote"
+        )
+    if own.remote and is_local:
+        raise Misuse(f"--remote permits an --http address that others can reach, but {address} is none; such as 0.0.0.0:8488")
+    if own.tokens is not None:
+        return _Entrance(address, tls, read_tokens(decode(read_bytes(own.tokens), str(own.tokens)).text, str(own.tokens)))
+    fresh = () if is_local else tuple(Token(role, role.title, secrets.token_urlsafe(24)) for role in reversed(Role))
+    return _Entrance(address, tls, fresh)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+class _Shown:
+    """The page of a world that is about to run."""
+
+    def __init__(self, own: StudioOptions, entrance: _Entrance, listening: socket.socket, audit: Audit) -> None:
+        self._own = own
+        self._entrance = entrance
+        self._listening = listening
+        self._audit = audit
+
+    async def open(self, running: Running) -> None:
+        """Serve it in the event loop of the world."""
+        live, pace, server = running.live, running.pace, running.server
+        loop = asyncio.get_running_loop()
+
+        def moment() -> Moment:
+            clock = server.cell.clock
+            goes = not pace.is_paused and live.world.stopped is None
+            return Moment(max(clock.now(), live.now) if goes and pace.speed != inf else live.now, goes, pace.speed)
+
+        def report(error: Exception) -> None:
+            loop.call_exception_handler({"message": "a request to the studio failed", "exception": error})
+
+        around = Surroundings(moment=moment, gate=self._entrance.gate, audit=self._audit, program=__version__, on_internal=report)
+        jogs = WorldJogs(live.subject)
+        live.companion = jogs
+        hub = Hub(running.control, jogs, around)
+        host, port = self._listening.getsockname()[:2]
+        entrance = self._entrance
+        is_local = is_loopback(entrance.address.host)
+        names = () if is_local else (socket.gethostname(), socket.getfqdn())
+        origins = Origins(port, names, by_address=not is_local, has_tls=entrance.tls is not None)
+        service = Service(hub, self._listening, origins, entrance.tls)
+        service.start()
+        url = f"{'http' if entrance.tls is None else 'https'}://{Address(_reached(host), port)}/"
+        details = {"host": host, "port": port, "url": url}
+        server.join(service, EndPoint("http", _place(url, entrance.tokens), "studio", details))
+        if self._own.http is None and port != DEFAULT.port:
+            server.notice(f"port {DEFAULT.port} is taken: the studio is at {url}")
+        if self._own.browser and has_desktop():
+            token = f"#token={entrance.tokens[0].text}" if entrance.tokens else ""
+            threading.Thread(target=webbrowser.open, args=(url + token,), name="browser", daemon=True).start()
+
+
+def _reached(host: str) -> str:
+    """An address at which a server that listens on all of them is reached."""
+    return socket.gethostname() if host in ANY else host
+
+
+def _place(url: str, tokens: Sequence[Token]) -> str:
+    """For people; with tokens one address for each."""
+    return url if not tokens else "  ".join(f"{url}#token={token.text} ({token.name}, {token.role.title})" for token in tokens)
+
+
+def has_desktop() -> bool:
+    """Whether somebody sits at a terminal in front of a browser."""
+    if not sys.stdout.isatty() or os.environ.get("SSH_CONNECTION"):
+        return False
+    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

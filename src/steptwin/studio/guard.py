@@ -1,0 +1,99 @@
+"""In front of everything that is asked over HTTP: names and origins, rates, headers; and errors that should not be."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from steptwin.access.origin import Origins
+from steptwin.access.rate import RateLimits
+from steptwin.errors import Refusal
+from steptwin.machine import Nanos
+from steptwin.studio.viewers import Receive, Scope, Send, Viewers
+from steptwin.subject.dispatch import failure
+
+RATE, BURST = 100.0, 400.0
+"""HTTP requests of one address in a second, and at once."""
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; "
+    "worker-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+PATH = "/ws"
+
+
+class Guard:
+    """An ASGI application before ``app``."""
+
+    def __init__(
+        self, app: Any, viewers: Viewers, origins: Origins, clock: Callable[[], Nanos], on_internal: Callable[[Exception], object]
+    ) -> None:
+        self._app = app
+        self._viewers = viewers
+        self._origins = origins
+        self._clock = clock
+        self._on_internal = on_internal
+        self._limits = RateLimits(RATE, BURST)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        headers = {key: value.decode("latin-1") for key, value in scope.get("headers", ())}
+        is_socket = scope["type"] == "websocket"
+        refuse = _refuse_socket if is_socket else _refuse
+        client = scope.get("client")
+        try:
+            self._origins.check(headers.get(b"host"), headers.get(b"origin"))
+            if not self._limits.allows(client[0] if client else None, self._clock()):
+                await refuse(send, receive, 429, Refusal(f"too many requests: permitted are {RATE:g} a second"))
+                return
+        except Refusal as error:
+            await refuse(send, receive, 403, error)
+            return
+        if not is_socket:
+            await self._pass(scope, receive, send)
+        elif scope["path"] != PATH:
+            await _refuse_socket(send, receive, 404, Refusal(f"the WebSocket is at {PATH}"))
+        else:
+            try:
+                await self._viewers.serve(scope, receive, send)
+            except Exception as error:  # noqa: BLE001  nobody else sees it
+                self._on_internal(error)
+
+    async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
+        has_begun = False
+
+        async def guarded(message: Any) -> None:
+            nonlocal has_begun
+            if message["type"] == "http.response.start":
+                has_begun = True
+                message = {**message, "headers": [*message.get("headers", ()), *HEADERS]}
+            await send(message)
+
+        try:
+            await self._app(scope, receive, guarded)
+        except Exception as error:  # noqa: BLE001  whoever asks is not left without an answer
+            self._on_internal(error)
+            if not has_begun:
+                await _refuse(send, receive, 500, error)
+
+
+async def _refuse(send: Send, receive: Receive, status: int, error: Exception) -> None:
+    body = json.dumps(failure(error)).encode()
+    headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode()), *HEADERS]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
+
+
+async def _refuse_socket(send: Send, receive: Receive, status: int, error: Exception) -> None:
+    """Before the connection is accepted: the answer to its request."""
+    await receive()
+    body = json.dumps(failure(error)).encode()
+    headers = [(b"content-type", b"application/json")]
+    await send({"type": "websocket.http.response.start", "status": status, "headers": headers})
+    await send({"type": "websocket.http.response.body", "body": body})

@@ -1,0 +1,245 @@
+"""REST for programs that look and act now and then: the requests of the WebSocket, each with its own address.
+
+Routes and their descriptions are made from the tables of requests.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, TypeAlias
+
+from fastapi import FastAPI, Request, Response
+
+from steptwin import __version__
+from steptwin.access.control import Viewer
+from steptwin.access.roles import Role
+from steptwin.errors import Misuse, Refusal
+from steptwin.machine import Nanos
+from steptwin.studio.hub import Hub
+from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
+from steptwin.studio.session import Session
+from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure
+from steptwin.subject.schema import definitions, request_schema
+
+Endpoint: TypeAlias = Callable[[Request], Awaitable[Response]]
+
+DONE, MISUSE, NO_TOKEN, FORBIDDEN, REFUSED, TOO_LONG, TOO_MANY, INTERNAL, FAILED = 200, 400, 401, 403, 409, 413, 429, 500, 502
+STATUS: Mapping[str, int] = {"misuse": MISUSE, "refusal": REFUSED, "failure": FAILED, "internal": INTERNAL}
+STATUS_TEXTS: Mapping[int, str] = {
+    DONE: "Done.",
+    MISUSE: "The request is wrong; the message says what is permitted.",
+    NO_TOKEN: "The token is missing or wrong.",
+    FORBIDDEN: "The role of the token may not do this, or the request comes from another site.",
+    REFUSED: "This cannot be done now; the message says why.",
+    TOO_LONG: "The body is too long.",
+    TOO_MANY: "Too many requests.",
+    INTERNAL: "An error in steptwin.",
+    FAILED: "The line or the device failed.",
+}
+MOST_POINTS = 1000
+
+
+class Rest:
+    """The routes. Who asks with a token is one viewer for all its requests; without tokens everybody is the same one."""
+
+    def __init__(self, hub: Hub, clock: Callable[[], Nanos]) -> None:
+        self._hub = hub
+        self._clock = clock
+        self._sessions: dict[tuple[Role, str | None], Session] = {}
+
+    def add_to(self, app: FastAPI) -> None:
+        for name, row in ALL.items():
+            if name not in OF_CONNECTION:
+                permit = permit_of(name)
+                needs = f" Role {permit.role.title}{', and control' if permit.control else ''}."
+                app.add_api_route(
+                    f"/api/do/{name}",
+                    self._command(name),
+                    methods=["POST"],
+                    name=name,
+                    summary=row.meaning,
+                    description=row.meaning + needs,
+                    openapi_extra=_extra(body=_body(name)),
+                    responses=RESPONSES,
+                )
+        app.add_api_route(
+            "/api/describe",
+            self._describe,
+            methods=["GET"],
+            name="get_describe",
+            summary="What there is.",
+            openapi_extra=_extra(),
+            responses=RESPONSES,
+        )
+        machine = {"name": "machine", "in": "query", "required": False, "schema": {"type": "string", "minLength": 1}}
+        app.add_api_route(
+            "/api/state",
+            self._state,
+            methods=["GET"],
+            name="get_state",
+            summary="Everything about a machine, or about all.",
+            openapi_extra=_extra(parameters=[machine]),
+            responses=RESPONSES,
+        )
+        names = {
+            "name": "names",
+            "in": "query",
+            "required": True,
+            "description": "Points with commas between them, such as table.M1.position,time.",
+            "schema": {"type": "string", "minLength": 1},
+        }
+        app.add_api_route(
+            "/api/points",
+            self._points,
+            methods=["GET"],
+            name="get_points",
+            summary="The present values of points.",
+            openapi_extra=_extra(parameters=[names]),
+            responses=RESPONSES,
+        )
+
+    # ------------------------------------------------------------------ routes
+
+    def _command(self, name: str) -> Endpoint:
+        async def do(request: Request) -> Response:
+            try:
+                fields = await _fields(request)
+            except Misuse as error:
+                return _response(failure(error), TOO_LONG if error.args[0] == TOO_LONG_TEXT else MISUSE)
+            return self._answer(request, name, fields)
+
+        return do
+
+    async def _describe(self, request: Request) -> Response:
+        return self._answer(request, "describe", {})
+
+    async def _state(self, request: Request) -> Response:
+        machine = request.query_params.get("machine")
+        if machine is not None:
+            return self._answer(request, "state", {"machine": machine})
+        names = [part.name for part in self._hub.subject.description.machines]
+        answers = {name: self._ask(request, "state", {"machine": name}) for name in names}
+        for answer, status in answers.values():
+            if status != DONE:
+                return _response(answer, status)
+        found = self._ask(request, "time", {})[0]
+        return _response({**found, "ok": {name: answer["ok"] for name, (answer, _) in answers.items()}}, DONE)
+
+    async def _points(self, request: Request) -> Response:
+        names = [name for name in request.query_params.get("names", "").split(",") if name]
+        return self._answer(request, "read", {"points": names[: MOST_POINTS + 1]})
+
+    def _answer(self, request: Request, name: str, fields: Mapping[str, object]) -> Response:
+        return _response(*self._ask(request, name, fields))
+
+    def _ask(self, request: Request, name: str, fields: Mapping[str, object]) -> tuple[Message, int]:
+        """The answer, and its status."""
+        try:
+            session = self._session(request)
+        except Refusal as error:
+            return failure(error), NO_TOKEN
+        answer = session.answer(json.dumps({**fields, "do": name}), self._clock())
+        error: Any = answer.get("error")
+        if error is None:
+            return answer, DONE
+        return answer, FORBIDDEN if session.viewer.role < permit_of(name).role else STATUS[error["code"]]
+
+    def _session(self, request: Request) -> Session:
+        """Raises `Refusal` for a missing or wrong token."""
+        scheme, _, given = request.headers.get("authorization", "").partition(" ")
+        role, name = self._hub.around.gate.enter(given.strip() if scheme.lower() == "bearer" else None)
+        found = self._sessions.get((role, name))
+        if found is None:
+            viewer = Viewer(self._hub.number(), name or "REST", role)
+            found = self._sessions[role, name] = Session(self._hub, viewer.name, entered=viewer)
+        return found
+
+
+TOO_LONG_TEXT = f"a body has at most {LONGEST_REQUEST} bytes"
+OWN = ("do", "id", "version")
+
+
+async def _fields(request: Request) -> dict[str, object]:
+    """The fields in a body. Raises `Misuse`."""
+    data = b""
+    async for piece in request.stream():
+        data += piece
+        if len(data) > LONGEST_REQUEST:
+            raise Misuse(TOO_LONG_TEXT)
+    if not data:
+        return {}
+    try:
+        found = json.loads(data)
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise Misuse('a body is an object of JSON with the fields: {"machine": "table", "axis": 1, ...}')
+    taken = [name for name in OWN if name in found]
+    if taken:
+        raise Misuse(f"no field {taken[0]!r}: the address says which request it is")
+    return found
+
+
+def _response(answer: Message, status: int) -> Response:
+    headers = {"cache-control": "no-store"} | ({"www-authenticate": "Bearer"} if status == NO_TOKEN else {})
+    return Response(json.dumps(answer), status, headers, media_type="application/json")
+
+
+# ---------------------------------------------------------------------- descriptions
+
+
+def _local(schema: Any) -> Any:
+    """References as they are in an OpenAPI document."""
+    if isinstance(schema, dict):
+        return {key: _component(value) if key == "$ref" else _local(value) for key, value in schema.items()}
+    return [_local(one) for one in schema] if isinstance(schema, list | tuple) else schema
+
+
+def _component(reference: str) -> str:
+    """``#/$defs/(answer)`` there."""
+    return f"#/components/schemas/{_named(reference.removeprefix('#/$defs/'))}"
+
+
+def _named(name: str) -> str:
+    """``(answer)`` there."""
+    return name.strip("()").capitalize()
+
+
+RESPONSES: dict[int | str, dict[str, Any]] = {
+    status: {"description": text, "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Answer"}}}}
+    for status, text in STATUS_TEXTS.items()
+}
+
+
+def _body(name: str) -> dict[str, object]:
+    row = ALL[name]
+    found: Any = request_schema(name, row.meaning, row.fields)
+    properties = {key: value for key, value in found["properties"].items() if key not in OWN}
+    return {**found, "properties": properties, "required": [key for key in found["required"] if key not in OWN]}
+
+
+def _extra(*, body: Mapping[str, object] | None = None, parameters: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+    found: dict[str, Any] = {"parameters": parameters} if parameters else {}
+    if body is not None:
+        content = {"application/json": {"schema": _local(body)}}
+        found["requestBody"] = {"required": bool(body["required"]), "content": content}
+    return found
+
+
+def describe_api(app: FastAPI, *, asks: bool) -> None:
+    """Has ``app`` describe itself with the schemas of the tables; ``asks``: a token is needed."""
+    from fastapi.openapi.utils import get_openapi
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            found = get_openapi(title="steptwin studio", version=__version__, routes=app.routes)
+            schemas = {_named(name): _local(one) for name, one in definitions().items()}
+            found.setdefault("components", {})["schemas"] = schemas
+            if asks:
+                found["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
+                found["security"] = [{"token": []}]
+            app.openapi_schema = found
+        return app.openapi_schema
+
+    app.openapi = openapi

@@ -1,0 +1,143 @@
+"""Viewers over WebSockets: each request is answered, and what a session has to send is sent as fast as its viewer reads.
+
+Everything runs in the event loop of the world, so commands are done between the requests of its other clients, without locks.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import Awaitable, Callable, MutableMapping
+from typing import Any, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.studio.hub import Hub
+from steptwin.studio.session import Session
+from steptwin.subject.dispatch import failure
+
+Scope: TypeAlias = MutableMapping[str, Any]
+Receive: TypeAlias = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+
+TICK_S = 1 / 30
+PATIENCE_S = 10.0
+"""For a viewer that reads nothing."""
+HELLO_S = 10.0
+"""For a connection to say hello."""
+REFUSED, SLOW, SILENT = 4401, 4408, 4400
+"""Codes with which a connection is closed: wrong token, reads nothing, says no hello."""
+
+
+class Viewers:
+    """All connections. ``clock`` is the wall clock in nanoseconds, which must never go back."""
+
+    def __init__(self, hub: Hub, clock: Callable[[], Nanos]) -> None:
+        self._hub = hub
+        self._clock = clock
+        self._connections: set[_Connection] = set()
+        self._ticking: asyncio.Task[None] | None = None
+
+    async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One connection, from its beginning to its end."""
+        await receive()  # that it wants to connect
+        await send({"type": "websocket.accept"})
+        session = Session(self._hub, _peer(scope))
+        connection = _Connection(session, send, self._clock, scope["state"]["abort"])
+        self._connections.add(connection)
+        if self._ticking is None:
+            self._ticking = asyncio.create_task(self._tick())
+        try:
+            await connection.serve(receive)
+        finally:
+            self._connections.discard(connection)
+            session.close()
+            await connection.close()
+
+    async def _tick(self) -> None:
+        """While there are connections; whatever one of them does, the others go on."""
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while self._connections:
+            now = self._clock()
+            self._hub.tick(now)
+            for connection in self._connections:
+                connection.look(now)
+            due = max(due + TICK_S, loop.time() + TICK_S / 4)
+            await asyncio.sleep(due - loop.time())
+        self._ticking = None
+
+    async def close(self) -> None:
+        if self._ticking is not None:
+            self._ticking.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._ticking
+
+
+class _Connection:
+    """Answers are sent in order; what is pushed is written by a task of its own, which alone waits for a slow reader."""
+
+    def __init__(self, session: Session, send: Send, clock: Callable[[], Nanos], abort: Callable[[], None]) -> None:
+        self._session = session
+        self._send = send
+        self._clock = clock
+        self._abort = abort
+        self._news = asyncio.Event()
+        self._writing: asyncio.Task[None] | None = None
+
+    async def serve(self, receive: Receive) -> None:
+        loop = asyncio.get_running_loop()
+        silent = loop.call_later(HELLO_S, self._abort)
+        self._writing = asyncio.create_task(self._write())
+        try:
+            while (message := await receive())["type"] == "websocket.receive":
+                await self._answer(message.get("text"))
+                if self._session.is_refused:
+                    await self._send({"type": "websocket.close", "code": REFUSED})
+                    return
+                if self._session.has_entered:
+                    silent.cancel()
+                self.look(self._clock())
+        except (TimeoutError, OSError):
+            self._abort()
+        finally:
+            silent.cancel()
+
+    async def _answer(self, text: str | None) -> None:
+        if text is None:
+            answer = json.dumps(failure(Misuse("a message is a text of JSON; this one is binary")))
+        else:
+            answer = self._session.receive(text, self._clock())
+        await self._written(answer)
+
+    async def _write(self) -> None:
+        try:
+            while True:
+                await self._news.wait()
+                self._news.clear()
+                for text in self._session.take(self._clock()):
+                    await self._written(text)
+        except (TimeoutError, OSError):
+            self._abort()
+
+    async def _written(self, text: str) -> None:
+        """Raises `TimeoutError` for a viewer that does not read, `OSError` for one that has gone."""
+        async with asyncio.timeout(PATIENCE_S):
+            await self._send({"type": "websocket.send", "text": text})
+
+    def look(self, now: Nanos) -> None:
+        """Have sent what there is."""
+        if not self._news.is_set() and self._session.has_news(now):
+            self._news.set()
+
+    async def close(self) -> None:
+        if self._writing is not None:
+            self._writing.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._writing
+
+
+def _peer(scope: Scope) -> str:
+    client = scope.get("client")
+    return str(client[0]) if client else "local"

@@ -1,0 +1,402 @@
+"""The service as a process, asked by independent clients: httpx, websockets, a Modbus master."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from pymodbus.client import ModbusTcpClient
+from tests.conftest import until
+from tests.peers.conftest import Master
+from tests.studio.conftest import Process
+from tests.support.studio_rig import check_answer, check_message
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection
+
+from steptwin.machine import MILLISECOND
+
+Start = Callable[..., Process]
+
+
+class Page:
+    """A viewer over a WebSocket."""
+
+    def __init__(self, socket: ClientConnection, **hello: object) -> None:
+        self.socket = socket
+        self.pushed: list[dict[str, Any]] = []
+        self.answer = self.ask("hello", **hello)
+
+    def ask(self, name: str, /, **fields: object) -> dict[str, Any]:
+        self.socket.send(json.dumps({"do": name, "id": name, **fields}))
+        while True:
+            message = self.next()
+            if "seq" not in message:
+                check_answer(name, message)
+                return message
+
+    def ok(self, name: str, /, **fields: object) -> Any:
+        answer = self.ask(name, **fields)
+        assert "ok" in answer, answer
+        return answer["ok"]
+
+    def next(self, timeout: float = 30.0) -> dict[str, Any]:
+        message = json.loads(self.socket.recv(timeout))
+        check_message(message)
+        if "seq" in message:
+            self.pushed.append(message)
+        return message
+
+    def wait_for(self, member: str, condition: Callable[[Any], bool] = lambda _: True) -> Any:
+        """The first content of a kind of message for which a condition holds."""
+        for _ in range(1000):
+            found = [message[member] for message in self.pushed if member in message and condition(message[member])]
+            if found:
+                return found[0]
+            self.next()
+        raise AssertionError(f"no {member}")
+
+
+def page(studio: Process, **hello: object) -> Page:
+    return Page(studio.connect(), **hello)
+
+
+# ---------------------------------------------------------------------- requests
+
+
+def test_a_page_says_hello_watches_follows_and_moves(start_studio: Start) -> None:
+    studio = start_studio()
+    page(studio, name="Anna")
+    viewer = page(studio, name="Piotr")
+    whole = viewer.wait_for("hello")
+    assert (whole["description"]["name"], whole["viewers"], whole["role"]) == ("hall", 2, "engineer")
+    viewer.ok("watch", points=["table.M1.position"], rate=30)
+    viewer.ok("follow", id=1, kinds=["plan"])
+    viewer.ok("enable", machine="table", axis=1)
+    viewer.ok("move", machine="table", axis=1, to=3)
+    assert viewer.wait_for("control") == {"viewer": whole["viewer"], "name": "Piotr"}
+    viewer.wait_for("events", lambda events: events[-1]["plan"]["final"] == 300.0)
+    viewer.wait_for("values", lambda values: values.get("1", [[0, None]])[0][1] == 3.0)
+    viewer.wait_for("clock")
+
+
+def test_it_moves_what_an_independent_master_sees(start_studio: Start) -> None:
+    studio = start_studio()
+    port = studio.end_points["tcp"]["port"]
+    with ModbusTcpClient("127.0.0.1", port=port) as modbus, httpx.Client(base_url=studio.url) as client:
+        master = Master(modbus, 1)
+        assert client.post("/api/do/enable", json={"machine": "table", "axis": 1}).json()["ok"] is None
+        assert client.post("/api/do/move", json={"machine": "table", "axis": 1, "to": 2.5}).status_code == 200
+        assert master.follow(1, 3)[-1][2:] == (2.5, 0.0, 4)
+        points = client.get("/api/points", params={"names": "table.M1.position,time"}).json()["ok"]
+        assert [(one["point"], one["unit"]) for one in points] == [("table.M1.position", "mm"), ("time", "s")]
+        assert points[0]["value"] == 2.5
+        assert set(client.get("/api/state").json()["ok"]) == {"table", "drum"}
+        assert client.get("/api/state", params={"machine": "drum"}).json()["ok"]
+        assert client.get("/api/describe").json()["ok"]["name"] == "hall"
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    process = Process(tmp_path_factory.mktemp("studio")).wait_until_ready()
+    yield process
+    try:
+        process.end()
+    finally:
+        process.close()
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "status", "message"),
+    [
+        ("/api/do/move", b'{"machine": "table", "axis": 1, "to": "x"}', 400, "to: 'x': expected a number"),
+        ("/api/do/move", b"{", 400, "a body is an object of JSON"),
+        ("/api/do/move", b"[1]", 400, "a body is an object of JSON"),
+        ("/api/do/move", b"[" * 60_000, 400, "a body is an object of JSON"),
+        ("/api/do/move", b'{"do": "stop"}', 400, "no field 'do'"),
+        ("/api/do/move", b"x" * 70_000, 413, "a body has at most 65536 bytes"),
+        ("/api/do/state", b'{"machine": "tabel"}', 400, "did you mean 'table'?"),
+        ("/api/do/jog", b'{"machine": "table", "axis": 2, "velocity": 1}', 409, "not enabled"),
+        ("/api/do/resume", b'{"speed": "max"}', 400, "--speed max"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_status(shared: Process, path: str, body: bytes, status: int, message: str) -> None:
+    answer = httpx.post(f"{shared.url}{path}", content=body)
+    assert (answer.status_code, answer.json()["error"]["code"]) == (status, "refusal" if status == 409 else "misuse")
+    assert message in answer.json()["error"]["message"]
+    check_message(answer.json())
+
+
+def test_there_is_no_request_about_a_connection_over_rest(shared: Process) -> None:
+    described = httpx.get(f"{shared.url}/openapi.json").json()["paths"]
+    assert "/api/do/move" in described
+    for name in ("follow", "unfollow", "watch", "unwatch", "hello", "resync"):
+        assert f"/api/do/{name}" not in described
+        assert httpx.post(f"{shared.url}/api/do/{name}", json={}).status_code in (404, 405)
+
+
+# ---------------------------------------------------------------------- access
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [{"host": "evil.example"}, {"host": "evil.example:8488"}, {"origin": "http://evil.example"}, {"origin": "null"}],
+)
+def test_other_sites_are_refused(shared: Process, headers: dict[str, str]) -> None:
+    for path in ("/", "/api/describe"):
+        answer = httpx.get(f"{shared.url}{path}", headers=headers)
+        assert (answer.status_code, answer.json()["error"]["code"]) == (403, "refusal")
+    with pytest.raises(InvalidStatus) as refused:
+        shared.connect(additional_headers={"Origin": "http://evil.example"})
+    assert refused.value.response.status_code == 403
+
+
+def test_the_own_origin_may_open_a_websocket_and_only_there_is_one(shared: Process) -> None:
+    shared.connect(origin=shared.url).close()
+    from websockets.sync.client import connect
+
+    with pytest.raises(InvalidStatus) as refused, connect(f"{shared.url.replace('http', 'ws')}/other"):
+        pass
+    assert refused.value.response.status_code == 404
+
+
+def test_the_page_comes_with_its_headers(shared: Process) -> None:
+    answer = httpx.get(f"{shared.url}/")
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == "text/html; charset=utf-8"
+    policy = answer.headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert answer.headers["cache-control"] == "no-cache"
+    for path in ("/nothing", "/../pyproject.toml", "/%2e%2e/service.py", "/assets/../../service.py"):
+        assert httpx.get(f"{shared.url}{path}").status_code == 404
+
+
+def tokens(directory: Path) -> dict[str, str]:
+    text = {role: f"{role}-0123456789abcdef" for role in ("viewer", "operator", "engineer")}
+    (directory / "tokens").write_text("".join(f"{role} {role} {token}\n" for role, token in text.items()))
+    return text
+
+
+def test_where_tokens_are_asked_for_they_give_roles(start_studio: Start, tmp_path: Path) -> None:
+    token = tokens(tmp_path)
+    studio = start_studio("--tokens", str(tmp_path / "tokens"), "--audit", str(tmp_path / "audit"))
+    move = {"machine": "table", "axis": 1, "on": True}
+
+    def post(name: str, role: str | None) -> int:
+        headers = {} if role is None else {"authorization": f"Bearer {token.get(role, role)}"}
+        return httpx.post(f"{studio.url}/api/do/{name}", json=move if name == "enable" else {}, headers=headers).status_code
+
+    assert [post("enable", role) for role in (None, "wrong", "viewer", "operator")] == [401, 401, 403, 200]
+    assert [post("audit", role) for role in ("operator", "engineer")] == [403, 200]
+    assert post("stop_all", "viewer") == 200
+    assert httpx.get(f"{studio.url}/api/describe").status_code == 401
+    with contextlib.closing(studio.connect()) as socket:
+        socket.send('{"do": "hello", "token": "wrong"}')
+        assert json.loads(socket.recv())["error"]["message"] == "wrong token"
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.recv()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 4401
+    viewer = page(studio, token=token["viewer"])
+    assert viewer.answer["ok"]["role"] == "viewer"
+    viewer.socket.close()
+    entries = [json.loads(line) for line in (tmp_path / "audit").read_text().splitlines()]
+    assert [(one["role"], one["do"], one["outcome"]) for one in entries] == [
+        ("viewer", "enable", "refusal"),
+        ("operator", "enable", "done"),
+        ("operator", "audit", "refusal"),
+        ("engineer", "audit", "done"),
+        ("viewer", "stop_all", "done"),
+    ]
+    assert (tmp_path / "audit").stat().st_mode & 0o077 == 0
+
+
+def test_others_reach_it_only_where_that_is_permitted_and_with_a_token(start_studio: Start) -> None:
+    studio = start_studio("--http", "0.0.0.0:0", "--remote")
+    port = studio.end_points["http"]["port"]
+    url = f"http://127.0.0.1:{port}"
+    assert httpx.get(f"{url}/api/describe").status_code == 401
+    (line,) = [line for line in studio.output.splitlines() if "#token=" in line]
+    token = line.partition("#token=")[2].split(" ")[0]
+    assert "(engineer, engineer)" in line
+    answer = httpx.get(f"{url}/api/describe", headers={"authorization": f"Bearer {token}"})
+    assert answer.status_code == 200
+    assert httpx.get(f"{url}/", headers={"host": f"evil.example:{port}"}).status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--http", "0.0.0.0:0"), "others can reach this address"),
+        (("--http", "nowhere"), "'nowhere' is not an address"),
+        (("--remote",), "--remote permits an --http address that others can reach, but 127.0.0.1:8488 is none"),
+        (("--certificate", "c.pem"), "--certificate and --key go together"),
+        (("--tokens", "/nowhere/tokens"), "/nowhere/tokens"),
+    ],
+)
+def test_options_that_do_not_go_together_are_named(options: tuple[str, ...], message: str) -> None:
+    from tests.conftest import run_command
+
+    ran = run_command(["studio", *options], dict(os.environ))
+    assert ran.returncode == 2, ran.stderr
+    assert message in ran.stderr
+
+
+def test_the_next_free_port_is_taken_and_named(start_studio: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    from steptwin.commands import studio as command
+    from steptwin.errors import LineFailure
+    from steptwin.studio.service import listen
+    from steptwin.world.addresses import Address
+
+    assert Address("127.0.0.1", 8488) == command.DEFAULT
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with listen(Address("127.0.0.1", port), is_fixed=False) as found:
+            assert port < found.getsockname()[1] < port + 20
+        with pytest.raises(LineFailure, match=f"cannot listen on 127.0.0.1:{port}"):
+            listen(Address("127.0.0.1", port), is_fixed=True)
+
+
+# ---------------------------------------------------------------------- hostile and slow
+
+
+def test_hostile_messages_end_in_an_error_or_the_end_of_the_connection(shared: Process) -> None:
+    for data in ("", "[" * 60_000, '{"do":"hello"}' * 100, b"\x00\xff", '{"do": "hello", "id": {}}', "null"):
+        with contextlib.closing(shared.connect()) as socket:
+            socket.send(data)
+            answer = json.loads(socket.recv())
+            check_message(answer)
+            assert answer["error"]["code"] == "misuse"
+    with contextlib.closing(shared.connect()) as socket:
+        socket.send("x" * 200_000)
+        with pytest.raises(ConnectionClosed):
+            socket.recv()
+    viewer = page(shared)
+    assert viewer.ok("time")
+    viewer.socket.close()
+
+
+def test_who_reads_nothing_slows_nobody(shared: Process) -> None:
+    with contextlib.closing(socket.create_connection(("127.0.0.1", shared.end_points["http"]["port"]))) as silent:
+        silent.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        host = shared.url.removeprefix("http://")
+        silent.sendall(
+            f"GET /ws HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+        )
+        assert b"101" in silent.recv(4096)
+        for text in ('{"do":"hello"}', '{"do":"follow","id":1}', '{"do":"watch","points":["time"],"rate":30}'):
+            data = text.encode()
+            mask = b"\0\0\0\0"
+            silent.sendall(bytes([0x81, 0x80 | len(data)]) + mask + data)
+        viewer = page(shared)
+        began = time.monotonic()
+        for n in range(200):
+            viewer.ok("note", text=str(n))
+        assert time.monotonic() - began < 60  # it is served at all
+        viewer.socket.close()
+
+
+# ---------------------------------------------------------------------- jogs
+
+
+JOGGING = """
+import json, sys
+from websockets.sync.client import connect
+
+socket = connect(sys.argv[1], max_size=None).__enter__()
+
+
+def ask(**message):
+    socket.send(json.dumps({**message, "id": message["do"]}))
+    while True:
+        answer = json.loads(socket.recv())
+        if answer.get("id") == message["do"]:
+            return answer.get("ok")
+
+
+def jog():
+    return ask(do="jog", machine="table", axis=1, velocity=20)
+
+
+ask(do="hello")
+ask(do="enable", machine="table", axis=1)
+lease = jog()
+import time
+while True:
+    print("renewed", flush=True)
+    time.sleep(lease["lasts_ms"] / 3000)
+    lease = ask(do="renew", lease=lease["lease"]) or jog()  # a busy computer may be late
+"""
+
+
+@pytest.mark.parametrize("fate", ["stopped", "killed"])
+def test_an_axis_stands_in_time_when_the_page_is_gone(start_studio: Start, fate: str) -> None:
+    studio = start_studio()
+    watcher = page(studio)
+    watcher.ok("follow", id="plans", kinds=["plan"], machines=["table"], axes=["1"])
+    url = f"{studio.url.replace('http', 'ws', 1)}/ws"
+    jogging = subprocess.Popen([sys.executable, "-c", textwrap.dedent(JOGGING), url], stdout=subprocess.PIPE, text=True)
+    try:
+        assert jogging.stdout is not None
+        for _ in range(20):
+            assert jogging.stdout.readline() == "renewed\n"
+        until(lambda: watcher.ok("read", points=["table.M1.velocity"])[0]["value"] == 20.0, "the axis runs")
+        jogging.send_signal(signal.SIGSTOP if fate == "stopped" else signal.SIGKILL)
+        gone = int(watcher.ask("time")["time_ns"])  # no renewal comes later
+        until(lambda: watcher.ok("read", points=["table.M1.velocity"])[0]["value"] == 0.0, "the axis stands")
+        watcher.wait_for("leases", lambda leases: leases == [])
+        watcher.ask("time")
+        plans = [e for message in watcher.pushed for e in message.get("events", ()) if e["kind"] == "plan"]
+        last = plans[-1]["plan"]
+        ends_ns = int(last["start_ns"]) + round((last["segments"][-1][0] if last["segments"] else 0) * 1e9)
+        assert ends_ns <= gone + 300 * MILLISECOND
+        assert watcher.ok("read", points=["table.M1_VMAX"])[0]["value"] == 40.0
+    finally:
+        jogging.kill()
+        jogging.wait()
+        jogging.stdout.close()
+    watcher.socket.close()
+
+
+def test_the_time_of_the_world_stands_with_the_process_and_a_jog_ends_afterwards(start_studio: Start) -> None:
+    """A service that is stopped holds its world up with it."""
+    studio = start_studio()
+    viewer = page(studio)
+    viewer.ok("enable", machine="table", axis=1)
+    viewer.ok("jog", machine="table", axis=1, velocity=20)
+    began = int(viewer.ask("time")["time_ns"])
+    studio.process.send_signal(signal.SIGSTOP)
+    time.sleep(1.2)
+    studio.process.send_signal(signal.SIGCONT)
+    until(lambda: viewer.ok("read", points=["table.M1.velocity"])[0]["value"] == 0.0, "the axis stands")
+    assert viewer.ok("read", points=["table.M1.position"])[0]["value"] <= 20 * 0.3
+    assert int(viewer.ask("time")["time_ns"]) > began
+    viewer.socket.close()
+
+
+def test_the_demo_machine_is_shown_without_a_file(start_studio: Start) -> None:
+    for port in (5020, 5021, 5022):
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                pytest.skip(f"port {port} is in use here")
+    studio = start_studio("--itself")
+    described = httpx.get(f"{studio.url}/api/describe").json()["ok"]
+    assert [one["name"] for one in described["machines"]] == ["table", "drum", "feeder"]
+    assert studio.end_points["tcp"]["port"] in (5020, 5022)
+    assert "Modbus TCP, bus    127.0.0.1:5020" in studio.output
+    assert f"studio             {studio.url}/" in studio.output
+    until(lambda: httpx.get(f"{studio.url}/api/points?names=table.M3.moving").json()["ok"][0]["value"] == 1.0, "it works")
