@@ -1,0 +1,69 @@
+"""Data sheet of the MIC488, every field, reviewed once against tables 3.1 and 3.2 and chapter 4 of the manuals:
+golden/datasheet.txt. Of the axes the first; what differs is the number.
+
+Regenerate with ``PYTHONPATH=tests/support python tests/mic488/test_datasheet.py`` and read the diff.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from sheets import sheet_lines
+
+from steptwin.mic488.config import UNITS, AxisConfig, ControllerConfig
+from steptwin.mic488.datasheet import datasheet, datasheet_of
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.registers import AXES, FIRMWARES
+
+GOLDEN = Path(__file__).parent / "golden" / "datasheet.txt"
+LATEST, *OLDER = reversed(FIRMWARES)
+OTHER_AXES = re.compile(r'"(path|name|code)": "M[234][_.]')
+
+
+def lines(firmware: str) -> list[str]:
+    return [line for line in sheet_lines(datasheet_of(firmware)) if not OTHER_AXES.search(line)]
+
+
+def everything() -> dict[str, list[str]]:
+    latest = lines(LATEST)
+    return {
+        f"data sheet of {LATEST}": latest,
+        **{f"other lines of {name}": [line for line in lines(name) if line not in latest] for name in OLDER},
+    }
+
+
+def test_data_sheets_are_the_reviewed_ones() -> None:
+    texts = GOLDEN.read_text(encoding="utf-8").split("=== ")[1:]
+    expected = {name: rows for name, *rows in (text.rstrip().splitlines() for text in texts)}
+    found = everything()
+    assert found.keys() == expected.keys()
+    for name, rows in found.items():
+        assert rows == expected[name]
+
+
+def test_axes_have_the_same_points_and_commands() -> None:
+    sheet = datasheet_of(LATEST)
+    for names in ([point.path for point in sheet.points], [command.name for command in sheet.commands]):
+        of_axes = [{name[2:] for name in names if re.match(rf"M{axis}[_.]", name)} for axis in range(1, AXES + 1)]
+        assert of_axes == [of_axes[0]] * AXES
+        assert of_axes[0]
+
+
+def test_units_are_those_of_the_configuration() -> None:
+    axes = (
+        AxisConfig(),
+        AxisConfig(unit=UNITS.index("mm"), gear=100.0),
+        AxisConfig(),
+        AxisConfig(unit=UNITS.index("degree"), gear=8.5),
+    )
+    sheet = datasheet(Mic488Device(ControllerConfig(axes=axes)))
+    assert [(axis.name, axis.unit, axis.pulses_per_unit) for axis in sheet.axes] == [
+        ("M1", "imp", 1.0), ("M2", "mm", 100.0), ("M3", "imp", 1.0), ("M4", "degree", 8.5)
+    ]  # fmt: skip
+    for path, unit in (("M2.position", "mm"), ("M4.velocity", "degree/s"), ("M1.position", "imp"), ("M4_POS_ACT", "degree")):
+        assert sheet.point(path).unit == unit
+
+
+if __name__ == "__main__":
+    GOLDEN.write_text("\n".join("\n".join([f"=== {name}", *rows]) for name, rows in everything().items()) + "\n", "utf-8")
