@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from steptwin.controllerstate import ControllerState, StateAxis, StateProgram, StateStatus
 from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactType, Pin, PinDirection, Point, PointEffect
@@ -17,7 +17,6 @@ from steptwin.wire.slave import FrameDirection as Way
 from steptwin.words.frames import FrameLine
 from steptwin.world import script as do
 from steptwin.world.control import Move, StopAxes
-from steptwin.world.elements.axis import AxisSpec
 from steptwin.world.faults import AxisLoad, Faults
 from steptwin.world.kernel import Kernel
 from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LinkKind, Member, Row, Service, Terminals
@@ -32,6 +31,9 @@ from steptwin.world.views import MachineView
 from toy.faults import ToyBody
 from toy.line import ToyLine
 from toy.machine import STEP_P, Toy
+
+if TYPE_CHECKING:
+    from steptwin.world.elements.axis import AxisSpec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
