@@ -49,8 +49,8 @@ class LineWords(FrameFollower, Protocol):
 class LineEndPoint(Stateful):
     """Where one program is connected. ``received`` is what has come and was not fetched, with its moments."""
 
-    __slots__ = ("framed", "inner", "kind", "on_output", "port", "received", "rubbish", "talks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"framed", "inner", "kind", "on_output", "port", "rubbish", "talks"})
+    __slots__ = ("at_once", "framed", "inner", "kind", "on_output", "port", "received", "rubbish", "talks")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"at_once", "framed", "inner", "kind", "on_output", "port", "rubbish", "talks"})
 
     def __init__(self, kind: str, port: FaultyPort, inner: Any, framed: SlavePort | None, *, talks: bool) -> None:
         self.kind = kind
@@ -61,6 +61,8 @@ class LineEndPoint(Stateful):
         """What reports Modbus frames in it."""
         self.rubbish = 0
         """Bytes that belonged to no frame, as far as that was reported."""
+        self.at_once = False
+        """Whether the port has sent all answers when it has taken a request, and nothing later."""
         self.talks = talks
         """Whether the port may send without having been asked."""
         self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
@@ -101,6 +103,10 @@ class Line(Stateful):
     def _port(self, place: str, kind: str) -> Port:
         """A port for one more program. Its state is copied by `_port_state`."""
         raise NotImplementedError
+
+    def _answers_at_once(self, kind: str) -> bool:
+        """Whether ports of a kind have sent all answers when they have taken a request."""
+        return False
 
     def _framed(self, port: Any) -> SlavePort | None:
         """What reports Modbus frames in a port of `_port`."""
@@ -158,6 +164,7 @@ class Line(Stateful):
             )
             is_busy = False
         found = self.places[place] = LineEndPoint(kind, faulty, port, framed, talks=is_busy)
+        found.at_once = self._answers_at_once(kind)
         if is_busy:
             self._busy[place] = found
         return found
