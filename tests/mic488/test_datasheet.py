@@ -17,7 +17,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, FIRMWARES
 
 GOLDEN = Path(__file__).parent / "golden" / "datasheet.txt"
-LATEST, *OLDER = reversed(FIRMWARES)
+LATEST, *OLDER = reversed(tuple(FIRMWARES))
 OTHER_AXES = re.compile(r'"(path|name|code)": "M[234][_.]')
 
 
