@@ -1,4 +1,4 @@
-"""Where a world begins: at its description, or at a moment of a session."""
+"""The beginning of a world: its description, or a moment of a session."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ SESSION_SUFFIX = ".json"
 
 
 def is_session(path: Path) -> bool:
-    """Whether a file is taken for a session; others are taken for descriptions."""
+    """Whether a file is a session; others are descriptions."""
     return path.suffix.lower() == SESSION_SUFFIX
 
 
 def check_session_target(path: Path) -> None:
-    """Whether a session can be written there, and is one by its name afterwards. Raises `Misuse`."""
+    """Check that a session can be written to a path, and that its name ends as that of a session. Raises `Misuse`."""
     if not is_session(path):
         raise Misuse(f"{path}: the name of a session must end with {SESSION_SUFFIX}")
     check_writable(path)
@@ -39,7 +39,7 @@ def begin_world(
     allow_outside: bool = False,
     state: Path | None = None,
 ) -> World:
-    """The world that a file describes; that of a session at its end, or at a ``moment`` with all that had come by then.
+    """The world that a file describes; that of a session at its end, or at ``moment`` (ns) with all inputs up to then.
 
     ``warn`` is called with warnings. Raises `Misuse`.
     """
@@ -68,6 +68,6 @@ def begin_world(
 
 
 def set_faults(world: World, faults: Sequence[str]) -> None:
-    """Faults of the command line, from now on. Raises `Misuse`."""
+    """Set faults of the command line. Raises `Misuse`."""
     for fault in faults:
         world.outside(do.SetFault(read_fault(fault)))

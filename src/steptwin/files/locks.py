@@ -1,4 +1,4 @@
-"""Locks on open files: flock, or what Windows has for it. The system gives them free when the process ends."""
+"""Locks on open files: flock, or its equivalent on Windows. The system releases them at the end of the process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def lock(file: int) -> None:
 
 
 def unlock(file: int) -> None:
-    """Give a locked file free. Windows does not do so at once when it is closed."""
+    """Unlock a file. Windows does not do so at once when it is closed."""
     if fcntl is None:
         msvcrt: Any = import_module("msvcrt")
         os.lseek(file, LOCKED_BYTE, os.SEEK_SET)

@@ -1,4 +1,4 @@
-"""A directory that keeps what survives power-off: non-volatile images, with one owner at a time.
+"""The state directory: non-volatile images, with one owner at a time.
 
 An image is one file. A save writes a temporary file, syncs it, renames it onto the image and syncs the directory: at any moment —
 ``kill -9``, power loss, full disk — the old or the new content is there whole. Damage is found by a header with format,
@@ -65,7 +65,7 @@ class StateDirectory:
         self.close()
 
     def close(self) -> None:
-        """Give the directory free. Closing twice does nothing."""
+        """Release the directory. Closing twice has no effect."""
         if self._lock is not None:
             self._lock.release()
             self._lock = None
@@ -79,7 +79,7 @@ class StateDirectory:
             sync_directory(path.parent)
 
     def load(self, name: str) -> bytes | None:
-        """The content last saved of an image, None when it was never saved.
+        """The last saved contents of an image; None if it was never saved.
 
         Raises `StateFailure` when it is damaged or of another format, `Misuse` for a name outside letters, digits, ``-``, ``_``.
         """
@@ -100,7 +100,7 @@ class StateDirectory:
         return data
 
     def save(self, name: str, data: bytes) -> None:
-        """Make ``data`` the content of an image; when this returns it survives power loss.
+        """Save ``data`` as an image; after the return it survives a power loss.
 
         Raises `StateFailure` when that is not possible, or what is there is of another format; a later `load` then gives the old
         content or this one.

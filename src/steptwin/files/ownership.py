@@ -1,4 +1,4 @@
-"""Lock files: of what one process at a time may have."""
+"""Lock files for resources that one process at a time may use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steptwin.system import LOCK_FLAGS, is_own
 
 
 class InUse(Misuse):
-    """Another process owns it; ``owner`` is a process in words."""
+    """Another process owns it; ``owner`` describes that process."""
 
     def __init__(self, path: Path, owner: str) -> None:
         self.owner = owner
@@ -43,7 +43,7 @@ def _content(file: int) -> bytes:
 
 
 class Ownership:
-    """A lock on the file ``path`` until `release`. The kernel gives it free when the process ends, however it ends.
+    """A lock on the file ``path`` until `release`. The system releases it at any end of the process.
 
     Raises `InUse` when another process (or another `Ownership`) has it, `OSError` when the file cannot be made, is a link or
     belongs to another user: what is written into a lock file must not go elsewhere.
@@ -63,7 +63,7 @@ class Ownership:
                 break
             os.close(self._file)  # its last owner removed it between our two calls
         self.left_behind = os.fstat(self._file).st_size > 0
-        """Whether a process that did not end cleanly had it before."""
+        """Whether the last owner did not end cleanly."""
         os.ftruncate(self._file, 0)
         os.lseek(self._file, 0, os.SEEK_SET)
         os.write(self._file, b"%d\n" % os.getpid())
@@ -76,7 +76,7 @@ class Ownership:
             return False
 
     def release(self) -> None:
-        """Give it free and take the file away."""
+        """Release it and remove the file."""
         if self._file < 0:
             return
         file, self._file = self._file, -1

@@ -24,7 +24,7 @@ Findings: TypeAlias = tuple[tuple[SourceText, list[Diagnostic]], ...]
 
 @dataclass(frozen=True, slots=True)
 class Banks:
-    """What a controller has in its banks, and the findings about the files it came from."""
+    """The contents of a controller's banks, and the findings about their files."""
 
     programs: Mapping[int, LoadedProgram] = field(default_factory=dict)
     positions: Mapping[int, PositionTable] = field(default_factory=dict)
@@ -66,7 +66,7 @@ def read_banks(
     *,
     option: str = "--positions {bank}=FILE",
 ) -> Banks:
-    """Read and check what goes into the banks: programs (`.prg`) and compiled images (`.wbc`), which bring their own table.
+    """Read and check the contents of the banks: programs (`.prg`) and compiled images (`.wbc`), which contain their own table.
 
     Names of positions are found in the table of the program's own bank number, or else in the only table there is. Raises
     `ProgramErrors`, and `Misuse` for files that cannot be read or run, and for a program that names positions where there is no

@@ -1,6 +1,6 @@
-"""Sessions: a world, its files, and everything that came from outside with its moments, in one file of JSON.
+"""Sessions: a world, its files, and all inputs with their moments, in one JSON file.
 
-``steptwin replay FILE`` runs it again and compares the digest of what happened. Nothing else is needed for that.
+``steptwin replay FILE`` runs it again and compares the digest of the trace. No other file is needed.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Session:
     """Values that replace those of the text."""
     version: str = __version__
     failed_saves: tuple[FailedSave, ...] = ()
-    """Memory that could not be kept: a fact from outside, as the inputs are."""
+    """Failed saves of memory, which are part of the inputs."""
 
     def world(self, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world at its beginning. Raises `WorldError`, and `Misuse` where the firmware is not the description's."""
@@ -69,7 +69,7 @@ class Session:
         return world
 
     def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
-        """The world after all of it, or after what had come by the moment ``until``, from which it may go another way.
+        """The world after all inputs, or after those up to the moment ``until`` (ns), from which it may continue differently.
 
         Raises `Misuse` where inputs do not fit the world, and for a moment after the session's end.
         """
@@ -111,7 +111,7 @@ def _firmwares(world: World) -> dict[str, str]:
 
 
 def session_of(world: World) -> Session:
-    """The session of a world up to now. What Python code did to the world is in it, the code is not.
+    """The session of a world up to now. It contains the inputs of Python code, not the code.
 
     Raises `Misuse` for a world that does not keep its inputs.
     """
@@ -156,7 +156,7 @@ def save(session: Session, path: Path | str) -> None:
 
 
 def load(path: Path | str) -> Session:
-    """What `save` wrote. Raises `Misuse` for a file that cannot be read or is not a session."""
+    """Read a session. Raises `Misuse` for a file that cannot be read or is not a session."""
     content = read_bytes(Path(path), MOST_RECORDED_BYTES)
     try:
         data = json.loads(content, parse_int=_whole, parse_constant=_finite)

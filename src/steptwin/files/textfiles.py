@@ -1,4 +1,4 @@
-"""Files the user names: texts as editors leave them, and writing."""
+"""Reading and writing of text files that the user names."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class TextFile:
     decoded: Decoded
 
     def to_bytes(self, text: str) -> bytes:
-        """A text in the manner of this file: encoding, byte order mark, DOS end mark. Its own text gives its own bytes."""
+        """Encode a text as this file was: encoding, byte order mark, DOS end mark. The unchanged text gives the same bytes."""
         return self.decoded.to_bytes(text)
 
 
 def check_writable(path: Path) -> None:
-    """Whether a file can be written here, before much is done for it; folders on the way can be made. Raises `Misuse`."""
+    """Check in advance that a file can be written; missing folders are permitted. Raises `Misuse`."""
     try:
         place, number = path, EISDIR if path.is_dir() else 0
         while not number and not place.exists():
@@ -46,13 +46,13 @@ def check_writable(path: Path) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Whether the folder a file is to be in is there. Raises `Misuse`."""
+    """Check that the folder of a file exists. Raises `Misuse`."""
     if not path.parent.is_dir():
         raise Misuse(f"cannot write {shown(path)}: there is no folder {shown(path.parent)}")
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file, and the folders it is to be in. Raises `Misuse` when it cannot be written."""
+    """Write a file, and make its folders. Raises `Misuse` if that is not possible."""
     check_writable(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -35,7 +35,7 @@ from steptwin.world.spec import WorldSpec
 from steptwin.world.views import LineView, MechanicsView, Views
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
-"""A condition that never comes true is given up after an hour, where no other limit is given."""
+"""Default limit of a run with a condition, ns: an hour."""
 SLICES = 200
 """In so many parts a run is done at least, where its progress is shown."""
 LONGEST_SLICE_NS: Nanos = 10 * SECOND
@@ -43,7 +43,7 @@ LONGEST_SLICE_NS: Nanos = 10 * SECOND
 
 
 class FailedSave(NamedTuple):
-    """The non-volatile memory of a machine could not be kept: the disk was full, or its like."""
+    """A failed save of the non-volatile memory of a machine, for example on a full disk."""
 
     time: Nanos
     machine: str
@@ -53,14 +53,13 @@ class FailedSave(NamedTuple):
 Duration: TypeAlias = float | str
 """Seconds, or a text such as ``"10 min"``."""
 Reaction: TypeAlias = do.Step | tuple[do.Step, ...] | Callable[[], object]
-"""What `World.at` and `World.when` do: steps, or a function that may do anything with the world."""
+"""The action of `World.at` and `World.when`: steps, or a function of the world."""
 
 
 class World(Plant):
     """A world in virtual time. It begins at 0 s and runs only on request.
 
-    What is done to it from Python goes into its session and can be replayed; what is done to a `device` or `chip` behind its
-    back cannot.
+    Calls of its methods go into its session and can be replayed; direct changes of a `device` or `chip` cannot.
     """
 
     def __init__(
@@ -77,7 +76,7 @@ class World(Plant):
         self._state = state
         self._failing = {(failed.time, failed.machine): failed.reason for failed in failing}
         self.failed_saves: list[FailedSave] = []
-        """Memory that could not be kept so far, where inputs are kept: a replay has to see the same."""
+        """Failed saves so far, if inputs are kept: a replay repeats them."""
         keep = None if state is None and not self._failing else self._save
         super().__init__(spec, files or {}, keep_trace=keep_trace, keep_inputs=keep_inputs, keep_memory=keep)
         self.mic488 = self.views(MIC488)
@@ -113,10 +112,10 @@ class World(Plant):
         """The world described by a TOML file. Raises `WorldError` (a `Misuse`).
 
         ``seed`` replaces that of the description, ``overrides`` other values in it: ``{"axis.x.pitch": 4.0}``. Without
-        ``keep_trace`` and ``keep_inputs`` the memory of a long run does not grow with what happens; it then has no trace and no
-        session. Files the description names are read from its folder and those below, with ``allow_outside`` from anywhere: their
-        content becomes part of sessions. ``state`` replaces the directory of non-volatile memory that the description names; the
-        world owns that directory until `close`, and raises `StateInUse` or `StateFailure` where it cannot have it.
+        ``keep_trace`` and ``keep_inputs`` the memory of a long run does not grow; it then has neither trace nor session. Files
+        the description names are read from its folder and those below, with ``allow_outside`` from anywhere: their content
+        becomes part of sessions. ``state`` replaces the directory of non-volatile memory that the description names; the world
+        owns that directory until `close`, and raises `StateInUse` or `StateFailure` if it cannot be used.
         """
         place = Path(path)
         spec = describe(str(path), read_text(place).source.text, seed, overrides)
@@ -194,7 +193,7 @@ class World(Plant):
         return None if self._state is None else self._state.path
 
     def close(self) -> None:
-        """Give the directory of non-volatile memory free, where there is one. Closing twice does nothing."""
+        """Release the directory of non-volatile memory, if any. Closing twice has no effect."""
         if self._state is not None:
             self._state.close()
 
@@ -234,13 +233,13 @@ class World(Plant):
         return None
 
     def due(self) -> Nanos | None:
-        """The next moment at which anything happens by itself, None when nothing will."""
+        """The next moment (ns) at which anything happens without input; None if nothing will."""
         dues = [due for kernel in self.kernels if (due := kernel.deadline()) is not None]
         own = self.next()
         return min(dues if own is None else [*dues, own], default=None)
 
     def step(self) -> Nanos | None:
-        """Run to the next moment at which anything happens by itself; gives it, None when nothing will."""
+        """Run to the next moment (ns) at which anything happens without input, and return it; None if nothing will."""
         due = self.due()
         if due is not None:
             self.run_to(max(due, self.now))
@@ -249,14 +248,14 @@ class World(Plant):
     # ------------------------------------------------------------------ operators
 
     def at(self, time: Duration, reaction: Reaction, name: str = "at") -> Script:
-        """Do something at a moment. Raises `Misuse` for one that has passed."""
+        """Execute an action at a moment. Raises `Misuse` for one that has passed."""
         moment = duration(time)
         if moment < self.now:
             raise Misuse(f"at {moment / SECOND:g} s: this world is at {self.time:g} s already")
         return self.start(name, partial(do.run_through, (do.At(moment), *_steps(reaction))), is_outside=True)
 
     def when(self, condition: str, reaction: Reaction, *, once: bool = False, name: str = "when") -> Script:
-        """Do something whenever a condition comes true, or only the first time. Raises `Misuse`."""
+        """Execute an action whenever a condition comes true, or only the first time. Raises `Misuse`."""
         self.condition(condition)
         return self.start(name, partial(do.run_when, _steps(reaction), condition, once=once), is_outside=True)
 

@@ -1,4 +1,4 @@
-"""Rules on one command by itself: is its number permitted, reserved, a line that is free?"""
+"""Rules for the number of a single command: permitted, reserved, a free line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
 
 
 def argument_rules(command: Command, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
-    """What is wrong or doubtful about the number written in the command."""
+    """Findings about the number written in the command."""
     number = command.number
     if number is None:
         return
@@ -31,7 +31,7 @@ def argument_rules(command: Command, variant: Variant, interface: Interface) -> 
 
 
 def number_problem(command: Command, number: int, variant: Variant, interface: Interface) -> Diagnostic | None:
-    """What is wrong with ``number`` as the argument of the command, wherever the number comes from."""
+    """The error of ``number`` as the argument of the command, written or from the internal variable."""
     spec = find(command.key, number, variant)
     if spec is None:
         return _out_of_range(command, number, variant)

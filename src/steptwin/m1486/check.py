@@ -17,7 +17,7 @@ from steptwin.m1486.variants import DEFAULT, Variant
 
 @dataclass(frozen=True, slots=True)
 class CheckedChipProgram:
-    """The result: the program as far as it could be read, the findings in text order, the memory of each chip."""
+    """The result: the parsed program, the findings in text order, the memory of each chip."""
 
     program: ProgramText
     diagnostics: list[Diagnostic]

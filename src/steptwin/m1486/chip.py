@@ -1,6 +1,6 @@
 """The M1486 as a pure machine: serial port, command memory, program, motor, pins.
 
-A chip is made of how it is tied and timed, and driven by four calls::
+A chip is made from the levels of its pins and its timing, and driven by four calls::
 
     chip = M1486Chip(variant("E1"), address=3, interface=DUAL_DAC, baud=4800, is_timed=True, image=kept)
     chip.receive(b"f12800\\rr\\r", now)  # characters from the host; chips that share a line: `steptwin.m1486.line`
@@ -8,12 +8,12 @@ A chip is made of how it is tied and timed, and driven by four calls::
     chip.advance(chip.deadline())  # time
     chip.to_send(now)  # characters to the host, with their moments
 
-What it does is reported by ``on_event`` (moves, waits, outputs, uploads, stops, wrong data), `take_edges` (pins) and ``drive``
-(motion: `ChipDrive.train` is the pulse train in force, `ChipDrive.revision` counts trains; `steptwin.m1486.signals` makes
-pulses and converter data of it). A program file is in the memory from the start when ``image`` is what
+Its actions are reported by ``on_event`` (moves, waits, outputs, uploads, stops, wrong data), `take_edges` (pins) and
+``drive`` (motion: `ChipDrive.train` is the pulse train in force, `ChipDrive.revision` counts trains; `steptwin.m1486.signals`
+makes pulses and converter data of it). A program file is in the memory from the start when ``image`` is what
 `steptwin.m1486.eeprom.image_of` makes of it; it then runs at power-on, on chips with RAM as well as on those with EEPROM.
-`M1486Chip.snapshot` and `M1486Chip.restore` (or `copy_state` and `set_state`, without their check) take all state out and put it
-back.
+`M1486Chip.snapshot` and `M1486Chip.restore` (or `copy_state` and `set_state`, without their check) take all state out and put
+it back.
 """
 
 from __future__ import annotations
@@ -169,8 +169,8 @@ class M1486Chip(Stateful):
         self.now = now
 
     def _run_instant(self, at: Nanos, until: Nanos) -> None:
-        """Something that is due at ``at``. A character that arrives comes after everything else, so that it does not matter
-        in which pieces characters are handed over."""
+        """Execute one deadline at ``at``. A received character comes after everything else, so that the splitting of input does
+        not matter."""
         self.now = at
         if self.is_shut_down:
             self._end_shutdown(at)
@@ -199,7 +199,7 @@ class M1486Chip(Stateful):
         return False
 
     def _run_program(self, at: Nanos, until: Nanos) -> None:
-        """As far as nothing else happens; one command where the drive or the receiver may depend on it."""
+        """Run the program until the next other deadline; a single command if the drive or the receiver may depend on it."""
         if self.drive.motion is not MotionMode.REST or self.receiver.is_stalled:
             until = at
         due = self._hardware_deadline()
@@ -214,7 +214,7 @@ class M1486Chip(Stateful):
         return self._due
 
     def _touch(self) -> None:
-        """State changed: find the next deadline anew."""
+        """Compute the next deadline after a change of state."""
         if self.is_shut_down:
             since = self._rst_high_since
             self._due = None if since is None else since + SHUTDOWN_RESET_NS
@@ -224,12 +224,12 @@ class M1486Chip(Stateful):
         self.changed()
 
     def _settle(self) -> None:
-        """After an input: what it leads to at this moment."""
+        """Execute the consequences of an input at this moment."""
         self._touch()
         self.advance(self.now)
 
     def is_idle(self) -> bool:
-        """Nothing is going on and nothing waits to be done; a program that is held or waits for a line is not idle."""
+        """Whether nothing is in progress or pending; a program that is held or waits for a line is not idle."""
         at_work = self.program.ready > self.now or not self.program.is_at_end
         hardware = self._hardware_deadline() is not None or self.receiver.is_stalled
         return not (at_work or hardware or self.program.is_held)
@@ -300,7 +300,7 @@ class M1486Chip(Stateful):
         return edges
 
     def level(self, line: int, now: Nanos) -> int:
-        """What can be read on a line; where the driver interface has its pin, the interface's signal (M-21)."""
+        """The level that is read on a line; on a pin of the driver interface, the interface's signal (M-21)."""
         if line in self.interface.occupied:
             return data_level(line, self.drive.currents(now))
         return self.io.levels[line]
@@ -313,12 +313,12 @@ class M1486Chip(Stateful):
         return number ^ (1 << len(lines)) - 1 if self.unit.on(COMPLEMENT) else number
 
     def refuse_occupied(self, line: int) -> None:
-        """M-21: there is no such line while the driver interface has its pin. Raises `WrongData`."""
+        """Raises `WrongData` for a line whose pin the driver interface uses (M-21)."""
         if line in self.interface.occupied:
             raise WrongData(f"B{line} belongs to the {self.interface.title} interface")
 
     def put_out(self, lines: range, bits: int, now: Nanos) -> None:
-        """Set outputs, lowest line = least significant bit. Raises `WrongData` where the interface has one (M-21)."""
+        """Set outputs, lowest line = least significant bit. Raises `WrongData` if the interface uses one (M-21)."""
         for line in lines:
             self.refuse_occupied(line)
         for bit, line in enumerate(lines):
@@ -346,7 +346,7 @@ class M1486Chip(Stateful):
             self.on_event(event)
 
     def wrong_data(self, what: str, now: Nanos) -> None:
-        """M-11: the command is dropped, and the program stops unless function 44 is ON."""
+        """Drop a command and stop the program, unless function 44 is ON (M-11)."""
         stops = not self.unit.on(CONTINUE)
         self.event(
             "wrong-data", f"wrong data: {what}{'; the program stops' if stops else ''}", now, ("why", what), ("stops", stops)
@@ -399,7 +399,7 @@ class M1486Chip(Stateful):
     # ------------------------------------------------------------------ power, RST, shutdown
 
     def power_off(self, now: Nanos) -> None:
-        """Everything off: until a `power_cycle` the chip does nothing, receives nothing and sends nothing."""
+        """Switch off: until a `power_cycle` the chip neither acts nor receives nor sends."""
         self.advance(now)
         self._fall_silent(now)
         self.io.release_outputs(now)
@@ -488,7 +488,7 @@ class M1486Chip(Stateful):
         self._restart(now)
 
     def resume(self, now: Nanos) -> None:
-        """Do the command before which a hook on commands (`ProgramExecution.watch`) has halted the program, and go on."""
+        """Execute the command before which a hook (`ProgramExecution.watch`) has halted the program, and continue."""
         self.advance(now)
         self.program.resume(now)
         self._settle()

@@ -47,9 +47,8 @@ class When(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class CommandSpec:
-    """One command. ``values``, in rising order, is what it takes on every variant; None where the variant decides or nothing
-    is taken.
-    """
+    """One command. ``values``, in rising order, are the permitted numbers on every variant; None if they depend on the variant
+    or there is no number."""
 
     key: str
     name: str
@@ -240,7 +239,7 @@ def takes_number(key: str) -> bool:
 
 
 def takes_variable(key: str) -> bool:
-    """True where the number may be left out and the internal variable stands for it."""
+    """Whether the number may be left out, so that the internal variable is used."""
     return takes_number(key) and key not in _NEEDS_ARGUMENT
 
 
@@ -250,7 +249,7 @@ def memory_bits(key: str) -> int:
 
 
 def when(key: str, argument: int | None) -> When:
-    """When the command acts; of the commands that share the letter C one does not wait its turn."""
+    """When the command acts; one of the commands with the letter C acts at once."""
     specs = rows(key)
     for spec in specs:
         if argument is not None and spec.values is not None and argument in spec.values:

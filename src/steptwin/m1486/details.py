@@ -1,4 +1,4 @@
-"""What the state of an M1486 has besides what that of every controller has."""
+"""The part of an M1486's state that other controllers do not have."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _SETTINGS: dict[str, Callable[[ChipDrive], int]] = {
     "Q": lambda drive: drive.qualification,
     "N": lambda drive: drive.characteristic,
 }
-"""By the command that makes it."""
+"""Settings by command."""
 BRIEF = frozenset({"listens", "memory_used", "input_waiting", "counter", "counter_valid", "variable", "flags_on", "functions_on"})
 _TEXT, _WHOLE, _TRUTH = FactType.TEXT, FactType.WHOLE, FactType.TRUTH
 

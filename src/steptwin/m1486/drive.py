@@ -89,7 +89,7 @@ class ChipDrive(Stateful):
     )
     FIXED: ClassVar[frozenset[str]] = frozenset({"_clock"})
     offset_p = 0
-    """Traces show the count since power-on: the position counter has its own scale and 24 bits (`counter_u`)."""
+    """0: traces show the count since power-on, because the position counter has its own scale and 24 bits (`counter_u`)."""
 
     def __init__(self, variant: Variant, interface: Interface, now: Nanos) -> None:
         self._clock = variant.clock
@@ -153,7 +153,7 @@ class ChipDrive(Stateful):
         return self.motion in BUSY
 
     def true_u(self, now: Nanos) -> int:
-        """Where the pulses given so far have led, since power-on."""
+        """The count of all pulses since power-on."""
         return self.train.count(now)
 
     def counter_u(self, now: Nanos) -> int:
@@ -210,7 +210,7 @@ class ChipDrive(Stateful):
         return True
 
     def seek(self, direction: int, now: Nanos) -> None:
-        """Go at start/stop speed until further notice. Raises `WrongMove`."""
+        """Run at start/stop speed until stopped. Raises `WrongMove`."""
         microstepping = self._microstepping()
         begin = self.true_u(now)
         speed = self._speed(self.start_stop)
@@ -234,7 +234,7 @@ class ChipDrive(Stateful):
         self.finish()
 
     def _keep_counter_at(self, target_u: int | None) -> None:
-        """M-16: the counter goes on to show the target of a move that does not get there, and is not valid."""
+        """The counter keeps the target of an unfinished move and is invalid (M-16)."""
         if target_u is not None:
             self.offset_u += target_u - self._final_u()
             self.is_valid = False

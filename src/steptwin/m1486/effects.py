@@ -1,4 +1,4 @@
-"""What a compiled command is: a closure over its chip that does it and returns the place of the next one.
+"""Compiled commands: closures over their chip that execute a command and return the place of the next one.
 
 Each part of the language enters its makers into a table of its own, by the name of the command's row in the command table.
 """
@@ -19,7 +19,7 @@ from steptwin.machine import Fact, Nanos
 
 
 class ProgramFlow(Protocol):
-    """Where a program is: its loops and call in progress, and what it waits for. `steptwin.m1486.program` says more."""
+    """The state of a program: loops and call in progress, present wait. See `steptwin.m1486.program`."""
 
     loop_starts: list[int]
     loop_counts: list[int]
@@ -30,14 +30,14 @@ class ProgramFlow(Protocol):
 
 
 class Mover(Protocol):
-    """What starts motions. False: one is in progress, and the command waits for its end."""
+    """Starts motions. False: one is in progress, and the command waits for its end."""
 
     def move(self, now: Nanos) -> bool: ...
     def seek(self, line: int, direction: int, now: Nanos) -> bool: ...
 
 
 class CommandHost(Protocol):
-    """What commands ask of the chip that does them, each at its moment ``now``."""
+    """The interface of a chip to its commands, each at its moment ``now``."""
 
     @property
     def variant(self) -> Variant: ...
@@ -67,17 +67,18 @@ class CommandHost(Protocol):
 
 
 Effect: TypeAlias = Callable[[Nanos], int]
-"""Takes the moment of the command; those that only compute do not look at it."""
+"""Called with the moment of the command."""
 Maker: TypeAlias = Callable[[CommandHost, int, int, int], Effect]
 """Takes the chip, the command's number (0 for none), its place and the place after it."""
 
 
 class WrongData(Exception):
-    """The command is dropped, and the program stops unless function 44 is ON (M-11). The text says why."""
+    """The command is dropped, and the program stops unless function 44 is ON (M-11). The text has the reason."""
 
 
 class Making(NamedTuple):
-    """How a command is made. ``computes``: it depends on no moment and shows nothing. ``is_linked``: it knows a label's place."""
+    """How a command is compiled. ``computes``: it neither depends on time nor has visible effects. ``is_linked``: it contains
+    the place of a label."""
 
     make: Maker
     computes: bool
@@ -99,7 +100,7 @@ class Makers(dict[str, Making]):
 
 
 def refusing(why: str) -> Effect:
-    """A command that can only be wrong data."""
+    """A command that is always wrong data."""
 
     def run(now: Nanos) -> NoReturn:
         raise WrongData(why)

@@ -1,9 +1,9 @@
 """Commands in the chip's memory: one byte for the letter, then the argument in as many bytes as its largest value needs
 (manual chapter II, Memory). The length depends on the letter only.
 
-The manual leaves open how an argument that is left out, and the sign of ``G+``, are told from numbers (M-29): the highest bit
-of the first byte says that the internal variable is the argument; ``G+`` and ``G-`` are the two largest numbers of 24 bits,
-which no position reaches. Low byte first.
+The manual does not specify how an omitted argument, and the sign of ``G+``, differ from numbers (M-29): here the highest bit
+of the first byte marks the internal variable as the argument; ``G+`` and ``G-`` are the two largest numbers of 24 bits, which
+no position reaches. Low byte first.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def encode(command: Command) -> bytes:
 def decode(raw: bytes) -> Stored | None:
     """The command that begins with ``raw[0]``; None where these bytes are no command, as when registers were written over it.
 
-    ``raw`` holds `LONGEST` bytes. Whether the number is permitted is not looked at.
+    ``raw`` holds `LONGEST` bytes. The range of the number is not checked.
     """
     letter = chr(raw[0] & ~FROM_VARIABLE)
     size = SIZES.get(letter)

@@ -1,4 +1,4 @@
-"""What happens in a chip and no pin or register shows. Codes are stable."""
+"""Events of a chip that no pin or register shows. Codes are stable."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ EVENTS: Mapping[str, EventDescription] = {
 
 
 class M1486Event(NamedTuple):
-    """Something that happened. ``code`` is stable, one of `EVENTS`; ``text`` is for people."""
+    """An event. ``code`` is stable, one of `EVENTS`; ``text`` is for people."""
 
     time: Nanos
     code: str
     text: str
     facts: tuple[Fact, ...] = ()
-    """What the text says, as `EVENTS` has it."""
+    """The contents of the text as fields, as defined in `EVENTS`."""

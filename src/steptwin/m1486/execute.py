@@ -1,4 +1,4 @@
-"""From a command in the memory to the closure that does it."""
+"""Compile commands in the memory to closures."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def compile_command(chip: CommandHost, command: Command, place: int, following: 
 
 
 def _with_variable(chip: CommandHost, key: str, place: int, following: int) -> Effect:
-    """A command without its number: the internal variable is it, whatever it is when the command is done."""
+    """A command without number, which uses the value of the internal variable at its execution."""
 
     def run(now: Nanos) -> int:
         number = chip.unit.variable

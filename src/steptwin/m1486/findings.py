@@ -1,7 +1,7 @@
-"""What the checker can say about an M1486 program: one row per code.
+"""The findings of the checker for M1486 programs: one row per code.
 
-M1xx are errors: the chip refuses the command, or the program cannot do what it says. M2xx are warnings: the manual does not
-document it, or it does less than it seems to.
+M1xx are errors: the chip refuses the command, or the program cannot work as written. M2xx are warnings: undocumented or
+without the apparent effect.
 """
 
 from __future__ import annotations

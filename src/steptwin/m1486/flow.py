@@ -1,8 +1,8 @@
-"""Where a program can go, and with which settings: every path is followed with the values the program itself sets.
+"""Flow analysis: all paths of a program, with the settings that the program makes.
 
 A command reached with several settings keeps each of them up to `MOST_STATES`; beyond that they are merged, and a value that
-differs becomes None, unknown. What the program cannot know (lines, registers, flags) is unknown or branches.
-Distances in minimum microsteps, speeds in full steps/s.
+differs becomes None, unknown. Lines, registers and flags are unknown, and conditions on them branch. Distances in minimum
+microsteps, speeds in full steps/s.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _MAIN = -1
 
 
 class Settings(NamedTuple):
-    """What the chip is set to; None is unknown. Field names are those of the commands."""
+    """The settings of the chip; None is unknown. Field names are those of the commands."""
 
     microstep: int | None
     qualification: int | None
@@ -88,7 +88,7 @@ class FlowAnalysis:
 
 
 def value(command: Command, state: Settings) -> int | None:
-    """The number a command works with: its own or the internal variable; None where it is unknown or none is taken."""
+    """The number of a command: its own or the internal variable; None if unknown or without number."""
     return state.variable if command.from_variable else command.number
 
 
@@ -98,14 +98,14 @@ def follow(stream: Stream, variant: Variant, interface: Interface) -> FlowAnalys
 
 
 class _Point:
-    """The settings one place has been reached with."""
+    """The settings with which a place has been reached."""
 
     def __init__(self) -> None:
         self.states: set[Settings] = set()
         self.merged: Settings | None = None
 
     def add(self, state: Settings) -> Settings | None:
-        """What to go on with from here because of ``state``; None if nothing is new."""
+        """The state to continue with from here after ``state``; None if nothing is new."""
         if self.merged is None:
             if state in self.states:
                 return None
@@ -158,7 +158,7 @@ class _Walk:
             self.open.append((index, call, news))
 
     def leave_endless_calls(self) -> bool:
-        """Go on after calls that never come back, so that what follows them is looked at all the same."""
+        """Continue after calls that never return, so that the commands behind them are analysed."""
         calls = {call for _, call in self.points if call != _MAIN} - self.returned
         for call in calls:
             self.returned.add(call)
@@ -193,7 +193,7 @@ class _Walk:
                     self.arrive(index + 1, call, after)
 
     def jump(self, index: int, call: int, state: Settings, label: int | None) -> None:
-        """Go to ``label``, to every label there is where it is unknown, and straight on where there is none."""
+        """Continue at ``label``; at every label if it is unknown; at the next command if it does not exist."""
         if label is None:
             targets = list(self.stream.visible_labels(index).values())
         else:

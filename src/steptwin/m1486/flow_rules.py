@@ -1,4 +1,4 @@
-"""Rules on what happens along the paths of a program: moves that cannot start, numbers from the internal variable, dead code."""
+"""Rules for the paths of a program: moves that cannot start, numbers from the internal variable, unreachable code."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def flow_rules(stream: Stream, variant: Variant, interface: Interface) -> Iterat
 
 
 def _judge(command: Command, states: set[Settings], rule: _Rule) -> Iterator[Diagnostic]:
-    """An error where it is one with every setting, otherwise a warning that it may be; a warning where it can happen at all."""
+    """An error if it occurs with every setting, else a warning if it can occur."""
     faults = [rule(command, state) for state in states]
     found = sorted({fault for fault in faults if fault is not None}, key=lambda fault: fault[1])
     if not found:

@@ -1,4 +1,5 @@
-"""Chips on one serial line: all hear the host, and all speak on the same wire to it (manual chapter II, Serial interface).
+"""Chips on one serial line: all receive the host's characters, and all send on the same wire (manual chapter II, Serial
+interface).
 
 How a shell builds a line::
 
@@ -9,7 +10,7 @@ How a shell builds a line::
     port.to_send(later)  # [(moment, characters)], the same for every port
 
 Chips are machines of their own: a shell adds each to its `steptwin.world.kernel.Kernel` and advances that before it hands
-over characters. What a chip does is told by its hooks (`steptwin.m1486.chip.M1486Chip`).
+over characters. Its actions are reported by its hooks (`steptwin.m1486.chip.M1486Chip`).
 """
 
 from __future__ import annotations
@@ -25,8 +26,7 @@ from steptwin.state import Stateful
 
 
 class SerialChain(Stateful):
-    """Up to sixteen chips with addresses of their own, in the order given. Its state is what is on the wire; the chips keep
-    their own.
+    """Up to sixteen chips with addresses of their own, in the order given. Its own state is that of the wire.
 
     M-33: outputs on one wire pull it low together. Characters that chips begin at the same moment come to the host as one,
     their bitwise AND; a character that begins while another chip's is on the wire is lost and counted in ``collisions``. While
@@ -58,7 +58,7 @@ class SerialChain(Stateful):
             chip.on_sent = self._wake_ports
 
     def port(self) -> LinePort:
-        """A place on the line for one more program. What the chips send from now on reaches every port."""
+        """A port of the line for one more program. Every port receives all characters of the chips from now on."""
         self.collect(max(chip.now for chip in self.chips.values()))
         port = LinePort(self)
         self._ports.append(port)
@@ -114,22 +114,22 @@ class SerialChain(Stateful):
 
 
 class LinePort:
-    """One program's place on the line; a `steptwin.machine.WirePort` that a link serves.
+    """The port of one program; a `steptwin.machine.WirePort` that a link serves.
 
-    ``on_output`` is called when there is something to fetch that nobody asked for.
+    ``on_output`` is called for unsolicited output.
     """
 
     broken = None
-    """A line cannot be broken by what is on it; a connection can."""
+    """Always None: traffic cannot break a serial line."""
 
     def __init__(self, chain: SerialChain) -> None:
         self._chain = chain
         self.pending: list[tuple[Nanos, bytes]] = []
-        """What was sent and not fetched; of more than `MOST_WAITING` characters the last ones."""
+        """Characters not fetched yet; at most the last `MOST_WAITING`."""
         self.on_output: Callable[[], None] | None = None
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        """The chips hear ``data``; everything `to_send` has then."""
+        """Send ``data`` to the chips; returns `to_send`."""
         self._chain.receive(data, now)
         return b"".join(data for _, data in self.to_send(now))
 

@@ -1,4 +1,5 @@
-"""The I/O lines B1 to B21, what shares their pins, and the driver interface that takes some of them (chapters II and VI)."""
+"""The I/O lines B1 to B21, the functions that share their pins, and the driver interface that uses some of them (chapters II
+and VI)."""
 
 from __future__ import annotations
 

@@ -3,8 +3,8 @@
 M-12: a command stays where it is until the ring comes round and overwrites it. Commands before ``end`` may run; those between
 ``end`` and ``write`` belong to a file in ``[ ]`` that is still open or are being written to an EEPROM.
 
-Places are counted in a circle of twice the size of the ring, so that a full ring and an empty one are told apart; the byte of
-a place is its remainder by the size.
+Places are counted modulo twice the size of the ring, to distinguish a full ring from an empty one; the byte of a place is
+its remainder by the size.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from steptwin.state import Stateful
 
 
 class FileState(enum.Enum):
-    """What becomes of the commands that arrive."""
+    """The destination of received commands."""
 
     CLOSED = "closed"
     #: Between ``[`` and ``]``: they are stored.
@@ -37,7 +37,7 @@ class StoredFile(NamedTuple):
 
 
 class Reader(Protocol):
-    """Whoever runs the commands and has to know what is not there any more."""
+    """The executor of the commands, which is notified of overwritten ones."""
 
     def bytes_changed(self, first: int, count: int) -> None: ...
     def labels_changed(self) -> None: ...
@@ -107,7 +107,7 @@ class CommandMemory(Stateful):
         return self.age(self.end) + size <= self.size
 
     def store(self, raw: bytes) -> None:
-        """Write a command where the ring has come to; what was there is lost."""
+        """Write a command at the present place of the ring; its old contents are lost."""
         place = self.write
         for offset, byte in enumerate(raw):
             self._bytes[(place + offset) % self.size] = byte
@@ -139,7 +139,7 @@ class CommandMemory(Stateful):
             self._reader.labels_changed()
 
     def enable(self) -> None:
-        """What has been written may run."""
+        """Release the written commands for execution."""
         self.end = self.write
 
     # ------------------------------------------------------------------ files
@@ -149,7 +149,7 @@ class CommandMemory(Stateful):
         self._file_labels = {}
 
     def refuse_file(self) -> None:
-        """Drop the file that is open, and what is still to come of it."""
+        """Drop the open file and the rest of it."""
         self.file = FileState.REFUSED
         self.write = self.end
 
@@ -191,7 +191,7 @@ class CommandMemory(Stateful):
         return self._bytes[low] | self._bytes[low + 1] << 8
 
     def set_register(self, number: int, value: int) -> None:
-        """Keep the low 16 bits of ``value``. Where registers share the memory, what stood there is no command any more."""
+        """Keep the low 16 bits of ``value``. In shared memory this destroys the command at that place."""
         if self._shared is None:
             self._own[number - 1] = value & 0xFFFF
             return

@@ -1,4 +1,4 @@
-"""What makes the motor move and stop: R, the seeks, K, LIMIT, jog; and what shows it: BOOST, Runsign, DIRECTION."""
+"""Control of the motor: R, the seeks, K, LIMIT, jog; and its signals: BOOST, Runsign, DIRECTION."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ AXIS: Fact = "axis", 1
 
 
 class MovingProgram(Protocol):
-    """The program, as far as motions hold it up."""
+    """The program, as far as motions make it wait."""
 
     is_killed: bool
     is_limited: bool
@@ -28,7 +28,7 @@ class MovingProgram(Protocol):
 
 
 class MotorHost(Protocol):
-    """What the motor asks of its chip."""
+    """The interface of a chip to its motor."""
 
     @property
     def interface(self) -> Interface: ...
@@ -43,7 +43,7 @@ class MotorHost(Protocol):
 
 
 class MotorControl(Stateful):
-    """The drive of a chip in the hands of its program and pins."""
+    """Controls the drive of a chip from its program and pins."""
 
     __slots__ = ("_chip", "_seek_line", "drive")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_chip"})

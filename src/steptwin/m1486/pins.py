@@ -1,6 +1,6 @@
 """The pins of the chip as they are electrically: open-drain user lines, control inputs, outputs (manual chapters II and VI).
 
-Levels are 0 and 1. A user line is high unless the chip or somebody outside pulls it low.
+Levels are 0 and 1. A user line is high unless the chip or external wiring pulls it low.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ALIASES = {
 }  # fmt: skip
 
 WAVEFORM = "N"
-"""No pin: its edges say which waveform the phase currents follow from then on."""
+"""A pseudo pin: its edges give the waveform of the phase currents from then on."""
 JOG_DIRECTION_LINE = 7
 _BAUD_LINES = (5, 6)
 _ADDRESS_LINES = (18, 19, 20, 21)
@@ -145,7 +145,7 @@ def settable_pin(pin: str, value: float) -> str:
 
 
 def refuse_taken(pin: str, interface: Interface) -> None:
-    """`Misuse` for a line whose pin the driver interface has: it is no input and no output (M-21)."""
+    """`Misuse` for a line whose pin the driver interface uses: it is neither input nor output (M-21)."""
     taken = interface.occupied
     if LINE_PINS.get(pin) in taken:
         raise Misuse(f"{pin} is taken: the {interface.title} interface has B{taken[0]} to B{taken[-1]}")

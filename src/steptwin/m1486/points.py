@@ -1,4 +1,4 @@
-"""The points of an M1486: what conditions ask for most, numeric registers, and the bytes that ``U`` sends. A world reads them
+"""The points of an M1486: common values for conditions, numeric registers, and the bytes that ``U`` sends. A world reads them
 without a command; on a device each takes a command and its time, and ``<`` changes the internal variable."""
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _value(path: str, meaning: str, unit: str = "", source: str = "") -> Point:
 
 
 def _has_room(chip: M1486Chip, now: Nanos) -> bool:
-    """Whether a host that heeds the chip's answers would send another line."""
+    """Whether a host with flow control would send another line."""
     receiver = chip.receiver
     return not receiver.is_listening or not (receiver.is_stalled or receiver.busy_until is not None)
 

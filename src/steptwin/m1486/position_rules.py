@@ -1,4 +1,4 @@
-"""Where a program takes the position counter, as far as it follows from the text: G and H count from what it shows.
+"""The range of the position counter in a program, as far as the text determines it: G and H count from it.
 
 The counter has 24 bits without a sign. The manual advises initial values that keep it from passing 0 (chapter VII.2, Equal).
 """

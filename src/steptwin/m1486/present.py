@@ -1,4 +1,4 @@
-"""The present state of an M1486, and what its program does in words."""
+"""The present state of an M1486, and that of its program as text."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MOTIONS = {MotionMode.MOVE: "move", MotionMode.ENDLESS: "endless move", MotionM
 
 
 def program_words(chip: M1486Chip, now: Nanos) -> str:
-    """What the program of a chip does."""
+    """The state of a chip's program as text."""
     program = chip.program
     if chip.is_shut_down:
         return "shut down"
@@ -84,7 +84,7 @@ def _activity(chip: M1486Chip, now: Nanos) -> ProgramActivity:
 
 
 def _axis(chip: M1486Chip, described: AxisDescription, now: Nanos) -> StateAxis:
-    """A chip does not switch its drive: whether that is on is not known."""
+    """The state of the axis. Whether its drive is on is unknown: the chip does not switch it."""
     drive = chip.drive
     return StateAxis(
         number=described.number,

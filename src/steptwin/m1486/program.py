@@ -1,4 +1,4 @@
-"""Running the commands in the memory: one after the other, each taking its time (M-19).
+"""Execution of the commands in the memory, each with its duration (M-19).
 
 Each command is compiled, when it is first met, into a closure that does it and returns the place of the next one. Those that
 only compute run in a bare loop; a closure that is not there yet or does more raises `_Look`, and the command is done with the
@@ -32,7 +32,7 @@ program before it."""
 
 
 class WaitReason(enum.Enum):
-    """What the next command waits for beside its time."""
+    """Reasons for waiting, besides the duration of commands."""
 
     NOTHING = "nothing"
     MOTION = "the end of the motion"
@@ -54,13 +54,13 @@ class _Compiled(NamedTuple):
 
 
 class ProgramHost(CommandHost, Protocol):
-    """What a program asks of its chip: all that commands do, and where wrong data go."""
+    """The interface of a chip to its program: effects of commands, and wrong data."""
 
     def wrong_data(self, what: str, now: Nanos) -> None: ...
 
 
 class ProgramExecution(Stateful):
-    """Where the program stands, and what it waits for.
+    """The state of the program: place, loops, present wait.
 
     ``statement_ns`` is the time of a command (M-19). ``loop_starts`` and ``loop_counts`` are the loops in progress, from the
     outermost in; ``back`` is the place after the call in progress.
@@ -123,12 +123,12 @@ class ProgramExecution(Stateful):
 
     @property
     def is_held(self) -> bool:
-        """Stopped for a while: by K or LIMIT without function 51, or by a debugger."""
+        """Whether it is held: by K or LIMIT without function 51, or by a debugger."""
         return self.is_killed or self.is_limited or self.is_halted
 
     @property
     def is_at_end(self) -> bool:
-        """Nothing is left to be done; a command in progress may still wait."""
+        """Whether no command is left; the present one may still wait."""
         return self.pc == self._chip.memory.end and self.waiting is WaitReason.NOTHING
 
     def deadline(self, now: Nanos) -> Nanos | None:
@@ -137,7 +137,7 @@ class ProgramExecution(Stateful):
         return max(self.ready, now)
 
     def abandon(self, now: Nanos) -> None:
-        """Give up what has been stored so far; commands that come now are done (M-11)."""
+        """Abandon the stored commands; commands received from now on are executed (M-11)."""
         self.pc = self._chip.memory.end
         self.ready = min(self.ready, now + self.statement_ns)
         self._forget_nesting()
@@ -171,9 +171,9 @@ class ProgramExecution(Stateful):
     # ------------------------------------------------------------------ running
 
     def run(self, now: Nanos, until: Nanos) -> Nanos:
-        """Do what is due from ``now`` to ``until``, at most up to the first command that does more than compute.
+        """Execute commands from ``now`` to ``until``, at most to the first that does more than compute.
 
-        Returns the moment that the chip has come to by that.
+        Returns the moment that the chip has reached.
         """
         statement = self.statement_ns
         most = (until - now) // statement + 1 if statement else self._left_at(now)

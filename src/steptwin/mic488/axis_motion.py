@@ -36,7 +36,7 @@ NEAR_P = 1e-6
 
 
 class AxisHost(Protocol):
-    """What an axis needs of its controller."""
+    """The interface of the controller to an axis."""
 
     def input_active(self, number: int) -> bool:
         """State of input ``number`` (from 0) after polarity, before the filter (MIC-30)."""
@@ -56,7 +56,7 @@ class AxisHost(Protocol):
 
 
 class AxisMotion(Stateful):
-    """The motion of axis ``number`` (from 1) of a MIC488: what follows a command, and what it shows."""
+    """The motion of axis ``number`` (from 1) of a MIC488, after a command, and its state."""
 
     __slots__ = (
         "_blocked_leg",
@@ -107,7 +107,7 @@ class AxisMotion(Stateful):
 
     @property
     def plan(self) -> Profile:
-        """What gives the pulses: the profile itself."""
+        """The source of pulses: the profile."""
         return self.profile
 
     def power_on(self, now: Nanos) -> None:
@@ -143,7 +143,7 @@ class AxisMotion(Stateful):
         self.control.reference(self, now)
 
     def set_state(self, plain: Plain) -> None:
-        """As ever, but what is put back is a replaced profile too."""
+        """Set the state; a restored profile also counts as a replacement."""
         super().set_state(plain)
         self.revision += 1
 
@@ -160,7 +160,7 @@ class AxisMotion(Stateful):
         return coordinate if DINT_MIN <= coordinate <= DINT_MAX else wrapped_dint(coordinate)
 
     def shaft(self, now: Nanos) -> int:
-        """What the encoder's shaft has turned since power-on, in counts."""
+        """Rotation of the encoder's shaft since power-on, in counts."""
         return self.encoder.shaft(self.profile.count(now), now)
 
     def encoder_counts(self, now: Nanos) -> int:
@@ -179,7 +179,7 @@ class AxisMotion(Stateful):
         return due
 
     def advance(self, now: Nanos) -> None:
-        """Run what is due at ``now``; called by the controller at each of the axis' deadlines, in order."""
+        """Execute the deadline at ``now``; the controller calls this at each of the axis' deadlines, in order."""
         leg, end = self._blocked_leg, self.profile.end
         if leg is not None and leg[0] <= now:
             self._limit_stop(now, leg[1])
@@ -209,7 +209,7 @@ class AxisMotion(Stateful):
         self.control.rested(self, now)
 
     def _forget(self) -> None:
-        """A new command replaces whatever was going on."""
+        """End the present motion, because a new command replaces it."""
         self.jogging = 0
         self.on_path = self.on_arc = False
         self.homing.leg = Homing.NONE

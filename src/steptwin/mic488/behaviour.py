@@ -1,7 +1,7 @@
-"""What each register does: one entry for each row of the register table, under the key of the row.
+"""The behaviour of registers: one entry for each row of the register table, under the key of the row.
 
-`steptwin.mic488.registers` describes the registers for whoever speaks to a controller, without one; this is the controller's
-side. A row without its behaviour, a behaviour without its row, or one that does not fit its row is refused at import.
+`steptwin.mic488.registers` describes the registers for masters; this is the controller's side. A row without its behaviour,
+a behaviour without its row, or one that does not fit its row is refused at import.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ AxisAction: TypeAlias = Callable[[Axis, float, Nanos], None]
 
 
 def _nothing(*_: object) -> Any:
-    """Of what is not read or not written."""
+    """The getter or setter of a register that cannot be read or written."""
     raise NotImplementedError
 
 

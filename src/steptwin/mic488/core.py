@@ -1,4 +1,4 @@
-"""What a MIC488 is without its Modbus face: four axes, inputs and outputs, memory, program control, and their time."""
+"""A MIC488 without its Modbus interface: four axes, inputs and outputs, memory, program control, and their time."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable
 
 MAX_EVENTS_PER_INSTANT = 10_000
-"""More than this at one moment is a runaway, not a motion."""
+"""Limit of deadlines at one moment; more is an endless loop."""
 
 EVENTS_KEPT = 1000
 
 Action: TypeAlias = "Callable[[ControllerCore, float, Nanos], None]"
-"""What a write of a holding register does."""
+"""The effect of a write of a holding register."""
 CoilAction: TypeAlias = "Callable[[ControllerCore, int, bool, Nanos], None]"
-"""What a write of a coil does. Takes the number of the axis or output, from 0."""
+"""The effect of a write of a coil, called with the number of the axis or output, from 0."""
 
 _ERROR = AxisStatus.ERROR
 """Asked for at every instant: a member found through its class costs more than all the rest of the question."""
 
 
 class Mic488Event(NamedTuple):
-    """Something that happened and that no register shows."""
+    """An event that no register shows."""
 
     time: Nanos
     axis: int | None
@@ -146,7 +146,7 @@ class ControllerCore(Stateful):
         self._edges: list[PinEdge] = []
         self._due: Nanos | None = None
         self._others: Nanos | None = None
-        """When something is due next, and of that when anything but the program is."""
+        """The next deadline of everything except the program, ns."""
         self.inputs = Inputs(config.inputs)
         self.analog_v = [0.0] * ANALOG_INPUTS
         self.outputs = [False] * OUTPUTS
@@ -154,7 +154,7 @@ class ControllerCore(Stateful):
         self.program = ProgramControl(self, programs, positions, statement_time)
         self.error_led = False
         self.master_error = False
-        """Whether a slave of the controller's own Modbus master does not answer, which only a fault brings about (WBC-13)."""
+        """Whether a slave of the controller's own Modbus master does not respond; only a fault sets it (WBC-13)."""
         self._power_on()
 
     def _power_on(self) -> None:
@@ -182,7 +182,7 @@ class ControllerCore(Stateful):
         self._power_on()
 
     def power_off(self, now: Nanos) -> None:
-        """Program, drives and outputs off. Until a `power_cycle` nothing more is to be asked of the controller."""
+        """Switch program, drives and outputs off. The controller must not be used again until a `power_cycle`."""
         self.advance(now)
         self.program.command(0, now)
         for number in range(OUTPUTS):
@@ -203,7 +203,7 @@ class ControllerCore(Stateful):
         self.now = now
 
     def _run_instant(self, at: Nanos, until: Nanos) -> None:
-        """Run everything due at ``at``; a program that concerns nothing else may go on up to ``until``."""
+        """Execute all deadlines at ``at``; a program without effects on other parts may run on up to ``until``."""
         self.now = at
         for _ in range(MAX_EVENTS_PER_INSTANT):
             others = self._others
@@ -241,13 +241,13 @@ class ControllerCore(Stateful):
         return self._due
 
     def command(self, action: Callable[[Nanos], object], now: Nanos) -> None:
-        """Have ``action`` command axes or the program at ``now``, after everything that is due then."""
+        """Apply ``action``, which commands axes or the program, at ``now``, after all deadlines of that moment."""
         self.advance(now)
         action(now)
         self._settle()
 
     def _settle(self) -> None:
-        """State was changed from outside: notify the program, find the next deadline and the ERR lamp anew."""
+        """After a change from outside: notify the program, compute the next deadline and the ERR output."""
         self.program.disturbed(self.now, inside=False)
         self._plan_ahead(self._due_without_program(), lamp=True)
 
@@ -294,7 +294,7 @@ class ControllerCore(Stateful):
     def write_registers(self, actions: Sequence[Action], values: Sequence[float], *, quiet: bool) -> None:
         """Write registers, in the order of their addresses, at the present moment.
 
-        ``quiet``: they only keep their values, which concerns a running program at most.
+        ``quiet``: the registers only keep their values, which affects a running program at most.
         """
         now = self.now
         for action, value in zip(actions, values, strict=True):
@@ -303,7 +303,7 @@ class ControllerCore(Stateful):
             self._settle()
 
     def user_registers_written(self) -> None:
-        """User registers were written over Modbus: a running program may wait for that."""
+        """Notify a running program of user registers written over Modbus."""
         if self.program.state:
             self._settle()
             self.program.registers_written(self.now)
@@ -351,7 +351,7 @@ class ControllerCore(Stateful):
     # ------------------------------------------------------------------ the vision system on COM1
 
     def see(self, record: VisionRecord, now: Nanos) -> None:
-        """A record of the vision system has come: it is in the registers Vision… of programs."""
+        """Take a record of the vision system into the registers Vision… of programs."""
         self.advance(now)
         self.program.registers.take_record(record)
         self._settle()
@@ -368,7 +368,7 @@ class ControllerCore(Stateful):
         self._settle()
 
     def couple_encoder(self, axis: int, coupling: Coupling, now: Nanos) -> None:
-        """Say what turns the shaft of ``axis`` (from 1): the drive, nothing, or a blocked drive."""
+        """Select what turns the shaft of ``axis`` (from 1): the drive, nothing, or a blocked drive."""
         chosen = self._axis(axis)
         self.advance(now)
         chosen.encoder.couple(coupling, chosen.profile.count(now), now)
@@ -427,7 +427,7 @@ class ControllerCore(Stateful):
     # ------------------------------------------------------------------ state that registers show
 
     def set_master_error(self, shown: bool, now: Nanos) -> None:
-        """Have M_STATUS show that a slave of the controller's own Modbus master does not answer, or no longer."""
+        """Set or clear the Modbus master error in M_STATUS."""
         self.advance(now)
         self.master_error = shown
         self._settle()

@@ -23,7 +23,7 @@ DEFAULT_SCALES = (("imp", 1.0),) * AXES
 
 
 def datasheet(device: Mic488Device) -> Datasheet:
-    """Of a controller as it is configured."""
+    """The data sheet of a configured controller."""
     return datasheet_of(device.firmware.name, tuple((axis.config.unit_name, axis.gear) for axis in device.axes))
 
 

@@ -26,7 +26,7 @@ class AxisScale(NamedTuple):
 
 
 class Wording:
-    """What one needs to know to put the frames of one controller into words.
+    """The knowledge for describing the frames of one controller.
 
     ``scales`` are those of axes 1–4; without them units are shown as ``u``. ``data_type`` is DATA_TYPE at the time.
     """
@@ -41,7 +41,7 @@ class Wording:
     # ------------------------------------------------------------------ PDUs
 
     def request(self, pdu: bytes) -> str:
-        """A request: what is read, or what is written with which values."""
+        """The text of a request: registers read, or registers written with their values."""
         try:
             request = modbus.decode_request(pdu)
         except modbus.ModbusException as refusal:
@@ -59,7 +59,7 @@ class Wording:
                 return f"write {self._registers(address, values)}"
 
     def response(self, pdu: bytes, request: bytes | None = None) -> str:
-        """A response. Values read and the place of an exception can only be named when the request is known."""
+        """The text of a response. Values and registers can only be named if the request is known."""
         try:
             response = modbus.decode_response(pdu)
         except modbus.BadResponse as failure:

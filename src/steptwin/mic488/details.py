@@ -1,4 +1,4 @@
-"""What the state of a MIC488 has besides what that of every controller has."""
+"""The part of a MIC488's state that other controllers do not have."""
 
 from __future__ import annotations
 

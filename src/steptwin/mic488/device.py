@@ -43,7 +43,7 @@ def pause_observer(devices: Mapping[int, Mic488Device]) -> Callable[[int, Nanos]
 
 
 class Serving(Protocol):
-    """What serves the requests of a controller: its `Slave`, or something in front of that."""
+    """Serves the requests of a controller: its `Slave`, or a wrapper of that."""
 
     def answer(self, device: ControllerCore, pdu: bytes) -> bytes: ...
 

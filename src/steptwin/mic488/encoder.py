@@ -1,7 +1,7 @@
 """The encoder of an axis: its shaft, what turns it, and the counter that registers show.
 
-``motor`` in the methods is the drive's counted position in pulses since power-on; ``shaft`` counts what the shaft has turned
-(after ×4 quadrature) and never jumps, whatever is written into the counter.
+``motor`` in the methods is the drive's counted position in pulses since power-on; ``shaft`` counts the rotation of the shaft
+(after ×4 quadrature) and never jumps, also when the counter is written.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from steptwin.state import Stateful
 
 
 class Coupling(enum.Enum):
-    """What turns the encoder's shaft besides a hand."""
+    """What turns the encoder's shaft, apart from manual turning."""
 
     DRIVE = "drive"
     """The drive, without loss."""
@@ -48,7 +48,7 @@ class Encoder(Stateful):
         self._built = (enc_resol, mot_resol)
         """Counts per pulses; negative counts: it counts backwards."""
         self._turned = 0
-        """Counts by hand."""
+        """Counts of manual turning."""
         self._lost = 0
         """Pulses of the drive that did not turn the shaft while it was coupled to something else."""
         self._standing = 0

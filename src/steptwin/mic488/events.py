@@ -1,4 +1,4 @@
-"""The events of a MIC488: what no register shows. Codes are stable."""
+"""The events of a MIC488, which no register shows. Codes are stable."""
 
 from __future__ import annotations
 

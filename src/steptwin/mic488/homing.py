@@ -16,7 +16,7 @@ SLOWEST_P = 1.0
 
 
 class HomingAxis(Protocol):
-    """What homing asks of its axis."""
+    """The interface of an axis to its homing."""
 
     @property
     def number(self) -> int: ...

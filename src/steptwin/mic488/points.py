@@ -1,5 +1,5 @@
-"""The points of a MIC488: its registers, and short names of what conditions ask for most. Values are in configured units,
-whatever DATA_TYPE says."""
+"""The points of a MIC488: its registers, and short names of common values. Values are in configured units, independent of
+DATA_TYPE."""
 
 from __future__ import annotations
 
@@ -171,7 +171,8 @@ def _short_name(text: str) -> tuple[ShortName, int | None] | None:
 
 
 def item_of(registers: RegisterMap, text: str) -> RegisterItem | None:
-    """What a name or an address of a register means, None where there is none. Raises `Misuse` for what is not a whole value."""
+    """The register or part of one with this name or address; None if there is none. Raises `Misuse` for what is not a whole
+    value."""
     match = _ADDRESS.fullmatch(text)
     if match is None:
         if "." in text:

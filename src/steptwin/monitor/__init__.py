@@ -1,6 +1,6 @@
 """The terminal monitor: a MIC488's registers, axes and frames, live. `steptwin monitor` behind its options.
 
-`session` talks to the controller and knows nothing of terminals; `app` shows what it has found.
+`session` polls the controller, independent of terminals; `app` shows the results.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from steptwin.errors import Misuse, SteptwinError
 
 
 class NoTextual(SteptwinError):
-    """The library that draws on terminals is missing."""
+    """The library textual is missing."""
 
 
 def monitor(device: str | None, hz: float) -> None:
-    """Watch a controller until the user ends it. Raises `Misuse`, or `NoTextual` with the command that installs it."""
+    """Run the monitor until the user ends it. Raises `Misuse`, or `NoTextual` with the command that installs it."""
     try:
         import textual  # noqa: F401
     except ImportError as error:

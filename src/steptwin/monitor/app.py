@@ -1,4 +1,4 @@
-"""The monitor on a terminal. Stopping is reachable whatever has the focus, for nothing here is modal."""
+"""The monitor on a terminal. The stop keys work with any focus, because nothing here is modal."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ until it does, and when you release it, the axis comes to rest by itself."""
 
 
 class Monitor(App[None]):
-    """What a session finds, on a terminal."""
+    """The application: shows a session."""
 
     ENABLE_COMMAND_PALETTE = False
     TITLE = "steptwin monitor"
@@ -163,7 +163,7 @@ class Monitor(App[None]):
 
     @property
     def _is_shown(self) -> bool:
-        """Whether there is anything on the screen: the session goes on for a moment when the user has quit."""
+        """Whether the screen exists: the session continues for a moment after the user has quit."""
         return len(self.screen_stack) > 0 and bool(self.query("#head"))
 
     def _pictured(self, picture: Picture) -> None:
@@ -292,7 +292,7 @@ class Monitor(App[None]):
     # ------------------------------------------------------------------ asking
 
     def _ask(self, title: str, answer: Callable[[str], Awaitable[object]]) -> None:
-        """Ask for a value. What is wrong with it is said and asked again; Esc stops, and closes it."""
+        """Ask for a value, and again with a message if it is wrong. Esc stops the axes and closes the input."""
         self._answer = answer
         ask = self.query_one("#ask", Input)
         ask.value = ""
@@ -331,7 +331,7 @@ class Monitor(App[None]):
         said.update(text)
 
     def _do(self, action: Awaitable[object]) -> None:
-        """Do something with the controller in a task of its own; what goes wrong is said."""
+        """Execute an action in its own task and show its errors."""
 
         async def done() -> None:
             try:
@@ -424,7 +424,7 @@ class Monitor(App[None]):
 
 
 class AxisTable(DataTable[str]):
-    """The arrow keys to the left and right jog: they are no use in a table whose rows are chosen."""
+    """The table of axes. The left and right arrow keys jog."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("left", "app.jog(-1)", show=False),
@@ -433,7 +433,7 @@ class AxisTable(DataTable[str]):
 
 
 class Ask(Input):
-    """A value is asked for. Space stops here too: no value has one in it."""
+    """The input of a value. Space stops the axes here, too, because values contain no blank."""
 
     def check_consume_key(self, key: str, character: str | None) -> bool:
         return key != "space" and super().check_consume_key(key, character)

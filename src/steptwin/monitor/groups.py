@@ -1,4 +1,4 @@
-"""How the monitor shows registers: in which groups, and what it says of their values."""
+"""Groups of registers in the monitor, and the texts of their values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.mic488.values import Value
 AXES = "M"
 CONTROLLER, INPUTS, OUTPUTS, USER = "Controller", "Inputs", "Outputs", "User"
 USER_SHOWN = 32
-"""So many user registers at a time."""
+"""User registers shown at a time."""
 
 
 def groups_of(registers: RegisterMap) -> Mapping[str, list[Register]]:
@@ -34,7 +34,7 @@ def groups_of(registers: RegisterMap) -> Mapping[str, list[Register]]:
 
 
 def shown(register: Register, value: Value) -> str:
-    """A value as people read it: ``REAL (0)``, ``on``, ``12.5``."""
+    """A value as text: ``REAL (0)``, ``on``, ``12.5``."""
     if register.type is Type.BIT:
         return "on" if value else "off"
     if register.values:
@@ -43,7 +43,7 @@ def shown(register: Register, value: Value) -> str:
 
 
 def permitted(register: Register, data_type: DataType, unit: str) -> str:
-    """What a register takes, in words."""
+    """The permitted values of a register as text."""
     if not register.accepts:
         return "read only"
     if register.values:

@@ -1,4 +1,4 @@
-"""A conversation with a controller that goes on: it is looked at again and again, and found again when lost."""
+"""A session with a controller: it is polled, and found again after a lost connection."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import Value
 
 AGAIN_S = 1.0
-"""A controller that does not answer is tried again after this time."""
+"""Interval of attempts to reach a controller that does not respond, s."""
 HZ = (0.2, 10.0)
 JOG_HOLD_S = 0.2
-"""How long an axis runs on after the last key: the least there is."""
+"""Hold time of a jog after the last key, s: the shortest permitted."""
 KEY_S = 0.25
-"""A key that is held comes again sooner than this."""
+"""Longest interval between repetitions of a held key, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What was found at the last look. ``trouble``: why there was no answer; the rest is from before, then."""
+    """The result of the last poll. ``trouble``: why there was no answer; the other values are then from before."""
 
     status: Mic488Status | None = None
     values: Mapping[str, tuple[Value, str]] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Picture:
 
 
 class MonitorSession:
-    """A controller that is watched. ``on_picture`` is told of every look, ``on_frame`` of every frame.
+    """Polls a controller. ``on_picture`` is called after every poll, ``on_frame`` for every frame.
 
     ``watched`` are names of registers to read besides the status, in as few frames as may be.
     """
@@ -54,7 +54,7 @@ class MonitorSession:
         self._at_once = asyncio.Event()
         self._jog: _Jogging | None = None
         self._ignored_until: float | None = None
-        """A key that is held through the end of its jog begins no other: until then it has to be let go."""
+        """Time until which a key still held after the end of its jog is ignored, s."""
         frames = mic.line.notes.get("frames")
         if frames is not None:
             frames.sinks.append(self._heard)
@@ -64,7 +64,7 @@ class MonitorSession:
 
     @property
     def registers(self) -> RegisterMap:
-        """The map of the firmware that was found; of the newest before."""
+        """The register map of the detected firmware; before detection that of the newest."""
         return register_map(self.mic.firmware)
 
     @property
@@ -74,7 +74,7 @@ class MonitorSession:
     # ------------------------------------------------------------------ looking
 
     async def run(self) -> None:
-        """Look until cancelled."""
+        """Poll until cancelled."""
         try:
             while True:
                 await self._look()
@@ -111,9 +111,9 @@ class MonitorSession:
     # ------------------------------------------------------------------ acting
 
     async def stop(self) -> str:
-        """Stop all axes at once, without ramp. A program that runs is paused, else it would move them again.
+        """Stop all axes at once, without ramp. A running program is paused, because it could move them again.
 
-        Goes before everything that waits for the line. Returns what was done. Raises `Unconfirmed`.
+        It precedes all waiting requests. Returns what was done, as text. Raises `Unconfirmed`.
         """
         self._jog = None
         self._ignore_held_key()
@@ -126,10 +126,10 @@ class MonitorSession:
         return "stopped; the program is paused"
 
     async def jog(self, axis: int, velocity_u: float) -> str:
-        """A key that jogs was pressed, or came again because it is held. The axis runs for as long as it comes again.
+        """Handle a jog key, pressed or repeated. The axis runs as long as the key repeats.
 
-        Another direction ends it. Gives why it has ended otherwise than by letting go: then, and after `stop`, a key that is held
-        on does nothing more.
+        Another direction ends it. Returns the reason if it has ended other than by release; then, and after `stop`, a key still
+        held has no effect.
         """
         if self._ignored_until is not None and asyncio.get_running_loop().time() < self._ignored_until:
             self._ignore_held_key()
@@ -160,7 +160,7 @@ class MonitorSession:
         self._ignored_until = asyncio.get_running_loop().time() + KEY_S
 
     async def do(self, action: Awaitable[object]) -> None:
-        """Do something with the controller, and look what came of it."""
+        """Execute an action, then poll."""
         try:
             await action
         finally:
@@ -168,7 +168,7 @@ class MonitorSession:
 
 
 class _Jogging:
-    """A key that is held."""
+    """A held key."""
 
     def __init__(self, axis: int, velocity_u: float) -> None:
         self.axis = axis

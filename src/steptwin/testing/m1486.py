@@ -1,4 +1,4 @@
-"""An M1486 in the hands of a test."""
+"""The rig of an M1486 for tests."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BAUD = 4800
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class M1486Marker:
-    """What ``@pytest.mark.m1486`` takes. Files are looked for beside the test."""
+    """The options of ``@pytest.mark.m1486``. Paths are relative to the test."""
 
     variant: str = DEFAULT.name
     """A, B, C, E1, E2, or A2x and so on."""
@@ -46,7 +46,7 @@ class M1486Marker:
     program: str | Path | None = None
     """A program to switch on with."""
     time: Literal["real", "virtual"] = "real"
-    """Virtual time passes only while the test lets it, and needs no clock; programs outside need real time."""
+    """Virtual time advances only on request of the test; external programs need real time."""
     speed: float = 1.0
     """In real time: seconds of the twin per second, 0.001 to 1000."""
     link: Literal["tcp", "pty"] = "tcp"
@@ -181,7 +181,7 @@ class M1486Rig(LineRig):
 
     @property
     def position(self) -> int:
-        """Where the pulses given so far have led, in minimum microsteps. The twin's."""
+        """The count of all pulses, in minimum microsteps. The twin's."""
         __tracebackhide__ = True
         return self.call(lambda chip, now: chip.drive.true_u(now))
 

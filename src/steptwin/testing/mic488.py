@@ -1,4 +1,4 @@
-"""A MIC488 in the hands of a test."""
+"""The rig of a MIC488 for tests."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ LINKS: Mapping[str, tuple[str, str]] = {"tcp": ("tcp", "tcp"), "rtu": ("rtu_tcp"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mic488Marker:
-    """What ``@pytest.mark.mic488`` takes. Files are looked for beside the test."""
+    """The options of ``@pytest.mark.mic488``. Paths are relative to the test."""
 
     firmware: str | None = None
     """Of the twin (default 1.70); a device with another one skips the test."""
@@ -59,7 +59,7 @@ class Mic488Marker:
     unit: int = 1
     """Slave address, 1 to 247."""
     time: Literal["real", "virtual"] = "real"
-    """Virtual time passes only while the test lets it, and needs no clock; programs outside need real time."""
+    """Virtual time advances only on request of the test; external programs need real time."""
     speed: float = 1.0
     """In real time: seconds of the twin per second, 0.001 to 1000."""
     link: Literal["tcp", "rtu", "pty"] = "tcp"
@@ -79,7 +79,7 @@ class Mic488Marker:
 
 
 class TwinAxis(NamedTuple):
-    """An axis of a twin at one moment, as it really is; no request is needed to see it."""
+    """The true state of an axis of a twin at one moment, read without a request."""
 
     position: float
     """Counted, in configured units."""
@@ -211,7 +211,7 @@ class Mic488Rig(LineRig):
         self._set_pin(pin.upper(), float(value))
 
     def axis(self, number: int) -> TwinAxis:
-        """Axis 1 to 4 as it really is at this moment. The twin's."""
+        """The true state of axis 1 to 4 at this moment. The twin's."""
         __tracebackhide__ = True
         if not 1 <= number <= AXES:
             raise Misuse(f"no axis {number}: axes are 1 to {AXES}")

@@ -25,15 +25,15 @@ from steptwin.world.addresses import LOOPBACK, Address
 T = TypeVar("T")
 
 LOOK_S = 0.005
-"""A condition is looked at this often."""
+"""Interval of checks of a condition, s."""
 ANSWER_S = 30.0
-"""A twin that does not answer for this long hangs."""
+"""Time-out of calls to a twin, s."""
 ROUNDS = 5
 SPEEDS = (0.001, 1000.0)
 
 
 class RealTime:
-    """Machines that keep up with the wall clock, ``speed`` times as fast. Every method may be called from the test's thread.
+    """Machines in real time, ``speed`` times as fast. Every method may be called from the test's thread.
 
     ``place`` names the twin in messages. Raises `Misuse` for a speed outside 0.001 to 1000.
     """

@@ -1,4 +1,4 @@
-"""Traces as files: JSON lines with everything, and formats of other programs.
+"""Traces as files: JSON lines with all records, and formats of other programs.
 
 | format | shows | needs |
 |---|---|---|
@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 NAME = "trace"
-"""What files are called in a directory."""
+"""The base name of files in a directory."""
 NO_VIEWS: AxisViews = {}
 
 
@@ -121,7 +121,7 @@ FORMATS: Mapping[str, Exporter] = {
     "parquet": Exporter("samples", ("numpy", "pyarrow"), "parquet", _parquet),
 }
 USUAL = ("jsonl", "html", "png")
-"""What a directory gets: small however long the run was. Those whose libraries are missing are left out."""
+"""The formats written into a directory: small for any length of run. Those with missing libraries are left out."""
 
 
 def write_trace(
@@ -181,7 +181,7 @@ def write_trace(
 
 
 def check_target(where: Path | str) -> None:
-    """Whether `write_trace` can write there, before much is done for it. Raises `Misuse`."""
+    """Check in advance that `write_trace` can write there. Raises `Misuse`."""
     for _, path in _targets(Path(where), None):
         check_writable(path)
 
@@ -223,9 +223,9 @@ def _check(name: str) -> None:
 
 
 def read_trace(where: Path | str) -> SavedTrace:
-    """What `write_trace` wrote as JSON lines: a file, or a directory with ``trace.jsonl``.
+    """Read JSON lines of `write_trace`: a file, or a directory with ``trace.jsonl``.
 
-    Raises `Misuse` where it cannot be read, is not a trace, or is not as it was written (checked by its digest).
+    Raises `Misuse` if it cannot be read, is not a trace, or was changed (its digest is checked).
     """
     path = Path(where)
     if path.is_dir():

@@ -1,4 +1,4 @@
-"""How far a long export is."""
+"""Progress of a long export."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TypeAlias
 from steptwin.machine import Nanos
 
 Progress: TypeAlias = Callable[[Nanos], None]
-"""Called with the moment up to which an export is done."""
+"""Called with the moment (ns) that an export has reached."""
 
 Watch: TypeAlias = Callable[[str, Nanos, Nanos], AbstractContextManager[Progress]]
 """Called with what is done, from when and until when; gives the function to call while it lasts."""

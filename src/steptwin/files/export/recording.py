@@ -1,4 +1,4 @@
-"""A trace sorted into tracks, one for every axis and pin, and a window of time: what all exports begin with."""
+"""A trace sorted into tracks, one for every axis and pin, in a window of time: the input of all exports."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class AxisTrack:
     times: list[Nanos] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
     loads: list[Carried] = field(default_factory=list)
-    """Where the load is, by moments, as far as it does not go with the pulses from the beginning."""
+    """Positions of the load by moment, if it does not follow the pulses throughout."""
     origins: list[tuple[Nanos, int]] = field(default_factory=list)
     """By how many pulses the coordinate is above the count, by moments."""
 
@@ -126,7 +126,7 @@ class PinTrack:
 
 @dataclass(slots=True)
 class Recording:
-    """What happened from ``begin`` to ``until``."""
+    """The tracks from ``begin`` to ``until``."""
 
     begin: Nanos
     until: Nanos

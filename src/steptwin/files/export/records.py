@@ -72,7 +72,7 @@ def _head_of(trace: Trace, views: AxisViews, title: str) -> dict[str, object]:
 
 
 def read_records(file: IO[bytes], name: str) -> SavedTrace:
-    """Raises `Misuse` with ``name`` and the line where it is not what `write_records` writes."""
+    """Read a file of `write_records`. Raises `Misuse` with ``name`` and the line of an error."""
     saved: SavedTrace | None = None
     is_open, latest = False, 0  # whether the end of the run is still to be said
     for number, line in enumerate(_lines(file), 1):

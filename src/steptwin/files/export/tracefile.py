@@ -1,4 +1,4 @@
-"""What is kept of what happens in a running world: nothing, a ring of the last records, or a file that grows on disk."""
+"""Recording of a running world: none, a ring of the last records, or a file that grows on disk."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Ring:
         trace.watchers.append(self._records.append)
 
     def trace(self) -> Trace:
-        """What it holds now."""
+        """The present contents as a trace."""
         held = Trace(self._machines)
         for record in self._records:
             held.add(record)
@@ -34,9 +34,9 @@ class Ring:
 
 
 class TraceFile:
-    """A file of JSON lines to which records are added as they happen; `read_trace` reads it, also one that was cut.
+    """A file of JSON lines to which records are appended; `read_trace` reads it, also if it was cut.
 
-    ``show`` is called once where the disk refuses more. Raises `Misuse` where it cannot be made.
+    ``show`` is called once if the disk is full. Raises `Misuse` if the file cannot be made.
     """
 
     def __init__(self, trace: Trace, path: Path, views: AxisViews, title: str, show: Callable[[str], None]) -> None:
@@ -69,7 +69,7 @@ class TraceFile:
         self._show(self._failure)
 
     def close(self, until: Nanos) -> None:
-        """The run has ended at a moment. Raises `Misuse` where not all of it could be written."""
+        """Write the end of the run and close. Raises `Misuse` if not everything could be written."""
         if self._add in self._trace.watchers:
             self._trace.watchers.remove(self._add)
         self._write(end_records(self._trace, until))
@@ -82,11 +82,11 @@ class TraceFile:
 
 
 Kept: TypeAlias = int | Path | None
-"""How much of a trace is kept: so many records, those in a file or a directory, none."""
+"""What is kept of a trace: a number of records, a file or directory, or None."""
 
 
 def read_kept(text: str) -> Kept:
-    """``off``, ``ring 10000``, or a file. Raises `Misuse`."""
+    """Parse ``off``, ``ring 10000``, or a path. Raises `Misuse`."""
     if text == "off":
         return None
     word, _, number = text.partition(" ")
