@@ -42,6 +42,11 @@ def test_wbc_12_there_are_128_variables() -> None:
     assert codes(program(129)) == ["W123"]
 
 
+def test_wbc_42_names_have_any_length() -> None:
+    name = "n" * 500
+    assert codes(f"#c{name} 5\n{name} = c{name}\nL{name}:\nOUT1 = {name}\nJUMP L{name}\n") == []
+
+
 def test_wbc_13_modbus_master_statements_are_not_invented() -> None:
     assert codes("MODBUS_READ 1 5\n") == ["W137"]
 

@@ -197,7 +197,7 @@ def test_wbc_1_the_stack_keeps_sixteen_and_forgets_the_oldest() -> None:
     assert rig.i(0) == 16
     assert rig.device.program.fault is not None
     assert rig.device.program.fault.text == (
-        "the 16 places for RETURN were not enough, the oldest were forgotten: too many JUMPs without RETURN"
+        "RETURN without a JUMP: more than 16 JUMPs without RETURN, so the oldest were forgotten"
     )
 
 

@@ -1,4 +1,4 @@
-"""Which IF, ELSE, ENDIF, WHILE and ENDWHILE belong together."""
+"""Matching of IF, ELSE, ENDIF, WHILE and ENDWHILE."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NOT_OPENED: dict[str, tuple[Finding, str]] = {
 
 
 BLOCK_WORDS = frozenset({*_NOT_CLOSED, *_NOT_OPENED})
-"""What `BlockMatcher` takes of sound statements."""
+"""The keywords for `BlockMatcher`."""
 
 _OF_IF = frozenset(finding.code for finding in (f.IF_NOT_CLOSED, f.ELSE_WITHOUT_IF, f.ENDIF_WITHOUT_IF, f.SECOND_ELSE))
 

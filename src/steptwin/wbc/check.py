@@ -38,8 +38,8 @@ def check(
 ) -> CheckedProgram:
     """All errors and warnings of a program. Never raises.
 
-    Without ``positions`` the names after @ are not checked (one warning says so); without ``setup`` nothing is said of
-    gears, ramps and input interrupts. What depends on the whole program is said once every line it depends on is understood.
+    Without ``positions`` the names after @ are not checked (one warning reports it); without ``setup`` gears, ramps and input
+    interrupts are not. Findings that depend on several lines need all these lines to be correct.
     """
     program, diagnostics = parse(text)
     return check_program(text, program, diagnostics, positions, setup, dialect)[0]
@@ -55,7 +55,7 @@ def check_program(
     *,
     memory: StepMemory | None = None,
 ) -> tuple[CheckedProgram, Scope]:
-    """As `check`, of a program that was read already, with what its names mean. ``memory`` is that of `resolve`."""
+    """As `check`, for a parsed program; also returns the scope of its names. ``memory`` is that of `resolve`."""
     resolution = resolve(program, positions, dialect, memory)
     executable = resolution.executable
     diagnostics += resolution.diagnostics

@@ -1,7 +1,7 @@
 """The code of a program: what `steptwin.wbc.compile` makes and `steptwin.wbc.machine` executes.
 
 The function of a step takes the execution and its cells (variables, then constants) and returns the number of the step that
-follows; with all bits inverted (``~number``) when the machine has to check for waits and interrupts before it goes on.
+follows; with all bits inverted (``~number``) if the machine must check for waits and interrupts before it continues.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from steptwin.wbc.controller import ProgramController, Tendency
 Cells: TypeAlias = "array[float]"
 StepCode: TypeAlias = "Callable[[Execution, Cells], int]"
 Seen: TypeAlias = Callable[[Any, Cells, Nanos], float]
-"""(controller, cells, moment) → what a look at that moment depends on."""
+"""(controller, cells, moment) → the value that a condition depends on at that moment."""
 
 
 class Execution(Protocol):
-    """The execution of a program, as its steps see it. `steptwin.wbc.machine.Interpreter` says what each of these means."""
+    """The interface of a program's execution to its steps; see `steptwin.wbc.machine.Interpreter`."""
 
     controller: ProgramController
     now: Nanos
@@ -38,7 +38,7 @@ class Execution(Protocol):
 
 
 class WatchedValue(NamedTuple):
-    """Something a step sees that changes with time. ``tendency`` None: how it changes is not known."""
+    """A value of a step that changes with time. ``tendency`` None: unknown."""
 
     seen: Seen
     tendency: Tendency | None

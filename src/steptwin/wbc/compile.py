@@ -312,9 +312,7 @@ def _return(m: Execution, cells: Cells) -> int:
     if not m.stack:
         # WBC-1
         if m.forgotten:
-            raise ProgramFault(
-                "the 16 places for RETURN were not enough, the oldest were forgotten: too many JUMPs without RETURN"
-            )
+            raise ProgramFault("RETURN without a JUMP: more than 16 JUMPs without RETURN, so the oldest were forgotten")
         raise ProgramFault("RETURN without a JUMP")
     following, not_before = m.stack.pop()
     if m.handling or not_before:

@@ -1,4 +1,4 @@
-"""Conditions whose outcome is known before the program runs."""
+"""Conditions with a constant outcome."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _MIRRORED = complete("comparison", COMPARISONS, "mirror image", {"=": "=", "<": 
 
 
 def outcome(condition: StepCondition) -> bool | None:
-    """True or False when the condition always is, from its numbers or from the values its register can have; else None."""
+    """The constant outcome of a condition, from its numbers or the range of its register; None if it varies."""
     left, sign, right = condition.left, condition.sign, condition.right
     if isinstance(left, Literal):
         if isinstance(right, Literal):

@@ -27,8 +27,8 @@ FOREVER: Nanos = 2**62
 class RegisterFamily:
     """A family of registers: what each function makes of the register's number.
 
-    Values written are within what the register takes, whole where it is whole. ``quiet``: a write touches nothing that has a
-    deadline or an output. Registers without ``tendency`` change only when something happens.
+    Values written are within what the register takes, whole where it is whole. ``quiet``: a write affects neither deadlines nor
+    outputs. Registers without ``tendency`` change only when something happens.
     """
 
     read: Callable[[int], Reader]
@@ -50,7 +50,7 @@ def complete_access(rows: Mapping[str, RegisterRow], given: Mapping[str, Registe
 
 
 class ProgramController(Protocol):
-    """Actions of statements, each at the moment ``now``. `steptwin.wbc.real.ProgramFault` when it cannot be done."""
+    """Actions of statements, each at the moment ``now``. Raises `steptwin.wbc.real.ProgramFault` for an impossible one."""
 
     def motion(self, keyword: str, axis: int, value: float, now: Nanos) -> None:
         """HOME, VABS, VREL, PABS, PREL of ``axis`` (from 1) in configured units."""

@@ -1,9 +1,8 @@
-"""From a compiled image back to source. Labels and names of positions are invented: the image has none.
+"""Decompile an image to source. Labels and names of positions are invented, because the image has none.
 
-Building what comes out gives the same bytes again; statements whose form is inferred (WBC-40) are marked by a comment, and are
-built only where that is asked for. What is not known, or known but written in a form the builder would not
-write, becomes a ``//!record`` line (a comment to the vendor's tool, raw data to the builder); a row no position table can
-express becomes a ``//!position`` line.
+Building the source gives the same bytes; statements with an inferred form (WBC-40) are marked by a comment, and built only
+on request. Unknown records, and known ones in a form that the builder does not write, become a ``//!record`` line (a comment to
+the vendor's tool, raw data to the builder); a row no position table can express becomes a ``//!position`` line.
 """
 
 from __future__ import annotations
@@ -83,9 +82,9 @@ def _used(data: bytes, start: int, end: int, size: int, what: str) -> tuple[byte
     if count > most:
         raise ImageError(f"damaged image: {count} {what}, permitted are 0…{most}")
     used = data[start : start + count * size]
-    told, found = int.from_bytes(data[end + 2 : end + 4], "big"), crc16(used)
-    if told != found:
-        raise ImageError(f"damaged image: the CRC of the {what} is {told:04X}, their bytes give {found:04X}")
+    stored, found = int.from_bytes(data[end + 2 : end + 4], "big"), crc16(used)
+    if stored != found:
+        raise ImageError(f"damaged image: the CRC of the {what} is {stored:04X}, their bytes give {found:04X}")
     if any(data[start + count * size : end]):
         raise ImageError(f"damaged image: bytes after the {count} {what} are not 0")
     return tuple(used[n : n + size] for n in range(0, len(used), size))
@@ -109,9 +108,9 @@ def decompile(data: bytes) -> Decompiled:
 
 
 def program_of(data: bytes, name: str) -> tuple[SourceText, PositionTable, list[Diagnostic]]:
-    """The program and position table of an image that is to be run, and what is doubtful in it.
+    """The program and position table of an image that is to be run, and its warnings.
 
-    Raises `Misuse` for what is no image, or has records that are not known.
+    Raises `Misuse` for a file that is not an image, or has unknown records.
     """
     try:
         found = decompile(data)

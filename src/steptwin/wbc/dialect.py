@@ -1,4 +1,4 @@
-"""What a firmware generation of the MIC488 gives its programs. A dialect is a value: nothing else asks for the firmware."""
+"""The features of a firmware generation for programs. A dialect is a value; no other code depends on the firmware."""
 
 from __future__ import annotations
 

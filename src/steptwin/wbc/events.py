@@ -1,4 +1,4 @@
-"""What can interrupt a program, as a table: the event, the labels it jumps to, the register that enables it."""
+"""The table of interrupts: event, label, and the register that enables it."""
 
 from __future__ import annotations
 

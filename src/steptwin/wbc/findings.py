@@ -22,7 +22,7 @@ class Spanned(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One kind of message. ``title`` says in general what ``at`` says of one place."""
+    """A kind of finding. ``title`` describes it in general; `at` makes the message for one place."""
 
     code: str
     title: str

@@ -1,4 +1,4 @@
-"""Where a program can go: unreachable code, interrupt labels without RETURN, RETURN without JUMP.
+"""Control flow: unreachable code, interrupt labels without RETURN, RETURN without JUMP.
 
 JUMP remembers the next line, so that line is reached when the code at the label can RETURN. "Can return" means: a RETURN is
 reached that takes back the JUMP which led here, every JUMP on the way having been taken back itself. Every question is answered
@@ -128,7 +128,7 @@ def interrupt_ends(flow: ControlFlow, executable: s.Executable) -> list[Diagnost
 
 
 def unreached(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
-    """The first line of every stretch of code that nothing leads to. A RETURN or END that only closes a stretch is no finding."""
+    """The first line of every unreachable stretch of code. A single RETURN or END at the end of a stretch is not reported."""
     steps, count = flow.steps, len(flow.steps)
     seen = [False] * (count + 1)
     work = [0, *executable.entries.values()]

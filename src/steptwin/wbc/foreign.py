@@ -1,7 +1,7 @@
-"""What other languages write, and what WBC has instead: better advice for lines that are wrong.
+"""Advice for wrong lines with elements of other languages.
 
-Only lines that the reader has refused come here, so nothing in this module can make a right program wrong. PLC languages, BASIC,
-C and G-code are what people bring along.
+Only lines that the reader has refused are analysed, so this module cannot make a correct program wrong. It knows PLC
+languages, BASIC, C and G-code.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from steptwin.wbc.statements import COMPARISONS, SET, STATEMENTS, OperandKind
 class ForeignLine(NamedTuple):
     """A refused line: its words, its text without comment and where that begins; ``jumps`` are the labels named by JUMPs.
 
-    ``reads`` tells whether a text would be accepted in place of the line.
+    ``reads`` returns whether a text would be accepted in place of the line.
     """
 
     words: Sequence[Lexeme]
@@ -44,7 +44,7 @@ class ForeignLine(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """What is said instead of the reader's own message. ``fix`` replaces the text from ``start`` to ``end``.
+    """A message that replaces the reader's own. ``fix`` replaces the text from ``start`` to ``end``.
 
     ``keyword``: the block statement that was meant, so that its block is known.
     """
@@ -58,7 +58,7 @@ class Advice(NamedTuple):
 
 
 def explain(line: ForeignLine, found: Diagnostic) -> tuple[Diagnostic, str | None]:
-    """The best message for a refused line, and the keyword that was meant if it is another than the reader saw."""
+    """The best message for a refused line, and the intended keyword if it differs from the one read."""
     for look in _LOOKS:
         advice = look(line)
         if advice is not None:
@@ -99,7 +99,7 @@ def _comment(line: ForeignLine) -> Advice | None:
     if sign == ";" and not after:
         return Advice(start, end, "no ; at the end of a line", "a statement ends with its line", "")
     if sign == ";" and before and line.reads(after):
-        return Advice(start, end, "one statement a line", "put the second one on the next line", "\n")
+        return Advice(start, end, "only one statement per line is permitted", "put the second one on the next line", "\n")
     closing = {"/*": "*/", "(*": "*)"}.get(sign)
     if closing is None:
         return Advice(start, end, _SLASHES, None, "//")
@@ -121,7 +121,9 @@ def _colon(line: ForeignLine) -> Advice | None:
     """``M1 = ON : M2 = ON``."""
     for number, word in enumerate(line.words[1:-1], 1):
         if word.text == ":" and line.reads(line.text(0, number - 1)) and line.reads(line.text(number + 1)):
-            return _over(line, (number, number), "one statement a line", "put the second one on the next line", "\n")
+            return _over(
+                line, (number, number), "only one statement per line is permitted", "put the second one on the next line", "\n"
+            )
     return None
 
 

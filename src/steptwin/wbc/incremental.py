@@ -1,8 +1,8 @@
-"""A program that is being edited: checked again after every change at the cost of what has changed.
+"""Incremental checking of a program in an editor.
 
 The tree of an unchanged line is kept, and so is its step, although the line has another place now. For that, nodes have
 *addresses* instead of places in the text: each line gets a number of its own that it keeps, and an address is this number and a
-column. `Edited.place` and `Edited.address` translate. What `check` says of a text and what is said here are the same.
+column. `Edited.place` and `Edited.address` translate. The findings are the same as those of `check`.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Edited:
     def check(
         self, positions: PositionTable | None = None, setup: Setup | None = None, dialect: Dialect = DEFAULT
     ) -> tuple[CheckedProgram, Scope]:
-        """What `steptwin.wbc.check.check` says of the text, with places in the text; what the names mean."""
+        """The findings of `steptwin.wbc.check.check`, with places in the text, and the scope of the names."""
         checked, scope = check_program(self.text, self.program, list(self._found), positions, setup, dialect, memory=self._memory)
         diagnostics = in_order([self.placed(diagnostic) for diagnostic in checked.diagnostics])
         return replace(checked, diagnostics=diagnostics), scope

@@ -1,4 +1,4 @@
-"""What people arranged in the text of a program, so that printing it again keeps that: alignment and indentation below labels."""
+"""The layout of a program text that printing keeps: alignment, and indentation below labels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a look can first turn out differently (WBC-18): looks before that moment need not be taken."""
+"""The first moment at which a condition can change (WBC-18); evaluations before it can be skipped."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """The execution of a program: one statement every statement time (WBC-6), waits, the return stack, interrupts.
 
-Nothing is looked at in vain (WBC-18). A WAIT whose look failed, and a loop that has come round without changing anything, *rest*:
-the moment at which one of their looks can first turn out differently is foreseen, and until then nothing is executed.
-Whatever happens meanwhile ends the rest (`disturb`); where the program stands at any moment follows from the rest itself, so
-that resting changes nothing but the work.
+Useless evaluations are skipped (WBC-18). A WAIT with a false condition, and a loop that has run once without any change,
+*rest*: the first moment at which one of their conditions can change is computed, and until then nothing is executed. Any event
+meanwhile ends the rest (`disturb`). The place of the program at any moment follows from the rest, so resting changes nothing
+but the computing time.
 
 How a loop is found: at a jump backwards the state is *marked*, and every statement from there on is recorded. Back at the mark
 with the same state, and without any effect on the controller on the way, the loop does the same again and again.

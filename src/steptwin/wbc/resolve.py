@@ -80,7 +80,7 @@ class _Resolver:
         self._records: dict[int, bytes] = {}
         self._lines: list[Statement] = []
         self._unchecked = False
-        self._told_unchecked = False
+        self._has_reported_unchecked = False
         self._writes_row_0 = False
         self._blocks = Blocks()
 
@@ -137,18 +137,18 @@ class _Resolver:
             last = None
         self._writes_row_0 = any(self._scope.family(name) in ROW_0 for name in assigned.values())
         if last is not None:
-            self._say(f.LABEL_AT_END.at(last.name, f"nothing follows the label {last.name.text}", "put an END after it"))
+            self._report(f.LABEL_AT_END.at(last.name, f"nothing follows the label {last.name.text}", "put an END after it"))
         limit = self._dialect.max_steps
         if len(lines) > limit:
             hint = f"firmware {self._dialect.firmware} holds {limit} executable lines"
-            self._say(f.TOO_MANY_LINES.at(lines[limit], f"{len(lines)} executable lines", hint))
+            self._report(f.TOO_MANY_LINES.at(lines[limit], f"{len(lines)} executable lines", hint))
         return matcher.finish()
 
     def _define_label(self, label: Label, defined: dict[str, Identifier]) -> None:
         name, key = label.name, label.name.key
         found = BY_LABEL.get(key)
         if key in defined:
-            self._say(f.DUPLICATE_LABEL.at(name, f"the label {name.text} is defined twice", "give one of them another name"))
+            self._report(f.DUPLICATE_LABEL.at(name, f"the label {name.text} is defined twice", "give one of them another name"))
             return
         defined[key] = name
         if found is None:
@@ -156,24 +156,28 @@ class _Resolver:
             if key.startswith((PREFIX, HARD_PREFIX)) and key not in PREDEFINED:
                 known = f"INT_IN1…INT_IN{INPUT_LABELS}, INT_MODBUS, INT_TICK"
                 hint = f"{known}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
-                self._say(f.RESERVED_LABEL.at(name, f"{name.text} is not an interrupt label, but begins like one", hint))
+                self._report(
+                    f.RESERVED_LABEL.at(
+                        name, f"{name.text} is not an interrupt label, although it begins with INT_ or HARDINT_", hint
+                    )
+                )
             elif key in self._scope.constants or key in self._scope.variables:
                 kind = "a constant" if key in self._scope.constants else "a variable"
                 message = f"{name.text} cannot be a label: it is {kind}"
-                self._say(f.RESERVED_LABEL.at(name, message, "give one of them another name"))
+                self._report(f.RESERVED_LABEL.at(name, message, "give one of them another name"))
             elif reason is not None:
-                self._say(f.RESERVED_LABEL.at(name, f"{name.text} cannot be a label: it is {reason}", "take another name"))
+                self._report(f.RESERVED_LABEL.at(name, f"{name.text} cannot be a label: it is {reason}", "take another name"))
             self._labels[key] = len(self._lines)
             return
         event, hard = found
         since = HARD_SINCE if hard else event.since
         if not self._dialect.has(since):
             hint = f"checked for {self._dialect.firmware}"
-            self._say(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint))
+            self._report(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint))
         if event in self._entries:
             other = (PREFIX if hard else HARD_PREFIX) + event.name
             hint = "an event has one label"
-            self._say(f.DUPLICATE_LABEL.at(name, f"{name.text} and {other} are labels of one event", hint))
+            self._report(f.DUPLICATE_LABEL.at(name, f"{name.text} and {other} are labels of one event", hint))
         else:
             self._entries[event] = len(self._lines)
         self._labels[key] = len(self._lines)
@@ -183,7 +187,7 @@ class _Resolver:
         rows = self._dialect.max_positions if self._positions is None else len(self._positions.rows)
         if record.index >= rows:
             hint = f"the table has {_rows(rows)}, numbered from 0"
-            self._say(f.OUT_OF_RANGE.at(record, f"row {record.index} is outside the position table", hint))
+            self._report(f.OUT_OF_RANGE.at(record, f"row {record.index} is outside the position table", hint))
 
     # -- second pass: the steps
 
@@ -213,7 +217,7 @@ class _Resolver:
             made = s.InterruptStep(start, end, event, hard)
         elif isinstance(statement, ImageRecord):
             hint = "the program stops with an error when it gets here"
-            self._say(f.NOT_EXECUTABLE.at(statement, "an unknown record cannot be executed", hint))
+            self._report(f.NOT_EXECUTABLE.at(statement, "an unknown record cannot be executed", hint))
             made = s.IllegalStep(start, end, statement.data, True)
         elif isinstance(statement, Broken):
             keyword = SET if statement.target is not None else statement.keyword
@@ -237,9 +241,9 @@ class _Resolver:
         place = statement.value
         if target.row.saturates:
             kept = domain.low if value < domain.low else domain.high
-            self._say(f.SATURATES.at(place, f"{target.name} becomes {kept:.10g}, not {value:.10g}", f"it holds {domain}"))
+            self._report(f.SATURATES.at(place, f"{target.name} becomes {kept:.10g}, not {value:.10g}", f"permitted: {domain}"))
         else:
-            self._say(f.OUT_OF_RANGE.at(place, f"{value:.10g} is out of range for {target.name}", f"permitted: {domain}"))
+            self._report(f.OUT_OF_RANGE.at(place, f"{value:.10g} is out of range for {target.name}", f"permitted: {domain}"))
 
     def _expression(self, node: Binary | FunctionCall) -> s.Operation | s.FunctionOperation | None:
         value = self._scope.value
@@ -248,7 +252,7 @@ class _Resolver:
             if left is None or right is None:
                 return None
             if node.operator in "/%" and isinstance(right, s.Literal) and right.value == 0:
-                self._say(f.ALWAYS_FAILS.at(node, "division by zero", "the program stops here with an error"))
+                self._report(f.ALWAYS_FAILS.at(node, "division by zero", "the program stops here with an error"))
             return s.Operation(left, node.operator, right)
         arguments = [value(argument) for argument in node.arguments]
         found = [argument for argument in arguments if argument is not None]
@@ -261,7 +265,7 @@ class _Resolver:
         impossible = argument < 0 if node.function.key == "SQRT" else node.function.key in ("ASIN", "ACOS") and abs(argument) > 1
         if impossible:
             message = f"{node.function.text}({argument:g}) does not exist"
-            self._say(f.ALWAYS_FAILS.at(node, message, "the program stops here with an error"))
+            self._report(f.ALWAYS_FAILS.at(node, message, "the program stops here with an error"))
 
     def _comparison(self, node: Operand) -> s.StepCondition | None:
         if not isinstance(node, Relation):
@@ -276,7 +280,7 @@ class _Resolver:
         row = STATEMENTS[keyword]
         if not self._dialect.has(row.since):
             hint = f"checked for {self._dialect.firmware}"
-            self._say(f.NOT_IN_FIRMWARE.at(statement, f"{keyword} needs firmware {row.since}", hint))
+            self._report(f.NOT_IN_FIRMWARE.at(statement, f"{keyword} needs firmware {row.since}", hint))
         return _STEPS[keyword](self, number, statement)
 
     def _if(self, number: int, statement: KeywordStatement) -> s.Step | None:
@@ -312,12 +316,12 @@ class _Resolver:
         seconds = self._value(statement.operands[0])
         if isinstance(seconds, s.Literal) and seconds.value < s.SHORTEST_DELAY_S:
             message = f"DELAY {seconds.value:g} waits {s.SHORTEST_DELAY_S:g} s"
-            self._say(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {s.SHORTEST_DELAY_S:g} s"))
+            self._report(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {s.SHORTEST_DELAY_S:g} s"))
         self._check_time("DELAY", statement.operands[0], seconds)
         return None if seconds is None else s.DelayStep(statement.start, statement.end, seconds)
 
     def _check_time(self, keyword: str, operand: Operand, seconds: s.Source | None) -> None:
-        """Hundreds of seconds are meant as milliseconds, unless they are whole minutes."""
+        """Warn of hundreds of seconds, which are probably milliseconds, unless they are whole minutes."""
         if not isinstance(seconds, s.Literal) or seconds.value < _LOOKS_LIKE_MS or seconds.value % 60 == 0:
             return
         whole, rest = divmod(seconds.value, 60)
@@ -325,7 +329,7 @@ class _Resolver:
         milliseconds = f"{seconds.value / 1000:.10g}"
         fix = milliseconds if isinstance(operand, DecimalNumber) else None
         hint = f"the time is in seconds: {seconds.value:.10g} ms are {milliseconds}"
-        self._say(f.LONG_TIME.at(operand, message, hint, fix=fix))
+        self._report(f.LONG_TIME.at(operand, message, hint, fix=fix))
 
     def _jump(self, number: int, statement: KeywordStatement) -> s.Step | None:
         name = statement.operands[0]
@@ -336,8 +340,8 @@ class _Resolver:
             return s.JumpStep(statement.start, statement.end, target)
         if not self._broken_labels:
             meant = self._near.of(name.text, self._labels)
-            hint = f"did you mean {meant}?" if meant else f"write {name.text}: on a line of its own where it should go on"
-            self._say(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
+            hint = f"did you mean {meant}?" if meant else f"define the label as {name.text}: on a line of its own"
+            self._report(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
         return None
 
     def _motion(self, number: int, statement: KeywordStatement) -> s.Step | None:
@@ -348,7 +352,7 @@ class _Resolver:
             return None
         if statement.keyword == "HOME" and isinstance(value, s.Literal) and value.value == 0:
             hint = "negative homes to KL, positive to KR"
-            self._say(f.OUT_OF_RANGE.at(operand, "HOME needs a velocity other than 0", hint))
+            self._report(f.OUT_OF_RANGE.at(operand, "HOME needs a velocity other than 0", hint))
         return s.MotionStep(statement.start, statement.end, statement.keyword, axis, value)
 
     def _halt(self, number: int, statement: KeywordStatement) -> s.Step | None:
@@ -366,8 +370,8 @@ class _Resolver:
         family = parts(name.key)
         if register is not None or family is None or family[0].key != "M":
             finding = f.HALT_WITHOUT_DRIVE if statement.keyword in HALTS else f.MOTION_WITHOUT_DRIVE
-            message = f"{statement.keyword} needs a drive, {name.text} is none"
-            self._say(finding.at(name, message, f"write {STATEMENTS[statement.keyword].usage}, M1…M4"))
+            message = f"{statement.keyword} needs a drive; {name.text} is not one"
+            self._report(finding.at(name, message, f"write {STATEMENTS[statement.keyword].usage}, M1…M4"))
         return None
 
     def _pulse(self, number: int, statement: KeywordStatement) -> s.Step | None:
@@ -376,10 +380,10 @@ class _Resolver:
         register = self._scope.register(name) if isinstance(name, Identifier) else None
         if register is None or register.row.key != "OUT":
             if register is not None or (isinstance(name, Identifier) and parts(name.key) is None):
-                self._say(f.WRONG_ARGUMENT.at(name, "PULSE needs an output", f"write {STATEMENTS['PULSE'].usage}, OUT1…OUT8"))
+                self._report(f.WRONG_ARGUMENT.at(name, "PULSE needs an output", f"write {STATEMENTS['PULSE'].usage}, OUT1…OUT8"))
             return None
         if isinstance(seconds, s.Literal) and seconds.value <= 0:
-            self._say(f.OUT_OF_RANGE.at(operand, f"PULSE cannot last {seconds.value:g} s", "permitted: greater than 0"))
+            self._report(f.OUT_OF_RANGE.at(operand, f"PULSE cannot last {seconds.value:g} s", "permitted: greater than 0"))
         self._check_time("PULSE", operand, seconds)
         return None if seconds is None else s.PulseStep(statement.start, statement.end, register.number, seconds)
 
@@ -391,7 +395,7 @@ class _Resolver:
         if row is None:
             return None
         if self._positions is None and not isinstance(operand, Position) and not (self._writes_row_0 and row == s.Literal(0.0)):
-            self._say_unchecked(operand)
+            self._report_unchecked(operand)
         if isinstance(row, s.Literal) and self._positions is not None:
             index = self._row_index(operand, row.value)
             if index is None:
@@ -402,7 +406,7 @@ class _Resolver:
     def _position(self, position: Position) -> s.Literal | None:
         name = position.name
         if self._positions is None:
-            self._say_unchecked(position)
+            self._report_unchecked(position)
             self._unchecked = True
             return s.Literal(0.0)
         index = self._positions.index(name.text)
@@ -410,25 +414,25 @@ class _Resolver:
             return s.Literal(float(index))
         meant = self._near.of(name.text, self._positions.names())
         hint = f"did you mean @{meant}?" if meant else f"the table has {_rows(len(self._positions.rows))}"
-        self._say(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, fix=meant and f"@{meant}"))
+        self._report(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, fix=meant and f"@{meant}"))
         return None
 
-    def _say_unchecked(self, place: Operand) -> None:
-        if not self._told_unchecked:
-            hint = "give the position table to have names and rows checked; the program does not start without one"
-            self._say(f.POSITIONS_UNCHECKED.at(place, "positions are not checked", hint))
-        self._told_unchecked = True
+    def _report_unchecked(self, place: Operand) -> None:
+        if not self._has_reported_unchecked:
+            hint = "give the position table to check names and rows; the program does not start without it"
+            self._report(f.POSITIONS_UNCHECKED.at(place, "positions are not checked", hint))
+        self._has_reported_unchecked = True
 
     def _row_index(self, place: Operand, value: float) -> int | None:
         rows = 0 if self._positions is None else len(self._positions.rows)
         if (0 <= value < rows and value == int(value)) or (value == 0 and self._writes_row_0):
             return int(value)
         hint = f"the table has {_rows(rows)}, numbered from 0"
-        self._say(f.UNKNOWN_POSITION.at(place, f"there is no row {value:g}", hint))
+        self._report(f.UNKNOWN_POSITION.at(place, f"there is no row {value:g}", hint))
         return None
 
     def _check_row(self, statement: KeywordStatement, index: int) -> None:
-        """Row 0 is left alone when the program writes it: its parameters are known when it runs."""
+        """Check the parameters of a row. Row 0 is not checked if the program writes it."""
         if self._positions is None or index in self._records or (index == 0 and self._writes_row_0):
             return
         values = self._positions.rows[index].values
@@ -436,14 +440,14 @@ class _Resolver:
         problem = row_problem(statement.keyword, values)
         if problem is not None:
             hint = STATEMENTS[statement.keyword].meaning
-            self._say(f.ROW_PARAMETERS.at(statement.operands[0], f"{statement.keyword} cannot use {name}: {problem}", hint))
+            self._report(f.ROW_PARAMETERS.at(statement.operands[0], f"{statement.keyword} cannot use {name}: {problem}", hint))
         elif names_no_axis(statement.keyword, values):
-            self._say(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
+            self._report(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
 
     def _value(self, operand: Operand, *, is_row: bool = False) -> s.Source | None:
         return self._scope.value(operand, is_row=is_row) if isinstance(operand, Identifier | DecimalNumber) else None
 
-    def _say(self, diagnostic: Diagnostic) -> None:
+    def _report(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)
 
 

@@ -36,7 +36,7 @@ class Scope:
         self.variables: dict[str, Identifier] = {}
         """First assignment of every variable, in order."""
         self.remarked: set[str] = set()
-        """Names that stand for something about which something was said when they were first used."""
+        """Names of wrong definitions, already reported at their first use."""
         # One text is looked at many times while it is edited: only names that come for the first time are looked at further.
         statements = [line.statement for line in program.lines]
         for statement in statements:
@@ -66,16 +66,16 @@ class Scope:
         name, key = constant.name, constant.name.key
         reason = self.reserved(key)
         if reason is not None:
-            self._say(f.RESERVED.at(name, f"{name.text} cannot be a constant: it is {reason}", "take another name"))
+            self._report(f.RESERVED.at(name, f"{name.text} cannot be a constant: it is {reason}", "take another name"))
             return
         if key in self.constants:
-            self._say(f.DUPLICATE_CONSTANT.at(name, f"the constant {name.text} is defined twice", "remove one definition"))
+            self._report(f.DUPLICATE_CONSTANT.at(name, f"the constant {name.text} is defined twice", "remove one definition"))
             return
         self.constants[key] = name
         value = constant.value
         if isinstance(value, Identifier) and parts(value.key) is None and value.key not in PREDEFINED:
             hint = "the value of a constant is a number or a register, like #speed 60 or #pump OUT3"
-            self._say(f.BAD_CONSTANT.at(value, f"{value.text} is neither a number nor a register", hint))
+            self._report(f.BAD_CONSTANT.at(value, f"{value.text} is neither a number nor a register", hint))
             self._broken.add(key)
             return
         resolved = self.value(value)
@@ -91,17 +91,19 @@ class Scope:
         reason = self.reserved(key)
         if reason is not None:
             self._broken.add(key)
-            self._say(f.RESERVED.at(name, f"{name.text} cannot be a variable: it is {reason}", "take another name"))
+            self._report(f.RESERVED.at(name, f"{name.text} cannot be a variable: it is {reason}", "take another name"))
             return
         index = len(self.variables)
         if index == self._dialect.max_variables:
             limit = self._dialect.max_variables
-            self._say(f.TOO_MANY_VARIABLES.at(name, f"{name.text} is one variable too many", f"a program has at most {limit}"))
+            self._report(
+                f.TOO_MANY_VARIABLES.at(name, f"there are too many variables: {name.text}", f"a program has at most {limit}")
+            )
         self.variables[key] = name
         self.known[key] = Variable(index, name.text)
 
     def reserved(self, key: str) -> str | None:
-        """Why a name cannot be given to a constant or variable."""
+        """Why a constant or variable cannot have this name; None if it can."""
         if parts(key) is not None:
             return "a register"
         if key in KEYWORDS or key in NOT_SUPPORTED:
@@ -132,7 +134,7 @@ class Scope:
         """
         if isinstance(node, DecimalNumber):
             if not -REAL_MAX <= node.value <= REAL_MAX:
-                self._say(f.OUT_OF_RANGE.at(node, f"{node.text} is out of range", f"REAL reaches ±{REAL_MAX:.3g}"))
+                self._report(f.OUT_OF_RANGE.at(node, f"{node.text} is out of range", f"REAL reaches ±{REAL_MAX:.3g}"))
                 return None
             return Literal(node.value)
         known = self.known.get(node.key)
@@ -149,11 +151,11 @@ class Scope:
                 return None
         if isinstance(found, Literal):
             kind = "a constant" if name.key in self.constants else "predefined"
-            self._say(f.NOT_ASSIGNABLE.at(name, f"{name.text} is {kind} and cannot be set", "set a variable or a register"))
+            self._report(f.NOT_ASSIGNABLE.at(name, f"{name.text} is {kind} and cannot be set", "set a variable or a register"))
             return None
         if isinstance(found, RegisterOperand) and found.row.writes is None:
             alias = "" if name.text.upper() == found.name.upper() else f" ({found.name})"
-            self._say(f.READ_ONLY.at(name, f"{name.text}{alias} is read-only", f"{found.row.name}: {found.row.meaning}"))
+            self._report(f.READ_ONLY.at(name, f"{name.text}{alias} is read-only", f"{found.row.name}: {found.row.meaning}"))
             return None
         return found
 
@@ -191,41 +193,41 @@ class Scope:
     def _register(self, name: Identifier, row: RegisterRow, number: int) -> RegisterOperand | None:
         dialect = self._dialect
         if not dialect.has(row.since):
-            self._say(f.NOT_IN_FIRMWARE.at(name, f"{name.text} needs firmware {row.since}", f"checked for {dialect.firmware}"))
+            self._report(f.NOT_IN_FIRMWARE.at(name, f"{name.text} needs firmware {row.since}", f"checked for {dialect.firmware}"))
             return None
         numbers = row.numbers(dialect)
         if numbers and number not in numbers:
             if row.words and number <= numbers[-1]:
                 hint = f"{row.name} takes two registers and begins at an even one"
-                self._say(f.ODD_ADDRESS.at(name, f"{name.text} has an odd address", hint))
+                self._report(f.ODD_ADDRESS.at(name, f"{name.text} has an odd address", hint))
             elif row.words:
                 hint = f"{row.spelling(dialect)} in firmware {dialect.firmware}"
-                self._say(f.USER_ADDRESS.at(name, f"there is no user register {name.text}", hint))
+                self._report(f.USER_ADDRESS.at(name, f"there is no user register {name.text}", hint))
             else:
-                self._say(f.NO_SUCH_REGISTER.at(name, f"there is no {name.text}", row.spelling(dialect)))
+                self._report(f.NO_SUCH_REGISTER.at(name, f"there is no {name.text}", row.spelling(dialect)))
             return None
         if row.key == "STATUS" and not dialect.has(_STATUS_SINCE):
             hint = f"it gives M_STATUS from firmware {_STATUS_SINCE} on"
             self.remarked.add(name.key)
-            self._say(f.STATUS_IS_ZERO.at(name, f"STATUS is always 0 in firmware {dialect.firmware}", hint))
+            self._report(f.STATUS_IS_ZERO.at(name, f"STATUS is always 0 in firmware {dialect.firmware}", hint))
         return RegisterOperand(row, number)
 
     def _unknown(self, name: Identifier, other: Value | None, *, is_row: bool) -> None:
         key = name.key
         if self._positions is not None and self._positions.index(key) is not None:
             hint = f"write @{name.text} after a motion statement"
-            self._say(
+            self._report(
                 f.RESERVED.at(name, f"{name.text} is a position, not a value", hint, fix=f"@{name.text}" if is_row else None)
             )
             return
         reason = self.reserved(key)
         if reason is not None:
-            self._say(f.RESERVED.at(name, f"{name.text} is {reason}, not a value"))
+            self._report(f.RESERVED.at(name, f"{name.text} is {reason}, not a value"))
             return
         meant = VALUES.get(key) or self.nearest(name.text)
         hint = f"did you mean {meant}?" if meant else self._names_for(other)
         hint = hint or "a variable comes into being when it is first set"
-        self._say(f.UNKNOWN_VARIABLE.at(name, f"unknown variable {name.text}", hint, fix=meant))
+        self._report(f.UNKNOWN_VARIABLE.at(name, f"unknown variable {name.text}", hint, fix=meant))
 
     def _names_for(self, other: Value | None) -> str:
         """The predefined names that make sense with a register; nothing where there are none."""
@@ -247,7 +249,7 @@ class Scope:
         yield from PREDEFINED
         yield from _register_spellings(self._dialect)
 
-    def _say(self, diagnostic: Diagnostic) -> None:
+    def _report(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)
 
 

@@ -92,11 +92,11 @@ def axes_never_enabled(executable: s.Executable, positions: PositionTable | None
     switched_on = (register for register, step in _register_writes(executable) if not _is_zero(step.value))
     enabled = {register.number for register in switched_on if register.row.key == "M"}
     found: list[Diagnostic] = []
-    told: set[int] = set()
+    reported: set[int] = set()
     for step in executable.steps:
         for axis in _moved(step, positions):
-            if axis not in enabled and axis not in told:
-                told.add(axis)
+            if axis not in enabled and axis not in reported:
+                reported.add(axis)
                 message = f"M{axis} is moved, but the program never enables it"
                 found.append(f.NEVER_ENABLED.at(step, message, f"write M{axis} = ON, unless a master enables the drive"))
     return found
@@ -192,14 +192,14 @@ def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic
     """Interrupts switched on that have no label, and labels whose interrupt nothing switches on."""
     found: list[Diagnostic] = []
     switched_on: set[InterruptEvent] = set()
-    told: set[InterruptEvent] = set()
+    reported: set[InterruptEvent] = set()
     for register, step in _register_writes(executable):
         event = BY_REGISTER.get(register.name.upper())
         if event is None or _is_zero(step.value):
             continue
         switched_on.add(event)
-        if event not in executable.entries and event not in told:
-            told.add(event)
+        if event not in executable.entries and event not in reported:
+            reported.add(event)
             message = f"the interrupt of {event.name} is enabled, but there is no label INT_{event.name}"
             found.append(f.NO_HANDLER.at(step, message, f"write INT_{event.name}: and its lines up to RETURN"))
     for event, entry in executable.entries.items():
