@@ -469,3 +469,31 @@ def test_a_position_that_a_chip_does_not_know_is_no_beginning() -> None:
     subject.do(command.Advance(until="idle"))
     with pytest.raises(Refusal, match=r"lift was stopped in a move: its counter does not show where it is \(M-16\)"):
         subject.do(command.Move("lift", 1, to=0.0))
+
+
+def test_the_description_has_the_geometry_of_axes() -> None:
+    text = """
+        [[mic488]]
+        name = "a"
+        [[axis]]
+        name = "x"
+        drive = "a.M1"
+        unit = "mm"
+        pulses_per_unit = 10
+        travel = [-5, 90.0]
+        switch = [
+          { to = "a.IN1", below = -1.0 }, { to = "a.IN2", above = 80 }, { to = "a.IN3", position = 4, width = 2, period = 20 },
+        ]
+        [[axis]]
+        name = "dial"
+        drive = "a.M2"
+        kind = "rotary"
+        unit = "degree"
+        pulses_per_unit = 10
+    """
+    x, dial = of(World.from_toml(text)).description.axes
+    assert (x.kind, x.travel) == ("linear", (-5.0, 90.0))
+    assert [(one.pin, one.low, one.high, one.period) for one in x.switches] == [
+        ("a.IN1", None, -1.0, None), ("a.IN2", 80.0, None, None), ("a.IN3", 3.0, 5.0, 20.0),
+    ]  # fmt: skip
+    assert (dial.kind, dial.travel, dial.switches) == ("rotary", None, ())

@@ -62,6 +62,17 @@ class MachinePart:
 
 
 @dataclass(frozen=True, slots=True)
+class SwitchPart:
+    """A switch at an axis: on from ``low`` to ``high``, in units of the axis; None where it is on without end. With ``period`` again after
+    each."""
+
+    pin: str
+    low: float | None
+    high: float | None
+    period: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class MechanicsPart:
     """What an axis of a controller moves."""
 
@@ -70,6 +81,11 @@ class MechanicsPart:
     axis: str
     unit: str
     points: tuple[str, ...]
+    kind: str = "linear"
+    """``linear`` or ``rotary``."""
+    travel: tuple[float, float] | None = None
+    """Hard stops, in units of the axis."""
+    switches: tuple[SwitchPart, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +143,17 @@ def read_description(data: Mapping[str, Any]) -> Description:
         for one in data["machines"]
     )
     axes = tuple(
-        MechanicsPart(one["name"], one["machine"], one["axis"], one["unit"], tuple(one["points"])) for one in data["axes"]
+        MechanicsPart(
+            one["name"],
+            one["machine"],
+            one["axis"],
+            one["unit"],
+            tuple(one["points"]),
+            one["kind"],
+            None if one["travel"] is None else (one["travel"][0], one["travel"][1]),
+            tuple(SwitchPart(**switch) for switch in one["switches"]),
+        )
+        for one in data["axes"]
     )
     lines = tuple(LinePart(**one) for one in data["lines"])
     return Description(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.contract import Description, LinePart, MachinePart, MechanicsPart
+from steptwin.subject.contract import Description, LinePart, MachinePart, MechanicsPart, SwitchPart
 from steptwin.subject.controls import controls_of
 from steptwin.world.elements.axis import MECHANICS
+from steptwin.world.elements.switch import SwitchSpec
 from steptwin.world.plant import Plant
 
 
@@ -32,4 +33,15 @@ def _machine(world: Plant, name: str) -> MachinePart:
 def _mechanics(world: Plant, name: str) -> MechanicsPart:
     fitted = world.axes[name]
     place = fitted.mechanism.machine, str(fitted.mechanism.number)
-    return MechanicsPart(name, *place, fitted.scale.unit, tuple(f"{name}.{what}" for what in MECHANICS))
+    points = tuple(f"{name}.{what}" for what in MECHANICS)
+    spec = fitted.spec
+    switches = tuple(_switch(one) for one in spec.switches)
+    return MechanicsPart(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches)
+
+
+def _switch(spec: SwitchSpec) -> SwitchPart:
+    pin = ".".join(spec.target)
+    if spec.position is None:
+        return SwitchPart(pin, spec.above, spec.below)
+    half = spec.width / 2
+    return SwitchPart(pin, spec.position - half, spec.position + half, spec.period)

@@ -231,13 +231,21 @@ export type SubjectEvent = {
 /** What there is. It does not change. */
 export type Description = {
   name: string;
-  axes: {
+  axes: ({
     name: string;
     machine: string;
     axis: string;
     unit: string;
     points: string[];
-  }[];
+    kind: string;
+    travel: number[] | null;
+    switches: ({
+      pin: string;
+      low: number | null;
+      high: number | null;
+      period: number | null;
+    })[];
+  })[];
   buttons: string[];
   lines: ({
     name: string;

@@ -7,6 +7,8 @@ export type Point = Datasheet["points"][number];
 export type Pin = Datasheet["pins"][number];
 export type AxisSheet = Datasheet["axes"][number];
 export type Line = Description["lines"][number];
+/** What an axis of a controller moves. */
+export type Mechanics = Description["axes"][number];
 export type Control = "enable" | "move" | "home" | "jog" | "stop" | "program";
 
 /** An axis of a controller, with the points of its data sheet that are about it. */
@@ -56,6 +58,7 @@ export interface Model {
   name: string;
   machines: readonly MachineModel[];
   lines: readonly Line[];
+  mechanics: readonly Mechanics[];
   buttons: readonly string[];
   commands: ReadonlySet<string>;
 }
@@ -131,6 +134,7 @@ export function modelOf(description: Description): Model {
     name: description.name,
     machines,
     lines: description.lines,
+    mechanics: description.axes,
     buttons: description.buttons,
     commands: new Set(description.commands),
   };

@@ -19,7 +19,7 @@ import { Watches, type Watch } from "./watch.svelte";
 
 export type EventKind = SubjectEvent["kind"];
 
-const EMPTY: Model = { name: "", machines: [], lines: [], buttons: [], commands: new Set() };
+const EMPTY: Model = { name: "", machines: [], lines: [], mechanics: [], buttons: [], commands: new Set() };
 /** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */
 const FOLLOWED: readonly EventKind[] = [
   "plan",

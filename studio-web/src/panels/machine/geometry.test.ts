@@ -1,0 +1,35 @@
+import { expect, test } from "vitest";
+import type { Mechanics } from "../../lib/state/model";
+import { trackOf, zonesOf } from "./geometry";
+
+const axis = (more: Partial<Mechanics>): Mechanics =>
+  ({ name: "x", unit: "mm", kind: "linear", travel: null, switches: [], ...more }) as Mechanics;
+
+test("a track goes from stop to stop", () => {
+  expect(trackOf(axis({ travel: [-12, 252] }), [0, 0])).toEqual({ low: -12, high: 252, hasStops: true });
+});
+
+test("without stops it has room for switches and what was seen", () => {
+  const switches = [{ pin: "a.IN1", low: null, high: -10, period: null }];
+  const { low, high } = trackOf(axis({ switches }), [0, 90]);
+  expect(low).toBeCloseTo(-15);
+  expect(high).toBeCloseTo(95);
+});
+
+test("zones without an end go to the end of the track", () => {
+  const switches = [
+    { pin: "a.IN1", low: null, high: 0, period: null },
+    { pin: "a.IN2", low: 75, high: null, period: null },
+  ];
+  expect(zonesOf(axis({ switches }), { low: -100, high: 100, hasStops: true })).toEqual([
+    { pin: "a.IN1", from: 0, to: 0.5 },
+    { pin: "a.IN2", from: 0.875, to: 1 },
+  ]);
+});
+
+test("marks come again", () => {
+  const switches = [{ pin: "a.IN1", low: 0, high: 1, period: 10 }];
+  expect(zonesOf(axis({ switches }), { low: 0, high: 40, hasStops: true }).map(({ from }) => from)).toEqual([
+    0, 0.25, 0.5, 0.75, 1,
+  ]);
+});

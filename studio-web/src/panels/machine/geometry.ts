@@ -1,0 +1,48 @@
+import type { Mechanics } from "../../lib/state/model";
+
+export interface Zone {
+  /** Fractions of the track. */
+  from: number;
+  to: number;
+  pin: string;
+}
+
+export interface Track {
+  low: number;
+  high: number;
+  hasStops: boolean;
+}
+
+/** What a track shows: the travel, or all switches and the places it has been at. */
+export function trackOf({ travel, switches }: Mechanics, seen: readonly [number, number]): Track {
+  if (travel !== null) {
+    const [low, high] = travel as [number, number];
+    return { low, high, hasStops: true };
+  }
+  const ends = switches.flatMap(({ low, high }) => [low, high]).filter((end) => end !== null);
+  const [low, high] = [Math.min(...seen, ...ends), Math.max(...seen, ...ends)];
+  const room = (high - low || 1) * 0.05;
+  return { low: low - room, high: high + room, hasStops: false };
+}
+
+/** Where switches are on, on a track; a mark that comes again as often as it does there. */
+export function zonesOf({ switches }: Mechanics, { low, high }: Track): Zone[] {
+  const MOST = 200;
+  const part = (place: number) => Math.min(1, Math.max(0, (place - low) / (high - low)));
+  return switches.flatMap(({ pin, low: from, high: to, period }): Zone[] => {
+    if (period === null || from === null || to === null) {
+      return [{ pin, from: part(from ?? low), to: part(to ?? high) }];
+    }
+    const first = Math.ceil((low - to) / period);
+    const last = Math.min(first + MOST, Math.floor((high - from) / period));
+    return Array.from({ length: Math.max(0, last - first + 1) }, (_, index) => {
+      const shift = (first + index) * period;
+      return { pin, from: part(from + shift), to: part(to + shift) };
+    });
+  });
+}
+
+/** Places around a dial, in turns. */
+export function turnOf(unit: string): number {
+  return unit === "degree" ? 360 : 1;
+}

@@ -1,0 +1,36 @@
+import { texts } from "../../text";
+
+export const t = texts(
+  {
+    title: "Machine",
+    none: "The description of this world has no mechanics.",
+    position: "{axis} place",
+    lost: "{count} steps lost",
+    stalled: "stalled",
+    press: "Press {button}",
+    switchOn: "{pin} on",
+    switchOff: "{pin} off",
+    path: "Path of the tool",
+    across: "Horizontal axis",
+    up: "Vertical axis",
+    trail: "the last {seconds} s",
+    buttons: "Buttons",
+    axis: "{axis}, moved by {drive}",
+  },
+  {
+    title: "Maszyna",
+    none: "Opis tego świata nie ma mechaniki.",
+    position: "położenie {axis}",
+    lost: "zgubione kroki: {count}",
+    stalled: "utyk",
+    press: "Naciśnij {button}",
+    switchOn: "{pin} zał.",
+    switchOff: "{pin} wył.",
+    path: "Tor narzędzia",
+    across: "Oś pozioma",
+    up: "Oś pionowa",
+    trail: "ostatnie {seconds} s",
+    buttons: "Przyciski",
+    axis: "{axis}, napęd {drive}",
+  },
+);
