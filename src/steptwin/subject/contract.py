@@ -63,8 +63,10 @@ class MachinePart:
 
 @dataclass(frozen=True, slots=True)
 class SwitchPart:
-    """A switch at an axis: on from ``low`` to ``high``, in units of the axis; None where it is on without end. With ``period`` again after
-    each."""
+    """A switch at an axis: on from ``low`` to ``high``, in units of the axis, and again after each ``period``.
+
+    Where ``low`` or ``high`` is None, there is no end on that side.
+    """
 
     pin: str
     low: float | None
