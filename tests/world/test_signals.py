@@ -251,6 +251,22 @@ def test_a_condition_on_what_a_master_only_stores_is_not_late() -> None:
     assert [record.time for record in world.trace if record.subject == "note"] == [2 * SECOND]
 
 
+def test_nor_is_it_over_tcp_where_nothing_is_recorded() -> None:
+    world = World.from_toml(MASTER)
+    live = LiveWorld(world)
+    world.stop_recording()
+    notes: list[int] = []
+    world.trace.watchers.append(lambda record: notes.append(record.time) if record.subject == "note" else None)
+    port = PlacePort(live, "bus", "tcp-1", "tcp")
+    for moment, value in ((1, "3f80"), (2, "4000")):
+        live.advance(moment * SECOND)
+        pdu = written(bytes.fromhex(f"0007 0000 {value}"))[1:-2]
+        port.exchange(bytes((0, 1, 0, 0, 0, len(pdu) + 1, 1)) + pdu, moment * SECOND)
+        live.deadline()
+    live.advance(3 * SECOND)
+    assert notes == [2 * SECOND]
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [

@@ -210,6 +210,9 @@ class PlacePort:
     def __init__(self, live: LiveWorld, line: str, place: str, kind: str) -> None:
         world = live.world
         self._live = live
+        self._world = world
+        self._direct: LineEndPoint | None = None
+        """Where it is connected, if nothing that it exchanges is recorded there and its port answers at once."""
         self._line = world.lines[line]
         self._kernel = world.plan.kernel_of[line]
         self._places = self._line.places
@@ -232,20 +235,31 @@ class PlacePort:
             self.on_output()
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        live, kernel = self._live, self._kernel
-        world = live.world
-        now = world.now  # a world that was stopped stands
+        kernel = self._kernel
+        now = self._world.now  # a world that was stopped stands
         if kernel.now != now or kernel.stale:
             kernel.advance(now)
+        direct = self._direct
+        if direct is None or not direct.is_connected or not direct.port.is_transparent or kernel.is_attentive:
+            return self._exchange(data, now)
+        port = direct.inner
+        answer: bytes = port.exchange(data, now)
+        if kernel.stale:
+            answer = self._with_the_rest(direct, answer, now)
+        self.broken = port.broken
+        return answer
+
+    def _exchange(self, data: bytes, now: Nanos) -> bytes:
+        """As `exchange`, wherever it is connected; the kernel is at ``now``."""
+        world, kernel = self._world, self._kernel
         place = self._places.get(self._name)
         if place is None or place.on_output is None:
             place = self._connected()
         if world.keeps_inputs or world.trace.is_recorded:
             answer = self._recorded(place, data, now)
-        elif place.at_once and place.port.is_transparent:
-            answer = place.port.exchange(data, now)
         else:
             answer = self._line.exchange(self._name, place, data, now)
+            self._direct = place if place.at_once and not place.received else None
         if kernel.stale or place.received:
             answer = self._with_the_rest(place, answer, now)
         self.broken = place.inner.broken

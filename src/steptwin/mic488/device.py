@@ -80,7 +80,11 @@ class Mic488Device(ControllerCore):
 
         One that fails unexpectedly is answered with exception 04, device failure, and an event.
         """
-        self.advance(now)
+        due = self._due
+        if now >= self.now and (due is None or due > now):
+            self.now = now  # as `advance` where nothing is due
+        else:
+            self.advance(now)
         try:
             return self.slave.answer(self, pdu)
         except Exception as error:  # noqa: BLE001 - a master waits for an answer

@@ -50,16 +50,15 @@ class Slave:
     def answer(self, device: ControllerCore, pdu: bytes) -> bytes:
         """The response to ``pdu``; a request that cannot be served is answered with its exception."""
         data_type = device.data_type
-        function = pdu[0] if pdu else 0
         try:
+            plan = self._whole[data_type].get(pdu)
+            if plan is not None:
+                return plan(device)
+            function = pdu[0] if pdu else 0
             if function in _REGISTER_WRITES:
                 writing = self._heads[data_type].get(pdu[:6] if function == WRITE_MULTIPLE_REGISTERS else pdu[:3])
                 if writing is not None and writing.length == len(pdu):
                     return writing(device, pdu)
-            else:
-                plan = self._whole[data_type].get(pdu)
-                if plan is not None:
-                    return plan(device)
             return self._compiled(DataType(data_type), pdu)(device)
         except ModbusException as refusal:
             return refusal.pdu

@@ -110,7 +110,8 @@ class _MemoryPlan:
 
     def __call__(self, device: ControllerCore, pdu: bytes) -> bytes:
         self._pack(device.user, self._place, *self._unpack(pdu, self.head))
-        device.user_registers_written()
+        if device.program.state:
+            device.user_registers_written()
         return pdu[:5]
 
 

@@ -19,6 +19,10 @@ from steptwin.wire.pdu import GATEWAY_TARGET_FAILED, READS, REFUSED, WRITE_MULTI
 
 _PLAIN = bytes(3)
 """Protocol 0 and a length below 256, in an MBAP header from its third byte."""
+_HEADERS = {size: bytes((0, 0, 0, size - 6)) for size in range(8, 260)}
+"""The third to the sixth byte of an MBAP header, by the size of the whole frame."""
+_LENGTHS = [bytes((size + 1,)) for size in range(255)]
+"""The last byte of the length in the header of an answer, by the size of its PDU."""
 
 
 class Device(Protocol):
@@ -231,12 +235,11 @@ class TcpSlavePort(SlavePort):
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         # Nearly always one whole request comes alone; this is that case without a framer.
         framer = self._framer
-        size = len(data)
-        if size >= 8 and data[2:5] == _PLAIN and data[5] == size - 6 and not framer.held and not framer.broken:
+        if data[2:6] == _HEADERS.get(len(data)) and not framer.held and not framer.broken:
             device = self._devices.get(data[6])
             if device is not None and self.on_frame is None:
                 pdu = device.execute(data[7:], now)
-                return data[:4] + (len(pdu) + 1).to_bytes(2, "big") + data[6:7] + pdu
+                return data[:5] + _LENGTHS[len(pdu)] + data[6:7] + pdu
         frames = framer.feed(data)
         self.broken = framer.broken
         return b"".join([self._answer(frame.raw, now) for frame in frames])

@@ -217,6 +217,13 @@ class Kernel:
             raise TimeReversal(self.now, now)
         if self.stale:
             self.settle()
+        due = self._due
+        if due is not None and due <= now:
+            self._run(now)
+        self.now = now
+
+    def _run(self, now: Nanos) -> None:
+        """Everything that is due by ``now``, in order."""
         if len(self.machines) == 1 and not self.parts and not self._wires:
             self._advance_alone(now)
         while self._due is not None and self._due <= now:
@@ -228,7 +235,6 @@ class Kernel:
             if self._flights:
                 self._arrive()
             self.settle()
-        self.now = now
 
     def _advance_alone(self, now: Nanos) -> None:
         """What `advance` and `settle` do where there is one machine and nothing that could act on it."""

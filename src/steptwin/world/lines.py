@@ -49,8 +49,10 @@ class LineWords(FrameFollower, Protocol):
 class LineEndPoint(Stateful):
     """Where one program is connected. ``received`` is what has come and was not fetched, with its moments."""
 
-    __slots__ = ("at_once", "framed", "inner", "kind", "on_output", "port", "received", "rubbish", "talks")
-    FIXED: ClassVar[frozenset[str]] = frozenset({"at_once", "framed", "inner", "kind", "on_output", "port", "rubbish", "talks"})
+    __slots__ = ("at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "received", "rubbish", "talks")
+    FIXED: ClassVar[frozenset[str]] = frozenset(
+        {"at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "rubbish", "talks"}
+    )
 
     def __init__(self, kind: str, port: FaultyPort, inner: Any, framed: SlavePort | None, *, talks: bool) -> None:
         self.kind = kind
@@ -63,6 +65,8 @@ class LineEndPoint(Stateful):
         """Bytes that belonged to no frame, as far as that was reported."""
         self.at_once = False
         """Whether the port has sent all answers when it has taken a request, and nothing later."""
+        self.is_connected = True
+        """Until the program has gone."""
         self.talks = talks
         """Whether the port may send without having been asked."""
         self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
@@ -174,6 +178,7 @@ class Line(Stateful):
         found = self.places.pop(place, None)
         self._busy.pop(place, None)
         if found is not None:
+            found.is_connected = False
             found.port.close()
 
     def _count_rubbish(self, name: str, place: LineEndPoint, now: Nanos) -> None:
