@@ -47,7 +47,7 @@ class Fix:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One finding. ``code`` is stable (``M101``, ``W204``), ``message`` says what was found, ``hint`` what is allowed."""
+    """One finding. ``code`` is stable (``M101``, ``W204``), ``message`` is the finding, ``hint`` what is permitted."""
 
     code: str
     severity: Severity

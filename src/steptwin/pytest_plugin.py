@@ -119,7 +119,7 @@ def pytest_runtest_makereport(
 
 
 def _options(request: pytest.FixtureRequest, name: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """What the markers of a test say; the nearest has the last word."""
+    """The options of a test's markers; the nearest marker takes precedence."""
     arguments: tuple[Any, ...] = ()
     options: dict[str, Any] = {"time": request.config.getini(TIME)}
     for marker in reversed(list(request.node.iter_markers(name))):
@@ -139,7 +139,7 @@ def _rig(request: pytest.FixtureRequest, name: str, make: Callable[[], Rig]) -> 
 
 
 def _without_traceback(name: str, do: Callable[[], T]) -> T:
-    """What people did wrong, and devices that do not answer, are told in a line."""
+    """Report wrong use, and devices that do not respond, in one line."""
     try:
         return do()
     except SteptwinError as error:
@@ -149,7 +149,7 @@ def _without_traceback(name: str, do: Callable[[], T]) -> T:
 
 @pytest.fixture
 def mic488(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[Mic488Rig]:
-    """A running MIC488 (`steptwin.testing.Mic488Rig`), new for each test. ``@pytest.mark.mic488(...)`` says which.
+    """A running MIC488 (`steptwin.testing.Mic488Rig`), new for each test. ``@pytest.mark.mic488(...)`` has its options.
 
     It is a twin, in real time on a free port unless the marker says otherwise; with ``--device`` it is that device.
     """
@@ -167,7 +167,7 @@ def mic488(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[Mic488Rig]
 
 @pytest.fixture
 def m1486(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[M1486Rig]:
-    """A running M1486 (`steptwin.testing.M1486Rig`), new for each test. ``@pytest.mark.m1486(...)`` says which.
+    """A running M1486 (`steptwin.testing.M1486Rig`), new for each test. ``@pytest.mark.m1486(...)`` has its options.
 
     It is a twin, in real time on a free port unless the marker says otherwise; with ``--device`` it is that device.
     """
@@ -187,7 +187,7 @@ def m1486(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[M1486Rig]:
 def steptwin_world(request: pytest.FixtureRequest) -> Iterator[WorldRig]:
     """A running world (`steptwin.testing.WorldRig`), new for each test.
 
-    ``@pytest.mark.steptwin_world("machine.toml")`` says which. Its lines are on free ports, wherever its file would have them.
+    ``@pytest.mark.steptwin_world("machine.toml")`` names its file. Its lines are on free ports, whatever the file gives.
     """
     from steptwin.testing.rig import options_of
     from steptwin.testing.world import WorldOptions, WorldRig

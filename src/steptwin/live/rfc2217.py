@@ -189,7 +189,7 @@ class Rfc2217Port:
         self._port = port
         self._line = line
         self._telnet = Telnet(line.baud())
-        self._told = ""
+        self._reported = ""
         """The settings of the last event."""
 
     @property
@@ -209,11 +209,11 @@ class Rfc2217Port:
         line, telnet = self._line, self._telnet
         baud = line.baud()
         if telnet.fits(baud):
-            self._told = ""
+            self._reported = ""
             return True
         told = f"{telnet.settings} is set by its client, the line has {baud} bit/s 8N1"
-        if told != self._told:
-            self._told = told
+        if told != self._reported:
+            self._reported = told
             effect = "no character gets through" if line.is_timed else "served all the same, as line timing is off"
             line.notice(f"network port: {told}: {effect}")
         return not line.is_timed

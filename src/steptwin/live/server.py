@@ -66,7 +66,7 @@ class Server:
         self.cell = cell
         self.end_points: list[EndPoint] = []
         self._show = show
-        self._told: dict[str, float] = {}
+        self._reported: dict[str, float] = {}
         self._links: list[Link] = []
         self._ready_file: tuple[Path, str] | None = None
         self._name = ""
@@ -83,9 +83,9 @@ class Server:
     def notice(self, text: str) -> None:
         """Show a notice to the user, but not the same one repeatedly."""
         now = asyncio.get_running_loop().time()
-        self._told = {told: at for told, at in self._told.items() if now - at < REPEAT_S}
-        if text not in self._told:
-            self._told[text] = now
+        self._reported = {told: at for told, at in self._reported.items() if now - at < REPEAT_S}
+        if text not in self._reported:
+            self._reported[text] = now
             self._show(text)
 
     async def open(

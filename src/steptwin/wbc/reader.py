@@ -1,6 +1,6 @@
-"""Reads one statement from the words of its line, and says what is wrong with it.
+"""Parses one statement from the tokens of its line, and reports its errors.
 
-What a line means with other lines (names, blocks, labels) is not looked at here.
+Relations between lines (names, blocks, labels) are not checked here.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class StatementReader:
         return KeywordStatement(start, self._tokens[-1].end, row.keyword, tuple(operands))
 
     def _rest(self, row: StatementRow) -> Rejected:
-        """What to say of the tokens after a complete statement."""
+        """The error of tokens after a complete statement."""
         token = self._tokens[self._at]
         rest = self._place_of_rest()
         usage = f"write {row.usage}"

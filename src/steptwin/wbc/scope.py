@@ -119,7 +119,7 @@ class Scope:
         return None
 
     def meanings(self) -> dict[str, object]:
-        """What the program itself says of names, to be compared with what it said before."""
+        """The definitions of names in the program, for comparison with earlier ones."""
         meanings: dict[str, object] = dict.fromkeys(self._broken, "broken")
         meanings.update((key, (source, key in self.constants)) for key, source in self.known.items())
         return meanings
@@ -127,7 +127,7 @@ class Scope:
     # -- using
 
     def value(self, node: Value, other: Value | None = None, *, is_row: bool = False) -> Source | None:
-        """What a number or name stands for; None after saying why it stands for nothing.
+        """The value of a number or name; None after reporting an error.
 
         ``other`` is what it is compared with or given to: that tells which names were possible. ``is_row``: a row of the
         position table is wanted.
@@ -141,7 +141,7 @@ class Scope:
         return known if known is not None else self._look_up(node, other, is_row=is_row)
 
     def target(self, name: Identifier) -> Target | None:
-        """The variable or register an assignment goes to; None after saying why there is none."""
+        """The variable or register of an assignment; None after reporting an error."""
         found = self.known.get(name.key)
         if found is None:
             if name.key in self._broken:

@@ -1,4 +1,4 @@
-"""The syntax tree of a WBC program: what the text says, line by line, with the place of every word.
+"""The syntax tree of a WBC program, line by line, with the place of every word.
 
 ``start`` and ``end`` are character offsets of the source. Nodes compare by what they say, not by where they stand:
 two programs are equal when they differ in nothing but blanks.

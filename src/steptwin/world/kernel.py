@@ -330,7 +330,7 @@ class Kernel:
         self._given.clear()
         self._flights = list(state.flights)
         for plans in self._plans:
-            plans.take_as_told()
+            plans.take_as_reported()
         self.settle()
 
 
@@ -361,7 +361,7 @@ class _Plans:
             if before is None or not _only_rests(before, profile):
                 record(TraceRecord(now, self._name, "plan", number, plan))
 
-    def take_as_told(self) -> None:
+    def take_as_reported(self) -> None:
         for i, _, drive in self._drives:
             self._revisions[i], self._profiles[i] = drive.revision, profile_of(drive.plan)
             self._origins[i] = drive.offset_p
