@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from mic488_rig import RUNNING, Rig, programmed
 
+from steptwin.machine import MILLISECOND
 from steptwin.mic488.config import ControllerConfig, InputConfig
 
 FILTER = 0.010
@@ -110,14 +111,27 @@ def test_wbc_3_a_jump_in_a_handler_lets_interrupts_in_and_returns_come_back() ->
     assert rig.changes("OUT3") == [(3.003, 1.0)]
 
 
-def test_wbc_3_what_waits_is_served_before_the_first_line_a_handler_jumps_to() -> None:
-    rig = started(
-        "CFGINT_IN1 = RIS\nCFGINT_IN2 = RIS\nWAIT 1 = 2\n"
-        "INT_IN1:\nDELAY 1\nJUMP SUB\nRETURN\nSUB:\n$I2 = $I0\nRETURN\nINT_IN2:\n$I0 = 7\nRETURN\n"
+@pytest.mark.parametrize("statement_time", [0, MILLISECOND])
+@pytest.mark.parametrize(
+    ("main", "handler"),
+    [
+        ("WAIT 1 = 2\n", "JUMP SUB\nRETURN\nSUB:\n$I2 = $I0\nRETURN\n"),
+        ("WHILE IN3 = OFF\nENDWHILE\n$I2 = $I0\nWAIT 1 = 2\n", "RETURN\n"),
+    ],
+)
+def test_wbc_3_what_waits_is_served_before_the_next_line_when_a_handler_ends_or_jumps(
+    main: str, handler: str, statement_time: int
+) -> None:
+    rig = programmed(
+        f"CFGINT_IN1 = RIS\nCFGINT_IN2 = RIS\n{main}INT_IN1:\nDELAY 1\n{handler}INT_IN2:\n$I0 = 7\nRETURN\n",
+        statement_time=statement_time,
     )
+    rig.start()
     rig.wait(0.1)
     pulse(rig, "IN1")
     pulse(rig, "IN2")
+    rig.pin("IN3", 1)
+    rig.wait(0.1)
     assert rig.i(0) == 0
     rig.wait(2)
     assert (rig.i(0), rig.i(2)) == (7, 7)

@@ -7,11 +7,14 @@ from collections.abc import Callable
 import pytest
 from chip_rig import ChipWire, Fault, chip_driver, chip_line
 
+from steptwin.drivers import Unconfirmed
+from steptwin.drivers.exchange import Job
 from steptwin.drivers.m1486 import M1486, Busy, Garbled, NoEcho, WrongType
 from steptwin.drivers.m1486.lines import TALK
-from steptwin.drivers.m1486.talk import SPOILER
+from steptwin.drivers.m1486.talk import SPOILER, ChipRequest
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.lines import DUAL_DAC
+from steptwin.machine import SECOND
 
 
 @pytest.mark.parametrize(
@@ -277,3 +280,48 @@ def test_a_line_that_belongs_to_the_interface_is_no_output() -> None:
 def test_who_is_what() -> None:
     chip = chip_driver(ChipWire("B", (10,)), 10, unit="mm")
     assert (repr(chip), chip.place, chip.address, chip.unit) == ("<M1486 chip A on memory>", "memory", 10, "mm")
+
+
+@pytest.mark.parametrize("kind", ["B", "E1"])
+def test_an_answer_that_is_lost_is_asked_for_again(kind: str) -> None:
+    """Whether it rests, and what it reads; an E type writes the second question into its memory before it answers."""
+    for lost in (len("u20|"), len("u20|B") + len("u1|")):
+        wire = ChipWire(kind)
+        chip = chip_driver(wire)
+        chip.set_variable(17)
+        wire.sleep(5.0)
+        wire.put(Fault("to host", lost, "drop"))
+        assert chip.counter() == 0
+        assert wire.faults[0].met
+        assert chip.variable() == 17
+
+
+def test_a_stop_that_is_not_echoed_right_is_said_five_times_before_it_is_tried_blind() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.run(1)
+    wire.before_each = lambda data: wire.put(Fault("to host", 0, "flip 0"))
+    wire.sent.clear()
+    with pytest.raises(Unconfirmed):
+        chip.stop()
+    said = [data for _, data in wire.sent]
+    assert said[: said.index(b"k\rk\r")] == [b"k\r", *[b"%\rk\r"] * 4]
+
+
+def test_a_stop_goes_before_what_waits_for_the_line() -> None:
+    wire = ChipWire("B")
+    line = chip_line(wire)
+    chip = M1486(line)
+    chip.open()
+    chip.run(1)
+    line._engine.submit(Job(ChipRequest(None, "u1", answers=True), SECOND))
+    wire.sent.clear()
+    chip.stop()
+    assert wire.sent[0][1] == b"k\r"
+
+
+@pytest.mark.parametrize(("timeout_s", "patience_s"), [(0.5, 10.0), (0.8, 10.0), (1.0, 12.0), (2.0, 24.0)])
+def test_what_moves_is_begun_within_10_s_or_four_times_the_time_of_its_tries(timeout_s: float, patience_s: float) -> None:
+    """A command is typed three times at most."""
+    unit = chip_driver(ChipWire("B"), timeout_s=timeout_s)._driver._unit
+    assert unit.permission().patience_ns == patience_s * SECOND

@@ -180,7 +180,6 @@ class CharacterTalk:
         text = request.text.encode("ascii")
         match request.sort:
             case ChipRequestKind.LISTEN | ChipRequestKind.LETTER | ChipRequestKind.UPLOAD:
-                request.committed = True
                 return self._put(b"", now)
             case ChipRequestKind.BLIND:
                 # Its first line spoils what may stand before it, and is said twice.

@@ -162,7 +162,7 @@ class ChipUnit:
                     # Everybody is to echo, so that the selection is verified by whoever hears it.
                     await self._blind(f"{rest}{EVERYBODY}t{RETURN}\r", pause)
                     rest = ""
-                    await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT, acts=False))
+                    await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
                 await self._blind_echo(rest, pause)
                 await self._exchange(ChipRequest(self.address, f"t{RETURN}", acts=False))
             except (NoAnswer, Garbled) as error:
@@ -242,25 +242,22 @@ class ChipUnit:
         command may have acted, even if it is sent correctly afterwards. ``retype``: it may be sent again before its CR.
         ``stored``: the command goes into the memory, which takes time on an E type. Raises `NoRoom`, `Garbled` or `NoAnswer`;
         with ``uncertain`` set the chip may have executed it."""
-        failure: LineFailure | None = None
-        for _ in range(TRIES):
+        tries = 0
+        while True:
             await self._ready()
             say = ChipRequest(self.address, text, answers=answers, acts=once or acts)
             try:
                 answer = await self._exchange(say, permission=permission, timeout_ns=self._patience(answers))
             except (Garbled, NoAnswer) as error:
-                failure = error
+                tries += 1
                 if isinstance(error, NoAnswer) and not say.committed:
                     self.talk.forget(self.address)
-                if (say.committed and once) or (say.commented and say.acts) or not retype:
+                if tries == TRIES or (say.committed and once) or (say.commented and say.acts) or not retype:
                     raise
                 continue
             if stored:
                 self._written()
             return answer
-        if failure is None:
-            raise Misuse("no tries")
-        raise failure
 
     async def act(
         self,
@@ -331,7 +328,7 @@ class ChipUnit:
         """Receive the second letter of a chip that was asked twice, so that it is not taken for the next answer."""
         talk = self.talk
         if talk.surplus:
-            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN, acts=False)
+            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN)
             with suppress(NoAnswer):
                 while talk.surplus:
                     await self._exchange(listening, timeout_ns=self._patience(True))
@@ -347,7 +344,7 @@ class ChipUnit:
         talk = self.talk
         limit = self.line.now() + patience_ns
         while self.address not in talk.came:
-            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN, acts=False)
+            listening = ChipRequest(self.address, WHO, sort=ChipRequestKind.LISTEN)
             try:
                 return (await self._exchange(listening, timeout_ns=SLICE_NS))[0]
             except NoAnswer:
@@ -360,12 +357,12 @@ class ChipUnit:
     async def hear_letter(self, patience_ns: Nanos) -> None:
         """Wait for a pending letter of any chip (`CharacterTalk.letters`)."""
         with suppress(NoAnswer):
-            await self._exchange(ChipRequest(self.address, WHO, sort=ChipRequestKind.LETTER, acts=False), timeout_ns=patience_ns)
+            await self._exchange(ChipRequest(self.address, WHO, sort=ChipRequestKind.LETTER), timeout_ns=patience_ns)
 
     async def hear_upload(self, patience_ns: Nanos) -> None:
         """Wait for bytes that a program uploads."""
         with suppress(NoAnswer):
-            await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.UPLOAD, acts=False), timeout_ns=patience_ns)
+            await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.UPLOAD), timeout_ns=patience_ns)
 
     def others(self) -> list[ChipNotes]:
         """The shared state of the other chips on the line."""
@@ -432,7 +429,7 @@ class ChipUnit:
         """Make the chip drop characters sent without CR: the next CR on the line would execute them."""
         if self.talk.dirty:
             with suppress(NoAnswer, Garbled):
-                await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT, acts=False))
+                await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
 
     async def kill(self, *, program: bool = False) -> None:
         """Send K before all waiting requests; ``program``: and wrong data before it. Raises `Unconfirmed`."""
