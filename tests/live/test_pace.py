@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import Callable
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from steptwin.commands.up_world import LiveWorld, PlacePort, UpOptions, up
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, session_of
 from steptwin.files.world import World
 from steptwin.live import pace as pacing
@@ -395,3 +396,71 @@ def test_what_a_script_stopped_goes_on_from_its_session(tmp_path: Path, capfd: p
     session = load(second)
     assert session.seed == 5
     assert session.replay().trace.digest() == session.digest
+
+
+TWO_LINES = """
+    [[line]]
+    name = "bus"
+    tcp = "127.0.0.1:0"
+    [[line]]
+    name = "chips"
+    kind = "m1486"
+    tcp = "127.0.0.1:0"
+    [[mic488]]
+    name = "m"
+    line = "bus"
+    [[m1486]]
+    name = "k"
+    line = "chips"
+"""
+
+
+def test_going_back_leaves_programs_connected_and_the_session_whole(run: Run) -> None:
+    """A master reads the position of then; a program on a shared line receives what comes from then on, nothing twice."""
+
+    async def scene() -> World:
+        rig = Rig(World.from_toml(dedent(TWO_LINES)))
+        rig.do("enable", machine="m", axis=1)
+        rig.do("jog", machine="m", axis=1, velocity=40.0)
+        rig.do("step", for_ns=3 * SECOND)
+        bus, chips = PlacePort(rig.live, "bus", "tcp-1", "tcp"), PlacePort(rig.live, "chips", "tcp-1", "raw")
+        read = bytes.fromhex("0001 0000 0006") + READ_POSITION[:-2]
+        rig.do("send", line="chips", text="u20\r")
+        rig.do("step", for_ns=SECOND)
+        before = bus.exchange(read, rig.world.now)
+        rig.do("snapshot", name="here")
+        heard = b"".join(data for _, data in chips.to_send(rig.world.now))
+        rig.do("resume")
+        await asyncio.sleep(4)
+        rig.cell.enter()
+        late = PlacePort(rig.live, "chips", "tcp-2", "raw")
+        assert bus.exchange(read, rig.world.now) != before
+        assert rig.do("restore", name="here")["time_ns"] == 4 * SECOND == rig.world.now
+        assert rig.do("time")["paused"]
+        assert bus.exchange(read, rig.world.now) == before
+        assert chips.to_send(rig.world.now) == []
+        rig.do("step", for_ns=SECOND)
+        rig.do("send", line="chips", text="u20\r")
+        rig.do("step", for_ns=SECOND)
+        there = [b"".join(data for _, data in port.to_send(rig.world.now)) for port in (chips, late)]
+        assert there[0] == there[1] == heard == b"B"
+        rig.do("resume")
+        await asyncio.sleep(2)
+        assert rig.do("time")["time_ns"] == 8 * SECOND
+        return rig.close()
+
+    assert the_same_again(run(scene()))
+
+
+def test_what_cannot_go_back_is_refused(run: Run, tmp_path: Path) -> None:
+    async def scene(world: World, *, writes: bool) -> None:
+        rig = Rig(world)
+        rig.live.writes_trace = writes
+        rig.do("snapshot", name="a")
+        rig.do("restore", name="a")
+
+    with pytest.raises(Refusal, match="the trace of this world is written to a file, which cannot go back"):
+        run(scene(feeder(), writes=True))
+    lasting = World.load(EXAMPLES / "feeder.toml", state=tmp_path)
+    with lasting, pytest.raises(Refusal, match=f"keeps its memory in {tmp_path}, which cannot go back"):
+        run(scene(lasting, writes=False))

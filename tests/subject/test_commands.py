@@ -69,6 +69,11 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "step", "for_ns": "9223372036854", "until": "a.IN1"}, command.Advance(duration=9223372036854, until="a.IN1")),
     ({"do": "step", "to_ns": "5"}, command.Advance(to=5)),
     ({"do": "save", "file": "/tmp/now.json"}, command.Save("/tmp/now.json")),
+    ({"do": "snapshot"}, command.TakeSnapshot()),
+    ({"do": "snapshot", "name": "before"}, command.TakeSnapshot("before")),
+    ({"do": "snapshots"}, command.ListSnapshots()),
+    ({"do": "restore", "name": "before"}, command.RestoreSnapshot("before")),
+    ({"do": "drop_snapshot", "name": "before"}, command.DropSnapshot("before")),
 ]
 
 

@@ -48,5 +48,9 @@ PERMITS: Mapping[str, Permit] = complete(
         "fault": SERVICE,
         "clear_fault": SERVICE,
         "save": SERVICE,
+        "snapshot": ACT,
+        "snapshots": LOOK,
+        "restore": ACT,
+        "drop_snapshot": ACT,
     },
 )

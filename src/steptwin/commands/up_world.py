@@ -182,6 +182,7 @@ def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
     if isinstance(kept, int):
         live.ring = Ring(world.trace, kept)
     elif kept is not None:
+        live.writes_trace = True
         recorder = TraceFile(world.trace, growing_file(kept), axis_views(world), world.spec.name, live.show)
     if kept is not None:
         world.trace.let_go()

@@ -169,6 +169,7 @@ class Pace:
             command.Resume: self._resume,
             command.Advance: self._advance,
             command.Save: self._save,
+            command.RestoreSnapshot: self._restore,
         }
 
     def where(self) -> dict[str, object]:
@@ -204,6 +205,17 @@ class Pace:
             "statements": self._statements(),
             **rest,
         }
+
+    def _restore(self, wanted: command.RestoreSnapshot) -> object:
+        """Time stands from now on, at the moment of the snapshot."""
+        self.pause()
+        try:
+            self._live.restore(wanted)
+        finally:
+            self._cell.clock.stop(self._live.now)
+            self._cell.close()
+            self._cell.moments += 1  # what was read at this moment is shared no more
+        return self.where()
 
     def _statements(self) -> dict[str, str]:
         """The current statements of running and paused programs, by controller."""

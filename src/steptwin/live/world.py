@@ -6,16 +6,18 @@ from collections.abc import Callable
 from heapq import heappop, heappush
 from typing import Protocol
 
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
 from steptwin.files import session as sessions
 from steptwin.files.export.tracefile import Ring
 from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.machine import Nanos
+from steptwin.subject.commands import RestoreSnapshot
 from steptwin.subject.world import WorldSubject
 from steptwin.world.actions import Bytes, Leave, Outside, See
 from steptwin.world.kernel import Kernel
+from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineEndPoint
 
 MOST_INPUTS = 200_000
@@ -58,6 +60,10 @@ class LiveWorld:
         self.ring: Ring | None = None
         """The ring of last records, if kept."""
         self.subject = WorldSubject(world, self.outside)
+        self.writes_trace = False
+        """Whether its trace is written to a file as it happens."""
+        self.ports: set[PlacePort] = set()
+        """Programs that are connected to lines."""
         self.companion: Companion | None = None
         """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
@@ -94,6 +100,35 @@ class LiveWorld:
         world.keeps_inputs = False
         world.inputs.clear()
         self.show(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
+
+    def restore(self, wanted: RestoreSnapshot) -> None:
+        """Go back to a snapshot. Programs stay connected to their lines; what was under way there, at either moment, is lost.
+
+        Raises `Misuse`, and `Refusal` where not everything can go back.
+        """
+        world = self.world
+        if world.state is not None:
+            raise Refusal(
+                f"this world keeps its memory in {world.state}, which cannot go back: start it without a state directory"
+            )
+        if self.writes_trace:
+            raise Refusal(
+                "the trace of this world is written to a file, which cannot go back: start it without that, or with a ring"
+            )
+        if self.companion is not None and self.companion.deadline() is not None:
+            raise Refusal("an axis is being jogged: end the jog first")
+        self.subject.restore(wanted)
+        self._recorded_bytes = sum(_size(given.what) for given in world.inputs)
+        self._dues = _Dues(world.kernels)
+        if self.ring is not None:
+            self.ring.clear()
+        for line in world.spec.lines:
+            links = {link.place for link in line_kinds()[line.kind].links.values()}
+            for place in [place for place in world.lines[line.name].places if place.partition("-")[0] in links]:
+                self.outside(Leave(line.name, place))
+        for port in list(self.ports):
+            port.join()
+        self.stale = True
 
     def session(self) -> sessions.Session:
         """The session up to now, or to the moment at which it was full. Raises `Misuse` if none is recorded."""
@@ -220,9 +255,14 @@ class PlacePort:
         self._kind = kind
         self.broken: str | None = None
         self.on_output: Callable[[], None] | None = None
-        if self._line.is_shared:  # it hears the others from now on
-            live.outside(Bytes(line, place, kind, b""))
-            live.stale = True
+        live.ports.add(self)
+        self.join()
+
+    def join(self) -> None:
+        """Where a line is shared it receives what others are sent, from now on."""
+        if self._line.is_shared:
+            self._live.outside(Bytes(self._line.name, self._name, self._kind, b""))
+            self._live.stale = True
             self._connected()
 
     def _connected(self) -> LineEndPoint:
@@ -300,4 +340,5 @@ class PlacePort:
         return None
 
     def close(self) -> None:
+        self._live.ports.discard(self)
         self._live.outside(Leave(self._line.name, self._name))

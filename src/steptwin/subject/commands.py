@@ -148,6 +148,32 @@ class Save:
     file: str
 
 
+@dataclass(frozen=True, slots=True)
+class TakeSnapshot:
+    """Keep the present state, to go back to it; None: under a number."""
+
+    name: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ListSnapshots:
+    """The states that are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreSnapshot:
+    """Go back to a state that is kept; time stands there."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class DropSnapshot:
+    """Keep a state no longer."""
+
+    name: str
+
+
 Command: TypeAlias = (
     do.Set
     | do.Press
@@ -184,6 +210,10 @@ Command: TypeAlias = (
     | Resume
     | Advance
     | Save
+    | TakeSnapshot
+    | ListSnapshots
+    | RestoreSnapshot
+    | DropSnapshot
 )
 
 
@@ -380,6 +410,24 @@ _ROWS = (
             Field("to_ns", TIME, "To which moment.", None, "ns", "to"),
             Field("until", TEXT, "A condition that ends it.", None),
         ),
+    ),
+    CommandRow(
+        "snapshot",
+        TakeSnapshot,
+        "Keep the present state in the process, to go back to it; one of the same name is replaced.",
+        "name, time_ns",
+        (Field("name", TEXT, "Its name; a number without.", None),),
+    ),
+    CommandRow("snapshots", ListSnapshots, "The states that are kept.", "a list of name, time_ns"),
+    CommandRow(
+        "restore",
+        RestoreSnapshot,
+        "Go back to a state that is kept. Time stands there; what happened since is undone.",
+        "as time",
+        (Field("name", TEXT, "The name of a snapshot."),),
+    ),
+    CommandRow(
+        "drop_snapshot", DropSnapshot, "Keep a state no longer.", _NOTHING, (Field("name", TEXT, "The name of a snapshot."),)
     ),
     CommandRow(
         "save",

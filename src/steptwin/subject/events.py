@@ -271,6 +271,23 @@ class PacePayload:
         return {"paused": self.paused, "speed": "max" if self.speed is None else self.speed}
 
 
+@dataclass(frozen=True, slots=True)
+class RestoredPayload:
+    """The world is as it was at the event's moment, which may be before those of earlier events: all values may be others. The
+    plans of all axes follow."""
+
+    kind: ClassVar[str] = "restored"
+    axis: ClassVar[None] = None
+    snapshot: str
+
+    @property
+    def text(self) -> str:
+        return f"back at snapshot {self.snapshot}"
+
+    def plain(self) -> dict[str, object]:
+        return {"snapshot": self.snapshot}
+
+
 Payload: TypeAlias = (
     PlanPayload
     | CoordinatePayload
@@ -286,9 +303,10 @@ Payload: TypeAlias = (
     | InputPayload
     | FaultPayload
     | PacePayload
+    | RestoredPayload
 )
 KINDS: tuple[str, ...] = tuple(payload.kind for payload in get_args(Payload))
-SHOWN_KINDS = frozenset({"status", "note", "report", "button", "input", "fault", "pace"})
+SHOWN_KINDS = frozenset({"status", "note", "report", "button", "input", "fault", "pace", "restored"})
 """Kinds that are shown to a user; the others are as frequent as requests."""
 STEP_KINDS = SHOWN_KINDS | {"edge", "plan"}
 """Kinds in the answer to a step to the next event."""
@@ -432,6 +450,7 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "input": _read_input,
         "fault": lambda data: FaultPayload(data["fault"], data["words"]),
         "pace": _read_pace,
+        "restored": lambda data: RestoredPayload(data["snapshot"]),
     },
 )
 
@@ -462,6 +481,12 @@ class Numbering:
 
     def done(self) -> None:
         self._command = None
+
+    def moved(self, now: Nanos) -> None:
+        """Time was set to another moment: only the command that did it can be a cause there."""
+        self._last.clear()
+        if self._command is not None:
+            self._command = now, self._command[1]
 
     def event(self, time: Nanos, machine: str, payload: Payload) -> Event:
         number = self._take()

@@ -78,6 +78,7 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
         "button": {"button": _TEXT, "pressed": _FLAG},
         "input": {"what": _TEXT, "value": {}},
         "fault": {"fault": _TEXT, "words": _TEXT},
+        "restored": {"snapshot": _TEXT},
         "pace": {"paused": _FLAG, "speed": {"anyOf": [_REAL, {"const": "max"}, {"type": "null"}]}},
     },
 )

@@ -14,8 +14,9 @@ from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import Action, Dispatcher
-from steptwin.subject.events import Event, FramePayload, Numbering, PacePayload, Payload, PlanPayload, payload_of
-from steptwin.subject.following import Filter, Followers, Following
+from steptwin.subject.events import Event, FramePayload, Numbering, PacePayload, Payload, PlanPayload, RestoredPayload, payload_of
+from steptwin.subject.following import Filter, Followers, Following, filter_of
+from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
 from steptwin.words.frames import FrameLine
 from steptwin.world import script as steps
@@ -45,6 +46,7 @@ class WorldSubject:
         lines = {name: line.name for name, (line, _) in world.plan.line_of.items()}
         self._numbering = Numbering(lines)
         self.followers = Followers(self._followed)
+        self.snapshots = Snapshots()
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self._words: dict[str, LineWords] = {}
         self._is_watching = False
@@ -66,6 +68,10 @@ class WorldSubject:
             command.ListFaults: lambda _: self._faults(),
             command.ListFaultKinds: lambda _: [kind.plain() for kind in rows()],
             command.Time: lambda _: self.time(),
+            command.TakeSnapshot: lambda wanted: self.snapshots.add(wanted, self.world.snapshot()),
+            command.ListSnapshots: lambda _: self.snapshots.plain(),
+            command.RestoreSnapshot: self._restore,
+            command.DropSnapshot: self.snapshots.drop,
             command.Advance: lambda wanted: advance(self, wanted),
         }
 
@@ -166,6 +172,18 @@ class WorldSubject:
         encoders = self.world.encoders(wanted.machine)
         self.world.touch(wanted.machine)
         return encoders.shown(self.world.machine(wanted.machine), self.world.now)
+
+    def _restore(self, wanted: command.RestoreSnapshot) -> object:
+        self.restore(wanted)
+        return self.time()
+
+    def restore(self, wanted: command.RestoreSnapshot) -> None:
+        """Go back to a snapshot, and tell followers. Raises `Misuse`."""
+        self.world.restore(self.snapshots.find(wanted))
+        self._numbering.moved(self.world.now)
+        self._publish(self.world.now, WORLD, RestoredPayload(wanted.name))
+        for plan in self.plans(filter_of(["plan"])):
+            self._publish(plan.time, plan.machine, plan.payload)
 
     def _faults(self) -> object:
         return [

@@ -25,6 +25,10 @@ class Ring:
         self._records: deque[TraceRecord] = deque(trace, maxlen=size)
         trace.watchers.append(self._records.append)
 
+    def clear(self) -> None:
+        """Hold nothing of what was before."""
+        self._records.clear()
+
     def trace(self) -> Trace:
         """The present contents as a trace."""
         held = Trace(self._machines)

@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | AuditRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | AuditRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -209,6 +209,18 @@ export type SubjectEvent = {
   kind: "fault";
   fault: string;
   words: string;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "restored";
+  snapshot: string;
   /** The command or the event that led to it. */
   cause: number | null;
   /** As text; it adds nothing to the rest. */
@@ -503,7 +515,7 @@ export type FollowRequest = {
   id?: string | number | null;
   version?: 1;
   /** Kinds of events; all but frames without. */
-  kinds?: ("plan" | "coordinate" | "sample" | "load" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace")[] | null;
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored")[] | null;
   /** Names of machines, lines, or 'world'; all without. */
   machines?: string[] | null;
   /** Numbers of axes as text; events of other axes are left out. */
@@ -800,6 +812,44 @@ export type StepRequest = {
   to_ns?: string | number | null;
   /** A condition that ends it. */
   until?: string | null;
+};
+
+/** Keep the present state in the process, to go back to it; one of the same name is replaced. Answer: name, time_ns. */
+export type SnapshotRequest = {
+  do: "snapshot";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Its name; a number without. */
+  name?: string | null;
+};
+
+/** The states that are kept. Answer: a list of name, time_ns. */
+export type SnapshotsRequest = {
+  do: "snapshots";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Go back to a state that is kept. Time stands there; what happened since is undone. Answer: as time. */
+export type RestoreRequest = {
+  do: "restore";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a snapshot. */
+  name: string;
+};
+
+/** Keep a state no longer. Answer: null. */
+export type DropSnapshotRequest = {
+  do: "drop_snapshot";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a snapshot. */
+  name: string;
 };
 
 /** Write the session, or the last records, to a file. Answer: as time; file, inputs, digest, or files, records for the last records. */
@@ -1126,6 +1176,10 @@ export interface Requests {
   pause: { request: PauseRequest; answer: unknown };
   resume: { request: ResumeRequest; answer: unknown };
   step: { request: StepRequest; answer: unknown };
+  snapshot: { request: SnapshotRequest; answer: unknown };
+  snapshots: { request: SnapshotsRequest; answer: unknown };
+  restore: { request: RestoreRequest; answer: unknown };
+  drop_snapshot: { request: DropSnapshotRequest; answer: unknown };
   save: { request: SaveRequest; answer: unknown };
   hello: { request: HelloRequest; answer: HelloAnswer };
   resync: { request: ResyncRequest; answer: ResyncAnswer };

@@ -1,0 +1,50 @@
+"""States of a world that are kept under names, to go back to them."""
+
+from __future__ import annotations
+
+from itertools import count
+
+from steptwin.errors import Misuse
+from steptwin.nearmiss import NearMiss
+from steptwin.subject.commands import DropSnapshot, RestoreSnapshot, TakeSnapshot
+from steptwin.world.plant import PlantSnapshot
+
+MOST_SNAPSHOTS = 32
+
+
+class Snapshots:
+    """At most `MOST_SNAPSHOTS`, in the order in which they were taken."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, PlantSnapshot] = {}
+
+    def add(self, wanted: TakeSnapshot, snapshot: PlantSnapshot) -> dict[str, object]:
+        """Raises `Misuse` where there are too many."""
+        name = wanted.name
+        if name is None:
+            name = next(text for number in count(1) if (text := str(number)) not in self._kept)
+        if name not in self._kept and len(self._kept) >= MOST_SNAPSHOTS:
+            raise Misuse(f"{MOST_SNAPSHOTS} snapshots are kept, as many as may be: drop one: {', '.join(self._kept)}")
+        self._kept.pop(name, None)
+        self._kept[name] = snapshot
+        return _plain(name, snapshot)
+
+    def plain(self) -> list[dict[str, object]]:
+        return [_plain(name, snapshot) for name, snapshot in self._kept.items()]
+
+    def find(self, wanted: RestoreSnapshot | DropSnapshot) -> PlantSnapshot:
+        """Raises `Misuse` with those there are."""
+        found = self._kept.get(wanted.name)
+        if found is None:
+            hint = NearMiss().hint(wanted.name, self._kept)
+            raise Misuse(f"no snapshot is called {wanted.name!r}{hint}; there are {', '.join(self._kept) or 'none'}")
+        return found
+
+    def drop(self, wanted: DropSnapshot) -> None:
+        """Raises `Misuse` as `find`."""
+        self.find(wanted)
+        del self._kept[wanted.name]
+
+
+def _plain(name: str, snapshot: PlantSnapshot) -> dict[str, object]:
+    return {"name": name, "time_ns": str(snapshot.now)}
