@@ -110,7 +110,7 @@ def test_a_device_that_is_pulled_out_is_served_again_when_it_is_back(tmp_path: P
 
     answer, (gone, back) = on_line(device, play)
     assert answer == ANSWER
-    assert gone.startswith(f"serial port {device} is gone (")
+    assert gone.startswith(f"serial port {device} was lost (")
     assert back == f"serial port {device} is back"
 
 
