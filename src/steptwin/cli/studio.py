@@ -1,4 +1,4 @@
-"""``steptwin studio``: a world, or a device, in a browser. Exit code 1 if an expectation of the world's scripts did not hold.
+"""``steptwin studio``: a world in a browser. Exit code 1 if an expectation of the world's scripts did not hold.
 
 From another program: the WebSocket and REST, which docs/studio.md explains.
 """
