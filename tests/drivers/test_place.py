@@ -171,3 +171,26 @@ def test_a_port_is_used_by_tasks() -> None:
     finally:
         os.close(master)
         os.close(slave)
+
+
+def test_a_connection_is_used_by_tasks(listener: Callable[[Callable[[socket.socket], None]], str]) -> None:
+    def talk(client: socket.socket) -> None:
+        assert client.recv(9) == b"ask"
+        client.sendall(b"answer")
+
+    address = listener(talk)
+
+    async def main() -> bytes:
+        heard: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+
+        class Hears(asyncio.Protocol):
+            def data_received(self, data: bytes) -> None:
+                heard.set_result(data)
+
+        transport = await parse_line_address(address, 38400).endpoint.connect(Hears)
+        transport.write(b"ask")
+        answer = await asyncio.wait_for(heard, 60)
+        transport.close()
+        return answer
+
+    assert asyncio.run(main()) == b"answer"
