@@ -47,6 +47,13 @@ export class AxisState {
     return { position: this.samples.at(-1)?.position ?? NaN, velocity: NaN };
   }
 
+  /** As the controller shows it, in whole pulses, in units of the axis. */
+  shown(now_ns: bigint): number {
+    const stretch = this.stretchAt(now_ns);
+    if (stretch === null) return this.at(now_ns).position;
+    return (stretch.course.counted(now_ns) + stretch.origin) / (this.model.pulses_per_unit ?? 1);
+  }
+
   isMoving(now_ns: bigint): boolean {
     return this.stretchAt(now_ns)?.course.isMoving(now_ns) ?? false;
   }

@@ -28,3 +28,13 @@ test("it moves from its start to its end", () => {
   expect(course.isMoving(1_500_000_000n)).toBe(false);
   expect(course.at(0n)).toEqual({ position: 0, velocity: 20 });
 });
+
+test("pulses are counted when they have been reached, in the direction of the motion", () => {
+  const forwards = new Course({ start_ns: "0", base: 100, final: 5.5, segments: [[1, 0, 0, 5.5, 0, 0, 1]] });
+  expect([0n, 500_000_000n, 999_000_000n, 2_000_000_000n].map((t) => forwards.counted(t))).toEqual([
+    100, 102, 105, 105,
+  ]);
+  const backwards = new Course({ start_ns: "0", base: 0, final: -5.5, segments: [[1, 0, 0, -5.5, 0, 0, -1]] });
+  expect([500_000_000n, 2_000_000_000n].map((t) => backwards.counted(t))).toEqual([-2, -5]);
+  expect(new Course({ start_ns: "0", base: 7, final: 0, segments: [] }).counted(5n)).toBe(7);
+});

@@ -21,12 +21,19 @@ interface Arc {
   way: Polynomial;
   /** Centre and radius in pulses, angle and turn in quarter turns. */
   course: readonly [number, number, number, number];
+  direction: number;
 }
 
 type Segment = Polynomial | Arc;
 
 const QUARTER = Math.PI / 2;
 const isArc = (segment: Segment): segment is Arc => !Array.isArray(segment);
+/** Numbers that are whole but for their rounding count as whole. */
+const ROUNDING = 1e-6;
+const whole = (segment: Segment, position: number): number => {
+  const isForward = (isArc(segment) ? segment.direction : segment[6]) > 0;
+  return isForward ? Math.floor(position + ROUNDING) : Math.ceil(position - ROUNDING);
+};
 const endOf = (segment: Segment): number | null => (isArc(segment) ? segment.end_s : segment[0]);
 
 function along([, anchor, c0, c1, c2, c3]: Polynomial, t: number): Motion {
@@ -76,6 +83,16 @@ export class Course {
       return { position: base + motion.position, velocity: motion.velocity };
     }
     return { position: base + final, velocity: 0 };
+  }
+
+  /** Pulses given until then, as the controller counts them: the last whole one that has been reached. */
+  counted(now_ns: bigint): number {
+    const t = Math.max(Number(now_ns - this.start_ns) / 1e9, 0);
+    const index = this.segments.findIndex((segment) => (endOf(segment) ?? Infinity) > t);
+    if (index >= 0)
+      return this.plan.base + whole(this.segments[index] as Segment, this.atSeconds(t).position - this.plan.base);
+    const last = this.segments.at(-1);
+    return this.plan.base + (last === undefined ? Math.round(this.plan.final) : whole(last, this.plan.final));
   }
 
   isMoving(now_ns: bigint): boolean {

@@ -38,7 +38,7 @@ export const t = texts(
     pause: "Pause program of {machine}",
     stop: "Stop program of {machine}",
     powerCycle: "Power-cycle {machine}",
-    powerCycleWord: "Off and on",
+    powerCycleWord: "Power-cycle",
     forced: "Faults set: {count}",
   },
   {
@@ -78,7 +78,7 @@ export const t = texts(
     pause: "Wstrzymaj program: {machine}",
     stop: "Zakończ program: {machine}",
     powerCycle: "Wyłącz i włącz: {machine}",
-    powerCycleWord: "Wył. i wł.",
+    powerCycleWord: "Wyłącz i włącz",
     forced: "Ustawione usterki: {count}",
   },
 );

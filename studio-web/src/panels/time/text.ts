@@ -4,8 +4,6 @@ export const t = texts(
   {
     title: "Time",
     speed: "Speed",
-    times: "{speed} times",
-    live: "Live (1×)",
     max: "As fast as possible",
     own: "Speed of time",
     set: "Set speed",
@@ -18,7 +16,6 @@ export const t = texts(
     conditionHelp: "such as table.M1.status == 4 or x.position > 100",
     within: "at most {time} s",
     came: "The condition came true.",
-    notCame: "The condition did not come true in this time.",
     idle: "Nothing more happens by itself.",
     happened: "What happened in the step",
     nothing: "Nothing.",
@@ -28,8 +25,6 @@ export const t = texts(
   {
     title: "Czas",
     speed: "Tempo",
-    times: "{speed} razy",
-    live: "Na żywo (1×)",
     max: "Najszybciej, jak się da",
     own: "Tempo czasu",
     set: "Ustaw tempo",
@@ -42,7 +37,6 @@ export const t = texts(
     conditionHelp: "na przykład table.M1.status == 4 albo x.position > 100",
     within: "najwyżej {time} s",
     came: "Warunek się spełnił.",
-    notCame: "Warunek nie spełnił się w tym czasie.",
     idle: "Samo z siebie nic więcej się nie wydarzy.",
     happened: "Co wydarzyło się w kroku",
     nothing: "Nic.",

@@ -1,0 +1,446 @@
+"""The page in a real browser, against a studio in a process of its own. What moves is seen by an independent Modbus master.
+
+The pictures of `test_pictures` are in build/studio.
+"""
+
+from __future__ import annotations
+
+import gzip
+import re
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, Playwright, expect, sync_playwright
+from pymodbus.client import ModbusTcpClient
+from tests.conftest import until
+from tests.peers.conftest import Master
+from tests.studio.conftest import Process
+
+from steptwin.errors import Refusal
+from steptwin.studio.page import find_page
+
+ROOT = Path(__file__).parent.parent.parent
+AXE = ROOT / "studio-web/node_modules/axe-core/axe.min.js"
+PICTURES = ROOT / "build/studio"
+PANELS = ("Overview", "Axes", "I/O", "Registers", "Faults", "Time")
+LARGEST_FIRST_LOAD = 400_000
+WAIT_MS = 20_000
+
+expect.set_options(timeout=WAIT_MS)
+
+
+@pytest.fixture(scope="module")
+def browser(require_peer: Callable[[str], str]) -> Iterator[Browser]:
+    chromium = require_peer("chromium")
+    try:
+        find_page()
+    except Refusal as error:
+        pytest.skip(str(error))
+    with sync_playwright() as playwright:
+        started = _launch(playwright, chromium)
+        yield started
+        started.close()
+
+
+def _launch(playwright: Playwright, chromium: str) -> Browser:
+    # Root has no user namespace to put the sandbox into.
+    return playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+
+
+class Studio:
+    """A studio, a master at its Modbus port, and pages that must not complain."""
+
+    def __init__(self, process: Process, browser: Browser) -> None:
+        self.process = process
+        self._browser = browser
+        self._opened = ExitStack()
+        self.complaints: list[str] = []
+        client = ModbusTcpClient("127.0.0.1", port=process.end_points["tcp"]["port"])
+        assert client.connect()
+        self._opened.callback(client.close)
+        self.master = Master(client)
+
+    def page(self, language: str = "en-US", panel: str | None = "Axes", **options: Any) -> Page:
+        settings: dict[str, Any] = {"viewport": {"width": 1280, "height": 720}, "locale": language, **options}
+        context = self._browser.new_context(**settings)
+        self._opened.callback(context.close)
+        page = context.new_page()
+        page.set_default_timeout(WAIT_MS)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("console", lambda message: self.complaints.append(message.text) if message.type == "error" else None)
+        page.goto(self.process.url)
+        expect(page.get_by_role("group", name=re.compile("Virtual time|Czas wirtualny"))).to_contain_text(re.compile("live|żywo"))
+        if panel is not None:
+            show(page, panel)
+        return page
+
+    def at(self, axis: int) -> float:
+        return self.master.sample(axis).position
+
+    def stands(self, axis: int) -> bool:
+        return self.master.sample(axis).velocity == 0.0
+
+    def close(self) -> None:
+        self._opened.close()
+
+
+def show(page: Page, panel: str) -> None:
+    page.get_by_role("navigation").get_by_role("button", name=panel, exact=True).click()
+    expect(page.get_by_role("region", name=panel, exact=True).last).not_to_be_empty()
+
+
+@pytest.fixture
+def studio(start_studio: Callable[..., Process], browser: Browser) -> Iterator[Studio]:
+    found = Studio(start_studio(), browser)
+    yield found
+    found.close()
+    assert found.complaints == []
+
+
+def button(page: Page, name: str) -> Locator:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def enable(page: Page, axis: str = "M1") -> None:
+    button(page, f"Enable {axis}").click()
+    expect(button(page, f"Enable {axis}")).to_have_attribute("aria-pressed", "true")
+
+
+# ---------------------------------------------------------------------- axes
+
+
+def test_an_axis_is_enabled_and_moved(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    page.get_by_label("Target M1").fill("20")
+    button(page, "Move M1 to").click()
+    until(lambda: studio.at(1) == 20.0, "the axis is at 20 mm")
+    expect(page.get_by_label("M1 position", exact=True)).to_have_text("20.00")
+    expect(page.get_by_label("M1 status")).to_contain_text("position reached")
+    page.get_by_label("Step M1", exact=True).fill("2,5")
+    button(page, "Step M1 −").click()
+    until(lambda: studio.at(1) == 17.5, "the axis has gone back by 2.5 mm")
+
+
+def test_a_jog_lasts_as_long_as_it_is_held(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    button(page, "Jog M1 +").hover()
+    page.mouse.down()
+    until(lambda: studio.at(1) > 5, "the axis jogs")
+    expect(page.get_by_label("M1 status")).not_to_contain_text("on at rest")
+    page.mouse.up()
+    until(lambda: studio.stands(1), "the axis stands")
+    there = studio.at(1)
+    expect(page.get_by_label("M1 position", exact=True)).to_have_text(f"{there:.2f}")
+    assert studio.at(1) == there
+
+
+def test_closing_the_page_ends_a_jog(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    button(page, "Jog M1 −").hover()
+    page.mouse.down()
+    until(lambda: studio.at(1) < -3, "the axis jogs")
+    page.context.close()
+    until(lambda: studio.stands(1), "the axis stands")
+    assert studio.stands(1)
+
+
+def test_the_jog_pad_jogs_two_axes_with_keys(studio: Studio) -> None:
+    page = studio.page()
+    for axis in ("M1", "M2"):
+        enable(page, axis)
+    page.get_by_role("application", name="Jog pad").focus()
+    page.keyboard.down("Numpad9")
+    until(lambda: studio.at(1) > 1 and studio.at(2) > 1, "both axes jog")
+    page.keyboard.up("Numpad9")
+    until(lambda: studio.stands(1) and studio.stands(2), "both axes stand")
+    there = studio.at(2)
+    page.keyboard.down("ArrowLeft")
+    until(lambda: not studio.stands(1), "the first axis jogs")
+    # The key is never let go: the focus is.
+    page.get_by_label("Target M1").focus()
+    until(lambda: studio.stands(1), "the first axis stands")
+    assert studio.at(2) == there
+
+
+def test_space_and_escape_stop_what_somebody_else_moves(studio: Studio) -> None:
+    page = studio.page()
+    studio.master.enable(1)
+    studio.master.run(1, 10.0)
+    until(lambda: studio.at(1) > 1, "the axis moves")
+    page.locator("body").press("Space")
+    until(lambda: studio.stands(1), "space has stopped it")
+    studio.master.run(1, 10.0)
+    until(lambda: not studio.stands(1), "the axis moves")
+    field = page.get_by_label("Target M1")
+    field.fill("1 2")
+    field.press("Space")
+    assert not studio.stands(1)
+    field.press("Escape")
+    until(lambda: studio.stands(1), "Escape has stopped it, from within a text")
+    studio.master.run(1, 10.0)
+    until(lambda: not studio.stands(1), "the axis moves")
+    button(page, "Stop all").click()
+    until(lambda: studio.stands(1), "the button has stopped it")
+
+
+def test_a_click_leaves_the_space_key_to_stop(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    studio.master.run(1, 10.0)
+    until(lambda: studio.at(1) > 1, "the axis moves")
+    page.keyboard.press("Space")
+    until(lambda: studio.stands(1), "space has stopped it")
+    expect(button(page, "Enable M1")).to_have_attribute("aria-pressed", "true")
+
+
+def test_everything_about_an_axis_can_be_done_with_the_keyboard(studio: Studio) -> None:
+    page = studio.page(panel=None)
+    panels = page.get_by_role("navigation").get_by_role("button").all_inner_texts()
+    page.keyboard.press(str(panels.index("Overview") + 1))
+    expect(page.get_by_role("region", name="Overview").last).to_be_visible()
+    page.keyboard.press(str(panels.index("Axes") + 1))
+    expect(button(page, "Enable M1")).to_be_visible()
+    names = tab_to(page, "Enable M1")
+    page.keyboard.press("Enter")
+    until(lambda: studio.master.status(1) == 1, "the drive is on")
+    tab_to(page, "Target M1")
+    page.keyboard.press("Control+a")
+    page.keyboard.type("12")
+    page.keyboard.press("Enter")
+    until(lambda: studio.at(1) == 12.0, "the axis has moved")
+    tab_to(page, "Jog M1 +")
+    page.keyboard.down("Enter")
+    until(lambda: studio.at(1) > 12.0, "the axis jogs")
+    page.keyboard.up("Enter")
+    until(lambda: studio.stands(1), "the axis stands")
+    assert "Stop all" in names
+
+
+def tab_to(page: Page, name: str) -> list[str]:
+    """With the tab key until that has the focus; the names of what had it."""
+    names: list[str] = []
+    while name not in names:
+        page.keyboard.press("Tab")
+        names.append(page.evaluate("document.activeElement.ariaLabel ?? ''"))
+        assert len(names) < 100, names
+    return names
+
+
+def test_a_chip_has_what_its_data_sheet_has(studio: Studio) -> None:
+    page = studio.page()
+    expect(page.get_by_label("drum position")).to_have_text("0")
+    expect(button(page, "Enable drum")).to_have_count(0)
+    expect(button(page, "Home drum")).to_have_count(0)
+    page.get_by_label("Step drum", exact=True).fill("6400")
+    button(page, "Step drum +").click()
+    expect(page.get_by_label("drum position")).to_have_text("6400")
+
+
+# ---------------------------------------------------------------------- other panels
+
+
+def test_overview_says_what_there_is_and_where_programs_connect(studio: Studio) -> None:
+    page = studio.page(panel="Overview")
+    region = page.get_by_role("region", name="Overview").last
+    expect(region.get_by_role("row", name=re.compile("^table"))).to_contain_text("MIC488 1.70")
+    expect(region).to_contain_text(f"127.0.0.1:{studio.process.end_points['tcp']['port']}")
+    studio.master.enable(1)
+    assert studio.master.status(1) == 1
+    button(page, "Power-cycle table").click()
+    until(lambda: studio.master.status(1) == 0, "the controller was off: its drive is")
+    studio.master.move(1, 5.0)
+    expect(region).to_contain_text("Alarms")
+    expect(region.get_by_role("row", name=re.compile("motion is ignored|not enabled|ignored", re.IGNORECASE))).to_be_visible()
+
+
+def test_inputs_are_set_and_forced(studio: Studio) -> None:
+    page = studio.page(panel="I/O")
+    button(page, "Set IN3").click()
+    until(lambda: studio.master.inputs(5002, 1) == [True], "the master sees IN3")
+    expect(page.get_by_role("img", name="IN3 level")).to_have_accessible_name("IN3 level")
+    expect(button(page, "Set IN3")).to_have_attribute("aria-pressed", "true")
+    page.get_by_label("Force IN4").select_option("1")
+    until(lambda: studio.master.inputs(5003, 1) == [True], "the master sees the forced input")
+    button(page, "Set IN4").click()
+    expect(page.get_by_label("Force IN4")).to_have_value("1")
+    assert studio.master.inputs(5003, 1) == [True]
+    page.get_by_label("Force IN4").select_option("")
+    until(lambda: studio.master.inputs(5003, 1) == [False], "the input is free again")
+    button(page, "Switch OUT2").click()
+    until(lambda: studio.master.client.read_coils(6001, count=1, device_id=1).bits[0], "the output is on")
+    page.get_by_label("Set AIN1").fill("4,2")
+    page.get_by_label("Set AIN1").press("Enter")
+    expect(page.get_by_label("AIN1 level")).to_have_text("4.20")
+
+
+def test_registers_are_found_read_and_written(studio: Studio) -> None:
+    page = studio.page(panel="Registers")
+    page.locator("body").press("/")
+    expect(page.get_by_role("searchbox")).to_be_focused()
+    page.keyboard.type("410053")
+    page.get_by_label("New value of M1_VMAX").fill("55.5")
+    button(page, "Write M1_VMAX").click()
+    until(lambda: studio.master.real(studio.master.words(10052, 2)) == 55.5, "the master reads it")
+    expect(page.get_by_label("M1_VMAX", exact=True)).to_have_text("55.5")
+    page.get_by_label("New value of M1_VMAX").fill("-1")
+    button(page, "Write M1_VMAX").click()
+    expect(page.get_by_role("alert").last).to_contain_text("−1: permitted is more than 0")
+    button(page, "Undo writing M1_VMAX").click()
+    until(lambda: studio.master.real(studio.master.words(10052, 2)) == 40.0, "it is as before")
+    studio.master.word(10, 7)
+    page.get_by_label("Group").select_option("user")
+    expect(page.get_by_label("USER_REGISTER[10]", exact=True)).to_have_text("7")
+    button(page, "REAL").click()
+    page.get_by_label("First user register").fill("20")
+    page.get_by_label("New value of USER_REGISTER[20]:real").fill("1.5")
+    page.keyboard.press("Enter")
+    until(lambda: studio.master.real(studio.master.words(20, 2)) == 1.5, "the master reads the REAL")
+
+
+def test_a_fault_is_set_and_cleared(studio: Studio) -> None:
+    page = studio.page(panel="Faults")
+    page.get_by_label("Kind of fault").select_option("exception")
+    page.get_by_label("code", exact=True).fill("6")
+    button(page, "Set fault").click()
+    read = lambda: studio.master.client.read_holding_registers(10010, count=1, device_id=1)  # noqa: E731
+    until(lambda: read().isError(), "requests are refused")
+    assert read().exception_code == 6
+    expect(page.get_by_role("row", name=re.compile("^exception "))).to_contain_text("exception code=6")
+    button(page, "Clear exception").click()
+    until(lambda: not read().isError(), "requests are answered")
+    expect(page.get_by_text("No fault is set.")).to_be_visible()
+
+
+def test_time_stands_steps_and_goes_on(studio: Studio) -> None:
+    page = studio.page(panel="Time")
+    now = page.get_by_label("World time")
+    page.locator("body").press(",")
+    expect(page.get_by_role("group", name="Virtual time")).to_contain_text("paused")
+    stood = float(now.inner_text())
+    page.get_by_label("Duration of a step").fill("0.25")
+    button(page, "Step by a duration").click()
+    expect(now).to_have_text(f"{stood + 0.25:.6f}")
+    button(page, "0.1×").click()
+    expect(button(page, "0.1×")).to_have_attribute("aria-pressed", "true")
+    page.locator("body").press(",")
+    page.get_by_label("Condition").fill("table.M1.position > 3 and")
+    button(page, "Step until a condition").click()
+    expect(page.get_by_role("alert").last).to_contain_text("table.M1.position > 3 and")
+
+
+# ---------------------------------------------------------------------- the shell
+
+
+def test_two_people_and_one_control(studio: Studio) -> None:
+    first, second = studio.page(), studio.page()
+    enable(first)
+    expect(first.get_by_role("group", name="Control")).to_contain_text("you have control")
+    button(second, "Enable M2").click()
+    expect(second.get_by_role("alert").last).to_contain_text("control")
+    assert studio.master.status(2) == 0
+    second.get_by_role("button", name=re.compile("^Take over")).click()
+    expect(second.get_by_role("group", name="Control")).to_contain_text("you have control")
+    enable(second, "M2")
+    assert studio.master.status(2) == 1
+
+
+def test_panes_are_remembered(studio: Studio) -> None:
+    page = studio.page()
+    button(page, "Open beside").click()
+    page.get_by_label("Panel", exact=True).last.select_option(label="Time")
+    expect(page.get_by_label("World time")).to_be_visible()
+    page.reload()
+    expect(page.get_by_label("World time")).to_be_visible()
+    expect(page.get_by_label("M1 position", exact=True)).to_be_visible()
+    button(page, "Close panel Time").click()
+    page.get_by_label("Language").select_option("pl")
+    expect(button(page, "Zatrzymaj wszystko")).to_be_visible()
+    page.reload()
+    expect(button(page, "Zatrzymaj wszystko")).to_be_visible()
+    expect(page.get_by_label("World time")).to_have_count(0)
+
+
+def test_a_studio_that_does_not_answer_is_seen_and_comes_back_by_itself(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    studio.process.process.send_signal(signal.SIGSTOP)
+    expect(page.get_by_role("status").first).to_contain_text("does not answer")
+    studio.process.process.send_signal(signal.SIGCONT)
+    expect(page.get_by_role("status").first).to_be_empty()
+    page.get_by_label("Target M1").fill("4")
+    page.get_by_label("Target M1").press("Enter")
+    expect(page.get_by_label("M1 position", exact=True)).to_have_text("4.00")
+
+
+def test_keys_are_told(studio: Studio) -> None:
+    page = studio.page()
+    page.locator("body").press("?")
+    dialog = page.get_by_role("dialog", name="Keys")
+    expect(dialog).to_contain_text("Stop all, from everywhere")
+    expect(dialog).to_contain_text("not an emergency stop")
+    page.keyboard.press("Escape")
+    expect(dialog).to_have_count(0)
+
+
+def test_the_first_load_is_small_and_local(studio: Studio, browser: Browser) -> None:
+    bodies: dict[str, bytes] = {}
+    context = browser.new_context()
+    page = context.new_page()
+    page.on("response", lambda response: bodies.update({response.url: b""}))
+    page.goto(studio.process.url)
+    expect(page.get_by_label("M1 position", exact=True)).to_be_visible()
+    assert all(url.startswith(studio.process.url) for url in bodies)
+    for url in list(bodies):
+        bodies[url] = page.request.get(url).body()
+    context.close()
+    assert len(bodies) > 3
+    assert sum(len(gzip.compress(body)) for body in bodies.values()) < LARGEST_FIRST_LOAD
+
+
+SIZES = {"1280x720": (1280, 720), "wide": (1920, 1080), "tablet": (820, 1180)}
+POLISH = dict(zip(PANELS, ("Przegląd", "Osie", "We/Wy", "Rejestry", "Usterki", "Czas"), strict=True))
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_serious_is_wrong_for_assistive_technology(studio: Studio, theme: str) -> None:
+    if not AXE.exists():
+        pytest.skip("axe-core is not installed; 'make types' installs it")
+    page = studio.page(color_scheme=theme, bypass_csp=True)
+    page.add_script_tag(path=AXE)
+    found: list[str] = []
+    for panel in PANELS:
+        show(page, panel)
+        page.wait_for_function("document.fonts.status === 'loaded'")
+        result = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")
+        for violation in result["violations"]:
+            if violation["impact"] in ("serious", "critical"):
+                where = "; ".join(str(node["target"]) for node in violation["nodes"][:4])
+                found.append(f"{panel}: {violation['id']}: {violation['help']}: {where}")
+    assert found == []
+
+
+@pytest.mark.parametrize(("theme", "language"), [("light", "en-US"), ("dark", "pl-PL")])
+def test_pictures(start_studio: Callable[..., Process], browser: Browser, theme: str, language: str) -> None:
+    """Of every panel of the demo machine; nothing is wider than the window, and Stop all is in sight."""
+    studio = Studio(start_studio("--demo"), browser)
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for size, (width, height) in SIZES.items():
+        page = studio.page(language, panel=None, viewport={"width": width, "height": height}, color_scheme=theme)
+        for number, panel in enumerate(PANELS, 1):
+            show(page, panel if language == "en-US" else POLISH[panel])
+            page.screenshot(path=PICTURES / f"{size}-{theme}-{language[:2]}-{number}.png")
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, (size, panel)
+            box = button(page, "Stop all" if language == "en-US" else "Zatrzymaj wszystko").bounding_box()
+            assert box is not None
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= width
+            assert box["y"] + box["height"] <= height
+    studio.close()
+    assert studio.complaints == []
