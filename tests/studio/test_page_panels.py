@@ -6,6 +6,7 @@ The pictures of `test_pictures` are in build/studio.
 from __future__ import annotations
 
 import gzip
+import itertools
 import re
 import signal
 from collections.abc import Callable, Iterator
@@ -26,7 +27,7 @@ from steptwin.studio.page import find_page
 ROOT = Path(__file__).parent.parent.parent
 AXE = ROOT / "studio-web/node_modules/axe-core/axe.min.js"
 PICTURES = ROOT / "build/studio"
-PANELS = ("Overview", "Axes", "I/O", "Registers", "Faults", "Time")
+PANELS = ("Overview", "Axes", "I/O", "Scope", "Registers", "Frames", "Faults", "Time")
 LARGEST_FIRST_LOAD = 400_000
 WAIT_MS = 20_000
 
@@ -335,6 +336,90 @@ def test_time_stands_steps_and_goes_on(studio: Studio) -> None:
     expect(page.get_by_role("alert").last).to_contain_text("table.M1.position > 3 and")
 
 
+def test_the_scope_has_the_curve_of_a_move(studio: Studio) -> None:
+    page = studio.page()
+    enable(page)
+    show(page, "Scope")
+    page.get_by_label("Trigger signal").select_option("table.M1.position")
+    page.get_by_label("Trigger level").fill("10")
+    button(page, "Arm").click()
+    expect(page.get_by_text("waiting for the trigger")).to_be_visible()
+    studio.master.move(1, 20.0)
+    expect(page.get_by_text("triggered at")).to_be_visible()
+    expect(button(page, "Follow")).to_have_attribute("aria-pressed", "false")
+    until(lambda: studio.at(1) == 20.0, "the axis is at 20 mm")
+    button(page, "Follow").click()
+    rows = [line.split(",") for line in downloaded(page, "Save as CSV").decode().splitlines()]
+    assert rows[0][:2] == ["time [s]", '"M1 position [mm]"']
+    positions = [float(row[1]) for row in rows[1:] if row[1]]
+    assert (positions[0], positions[-1]) == (0.0, 20.0)
+    assert positions == sorted(positions)
+    # 10 mm is reached where the trigger was found: the acceleration and the velocity are those of the description.
+    at = {round(float(row[0]), 2): float(row[1]) for row in rows[1:] if row[1]}
+    assert max(after - before for before, after in itertools.pairwise(at.values())) <= 40.0 * 0.011
+    assert downloaded(page, "Save as PNG").startswith(b"\x89PNG")
+    assert b"$var real 64 ! table.M1.position $end" in downloaded(page, "Save as VCD")
+
+
+def number(output: Locator) -> float:
+    return float(output.inner_text().replace("−", "-"))
+
+
+def downloaded(page: Page, name: str) -> bytes:
+    with page.expect_download() as download:
+        button(page, name).click()
+    return download.value.path().read_bytes()
+
+
+def test_frames_are_shown_in_words_and_sent(studio: Studio) -> None:
+    page = studio.page(panel="Frames")
+    frames = page.get_by_role("region", name="Frames of the lines")
+    expect(frames).to_contain_text("No frames yet")
+    studio.master.words(10020, 2)
+    expect(frames.get_by_role("row", name=re.compile("read M1_POS_ACT = 0 mm"))).to_be_visible()
+    assert studio.master.client.read_holding_registers(9000, count=1, device_id=1).isError()
+    expect(page.get_by_text("1 errors")).to_be_visible()
+    page.get_by_label("Errors only").check()
+    expect(frames.get_by_role("row")).to_have_count(2)
+    page.get_by_label("Errors only").uncheck()
+    page.get_by_label("Function code and data (hex)").fill("05 07 D0 FF 00")
+    button(page, "Send request").click()
+    until(lambda: studio.master.status(1) == 1, "the request has enabled the drive")
+    page.get_by_label("Function code and data (hex)").fill("05 7")
+    button(page, "Send request").click()
+    expect(page.get_by_role("alert").last).to_contain_text("pairs of hexadecimal digits")
+    assert downloaded(page, "Save as pcapng")[:4] == bytes.fromhex("0a0d0d0a")
+    assert b"read M1_POS_ACT = 0 mm" in downloaded(page, "Save as CSV")
+
+
+def test_the_machine_is_drawn_and_its_button_pressed(start_studio: Callable[..., Process], browser: Browser) -> None:
+    studio = Studio(start_studio("--demo"), browser)
+    page = studio.page(panel="Machine")
+    place = page.get_by_label("x place")
+    expect(place).not_to_have_text("–")
+    shown = place.inner_text()
+    expect(place).not_to_have_text(shown)  # the program moves it
+    press = button(page, "Press part")
+    press.hover()
+    page.mouse.down()
+    until(lambda: studio.master.inputs(5008, 1) == [True], "the master sees the button")
+    page.mouse.up()
+    until(lambda: studio.master.inputs(5008, 1) == [False], "it is released")
+    button(page, "Stop all").click()
+    until(lambda: studio.stands(1) and studio.stands(2), "the axes stand")
+    button(page, "Stop all").click()
+    until(lambda: studio.stands(1), "the axis stands")
+    before, place_before = studio.at(1), number(place)
+    target = 60.0 if before > 100.0 else 140.0
+    studio.master.enable(1)
+    studio.master.move(1, target)
+    until(lambda: studio.at(1) == target, "the axis has moved")
+    # The zeros differ, because the program homes; the way is the same.
+    until(lambda: abs(number(place) - place_before - (target - before)) < 0.02, "the drawing shows the whole way")
+    studio.close()
+    assert studio.complaints == []
+
+
 # ---------------------------------------------------------------------- the shell
 
 
@@ -405,7 +490,7 @@ def test_the_first_load_is_small_and_local(studio: Studio, browser: Browser) -> 
 
 
 SIZES = {"1280x720": (1280, 720), "wide": (1920, 1080), "tablet": (820, 1180)}
-POLISH = dict(zip(PANELS, ("Przegląd", "Osie", "We/Wy", "Rejestry", "Usterki", "Czas"), strict=True))
+POLISH = dict(zip(PANELS, ("Przegląd", "Osie", "We/Wy", "Oscyloskop", "Rejestry", "Ramki", "Usterki", "Czas"), strict=True))
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -32,8 +32,9 @@ export const t = texts(
     notHex: "{text}: pairs of hexadecimal digits are expected, such as 03 27 24 00 02",
     badUnit: "unit {unit}: permitted is 0 to 255",
     saveCsv: "Save as CSV",
-    savePcapng: "Save for Wireshark",
-    pcapngHelp: "pcapng. Modbus TCP is decoded at once; for serial lines choose Decode As… › Modbus RTU in Wireshark.",
+    savePcapng: "Save as pcapng",
+    pcapngHelp:
+      "For Wireshark. Modbus TCP is decoded at once; for serial lines choose Decode As… › Modbus RTU in Wireshark.",
     frames: "Frames of the lines",
   },
   {
@@ -67,9 +68,9 @@ export const t = texts(
     notHex: "{text}: oczekiwane są pary cyfr szesnastkowych, na przykład 03 27 24 00 02",
     badUnit: "adres {unit}: dozwolone jest 0 do 255",
     saveCsv: "Zapisz jako CSV",
-    savePcapng: "Zapisz dla Wiresharka",
+    savePcapng: "Zapisz jako pcapng",
     pcapngHelp:
-      "pcapng. Modbus TCP jest dekodowany od razu; dla linii szeregowych wybierz w Wiresharku Decode As… › Modbus RTU.",
+      "Dla Wiresharka. Modbus TCP jest dekodowany od razu; dla linii szeregowych wybierz w Wiresharku Decode As… › Modbus RTU.",
     frames: "Ramki linii",
   },
 );
