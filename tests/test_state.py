@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import pytest
+from toy import lamp
 
 import steptwin
 from steptwin.files.world import World
@@ -198,6 +199,15 @@ to = "table.AIN1"
 kind = "sine"
 value = 5.0
 amplitude = 4.0
+[[lamp]]
+name = "busy"
+from = "table.OUT1"
+warms = "20 ms"
+[[fault]]
+kind = "burnt-out"
+element = "busy"
+from_s = 0.4
+until_s = 0.9
 [[fault]]
 kind = "lost-steps"
 axis = 1
@@ -228,6 +238,13 @@ steps = [
 ]
 """
 PROGRAM = b"M1 = ON\nA:\nPABS M1 20\nWAITPOS\nOUT1 = ON\nDELAY 0.05\nPABS M1 -3,5\nWAITPOS\nOUT1 = OFF\nJUMP A\n"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def lamps() -> Iterator[None]:
+    """An element that can fail; the product has none yet."""
+    with lamp.registered():
+        yield
 
 
 def everything() -> World:
