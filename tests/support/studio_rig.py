@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from textwrap import dedent
 from typing import Any
 
@@ -19,6 +20,7 @@ from steptwin.studio.jogs import WorldJogs
 from steptwin.studio.schema import schema
 from steptwin.studio.session import Session
 from steptwin.subject.world import WorldSubject
+from steptwin.world.programtexts import WorldPrograms
 
 WORLD = """
     [world]
@@ -75,8 +77,8 @@ def check_answer(name: str, message: dict[str, Any]) -> None:
 class Studio:
     """The world, its hub and time."""
 
-    def __init__(self, text: str = WORLD, *, tokens: bool = False) -> None:
-        self.world = World.from_toml(dedent(text))
+    def __init__(self, text: str = WORLD, *, tokens: bool = False, files: Mapping[str, bytes] | None = None) -> None:
+        self.world = World.from_toml(dedent(text), files)
         self.subject = WorldSubject(self.world)
         self.jogs = WorldJogs(self.subject)
         self.speed = 1.0
@@ -87,6 +89,7 @@ class Studio:
             gate=gate,
             audit=Audit(lambda: "2026-01-01T00:00:00Z"),
             program="0",
+            programs=WorldPrograms(self.world),
             on_internal=self.errors.append,
         )
         self.hub = Hub(self.subject, self.jogs, around)

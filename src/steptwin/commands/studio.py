@@ -32,6 +32,7 @@ from steptwin.studio.jogs import WorldJogs
 from steptwin.studio.service import Service, Tls, listen
 from steptwin.textcodec import decode
 from steptwin.world.addresses import Address, is_loopback, parse_address
+from steptwin.world.programtexts import WorldPrograms
 
 DEFAULT = Address("127.0.0.1", 8488)
 ANY = ("0.0.0.0", "::")
@@ -126,7 +127,14 @@ class _Shown:
         def report(error: Exception) -> None:
             loop.call_exception_handler({"message": "a request to the studio failed", "exception": error})
 
-        around = Surroundings(moment=moment, gate=self._entrance.gate, audit=self._audit, program=__version__, on_internal=report)
+        around = Surroundings(
+            moment=moment,
+            gate=self._entrance.gate,
+            audit=self._audit,
+            program=__version__,
+            programs=WorldPrograms(live.world),
+            on_internal=report,
+        )
         jogs = WorldJogs(live.subject)
         live.companion = jogs
         hub = Hub(running.control, jogs, around)

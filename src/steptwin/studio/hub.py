@@ -75,6 +75,16 @@ class Lease:
         return {**head, "velocity": self.jog.velocity}
 
 
+class Programs(Protocol):
+    """The texts of programs that the controllers of a subject were given, as plain values."""
+
+    def list(self) -> Sequence[Mapping[str, object]]: ...
+
+    def text(self, machine: str, place: str) -> Mapping[str, object]:
+        """Raises `Misuse` where there is none."""
+        ...
+
+
 class Shared:
     """A part of the state that all viewers are sent when it has changed. ``version`` counts the changes."""
 
@@ -100,6 +110,7 @@ class Surroundings:
     audit: Audit
     program: str
     """Version of steptwin."""
+    programs: Programs
     virtual: bool = True
     on_internal: Callable[[Exception], object] = lambda error: None
 

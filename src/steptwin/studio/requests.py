@@ -12,12 +12,14 @@ from typing import TypeAlias
 
 from steptwin.access.commands import PERMITS
 from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
+from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
 from steptwin.subject.commands import COMMANDS, CommandRow
 from steptwin.subject.fields import FLAG, NAMES, TEXT, Field, Schema, number, read_fields, whole
 from steptwin.subject.shapes import members
+from steptwin.world.programtexts import LANGUAGES
 
 FASTEST_RATE = 30.0
 """Updates in a second of the wall clock."""
@@ -92,7 +94,33 @@ class ReadAudit:
     most: int = 100
 
 
-StudioRequest: TypeAlias = Hello | Resync | Watch | Unwatch | TakeControl | ReleaseControl | Renew | LetGo | StopAll | ReadAudit
+@dataclass(frozen=True, slots=True)
+class ListPrograms:
+    """The texts of programs that controllers were given."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadProgram:
+    """One of them."""
+
+    machine: str
+    place: str
+
+
+StudioRequest: TypeAlias = (
+    Hello
+    | Resync
+    | Watch
+    | Unwatch
+    | TakeControl
+    | ReleaseControl
+    | Renew
+    | LetGo
+    | StopAll
+    | ReadAudit
+    | ListPrograms
+    | ReadProgram
+)
 """Another kind of request is a class, its row here, and what does it in `steptwin.studio.session`."""
 
 # ---------------------------------------------------------------------- the table
@@ -119,6 +147,27 @@ _LEASE = Field("lease", whole(1, 2**53), "The number in the answer to jog.")
 
 LEASE: Schema = members({"lease": _WHOLE, "lasts_ms": {**_WHOLE, "description": "Renew it in a third of this. [ms]"}})
 """The answer to jog."""
+
+_PROGRAM: Mapping[str, object] = {
+    "machine": _TEXT,
+    "place": {**_TEXT, "description": "Unlike all others of the machine, such as program 0."},
+    "name": {**_TEXT, "description": "Of the file."},
+    "language": {"enum": list(LANGUAGES)},
+    "running": {"type": "boolean"},
+    "line": {
+        "anyOf": [_WHOLE, {"type": "null"}],
+        "description": "Of the present statement, from 1, while it runs or is paused; null where that is not known.",
+    },
+}
+_FINDING: Schema = members(
+    {
+        **dict.fromkeys(("line", "column", "end_line", "end_column"), _WHOLE),
+        "severity": {"enum": [one.value for one in Severity]},
+        "code": _TEXT,
+        "message": _TEXT,
+        "hint": {"anyOf": [_TEXT, {"type": "null"}]},
+    }
+)
 
 _ROWS = (
     RequestRow(
@@ -187,6 +236,21 @@ _ROWS = (
                 "failed": {"type": "object", "additionalProperties": _TEXT, "description": "Why, by machine."},
             }
         ),
+    ),
+    RequestRow(
+        "programs",
+        ListPrograms,
+        LOOK,
+        "The texts of programs and positions that the description gives to controllers.",
+        {"type": "array", "items": members(_PROGRAM)},
+    ),
+    RequestRow(
+        "program_text",
+        ReadProgram,
+        LOOK,
+        "One of these texts, with what the checker of its language finds in it.",
+        members({**_PROGRAM, "text": _TEXT, "diagnostics": {"type": "array", "items": _FINDING}}),
+        (Field("machine", TEXT, "Of a controller."), Field("place", TEXT, "As in the answer to programs.")),
     ),
     RequestRow(
         "audit",

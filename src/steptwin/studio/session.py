@@ -95,6 +95,8 @@ class Session:
                 ask.Renew: lambda wanted: hub.renew(self.viewer, wanted.lease),
                 ask.LetGo: lambda wanted: hub.let_go(self.viewer, wanted.lease),
                 ask.StopAll: lambda _: hub.stop_all(),
+                ask.ListPrograms: lambda _: hub.around.programs.list(),
+                ask.ReadProgram: lambda wanted: hub.around.programs.text(wanted.machine, wanted.place),
                 ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
             },
         )

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from steptwin.world.lanes import AxisLane
     from steptwin.world.lines import Line, LineWords
     from steptwin.world.plant import Plant
+    from steptwin.world.programtexts import ProgramText
     from steptwin.world.script import Step
     from steptwin.world.trace import Recorder
 
@@ -219,6 +220,8 @@ class ControllerKind(Generic[S, M, V]):
     """Whether it has non-volatile memory."""
     watch_program: Callable[[M, Kernel, str], ProgramReport | None] = lambda machine, kernel, name: None
     """Watch the programs of the machine, which has that name in its kernel; None without any."""
+    texts: Callable[[S, M, BuildContext], Sequence[ProgramText]] = lambda spec, machine, context: ()
+    """The texts of programs that its description gives it, with what the checkers find in them; the machine is at the present."""
     remarks: Callable[[str, M], Sequence[str]] = lambda name, machine: ()
     """What a person who starts it, under a name, should know."""
     encoders: Encoders[M] | None = None

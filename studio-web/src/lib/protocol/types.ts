@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | AuditRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | ProgramsRequest | ProgramTextRequest | AuditRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -952,6 +952,26 @@ export type StopAllRequest = {
   version?: 1;
 };
 
+/** The texts of programs and positions that the description gives to controllers. */
+export type ProgramsRequest = {
+  do: "programs";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** One of these texts, with what the checker of its language finds in it. */
+export type ProgramTextRequest = {
+  do: "program_text";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of a controller. */
+  machine: string;
+  /** As in the answer to programs. */
+  place: string;
+};
+
 /** Who did what, the newest last. */
 export type AuditRequest = {
   do: "audit";
@@ -1003,6 +1023,41 @@ export type StopAllAnswer = {
   machines: string[];
   /** Why, by machine. */
   failed: Record<string, string>;
+};
+
+export type ProgramsAnswer = ({
+  machine: string;
+  /** Unlike all others of the machine, such as program 0. */
+  place: string;
+  /** Of the file. */
+  name: string;
+  language: "wbc" | "m1486" | "csv";
+  running: boolean;
+  /** Of the present statement, from 1, while it runs or is paused; null where that is not known. */
+  line: number | null;
+})[];
+
+export type ProgramTextAnswer = {
+  machine: string;
+  /** Unlike all others of the machine, such as program 0. */
+  place: string;
+  /** Of the file. */
+  name: string;
+  language: "wbc" | "m1486" | "csv";
+  running: boolean;
+  /** Of the present statement, from 1, while it runs or is paused; null where that is not known. */
+  line: number | null;
+  text: string;
+  diagnostics: ({
+    line: number;
+    column: number;
+    end_line: number;
+    end_column: number;
+    severity: "error" | "warning" | "note";
+    code: string;
+    message: string;
+    hint: string | null;
+  })[];
 };
 
 export type AuditAnswer = ({
@@ -1190,5 +1245,7 @@ export interface Requests {
   renew: { request: RenewRequest; answer: RenewAnswer };
   let_go: { request: LetGoRequest; answer: LetGoAnswer };
   stop_all: { request: StopAllRequest; answer: StopAllAnswer };
+  programs: { request: ProgramsRequest; answer: ProgramsAnswer };
+  program_text: { request: ProgramTextRequest; answer: ProgramTextAnswer };
   audit: { request: AuditRequest; answer: AuditAnswer };
 }

@@ -63,6 +63,7 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     control=control.CONTROL,
     held_jog=M1486HeldJog,
     state=state_of,
+    texts=build.texts,
     view=M1486View,
     lanes=lanes.lanes,
     body=faults.body,

@@ -97,6 +97,7 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     body=faults.body,
     keeps_memory=lambda device: device.firmware.stored_user_registers is not None,
     watch_program=watch_program,
+    texts=build.texts,
     remarks=empty_banks,
     encoders=axes.ENCODERS,
     registers=NamedRegisters(

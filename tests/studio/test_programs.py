@@ -1,0 +1,77 @@
+"""The texts of programs that viewers can read."""
+
+from __future__ import annotations
+
+from tests.support.studio_rig import VIEWER, Studio
+
+WORLD = """
+    [world]
+    name = "hall"
+    [[line]]
+    name = "bus"
+    kind = "modbus"
+    [[mic488]]
+    name = "table"
+    line = "bus"
+    programs = { 0 = "a.prg", 2 = "b.prg" }
+    positions = { 0 = "p.csv" }
+    [[line]]
+    name = "chips"
+    kind = "m1486"
+    [[m1486]]
+    name = "drum"
+    line = "chips"
+    address = 7
+"""
+LOOP = b"START:\nDELAY 1\nJUMP START\n"
+FILES = {"a.prg": LOOP, "b.prg": b"DELAY 1\n", "p.csv": b"home;1;2;3;4\n"}
+
+
+def test_texts_are_listed_with_the_line_of_the_one_that_runs() -> None:
+    studio = Studio(WORLD, files=FILES)
+    tab = studio.open()
+    listed = tab.ok("programs")
+    assert [(one["machine"], one["place"], one["name"], one["language"]) for one in listed] == [
+        ("table", "program 0", "a.prg", "wbc"),
+        ("table", "program 2", "b.prg", "wbc"),
+        ("table", "positions 0", "p.csv", "csv"),
+    ]
+    assert [(one["running"], one["line"]) for one in listed] == [(False, None)] * 3
+    tab.ok("program", machine="table", action="start")
+    studio.run(200)
+    assert [(one["running"], one["line"]) for one in tab.ok("programs")] == [(True, 2), (False, None), (False, None)]
+    tab.ok("program", machine="table", action="pause")
+    studio.run(2000)
+    paused = tab.ok("programs")[0]
+    assert paused["running"] is False
+    assert paused["line"] is not None
+
+
+def test_a_viewer_reads_a_text_with_what_the_checker_finds() -> None:
+    files = {**FILES, "b.prg": b"DELAY 1\nJUMP LAST\nDELAY 2\nLAST:\nEND\n"}
+    tab = Studio(WORLD, files=files, tokens=True).open(token=VIEWER)
+    text = tab.ok("program_text", machine="table", place="program 2")
+    assert text["text"] == files["b.prg"].decode()
+    assert [(one["line"], one["column"], one["severity"]) for one in text["diagnostics"]] == [(3, 1, "warning")]
+    assert tab.ok("program_text", machine="table", place="program 0")["diagnostics"] == []
+
+
+def test_a_text_of_a_chip_runs_only_while_it_is_what_is_stored() -> None:
+    world = WORLD + '    program = "drum.m1486"\n'
+    studio = Studio(world, files={**FILES, "drum.m1486": b"[\n@1\nw2000\nJ1\n]\n"})
+    tab = studio.open()
+    studio.run(200)
+    text = tab.ok("program_text", machine="drum", place="program")
+    assert (text["language"], text["running"], text["line"]) == ("m1486", True, None)
+    studio.world.m1486["drum"].chip.image = b""
+    assert tab.ok("program_text", machine="drum", place="program")["running"] is False
+
+
+def test_a_text_that_is_not_there_is_named_with_those_that_are() -> None:
+    tab = Studio(WORLD, files=FILES).open()
+    assert tab.error("program_text", machine="drum", place="program") == (
+        "misuse",
+        "drum was given no text 'program': texts are none",
+    )
+    assert tab.error("program_text", machine="table", place="x")[1].endswith("texts are program 0, program 2, positions 0")
+    assert tab.error("program_text", machine="x", place="x") == ("misuse", "there is no controller 'x': there are table, drum")
