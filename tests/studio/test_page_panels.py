@@ -27,7 +27,7 @@ from steptwin.studio.page import find_page
 ROOT = Path(__file__).parent.parent.parent
 AXE = ROOT / "studio-web/node_modules/axe-core/axe.min.js"
 PICTURES = ROOT / "build/studio"
-PANELS = ("Overview", "Axes", "I/O", "Scope", "Registers", "Frames", "Faults", "Time")
+PANELS = ("Overview", "Axes", "I/O", "Scope", "Program", "Registers", "Frames", "Faults", "Time")
 LARGEST_FIRST_LOAD = 400_000
 WAIT_MS = 20_000
 
@@ -392,6 +392,26 @@ def test_frames_are_shown_in_words_and_sent(studio: Studio) -> None:
     assert b"read M1_POS_ACT = 0 mm" in downloaded(page, "Save as CSV")
 
 
+def test_the_program_shows_the_line_it_is_at(start_studio: Callable[..., Process], browser: Browser) -> None:
+    studio = Studio(start_studio("--demo"), browser)
+    page = studio.page(panel="Program")
+    text = page.get_by_role("region", name="Text of demo.prg")
+    expect(text).to_contain_text("PABS M1 target")
+    now = text.locator("[aria-current=step]")
+    expect(now).to_have_count(1)
+    shown = now.inner_text()
+    expect(now).not_to_have_text(shown)  # it goes on
+    expect(page.get_by_role("row", name=re.compile("^place"))).to_be_visible()
+    button(page, "Stop the program of table").click()
+    until(lambda: studio.master.words(10003)[0] == 0, "the master sees that it has stopped")
+    expect(now).to_have_count(0)
+    button(page, "Start the program of table").click()
+    until(lambda: studio.master.words(10003)[0] == 1, "the master sees that it runs")
+    expect(now).to_have_count(1)
+    studio.close()
+    assert studio.complaints == []
+
+
 def test_the_machine_is_drawn_and_its_button_pressed(start_studio: Callable[..., Process], browser: Browser) -> None:
     studio = Studio(start_studio("--demo"), browser)
     page = studio.page(panel="Machine")
@@ -490,7 +510,7 @@ def test_the_first_load_is_small_and_local(studio: Studio, browser: Browser) -> 
 
 
 SIZES = {"1280x720": (1280, 720), "wide": (1920, 1080), "tablet": (820, 1180)}
-POLISH = dict(zip(PANELS, ("Przegląd", "Osie", "We/Wy", "Oscyloskop", "Rejestry", "Ramki", "Usterki", "Czas"), strict=True))
+POLISH = dict(zip(PANELS, ("Przegląd", "Osie", "We/Wy", "Oscyloskop", "Program", "Rejestry", "Ramki", "Usterki", "Czas"), strict=True))
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
