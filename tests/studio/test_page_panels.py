@@ -510,7 +510,13 @@ def test_the_first_load_is_small_and_local(studio: Studio, browser: Browser) -> 
 
 
 SIZES = {"1280x720": (1280, 720), "wide": (1920, 1080), "tablet": (820, 1180)}
-POLISH = dict(zip(PANELS, ("Przegląd", "Osie", "We/Wy", "Oscyloskop", "Program", "Rejestry", "Ramki", "Usterki", "Czas"), strict=True))
+POLISH = dict(
+    zip(
+        PANELS,
+        ("Przegląd", "Osie", "We/Wy", "Oscyloskop", "Program", "Rejestry", "Ramki", "Usterki", "Czas"),
+        strict=True,
+    )
+)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
