@@ -11,7 +11,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.descriptors import descriptors
-from steptwin.live.tcp_epoll import Connection
+from steptwin.live.tcp_epoll import EpollConnection
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.wire.slave import TcpSlavePort
@@ -38,7 +38,7 @@ async def main(port: int) -> None:
         kernel.add("1", device)
         for request in (ENABLE_ALL, *RUN):
             device.execute(request, kernel.now)
-        Connection(client, Address(*peer), Cell(kernel, clock), TcpSlavePort({1: device}), clients)
+        EpollConnection(client, Address(*peer), Cell(kernel, clock), TcpSlavePort({1: device}), clients)
 
     descriptors().await_input(listener.fileno(), accept)
     gc.freeze()

@@ -29,7 +29,8 @@ CHOICE = "MUTANTS_CHOICE"
 REQUESTS, ANSWERS = "MUTANTS_REQUESTS", "MUTANTS_ANSWERS"
 """The environment variables with the numbers of the pipes to and from `mutants.forks`."""
 PASSED, FAILED, UNFIT = 0, 1, 3
-PYTEST = (sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider")
+# Foreign programs take time, and a browser more memory than there is.
+PYTEST = (sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", "-m", "not peers")
 MEMORY_BYTES = 4 * 2**30
 START_S = 20.0
 """For interpreter and collection, or for a short test, on a busy machine."""

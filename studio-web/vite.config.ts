@@ -1,16 +1,20 @@
 import { svelte } from "@sveltejs/vite-plugin-svelte";
-import { readFileSync } from "node:fs";
+import { readFileSync, readdirSync } from "node:fs";
 import { defineConfig, type Plugin } from "vite";
 
-/** The texts of the licences of what is shipped with the page. */
-function licences(packages: readonly string[]): Plugin {
+/** The texts of the licences of what is shipped with the page: packages whose modules are in it, and `others`. */
+function licences(others: readonly string[]): Plugin {
   return {
     name: "licences",
-    generateBundle() {
-      const texts = packages.map((name) => {
-        const read = (file: string) => readFileSync(new URL(`node_modules/${name}/${file}`, import.meta.url), "utf-8");
-        const file = name.startsWith("@fontsource") ? "LICENSE" : "LICENSE.md";
-        return `${name} ${JSON.parse(read("package.json")).version}\n\n${read(file)}`;
+    generateBundle(_options, bundle) {
+      const modules = Object.values(bundle).flatMap((chunk) => (chunk.type === "chunk" ? chunk.moduleIds : []));
+      const found = modules.flatMap((id) => /node_modules\/((?:@[^/]+\/)?[^/]+)\//.exec(id)?.[1] ?? []);
+      const texts = [...new Set([...others, ...found])].sort().map((name) => {
+        const folder = new URL(`node_modules/${name}/`, import.meta.url);
+        const file = readdirSync(folder).find((one) => /^licen[cs]e/i.test(one));
+        if (file === undefined) throw new Error(`${name} has no licence`);
+        const { version } = JSON.parse(readFileSync(new URL("package.json", folder), "utf-8")) as { version: string };
+        return `${name} ${version}\n\n${readFileSync(new URL(file, folder), "utf-8")}`;
       });
       this.emitFile({ type: "asset", fileName: "licences.txt", source: texts.join("\n\n----\n\n") });
     },
@@ -19,7 +23,7 @@ function licences(packages: readonly string[]): Plugin {
 
 export default defineConfig({
   base: "./",
-  plugins: [svelte(), licences(["svelte", "@fontsource/ibm-plex-sans", "@fontsource/ibm-plex-mono"])],
+  plugins: [svelte(), licences(["@fontsource/ibm-plex-sans", "@fontsource/ibm-plex-mono"])],
   build: {
     outDir: "../src/steptwin/studio/page",
     emptyOutDir: true,

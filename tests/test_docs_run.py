@@ -23,7 +23,11 @@ NOT_RUN = {
     "docs/getting-started.md": ["needs mbpoll; tests/peers/test_readme.py does it"],
     "docs/install.md": ["a clone is what these pages are run in", "needs a package index", "needs a package index"],
     "docs/monitor.md": ["needs a device and a terminal"],
-    "docs/studio.md": ["it goes on until Ctrl-C", "needs a running studio; tests/studio/test_examples.py does it"],
+    "docs/studio.md": [
+        "it goes on until Ctrl-C",
+        "needs devices",
+        "needs a running studio; tests/studio/test_examples.py does it",
+    ],
     "docs/testing.md": ["needs devices"],
 }
 """Blocks that are not run here, with the reason that stands before them in the source."""

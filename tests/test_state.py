@@ -203,6 +203,60 @@ amplitude = 4.0
 name = "busy"
 from = "table.OUT1"
 warms = "20 ms"
+[[gate]]
+name = "both"
+kind = "or"
+inputs = ["table.OUT1", "start-time.out"]
+[[latch]]
+name = "seen"
+set = "clamp.extended"
+[[wire]]
+from = "seen.out"
+to = "table.IN10"
+[[timer]]
+name = "start-time"
+kind = "pulse"
+time = "300 ms"
+input = "table.OUT1"
+[[counter]]
+name = "cycles"
+preset = 2
+up = "both.out"
+[[relay]]
+name = "power"
+coil = "both.out"
+pull_in = "7 ms"
+[[wire]]
+from = "power.no"
+to = "belt.run"
+[[cylinder]]
+name = "clamp"
+extend = "power.no"
+extend_time = "90 ms"
+[[conveyor]]
+name = "belt"
+length = 300.0
+speed = 500.0
+feed_every = "150 ms"
+[[conveyor.sensor]]
+at = 100.0
+to = "table.IN11"
+bounce = "2 ms"
+[[vacuum]]
+name = "cup"
+ejector = "clamp.extended"
+pick = "clamp.extended"
+from = "belt"
+pick_at = 80.0
+build_up = "40 ms"
+[[wire]]
+from = "cup.held"
+to = "table.IN12"
+[[fault]]
+kind = "jam"
+element = "clamp"
+from_s = 0.35
+until_s = 0.9
 [[fault]]
 kind = "burnt-out"
 element = "busy"
@@ -242,7 +296,7 @@ PROGRAM = b"M1 = ON\nA:\nPABS M1 20\nWAITPOS\nOUT1 = ON\nDELAY 0.05\nPABS M1 -3,
 
 @pytest.fixture(scope="module", autouse=True)
 def lamps() -> Iterator[None]:
-    """An element that can fail; the product has none yet."""
+    """An element that the source does not know."""
     with lamp.registered():
         yield
 
@@ -303,7 +357,7 @@ def product_classes() -> Iterator[type[Stateful]]:
 def test_everything_that_has_state_is_in_these_tests() -> None:
     world = everything()
     world.run(for_=0.1)
-    plan: Any = world.plan
+    plan: Any = world.parts
     seen: dict[int, Stateful] = {}
     parts([Ports(), plan.faults, plan.lines], seen)
     for kernel in plan.kernels:

@@ -84,7 +84,7 @@ def test_a_complete_table_is_read_only() -> None:
             "step of scripts Bytes lacks its execution",
         ),
         (
-            "import steptwin.world.actions as t; t.Outside |= int",
+            "import steptwin.world.actions as t; t.ExternalInput |= int",
             "steptwin.world.references",
             "step int lacks its check",
         ),

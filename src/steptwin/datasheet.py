@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 
@@ -22,6 +22,24 @@ class PointEffect(enum.Enum):
     """Does something at once, or starts what may be started once; no motion."""
     MOVES = "moves"
     """Gives an axis a motion, or prepares one."""
+
+
+class Condition(enum.Enum):
+    """What a value of a status means, for whoever sees it at a glance."""
+
+    OFF = "off"
+    REST = "rest"
+    MOVING = "moving"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class EventSeverity(enum.Enum):
+    INFORMATION = "information"
+    WARNING = "warning"
+    """Something was not done as it was commanded, or may go wrong next."""
+    ALARM = "alarm"
+    """Something has failed."""
 
 
 class Access(enum.Enum):
@@ -69,6 +87,7 @@ class Pin:
     name: str
     direction: PinDirection
     is_analog: bool = False
+    """Whether it has more levels than 0 and 1, such as volts."""
     unit: str = ""
     limits: Limits = Limits(0, 1)
     is_active_low: bool = False
@@ -102,6 +121,8 @@ class Point:
     """Of what may be written; None where nothing may."""
     values: Mapping[int, str]
     """Texts of enumerated values."""
+    conditions: Mapping[int, Condition] = field(default_factory=dict)
+    """Of a status: what its values mean."""
     access: Access
     effect: PointEffect
     addresses: tuple[PointAddress, ...] = ()
@@ -160,6 +181,9 @@ class EventDescription:
     code: str
     meaning: str
     facts: tuple[FactDescription, ...] = ()
+    severity: EventSeverity = EventSeverity.INFORMATION
+    stops_motor: bool | None = None
+    """Whether a motor stops with it; None where that depends, and for what has nothing to do with motors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +224,7 @@ class Datasheet:
 def plain(value: Any) -> Any:
     """A data sheet, or a part of it, as JSON has values."""
     if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        return {one.name: plain(getattr(value, one.name)) for one in fields(value)}
     if isinstance(value, enum.Enum):
         return value.value
     if isinstance(value, Mapping):
@@ -235,6 +259,7 @@ def _read_point(data: Mapping[str, Any]) -> Point:
     read: dict[str, Any] = {
         "limits": _read_limits(data["limits"]),
         "values": {int(number): text for number, text in data["values"].items()},
+        "conditions": {int(number): Condition(text) for number, text in data["conditions"].items()},
         "access": Access(data["access"]),
         "effect": PointEffect(data["effect"]),
         "addresses": tuple(PointAddress(**address) for address in data["addresses"]),
@@ -257,7 +282,8 @@ def _read_event(data: Mapping[str, Any]) -> EventDescription:
         FactDescription(name=one["name"], type=FactType(one["type"]), unit=one["unit"], is_optional=one["is_optional"])
         for one in data["facts"]
     )
-    return EventDescription(code=data["code"], meaning=data["meaning"], facts=facts)
+    read: dict[str, Any] = {"facts": facts, "severity": EventSeverity(data["severity"])}
+    return EventDescription(**{**data, **read})
 
 
 def _read_detail(data: Mapping[str, Any]) -> Detail:

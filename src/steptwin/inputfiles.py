@@ -31,7 +31,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
             data = file.read(most + 1)
         except OSError as error:
             raise Misuse(f"cannot read {path}: {reason(error)}") from error
-    if len(data) > most:  # it grew, or its file system tells no sizes
+    if len(data) > most:  # it grew, or its file system reports no sizes
         raise _too_large(path, len(data), most)
     return data
 

@@ -150,7 +150,7 @@ class Port(Protocol):
 
 
 @runtime_checkable
-class TalkingPort(Port, Protocol):
+class SendingPort(Port, Protocol):
     """A port that sends without being asked, too: it calls ``on_output`` when there is something for `to_send`."""
 
     @property

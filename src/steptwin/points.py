@@ -28,7 +28,7 @@ class LivePoint:
     """The value at the moment to which the controller has come; reading changes nothing. None where it can only be written."""
     turns: Turns | None = None
     version: Callable[[], object] | None = None
-    """Another one whenever ``turns`` may be others; None where that cannot be told."""
+    """A value that changes whenever ``turns`` may have changed; None if that is unknown."""
     is_kept: bool = False
     """Whether a write only keeps the value, which is not an event of the controller."""
 

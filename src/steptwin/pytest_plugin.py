@@ -96,7 +96,7 @@ def _controllers(items: list[pytest.Item]) -> set[str]:
     }
     names: set[str] = set()
     for file in files:
-        with contextlib.suppress(Misuse):  # the test tells what is wrong with its world
+        with contextlib.suppress(Misuse):  # the test itself reports errors of its world
             names.update(controllers_in(file))
     return names
 
@@ -109,9 +109,9 @@ def pytest_runtest_makereport(
     report = yield
     if report.failed:
         for name, rig in item.stash.get(_rigs, {}).items():
-            story = rig.story()
-            if story:
-                report.sections.append((f"{name}: what happened last", story))
+            log = rig.log()
+            if log:
+                report.sections.append((f"{name}: what happened last", log))
     return report
 
 

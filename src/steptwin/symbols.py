@@ -24,10 +24,11 @@ class SymbolKind(enum.Enum):
     LINE = "line"
     AXIS = "axis"
     BUTTON = "button"
+    ELEMENT = "element"
     SCRIPT = "script"
 
 
-class Role(enum.Enum):
+class SymbolRole(enum.Enum):
     """``DEFINE``: here it comes into being."""
 
     DEFINE = "define"
@@ -50,4 +51,4 @@ class Use:
 
     symbol: Symbol
     span: Span
-    role: Role
+    role: SymbolRole

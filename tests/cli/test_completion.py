@@ -32,7 +32,7 @@ def test_types_of_the_m1486() -> None:
 
 
 def test_faults_and_what_they_take() -> None:
-    assert offered("steptwin fault no") == ["noise", "no-answer"]
+    assert offered("steptwin fault no") == ["noise", "no-answer", "no-air"]
     taken = offered("steptwin fault crc nth=3 ")
     assert {"every=", "probability=", "address="} <= set(taken)
     assert "nth=" not in taken

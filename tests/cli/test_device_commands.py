@@ -18,7 +18,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.cli import main
-from steptwin.cli.device import HeldUp, shown, table, tell_under_way, tied
+from steptwin.cli.device import SuspensionDetector, print_started, shown, table, tied
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import DeviceAddress, parse_device
 from steptwin.errors import Misuse, Refusal
@@ -43,9 +43,9 @@ def test_a_real_is_shown_as_people_write_it() -> None:
 def test_somebody_at_a_terminal_is_told_that_it_moves(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    tell_under_way(["M1"])
+    print_started(["M1"])
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    tell_under_way(["M1", "M3"])
+    print_started(["M1", "M3"])
     assert capsys.readouterr() == ("", "M1, M3 under way; Ctrl-C stops\n")
 
 
@@ -79,7 +79,7 @@ def shell(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -
 @pytest.fixture
 def twin(serve: Callable[..., Any], shell: Shell, monkeypatch: pytest.MonkeyPatch) -> Any:
     twin = serve("--demo")
-    monkeypatch.setenv("STEPTWIN_DEVICE", f"tcp://127.0.0.1:{twin.tcp_port},timeout=5")
+    monkeypatch.setenv("STEPTWIN_DEVICE", f"tcp://127.0.0.1:{twin.tcp_port},timeout=60")
     return twin
 
 
@@ -114,7 +114,7 @@ def test_a_session(twin: Any, shell: Shell) -> None:
 def test_a_command_that_was_suspended_before_a_motion_does_not_move(monkeypatch: pytest.MonkeyPatch) -> None:
     time = [0.0]
     monkeypatch.setattr("steptwin.cli.device.time.monotonic", lambda: time[0])
-    held_up = HeldUp()
+    held_up = SuspensionDetector()
     for _ in range(3):
         time[0] += 15.0
         held_up.check()
@@ -298,7 +298,7 @@ def test_the_ports_of_this_system_can_be_listed(shell: Shell) -> None:
 
 def test_a_terminal_on_a_pipe(twin: Any) -> None:
     lines = "M1_EN = on\nM1_ACC=1000  # fast\nM1_POS_ABS=2\nwait 1\n\nM1_POS_ACT OUT1\nraw 03 27 24 00 02\nhelp\nstop\nquit\nM9\n"
-    place = f"tcp://127.0.0.1:{twin.tcp_port},timeout=5"
+    place = f"tcp://127.0.0.1:{twin.tcp_port},timeout=60"
     run = subprocess.run([STEPTWIN, "terminal", "-d", place], input=lines, capture_output=True, text=True, check=False)
     assert run.stdout.splitlines()[:4] == ["M1: target reached, 2", "M1_POS_ACT = 2 u", "OUT1 = OFF", "answer: 03 04 00 00 40 00"]
     assert (run.stderr, run.returncode) == ("", 0)

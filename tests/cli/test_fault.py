@@ -12,7 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from steptwin.cli import app
-from steptwin.commands.serve import ServeM1486, ServeMic488, serve_m1486, serve_mic488
+from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
+from steptwin.commands.serve_mic488 import ServeMic488, serve_mic488
 from steptwin.errors import Misuse
 from steptwin.world.faults import KINDS
 
@@ -56,7 +57,7 @@ def test_a_stuck_switch_stays_stuck_under_a_hand(serve: Serve) -> None:
 
 def test_faults_of_a_line_of_chips(serve_m1486: Serve) -> None:
     twin = serve_m1486("--fault", "flip nth=2 bit=0 link=tcp-1")
-    with socket.create_connection(("127.0.0.1", twin.tcp_port), timeout=10) as host:
+    with socket.create_connection(("127.0.0.1", twin.tcp_port), timeout=60) as host:
         host.sendall(b"U20\rU20\rU20\r")
         heard = b""
         while len(heard) < 3:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from steptwin.commands.serve import ServeM1486, serve_m1486
+from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
 from steptwin.errors import Misuse
 
 Serve = Callable[..., Any]
@@ -22,7 +22,7 @@ class Host:
     """A program on the raw TCP end of the line."""
 
     def __init__(self, port: int) -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=60)
 
     def ask(self, text: str, count: int) -> bytes:
         """Type lines; ``count`` bytes of what the chips say."""
@@ -41,7 +41,7 @@ class Host:
 
 def wait_for_line(twin: Any, text: str) -> None:
     """The twin says ``text``; a thread of its own prints it."""
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 60
     while not any(text in line for line in twin.lines):
         assert time.monotonic() < deadline, twin.lines
         time.sleep(0.01)

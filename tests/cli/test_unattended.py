@@ -60,7 +60,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def wait_for(text: str, output: Callable[[], str]) -> None:
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 60
     while text not in output():
         assert time.monotonic() < deadline, f"no {text!r} in {output()!r}"
         time.sleep(0.01)
@@ -108,7 +108,7 @@ def test_a_client_that_only_listens_hears_the_program(serve_m1486: Callable[...,
     twin = serve_m1486("--variant", "B", "--program", str(tmp_path / "p.m1486"))
     pty = os.open(twin.pty, os.O_RDWR | os.O_NOCTTY)
     try:
-        with socket.create_connection(("127.0.0.1", twin.tcp_port), timeout=30) as client:
+        with socket.create_connection(("127.0.0.1", twin.tcp_port), timeout=60) as client:
             assert client.recv(1) == b"B"
         assert os.read(pty, 1) == b"B"
     finally:

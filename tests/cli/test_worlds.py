@@ -156,8 +156,9 @@ def test_what_was_waited_for_in_vain_is_a_warning(tmp_path: Path) -> None:
     assert told["overdue"] == [{"time_s": 0.5, "what": "hand waited in vain for a.M1.position > 3"}]
 
 
-def test_what_is_doubtful_in_files_of_a_world_is_shown(tmp_path: Path) -> None:
-    world = tmp_path / "w.toml"
+def test_what_is_doubtful_in_files_of_a_world_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    world = Path("w.toml")
     (tmp_path / "m.cfg").write_text("[Axis0]\nGear=10\nColour=3\n[Oven]\nHeat=1\n")
     table = '[[mic488]]\nname = "{}"\nconfig = "m.cfg"\n'
     world.write_text(table.format("a") + table.format("b"))
@@ -210,3 +211,42 @@ def test_the_keys_of_a_description_have_their_defaults_with_units() -> None:
 
     (source,) = [section for section in sections() if "[[source]]" in section.title]
     assert {row[0]: row[2] for row in source.rows}["period"] == "10 ms"
+
+
+WITH_PROGRAM = """
+[[line]]
+name = "bus"
+kind = "m1486"
+[[m1486]]
+name = "c"
+line = "bus"
+variant = "E1"
+program = "p.m1486"
+"""
+
+
+@pytest.mark.parametrize("arguments", [("run", "--for", "1s"), ("up",)])
+def test_errors_in_files_of_a_world_have_the_path_seen_from_the_folder_of_the_user(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "cell" / "w.toml").write_text(WITH_PROGRAM)
+    (tmp_path / "cell" / "p.m1486").write_text("[\nQQ\n]\n")
+    monkeypatch.chdir(tmp_path)
+    command, *options = arguments
+    with pytest.raises(Misuse, match=r"^cell/p\.m1486:2:2: error M103"):
+        invoke(command, "cell/w.toml", *options)
+
+
+def test_what_a_chip_does_at_power_on_is_shown_and_on_its_line(tmp_path: Path) -> None:
+    """An E type runs its stored file at power-on (manual chapter II): U5 at 0, and U6 after one command."""
+    world = tmp_path / "w.toml"
+    world.write_text(WITH_PROGRAM)
+    (tmp_path / "p.m1486").write_text("[\nu5\nu6\n]\n")
+    shown = invoke("run", str(world), "--for", "1s", "--trace", str(tmp_path / "t.jsonl"))
+    assert shown.startswith("    0.000000 s  c          U5 sends 00H\n")
+    records = [json.loads(line) for line in (tmp_path / "t.jsonl").read_text().splitlines()[1:]]
+    sent = [record["time_ns"] for record in records if record["kind"] == "frame"]
+    assert sent == [record["time_ns"] for record in records if record["subject"] == "upload"]
+    assert sent[0] == 0
+    assert len(sent) == 2

@@ -56,16 +56,16 @@ def test_what_comes_back_in_words(typed: list[str], heard: bytes, told: list[str
     words = TerminalWords()
     for line in typed:
         words.typed(line)
-    assert words.heard(heard) == told
+    assert words.decode(heard) == told
     assert words.refused == sum(LOST in text and "or:" not in text for text in told)
 
 
 def test_an_answer_that_takes_its_time_is_still_known() -> None:
     words = TerminalWords()
     words.typed("u3")
-    assert words.heard(b"u3\r") == []
+    assert words.decode(b"u3\r") == []
     assert words.is_awaiting
-    assert words.heard(b"\x05") == ["05H  U3 position, high byte: 5"]
+    assert words.decode(b"\x05") == ["05H  U3 position, high byte: 5"]
     assert not words.is_awaiting
 
 

@@ -8,13 +8,8 @@ from typing import Any
 
 import pytest
 
-from steptwin.commands.serve import (
-    ServeM1486,
-    ServeMic488,
-    describe_m1486,
-    describe_mic488,
-    serve_mic488,
-)
+from steptwin.commands.serve_m1486 import ServeM1486, describe_m1486
+from steptwin.commands.serve_mic488 import ServeMic488, describe_mic488, serve_mic488
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.world import script as do
@@ -116,7 +111,7 @@ def test_the_demo_is_a_world_with_switches_at_both_ends() -> None:
     with World.from_toml(describe_mic488(ServeMic488(units="1,2", demo=True))) as world:
         assert list(world.axis) == ["x-1", "y-1", "z-1", "u-1", "x-2", "y-2", "z-2", "u-2"]
         for registers in ((("mic488-2", "M1_EN", 1.0),), (("mic488-2", "M1_VEL_ABS", -25.0),)):
-            world.outside(do.Write(registers))
+            world.apply_input(do.Write(registers))
         assert world.run(until="mic488-2.IN1 == 1", for_="2 s") is not None
         assert world.axis["x-2"].position == pytest.approx(-10.0, abs=0.3)
         assert world.read("mic488-1.IN1") == 0
@@ -133,7 +128,7 @@ def test_a_saved_description_has_the_files_it_names_beside_it(tmp_path: Path, ca
     assert capsys.readouterr().out == f"wrote {tmp_path / 'there' / 'machine.cfg'}\nwrote {target}\n"
     with World.load(target) as world:
         assert world.mic488["mic488"].device.axes[0].config.gear == 50.0
-        assert world.plan.line_of["mic488"][1] == 9  # the address of the configuration
+        assert world.parts.line_of["mic488"][1] == 9  # the address of the configuration
     (tmp_path / "there" / "machine.cfg").write_text("[Axis0]\nGear=3\n")
     with pytest.raises(Misuse, match="is another file than"):
         serve_mic488(options)

@@ -13,8 +13,8 @@ import pytest
 from steptwin.commands.sniff import Decoder, M1486Decoder, ModbusDecoder, sniff
 from steptwin.drivers.place import parse_line_address
 from steptwin.errors import LineFailure, Misuse
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.words.frames import FrameLine
 from steptwin.world.addresses import Address
 
 READ, ANSWER = bytes.fromhex("01 03 27 24 00 02 8E B4"), bytes.fromhex("01 03 04 00 00 41 48 CA 55")
@@ -96,7 +96,7 @@ def decoded(*heard: tuple[str, bytes]) -> list[str]:
             now = due
             decoder.expire(now)
         else:
-            decoder.heard(data, now, FrameDirection.IN if what == ">" else FrameDirection.OUT)
+            decoder.feed(data, now, FrameDirection.IN if what == ">" else FrameDirection.OUT)
     return told(frames)
 
 

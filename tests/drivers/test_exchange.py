@@ -76,6 +76,22 @@ def submit(e: Exchanger[Ask, str], text: str, device: str = "a", **options: obje
     return job
 
 
+def test_an_engine_is_busy_from_the_first_job_to_the_last_answer() -> None:
+    e = engine()
+    assert (e.busy, e.in_flight) == (False, False)
+    submit(e, "one")
+    submit(e, "two")
+    assert (e.busy, e.in_flight) == (True, False)
+    e.step(0)
+    assert (e.busy, e.in_flight) == (True, True)
+    e.receive(b"one!", 1)
+    assert (e.busy, e.in_flight) == (True, False)
+    e.step(1)
+    assert (e.busy, e.in_flight) == (True, True)
+    e.receive(b"two!", 2)
+    assert (e.busy, e.in_flight) == (False, False)
+
+
 def test_one_exchange_at_a_time_in_the_order_they_came() -> None:
     e = engine()
     first = submit(e, "one")
@@ -135,7 +151,7 @@ def test_no_answer_says_how_often_how_long_and_what_was_heard() -> None:
         "here: no answer to 'device a: one' within 0.3 s, tried 2 times; only 6f 6e was received, which is not an answer; "
         "it is unknown whether the device has executed it"
     )
-    assert (caught.value.uncertain, caught.value.attempts, caught.value.heard) == (True, 2, b"on")
+    assert (caught.value.uncertain, caught.value.attempts, caught.value.received) == (True, 2, b"on")
 
 
 def test_no_answer_to_what_only_reads_leaves_no_doubt() -> None:
@@ -327,7 +343,7 @@ def test_everybody_is_told_once() -> None:
     e = engine()
     told: list[str] = []
     for text in ("one", "two"):
-        submit(e, text).tell = lambda text=text: told.append(text)
+        submit(e, text).on_done = lambda text=text: told.append(text)
     e.step(0)
     e.receive(b"one!", 1)
     e.fail_all(LineLost("gone"))
@@ -403,7 +419,7 @@ def test_what_was_sent_too_late_is_told(answer: bytes) -> None:
     e, time = engine(), Time()
     job = permitted(e, time)
     told: list[bool] = []
-    job.tell = lambda: told.append(job.done)
+    job.on_done = lambda: told.append(job.done)
     assert e.step(0) == b"one"
     time.now = 2 * SECOND
     e.written()

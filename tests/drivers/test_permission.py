@@ -42,6 +42,18 @@ def test_it_ends_with_its_patience_and_is_never_revived(patience: int, steps: li
         is_over = is_late
 
 
+def test_it_lasts_to_its_last_nanosecond() -> None:
+    clock = Clock()
+    permission = Permission(clock, 10)
+    clock.now = 1010
+    assert not permission.has_expired()
+    permission.extend()
+    clock.now = 1020
+    assert not permission.has_expired()
+    clock.now = 1021
+    assert permission.has_expired()
+
+
 def test_an_expired_permission_stays_expired_though_the_clock_should_go_back() -> None:
     clock = Clock()
     permission = Permission(clock, 10)

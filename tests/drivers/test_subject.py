@@ -16,6 +16,7 @@ import pytest
 from host_rig import Wire, async_driver, run_virtual, task_line
 from tests.conftest import until
 
+from steptwin.controllerstate import ProgramActivity, read_state
 from steptwin.drivers.m1486 import M1486, Busy
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
@@ -29,8 +30,9 @@ from steptwin.mic488.status import ControllerStatus
 from steptwin.subject import commands as command
 from steptwin.subject.commands import row_of
 from steptwin.subject.contract import UNKNOWN, Reading, Subject, read_description
-from steptwin.subject.events import SamplePayload, read_event
+from steptwin.subject.events import read_event
 from steptwin.subject.following import filter_of
+from steptwin.subject.payloads import SamplePayload
 from steptwin.subject.world import WorldSubject
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip, joined_driver
 from steptwin.world import script as do
@@ -142,7 +144,7 @@ def in_another_process(directory: Path) -> Generator[Way]:
             yield Way(subject, lambda ns: subject.do(command.Advance(duration=ns)))
     finally:
         process.terminate()
-        process.wait(10)
+        process.wait(60)
 
 
 @contextmanager
@@ -183,6 +185,8 @@ STORY: tuple[command.Command | int, ...] = (
     command.Enable("tabel", 1),
     command.ReadPins("table"),
     command.ReadPins("tabel"),
+    command.State("table"),
+    command.State("tabel"),
     command.Encoders("table"),
     command.ReadPoints(("table.M1.position", "table.nothing")),
     command.ReadPoints(("nothing.M1.position",)),
@@ -233,7 +237,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Step]]:
 
 def test_a_world_in_another_process_answers_the_same(told: dict[str, list[Step]]) -> None:
     assert told["in another process"] == told["in this process"]
-    assert [step.answer for step in told["in this process"]].count("misuse") == 7
+    assert [step.answer for step in told["in this process"]].count("misuse") == 8
 
 
 def test_a_device_answers_the_same_but_for_what_it_cannot_know_or_refuses(told: dict[str, list[Step]]) -> None:
@@ -246,14 +250,25 @@ def test_a_device_answers_the_same_but_for_what_it_cannot_know_or_refuses(told: 
             for point in set(POINTS) - UNKNOWN_TO_DRIVERS:
                 assert device.points[point].value == pytest.approx(world.points[point].value, abs=1e-6), (number, point)
         assert [reading.unit for reading in device.points.values()] == [reading.unit for reading in world.points.values()]
-    refused, pins, encoders = (STORY.index(one) for one in (STORY[0], command.ReadPins("table"), command.Encoders("table")))
-    assert different.keys() == {refused, pins, encoders}
+    differing = STORY[0], command.ReadPins("table"), command.Encoders("table"), command.State("table")
+    refused, pins, encoders, state = map(STORY.index, differing)
+    assert different.keys() == {refused, pins, encoders, state}
     # The controller ignores a motion while the drive is off (MIC-8): the driver refuses it before anything is sent.
     assert different[refused] == (None, "refusal")
     levels, known = different[pins]
     assert known == {pin: None if pin.split(".")[1] in UNKNOWN_PINS else level for pin, level in levels.items()}
     counts, known = different[encoders]
     assert known == [{**one, "turned_by": None} for one in counts]
+    present, shown = different[state]
+    for axis, seen, count in zip(present["axes"], shown["axes"], counts, strict=True):
+        position = pytest.approx(axis["position"], abs=1e-6)
+        assert seen == {**axis, "position": position, "moving": None, "encoder": count["counts"]}
+    assert shown["program"] == present["program"]
+    assert shown["pins"] == {pin: None if pin in UNKNOWN_PINS else level for pin, level in present["pins"].items()}
+    assert shown["details"] == {**present["details"], "user_registers": None}
+    assert read_state(shown).time_s is None
+    for key in ("kind", "variant", "status"):
+        assert shown[key] == present[key]
 
 
 # ---------------------------------------------------------------------- what only twins can do
@@ -322,7 +337,7 @@ def test_time_begins_with_the_subject(table: DeviceSubject, rig: Rig) -> None:
 
 
 def test_a_line_that_fails_is_a_failure(table: DeviceSubject, rig: Rig) -> None:
-    rig.world.outside(do.SetFault(read_fault("no-answer lost=answer")))
+    rig.world.apply_input(do.SetFault(read_fault("no-answer lost=answer")))
     with pytest.raises(LineFailure):
         table.read("table.M1.position")
 
@@ -335,14 +350,17 @@ def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) ->
     assert [(event.kind, event.payload.plain()["position"]) for event in following.take().events] == [("sample", 0.0)] * 4
     table.do(command.Enable("table", 1))
     table.do(command.Move("table", 1, to=10.0))
-    rig.world.outside(do.Set((("table", "IN7", 1.0),)))
+    rig.world.apply_input(do.Set((("table", "IN7", 1.0),)))
     rig.time.sleep(0.3)
     events = following.take().events
     assert [(event.kind, event.axis) for event in events] == [("sample", "1"), ("edge", None), ("status", "1")]
     assert [event.text for event in events][1:] == ["IN7: 1", "M1: moving to position"]
     sample = events[0].payload
     assert isinstance(sample, SamplePayload)
+    assert sample.position is not None
     assert 0.0 < sample.position < 10.0
+    assert sample.velocity is not None
+    assert 0.0 < sample.velocity <= 40.0
     assert sample.unit == "mm"
     assert [read_event(json.loads(json.dumps(event.plain()))) for event in events] == events
     assert following.take().events == []  # not before the next period
@@ -381,7 +399,7 @@ def test_a_device_is_polled_at_the_period_that_was_asked_for(rig: Rig, period_s:
     table = rig.mic.subject("table", period_s=period_s)
     begin = rig.time.now()
     following = table.follow(filter_of(["edge"]), 9)
-    rig.world.outside(do.Set((("table", "IN7", 1.0),)))
+    rig.world.apply_input(do.Set((("table", "IN7", 1.0),)))
     due = begin + round(period_s * SECOND)
     rig.time.advance(due - 1)
     assert following.take().events == []
@@ -419,18 +437,39 @@ def test_an_m1486_moves_and_is_unknown_meanwhile(drum: DeviceSubject, rig: Rig) 
     assert rig.world.read("drum.counter") == 5000 * 64
 
 
+def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -> None:
+    """Every upload that a state has is that of the twin; levels are unknown, because reading them takes the internal variable."""
+    twin = WorldSubject(rig.world)
+    drum.do(do.Send("chips", b"t41\r"))
+    found, there = (read_state(subject.do(command.State("drum")).value) for subject in (drum, twin))
+    known = ("counter", "counter_valid", "variable", "flags_on", "functions_on")
+    assert {name: value for name, value in found.details.items() if value is not None} == {n: there.details[n] for n in known}
+    assert found.details.keys() == there.details.keys()
+    assert (found.kind, found.variant, found.program.state) == (there.kind, there.variant, ProgramActivity.STOPPED)
+    assert found.pins == dict.fromkeys(there.pins)
+    drum.do(command.Move("drum", 1, by=5000.0))
+    found = read_state(drum.do(command.State("drum")).value)
+    assert (found.program.state, found.axes[0].position, found.axes[0].moving) == (None, None, None)
+    rig.time.sleep(60.0)
+    found = read_state(drum.do(command.State("drum")).value)
+    assert (found.axes[0].position, found.axes[0].velocity, found.axes[0].moving) == (5000.0, 0.0, False)
+
+
 def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:
     following = drum.follow(filter_of(), 9)
     following.take()
     drum.do(command.Jog("drum", 1, -50.0))
     rig.time.sleep(2.0)
-    assert [event.text for event in following.take().events] == ["moves, waits or runs its program"]
+    assert [event.text for event in following.take().events] == [
+        "moves, waits or runs its program",
+        "axis 1: the position is not known",
+    ]
     assert rig.world.read("drum.velocity") == -50.0 * 64
     drum.do(command.StopAxes("drum", 1))
     rig.time.sleep(2.0)
     status, sample = following.take().events
     assert status.text == "is at rest"
-    assert sample.kind == "sample"
+    assert sample.payload.plain()["velocity"] == 0.0
     assert rig.world.read("drum.velocity") == 0.0
     rig.time.sleep(2.0)
     assert following.take().events == []
@@ -450,7 +489,7 @@ def test_an_m1486_is_moved_and_shown_in_the_unit_of_its_driver(rig: Rig) -> None
         rig.time.sleep(60.0)
         assert rig.world.read("drum.counter") == 40 * 40 * 64
         (sample,) = drum.follow(filter_of(), 9).take().events
-        assert sample.payload.plain() == {"axis": "1", "position": -60.0, "unit": "mm"}
+        assert sample.payload.plain() == {"axis": "1", "position": -60.0, "unit": "mm", "velocity": 0.0}
         drum.do(command.Move("drum", 1, by=-2.0))
         rig.time.sleep(60.0)
         assert rig.world.read("drum.counter") == 38 * 40 * 64
@@ -466,7 +505,7 @@ def test_of_an_m1486_only_what_was_asked_for_is_followed(drum: DeviceSubject, ri
     for pause in (2.0, 60.0):
         rig.time.sleep(pause)
         found.append([[event.kind for event in following.take().events] for following in (samples, states)])
-    assert found == [[["sample"], ["status"]], [["sample"], ["status"]]], "the first sample is where it stood"
+    assert found == [[["sample", "sample"], ["status"]], [["sample"], ["status"]]], "where it stood, not known, where it stands"
     samples.close()
     frames = WorldSubject(rig.world).follow(filter_of(["frame"]), 99)
     states.take()
@@ -489,7 +528,7 @@ def test_an_m1486_that_begins_to_move_while_it_is_looked_at(
 
     monkeypatch.setattr(rig.chip._driver, "counter", moves)
     rig.time.sleep(1.0)
-    assert following.take().events == []
+    assert [event.text for event in following.take().events] == ["axis 1: the position is not known"]
 
 
 def test_the_program_of_an_m1486_is_ended(drum: DeviceSubject, rig: Rig) -> None:

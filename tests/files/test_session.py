@@ -17,7 +17,7 @@ from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Outside
+from steptwin.world.actions import Bytes, ExternalInput
 from steptwin.world.faults import read
 from steptwin.world.script import Steps
 
@@ -29,7 +29,7 @@ GOLDEN = json.loads((Path(__file__).parent / "world_digests.json").read_text())
 def busy() -> World:
     """A world to which everything happens that can come from outside."""
     world = World.load(EXAMPLES / "feeder.toml")
-    world.outside(do.SetFault(read("delay unit=1 for_ms=40 nth=3 name=slow")))
+    world.apply_input(do.SetFault(read("delay unit=1 for_ms=40 nth=3 name=slow")))
     world.run(for_=0.5)
     world.mic488["table"].write("M2_EN", 1)
     world.mic488["table"].write("M2_VEL_ABS", 400.0)
@@ -37,13 +37,13 @@ def busy() -> World:
     world.press("start", 0.3)
     world.run(for_=1.25)
     world.line["bus"].send(bytes.fromhex("01 03 27 24 00 02 8e b4"))
-    world.outside(do.Turn("table", 3, -25))
+    world.apply_input(do.Turn("table", 3, -25))
     world.run(for_=0.5)
     assert len(world.line["bus"].received()) == 9
     world.line["chips"].send(b"x3\rf6400\rr\r")
     world.m1486["drum"].set_pin("B5", 0)
     world.run(for_=6)
-    world.outside(do.ClearFault("slow"))
+    world.apply_input(do.ClearFault("slow"))
     world.mic488["table"].power_cycle()
     world.run(for_=2)
     return world
@@ -191,12 +191,12 @@ def test_what_comes_at_the_nanosecond_of_other_steps_replays(changes: list[Any],
         (Bytes("bus", "late", "raw", b"?"), "takes no connection of kind 'raw'"),
     ],
 )
-def test_what_is_refused_leaves_no_mark(step: Outside, message: str) -> None:
+def test_what_is_refused_leaves_no_mark(step: ExternalInput, message: str) -> None:
     world = World.load(EXAMPLES / "feeder.toml")
     world.run(for_=1)
     before = world.trace.digest()
     with pytest.raises(Misuse, match=message):
-        world.outside(step)
+        world.apply_input(step)
     world.settle_all()
     assert (world.trace.digest(), world.inputs) == (before, [])
 
@@ -244,7 +244,7 @@ def test_another_run_has_another_digest() -> None:
     world = session.world()
     for time, what, _ in session.inputs[:-1]:
         world.advance(time)
-        world.outside(what)
+        world.apply_input(what)
     world.run(until=session.until / SECOND)
     assert world.trace.digest() != session.digest
 
@@ -339,8 +339,8 @@ def test_digests_are_the_same_everywhere(name: str) -> None:
 @given(way=WAYS, value=VALUES)
 def test_a_session_of_other_values_is_refused_or_replayed(way: list[int], value: Any, tmp_path: Path) -> None:
     world = World.from_toml('[[mic488]]\nname = "a"\nline = "l"\n[[line]]\nname = "l"\n')
-    world.outside(do.Set((("a", "IN3", 1.0),)))
-    world.outside(do.SetFault(read("crc nth=3 link=script")))
+    world.apply_input(do.Set((("a", "IN3", 1.0),)))
+    world.apply_input(do.SetFault(read("crc nth=3 link=script")))
     world.line["l"].send(b"\x01")
     world.run(for_=0.5)
     path = tmp_path / "s.json"

@@ -77,7 +77,7 @@ def test_the_directory_belongs_to_one_world_until_it_is_closed(tmp_path: Path) -
 def test_an_eeprom_lasts_and_is_run_at_power_on(tmp_path: Path) -> None:
     """What the host stores is there when the chip is switched on again: position 100 without a word on the line."""
     with _begin(tmp_path, CHIP, '[world]\nstate = "memory"') as world:
-        world.outside(Send("bus", b"[\rF\rA40\rW\r]\r"))
+        world.apply_input(Send("bus", b"[\rF\rA40\rW\r]\r"))
         world.run(for_="3 s")
         image = world.m1486["loader"].chip.image
         assert image
@@ -134,9 +134,9 @@ def test_a_save_that_failed_fails_in_the_replay_too(kind: str, tmp_path: Path, m
         world.run(for_="1 s")
         with monkeypatch.context() as disk:
             disk.setattr(os, "fsync", full)
-            world.outside(save)
+            world.apply_input(save)
             world.run(for_="3 s")
-        world.outside(save)
+        world.apply_input(save)
         world.run(for_="3 s")
         session = sessions.session_of(world)
         sessions.save(session, tmp_path / "s.json")

@@ -70,7 +70,7 @@ class Program:
     def send(self, data: bytes) -> None:
         os.write(self.file, data)
 
-    async def receive(self, count: int, seconds: float = 5.0) -> bytes:
+    async def receive(self, count: int, seconds: float = 60.0) -> bytes:
         """``count`` bytes, or what has come when the time is over."""
         data = b""
         deadline = time.monotonic() + seconds
@@ -136,7 +136,7 @@ def test_a_program_that_left_echo_on_does_not_spoil_the_line_for_the_next(tmp_pa
 
 async def left(link: PtyLink) -> None:
     """Let the link notice that nobody has the line open."""
-    for _ in range(20):
+    for _ in range(50):
         await asyncio.sleep(0.001)
 
 
@@ -220,10 +220,10 @@ def test_a_program_that_never_reads_does_not_stop_the_loop(tmp_path: Path) -> No
 def test_nobody_there_costs_nothing(tmp_path: Path) -> None:
     async def play(link: PtyLink) -> float:
         before = time.process_time()
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.5)
         return time.process_time() - before
 
-    assert on_link(tmp_path / "line", play) < 0.03
+    assert on_link(tmp_path / "line", play) < 0.2
 
 
 # ---------------------------------------------------------------------- the path

@@ -47,7 +47,7 @@ class Adapter:
     async def ask(self, request: bytes, count: int) -> bytes:
         os.write(self.wire, request)
         data = b""
-        deadline = time.monotonic() + 5.0
+        deadline = time.monotonic() + 60.0
         while len(data) < count and time.monotonic() < deadline:
             try:
                 data += os.read(self.wire, count - len(data))

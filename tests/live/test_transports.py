@@ -15,7 +15,7 @@ from steptwin.live import ptys
 from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.rfc2217 import TwinLine
-from steptwin.live.transports import TRANSPORTS, Opened, Opening
+from steptwin.live.transports import TRANSPORTS, LinkArguments, OpenLink
 from steptwin.mic488.device import Mic488Device
 from steptwin.wire.slave import RtuSlavePort
 from steptwin.world.kinds import line_kinds
@@ -29,10 +29,12 @@ INPUTS_ANSWER = bytes.fromhex("01020100A188")
 SET_BAUD = bytes((255, 251, 44, 255, 250, 44, 1, 0, 0, 0x25, 0x80, 255, 240))  # RFC 2217: WILL COM-PORT-OPTION, 9600 bit/s
 
 
-def opened(run: Run, make_cell: Make, key: str, where: str, play: Callable[[Opened], Any], **changes: Any) -> Any:
+def opened(run: Run, make_cell: Make, key: str, where: str, play: Callable[[OpenLink], Any], **changes: Any) -> Any:
     async def scene() -> Any:
         cell, device = make_cell()
-        opening = Opening(where=where, make_port=lambda: RtuSlavePort({1: device}), line=TwinLine(), cell=cell, clients=Clients())
+        opening = LinkArguments(
+            where=where, make_port=lambda: RtuSlavePort({1: device}), line=TwinLine(), cell=cell, clients=Clients()
+        )
         found = await TRANSPORTS[key].open(replace(opening, **changes))
         try:
             return await play(found)
@@ -43,7 +45,7 @@ def opened(run: Run, make_cell: Make, key: str, where: str, play: Callable[[Open
     return run(scene())
 
 
-async def asked(found: Opened, request: bytes, count: int) -> bytes:
+async def asked(found: OpenLink, request: bytes, count: int) -> bytes:
     host, _, port = found.place.rpartition(":")
     reader, writer = await asyncio.open_connection(host, int(port))
     writer.write(request)
@@ -60,7 +62,7 @@ def test_there_is_one_for_every_key_and_lines_name_no_others() -> None:
 
 @pytest.mark.parametrize("key", [key for key, transport in TRANSPORTS.items() if transport.is_address])
 def test_those_that_listen_say_where_and_answer_there(run: Run, make_cell: Make, key: str) -> None:
-    async def play(found: Opened) -> tuple[str, dict[str, Any], bytes]:
+    async def play(found: OpenLink) -> tuple[str, dict[str, Any], bytes]:
         return found.place, dict(found.details), await asked(found, INPUTS, len(INPUTS_ANSWER))
 
     place, details, answer = opened(run, make_cell, key, "127.0.0.1:0", play)
@@ -70,7 +72,7 @@ def test_those_that_listen_say_where_and_answer_there(run: Run, make_cell: Make,
 
 @pytest.mark.parametrize("key", [key for key, transport in TRANSPORTS.items() if transport.is_address])
 def test_those_that_listen_need_permission_for_other_networks(run: Run, make_cell: Make, key: str) -> None:
-    async def play(found: Opened) -> str:
+    async def play(found: OpenLink) -> str:
         return found.place
 
     with pytest.raises(Misuse, match="is not a loopback address"):
@@ -81,7 +83,7 @@ def test_those_that_listen_need_permission_for_other_networks(run: Run, make_cel
 def test_settings_of_a_network_serial_port_are_compared_with_the_line(run: Run, make_cell: Make) -> None:
     notices: list[str] = []
 
-    async def play(found: Opened) -> None:
+    async def play(found: OpenLink) -> None:
         await asked(found, SET_BAUD + INPUTS, 3 + 9 + len(INPUTS_ANSWER))
 
     opened(run, make_cell, "rfc2217", "127.0.0.1:0", play, line=TwinLine(lambda: 38400, False, notices.append))
@@ -93,7 +95,7 @@ def test_settings_of_a_network_serial_port_are_compared_with_the_line(run: Run, 
 def test_a_pseudo_terminal_is_a_path(run: Run, make_cell: Make, tmp_path: Path) -> None:
     path = tmp_path / "line"
 
-    async def play(found: Opened) -> tuple[str, object, bool]:
+    async def play(found: OpenLink) -> tuple[str, object, bool]:
         return found.place, found.details, path.is_symlink()
 
     assert opened(run, make_cell, "pty", str(path), play) == (str(path), {"path": str(path)}, True)
@@ -102,14 +104,14 @@ def test_a_pseudo_terminal_is_a_path(run: Run, make_cell: Make, tmp_path: Path) 
 def test_a_system_without_pseudo_terminals(run: Run, make_cell: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ptys, "HAS_PTYS", False)
 
-    async def play(found: Opened) -> None: ...
+    async def play(found: OpenLink) -> None: ...
 
     with pytest.raises(Misuse, match=r"they exist on Linux and macOS only; use TCP, RTU over TCP or a network serial port"):
         opened(run, make_cell, "pty", str(tmp_path / "line"), play)
 
 
 def test_a_serial_port_has_the_rate_of_its_line(run: Run, make_cell: Make) -> None:
-    async def play(found: Opened) -> None: ...
+    async def play(found: OpenLink) -> None: ...
 
     with pytest.raises(LineFailure, match="cannot open serial port /dev/none at 4800 bit/s"):
         opened(run, make_cell, "serial", "/dev/none", play, line=TwinLine(lambda: 4800))

@@ -15,7 +15,8 @@ from steptwin.machine import MILLISECOND, Port
 from steptwin.mic488.present import state_of
 from steptwin.mic488.vision import uses_vision
 from steptwin.wire.crc import crc16
-from steptwin.world.small import LINE, Whole, mic488_world
+from steptwin.world.kinds.mic488.small import mic488_world
+from steptwin.world.small import LINE, Whole
 
 #: Copies each new record, with the number of records before it in $I0.
 PICK = """\

@@ -23,8 +23,8 @@ from steptwin.live.world_frames import follow_frames
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection, TcpSlavePort
-from steptwin.words.frames import FrameLine
 from steptwin.world import script as do
 from steptwin.world.actions import Bytes, See
 from steptwin.world.faults import Faults, FaultyPort

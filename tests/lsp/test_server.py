@@ -37,7 +37,7 @@ def open_text(client: LanguageClient, uri: str, text: str, language: str = "") -
 async def diagnostics(client: LanguageClient, uri: str) -> list[str]:
     """The codes that are pushed next for a text."""
     while True:
-        await asyncio.wait_for(client.wait_for_notification(lsp.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS), 20)
+        await asyncio.wait_for(client.wait_for_notification(lsp.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS), 60)
         if uri in client.diagnostics:
             return [str(found.code) for found in client.diagnostics.pop(uri)]
 

@@ -149,6 +149,13 @@ def test_m_12_a_label_that_has_left_the_ring_is_out_of_reach() -> None:
     assert codes("L3\n" + "R\n" * 106 + "E", A) == ["M122"]
 
 
+def test_m_12_a_file_may_have_overwritten_a_label_before_it_unless_it_does_not_fit_at_all() -> None:
+    before = "@1\n" + "R\n" * 100
+    assert codes(before + "[\n" + "R\n" * 6 + "J1\n]", A) == []  # 106 * 8 + 16 = 864 bits
+    assert codes(before + "[\n" + "R\n" * 7 + "J1\n]", A) == ["M122"]
+    assert codes("[\n@1\n" + "R\n" * 107 + "J1\n]", A) == codes("[\n" + "R\n" * 109 + "]", A)
+
+
 # ---------------------------------------------------------------------- interpretations
 
 
@@ -233,6 +240,9 @@ def test_g_counts_from_a_counter_below_0_only_where_the_position_is_known() -> N
         # There and back: each turn of the loop begins with its D.
         ("L2\nd\nr\nE\ng640", []),
         ("L3\nd\nr\nE\ng640", ["M221"]),
+        # Six turns of a loop in a loop, each of which begins with its D.
+        ("L2\nL3\nd\nr\nE\nE\ng640", ["M203"]),
+        ("L3\nL3\nd\nr\nE\nE\ng640", ["M203", "M221"]),
     ],
 )
 def test_g_counts_from_what_all_paths_lead_to(text: str, found: list[str]) -> None:

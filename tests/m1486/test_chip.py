@@ -247,6 +247,13 @@ def test_a_chip_with_ram_can_be_switched_on_with_a_program() -> None:
     assert bench.finish() == b"\x41"
 
 
+def test_an_image_for_another_type_runs_up_to_what_this_one_does_not_have() -> None:
+    """Labels go up to 15 on an A, and to 80 on a B."""
+    bench = Bench("A", image=image("B", "u4", "j20", "u4"))
+    assert bench.finish() == b"\0"
+    assert bench.wrong == ["wrong data: J20 is out of range: permitted is 1 to 15; the program stops"]
+
+
 # ---------------------------------------------------------------------- shutdown
 
 

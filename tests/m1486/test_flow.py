@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from steptwin.m1486.commands import find
 from steptwin.m1486.flow import Settings, defaults, follow
 from steptwin.m1486.lines import STEP_DIRECTION
-from steptwin.m1486.structure import Stream, streams
+from steptwin.m1486.structure import CommandStream, streams
 from steptwin.m1486.syntax import JumpCondition, parse
 from steptwin.m1486.variants import variant
 
@@ -44,7 +44,7 @@ def after(key: str, number: int, state: Settings, chance: random.Random) -> Sett
     return state._replace(variable=results[key] % 2**24)
 
 
-def walk(stream: Stream, chance: random.Random) -> Iterator[tuple[int, Settings]]:
+def walk(stream: CommandStream, chance: random.Random) -> Iterator[tuple[int, Settings]]:
     """One way through the program: lines, readings and registers by chance; ends where the chip would stop."""
     at, state, home = 0, defaults(B, STEP_DIRECTION)._replace(variable=0), -1
     left: dict[int, int] = {}
@@ -94,7 +94,7 @@ def test_every_walk_is_foreseen(first: list[str], second: list[str], third: list
             )
 
 
-def flow_of(text: str) -> tuple[Stream, dict[int, set[Settings]]]:
+def flow_of(text: str) -> tuple[CommandStream, dict[int, set[Settings]]]:
     (stream,) = streams(parse(text).program)
     return stream, follow(stream, B, STEP_DIRECTION).states
 

@@ -9,9 +9,10 @@ from held import held
 from m1486_rig import Bench, seconds
 
 from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.encoding import decode
 from steptwin.m1486.program import BURST, BURST_NS
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.machine import MILLISECOND
 
 
 def sends(*lines: str, kind: str = "B", **options: Any) -> bytes:
@@ -249,41 +250,43 @@ def test_a_reset_ends_holding() -> None:
 # ---------------------------------------------------------------------- hooks
 
 
-def test_a_hook_is_told_of_every_command_and_changes_nothing() -> None:
+def test_a_hook_is_called_before_every_command_and_changes_nothing() -> None:
     lines = (":58", "l3", "+2", "i87h1", "e", "@1", "u4", "f", "w5")
     plain = Bench()
     plain.file(*lines)
     plain.finish()
     watched = Bench()
-    told: list[tuple[int, int, str]] = []
-    watched.chip.program.watch(lambda now, place, command: told.append((now, place, str(command))))
+    chip, called = watched.chip, list[tuple[int, str]]()
+
+    def hook(now: int, place: int) -> None:
+        found = decode(chip.memory.fetch(place))
+        called.append((now, "" if found is None else str(found.command)))
+
+    chip.program.hook(hook)
     watched.file(*lines)
     watched.finish()
-    assert [command for _, _, command in told] == [":58", "L3", *["+2", "I87H1", "E"] * 3, "U4", "F", "W5"]
-    assert [now for now, _, _ in told] == [n * MILLISECOND for n in range(len(told))]
-    assert watched.chip.events == plain.chip.events
-    watched.chip.program.watch(None)
-    assert watched.chip.snapshot().state == plain.chip.snapshot().state
+    assert [command for _, command in called] == [":58", "L3", *["+2", "I87H1", "E"] * 3, "U4", "F", "W5"]
+    assert [now for now, _ in called] == [n * MILLISECOND for n in range(len(called))]
+    assert chip.events == plain.chip.events
+    chip.program.unhook(hook)
+    assert chip.snapshot().state == plain.chip.snapshot().state
 
 
-def test_a_hook_can_halt_the_program_before_a_command() -> None:
+def test_several_hooks_are_called_in_their_order_until_they_are_taken_away() -> None:
     bench = Bench()
-    breakpoint_at = 4
-    bench.chip.program.watch(lambda _now, place, _command: place == breakpoint_at)
-    bench.file(":7", "u4", "u4", "j1", "@1")
-    assert bench.run(1.0) == b""
-    assert bench.chip.program.is_halted
-    assert bench.chip.program.pc == breakpoint_at
-    bench.chip.resume(2 * SECOND)
-    assert bench.finish() == b"\x07\x07"
+    called: list[str] = []
 
+    def first(_now: int, place: int) -> None:
+        called.append(f"first {place}")
 
-def test_single_steps() -> None:
-    bench = Bench()
-    bench.chip.program.watch(lambda _now, _place, _command: True)
-    bench.file("+1", "+1", "+1")
-    seen = []
-    for _ in range(4):
-        seen.append(bench.variable)
-        bench.chip.resume(bench.now + SECOND)
-    assert seen == [0, 1, 2, 3]
+    def second(_now: int, place: int) -> None:
+        called.append(f"second {place}")
+
+    bench.chip.program.hook(first)
+    bench.chip.program.hook(second)
+    bench.file("+1")
+    bench.finish()
+    bench.chip.program.unhook(first)
+    bench.send("+1")
+    bench.finish()
+    assert [name.split()[0] for name in called] == ["first", "second", "second"]

@@ -15,6 +15,11 @@ from steptwin.machine import SECOND
 from steptwin.motion.waveforms import CHARACTERISTICS, currents
 
 
+def test_times_of_chapter_4() -> None:
+    """Step pulse width 1,8 µs; data valid to Strobe transition 960 ns."""
+    assert (STEP_PULSE_NS, DATA_VALID_NS) == (1800, 960)
+
+
 def test_step_gives_one_pulse_for_each_microstep() -> None:
     bench = Bench()
     bench.do("m8", "v1000", "f6400", "r")

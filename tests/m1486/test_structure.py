@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from steptwin.m1486.structure import File, Stream, streams
+from steptwin.m1486.structure import CommandStream, File, streams
 from steptwin.m1486.syntax import parse
 
 
-def only_stream(text: str) -> Stream:
+def only_stream(text: str) -> CommandStream:
     (stream,) = streams(parse(text).program)
     return stream
 

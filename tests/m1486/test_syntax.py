@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from steptwin.diagnostics import Fix, Span
-from steptwin.m1486.syntax import Command, JumpCondition, ProgramLine, ProgramText, format_program, parse, parse_line
+from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram, ProgramLine, format_program, parse, parse_line
 from steptwin.m1486.variants import Variant, variant
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ def test_any_text_is_read_and_survives_print(text: str) -> None:
 
 
 def test_equality_is_about_meaning_not_place() -> None:
-    assert parse("F640").program == parse("  f 640").program == ProgramText((ProgramLine(Command("F", 640)),))
+    assert parse("F640").program == parse("  f 640").program == ParsedProgram((ProgramLine(Command("F", 640)),))
     assert parse("I2H3").program != parse("I2L3").program
 
 

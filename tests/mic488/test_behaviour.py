@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from mic488_rig import WORDS, Rig, word_pdu
 
-from steptwin.mic488.behaviour import BEHAVIOUR, Behaviour, Bit, OfAxis, OfDevice, checked
+from steptwin.mic488.behaviour import BEHAVIOUR, AxisBehaviour, Behaviour, Bit, DeviceBehaviour, checked
 from steptwin.mic488.registermap import MapRow, Space, Type
 from steptwin.mic488.registers import ROWS
 from steptwin.tables import IncompleteTable
@@ -30,30 +30,34 @@ def _write(*_: object) -> None: ...
     ("row", "behaviour", "message"),
     [
         (_row("ACC"), None, "register NEW lacks its behaviour"),
-        (None, OfDevice(_read), "behaviour of NEW: there is no such register"),
-        (_row("EN"), OfAxis(write=_write), "register NEW needs the behaviour Bit, not OfAxis"),
-        (_row("ACC"), OfDevice(_read, _write), "register NEW needs the behaviour OfAxis, not OfDevice"),
-        (_row("DATA_TYPE"), OfAxis(_read, write=_write), "register NEW needs the behaviour OfDevice, not OfAxis"),
+        (None, DeviceBehaviour(_read), "behaviour of NEW: there is no such register"),
+        (_row("EN"), AxisBehaviour(write=_write), "register NEW needs the behaviour Bit, not AxisBehaviour"),
+        (_row("ACC"), DeviceBehaviour(_read, _write), "register NEW needs the behaviour AxisBehaviour, not DeviceBehaviour"),
+        (
+            _row("DATA_TYPE"),
+            AxisBehaviour(_read, write=_write),
+            "register NEW needs the behaviour DeviceBehaviour, not AxisBehaviour",
+        ),
         (_row("IN"), Bit(), "register NEW (BIT, reads (2,), writes ()) lacks its read"),
         (_row("OUT"), Bit(_read), "register NEW (BIT, reads (1,), writes (5,)) lacks its write"),
-        (_row("DATA_TYPE"), OfDevice(_read), "register NEW (WORD, reads (3,), writes (6,)) lacks its write"),
-        (_row("DATA_TYPE"), OfDevice(write=_write), "register NEW (WORD, reads (3,), writes (6,)) lacks its read"),
-        (_row("STATUS"), OfAxis(), "register NEW (WORD, reads (3,), writes ()) lacks its read"),
-        (_row("ACC"), OfAxis(_read, write=_write), "register NEW (REAL/DINT, reads (3,), writes (16,)) lacks its read_p"),
-        (_row("ACC"), OfAxis(_read, _read), "register NEW (REAL/DINT, reads (3,), writes (16,)) lacks its write"),
+        (_row("DATA_TYPE"), DeviceBehaviour(_read), "register NEW (WORD, reads (3,), writes (6,)) lacks its write"),
+        (_row("DATA_TYPE"), DeviceBehaviour(write=_write), "register NEW (WORD, reads (3,), writes (6,)) lacks its read"),
+        (_row("STATUS"), AxisBehaviour(), "register NEW (WORD, reads (3,), writes ()) lacks its read"),
+        (_row("ACC"), AxisBehaviour(_read, write=_write), "register NEW (REAL/DINT, reads (3,), writes (16,)) lacks its read_p"),
+        (_row("ACC"), AxisBehaviour(_read, _read), "register NEW (REAL/DINT, reads (3,), writes (16,)) lacks its write"),
         (
             _row("STATUS"),
-            OfAxis(_read, write=_write),
+            AxisBehaviour(_read, write=_write),
             "register NEW (WORD, reads (3,), writes ()) has a write that its row does not permit",
         ),
         (
             _row("HOME"),
-            OfAxis(_read, write=_write),
+            AxisBehaviour(_read, write=_write),
             "register NEW (REAL/DINT, reads (), writes (16,)) has a read that its row does not permit",
         ),
         (
             _row("ENC_IMP"),
-            OfAxis(_read, _read, _write),
+            AxisBehaviour(_read, _read, _write),
             "register NEW (DINT, reads (3,), writes (16,)) has a read_p that its row does not permit",
         ),
     ],

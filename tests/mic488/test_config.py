@@ -348,7 +348,11 @@ def test_utf_16_is_read_and_written_back(mark: bytes, encoding: str) -> None:
 )
 def test_a_binary_file_is_named_once(data: bytes) -> None:
     file = IniFile.parse(data)
-    assert [(f.code, f.message) for f in file.findings] == [("C004", "the file is not text")]
+    assert [(f.code, f.severity, f.message, f.hint) for f in file.findings] == [
+        ("C004", Severity.ERROR, "the file is not text", "save it as ANSI or UTF-8")
+    ]
+    (span,) = (f.span for f in file.findings)
+    assert file.source.text[span.start : span.end] == "\0"
     assert file.to_bytes() == data
 
 
@@ -415,6 +419,7 @@ def test_a_new_key_joins_its_section_with_the_file_s_line_ends() -> None:
 def test_a_new_section_goes_to_the_end() -> None:
     assert parse("[A]\nx=1").with_value("B", "y", "2").to_bytes() == b"[A]\nx=1\n[B]\ny=2\n"
     assert parse("").with_value("B", "y", "2").to_bytes() == b"[B]\r\ny=2\r\n"
+    assert parse(";").with_value("B", "y", "2").to_bytes() == b";\r\n[B]\r\ny=2\r\n"
     assert IniFile.parse(b"\xef\xbb\xbf").with_value("B", "y", "2").to_bytes() == b"\xef\xbb\xbf[B]\r\ny=2\r\n"
     assert parse("[B]\n\n[C]\n").with_value("b", "y", "2").to_bytes() == b"[B]\ny=2\n\n[C]\n"
 

@@ -11,10 +11,12 @@ from pathlib import Path
 
 from sheets import sheet_lines
 
+from steptwin.datasheet import Condition, EventSeverity
 from steptwin.mic488.config import UNITS, AxisConfig, ControllerConfig
 from steptwin.mic488.datasheet import datasheet, datasheet_of
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, FIRMWARES
+from steptwin.mic488.status import AxisStatus
 
 GOLDEN = Path(__file__).parent / "golden" / "datasheet.txt"
 LATEST, *OLDER = reversed(tuple(FIRMWARES))
@@ -63,6 +65,29 @@ def test_units_are_those_of_the_configuration() -> None:
     ]  # fmt: skip
     for path, unit in (("M2.position", "mm"), ("M4.velocity", "degree/s"), ("M1.position", "imp"), ("M4_POS_ACT", "degree")):
         assert sheet.point(path).unit == unit
+
+
+def test_each_value_of_a_status_has_its_condition() -> None:
+    sheet = datasheet_of(LATEST)
+    for path in ("status", "M1.status"):
+        point = sheet.point(path)
+        assert set(point.conditions) == set(point.values)
+    conditions = sheet.point("M1.status").conditions
+    assert {
+        value.name: conditions[value] for value in (AxisStatus.OFF, AxisStatus.HOMING, AxisStatus.ERROR, AxisStatus.LIMIT_L)
+    } == {
+        "OFF": Condition.OFF,
+        "HOMING": Condition.MOVING,
+        "ERROR": Condition.ERROR,
+        "LIMIT_L": Condition.WARNING,
+    }
+
+
+def test_events_say_how_grave_they_are() -> None:
+    events = {event.code: event for event in datasheet_of(LATEST).events}
+    assert (events["homed"].severity, events["homed"].stops_motor) == (EventSeverity.INFORMATION, None)
+    assert (events["limit"].severity, events["limit"].stops_motor) == (EventSeverity.WARNING, True)
+    assert (events["position-error"].severity, events["overrun"].stops_motor) == (EventSeverity.ALARM, False)
 
 
 if __name__ == "__main__":

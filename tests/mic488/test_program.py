@@ -250,15 +250,24 @@ def test_a_snapshot_in_the_middle_of_any_statement_goes_on_elsewhere() -> None:
         assert other.axes[0].coordinate_p(end) == ahead.axes[0].coordinate_p(end)
 
 
-def test_a_snapshot_belongs_to_the_contents_of_the_banks() -> None:
-    rig = programmed(BUSY)
+def test_a_snapshot_brings_the_contents_of_the_banks() -> None:
+    """Also pickled, where programs have to be made again from their texts; positions have the rows that they had."""
+    text = "MOVEPTP @B\nLOOP:\nDELAY 100\nJUMP LOOP\n"
+    rig = programmed(text, "A;1;x;x;x\nB;2;x;x;x\n")
+    rig.device.load_positions(0, parse_positions("B;7;x;x;x\nA;8;x;x;x\n")[0])
     rig.start()
+    rig.wait(0.5)
     snapshot = rig.device.snapshot()
-    other = programmed(COUNTER)
-    with pytest.raises(Misuse, match="other programs or positions in its banks"):
-        other.device.restore(snapshot)
-    other.load(BUSY)
-    other.device.restore(snapshot)
+    for copy in (snapshot, pickle.loads(pickle.dumps(snapshot))):
+        other = programmed(COUNTER)
+        other.start()
+        other.device.restore(copy)
+        control = other.device.program
+        assert control.contents() == rig.device.program.contents()
+        assert control.statement(other.device.now) == rig.device.program.statement(rig.device.now)
+        assert control.positions[0].rows[1].values[0] == 8.0
+        assert control.programs[0].steps == rig.device.program.programs[0].steps
+        other.device.restore(copy)
 
 
 def test_controllers_share_a_program_and_nothing_else() -> None:

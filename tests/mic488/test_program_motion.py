@@ -360,6 +360,19 @@ def test_an_arc_stays_within_a_pulse_and_ends_exactly(x: int, y: int, more: floa
     assert (rig.position(1), rig.position(2)) == end
 
 
+def test_a_soft_limit_that_is_moved_out_of_the_way_leaves_an_arc_as_it_is() -> None:
+    def moment_and_place(*, moves: bool) -> tuple[float, float, float]:
+        rig = ready(f"{ON}MOVETOCIRC @A\nWAITPOS\nOUT2 = ON\nDOCIRC @A\n{DONE}", "A;50;0;10;90\n")
+        rig.pin_until("OUT2", 1.0)
+        rig.wait(0.1)
+        if moves:
+            rig.set("POSLIM_R", 1000.0, 1)
+            rig.set("POSLIM_L", -1000.0, 2)
+        return rig.pin_until("OUT1", 1.0), rig.position(1), rig.position(2)
+
+    assert moment_and_place(moves=True) == moment_and_place(moves=False)
+
+
 def test_an_arc_ends_on_a_soft_limit() -> None:
     rig = ready(f"{ON}LimRM2 = 8\nMOVETOCIRC @A\nWAITPOS\nDOCIRC @A\n{DONE}", "A;50;0;10;180\n")
     rig.pin_until("OUT1", 1.0)

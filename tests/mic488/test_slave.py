@@ -420,6 +420,15 @@ def test_a_position_beyond_the_counter_is_refused(value: float) -> None:
     assert rig.exception(rig.set_pdu("POS_ACT", -2147483648.0)) == 0
 
 
+@pytest.mark.parametrize(("gear", "last", "beyond"), [(32767.0, 65538.0, 65539.0), (32767.5, 65536.0, 65537.0)])
+def test_mic_14_a_position_is_rounded_before_it_is_compared_with_the_counter(gear: float, last: float, beyond: float) -> None:
+    """65537 x 32767.5 is half a pulse beyond the last position, and the next whole one is outside."""
+    rig = Rig(controller(AxisConfig(gear=gear)))
+    for sign in (1.0, -1.0):
+        assert rig.exception(rig.set_pdu("POS_ABS", sign * last)) == 0
+    assert rig.exception(rig.set_pdu("POS_ABS", beyond)) == ILLEGAL_VALUE
+
+
 def test_quantities_that_outgrow_their_register_show_its_limit() -> None:
     rig = Rig(controller(AxisConfig(gear=1e-6, acc=1e9)))
     rig.use_dint()

@@ -94,7 +94,7 @@ class Master:
         position, velocity = (self.real(words[at : at + 2]) for at in (2 * axis - 2, 2 * axis + 6))
         return Sample(before, after, position, velocity, status)
 
-    def follow(self, axis: int, *statuses: int, seconds: float = 10.0) -> list[Sample]:
+    def follow(self, axis: int, *statuses: int, seconds: float = 60.0) -> list[Sample]:
         """Samples of an axis while its status is one of these, and one more."""
         deadline = time.monotonic() + seconds
         samples = [self.sample(axis)]
@@ -110,7 +110,7 @@ def connect() -> Iterator[Callable[..., Master]]:
     with ExitStack() as stack:
 
         def open_(port: int, unit: int = 1) -> Master:
-            client = ModbusTcpClient("127.0.0.1", port=port, timeout=5, retries=0)
+            client = ModbusTcpClient("127.0.0.1", port=port, timeout=60, retries=0)
             assert client.connect()
             stack.callback(client.close)
             return Master(client, unit)

@@ -31,6 +31,7 @@ int main(int argc, char **argv) {
     modbus_mapping_t *map = modbus_mapping_new(7000, 6000, 12000, 0);
     unsigned char query[MODBUS_TCP_MAX_ADU_LENGTH];
     modbus_set_slave(ctx, 1);
+    modbus_set_byte_timeout(ctx, 60, 0);
     if (tcp) {
         struct sockaddr_in where;
         socklen_t size = sizeof where;

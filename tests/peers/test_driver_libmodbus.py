@@ -72,7 +72,7 @@ def address(program: str, request: pytest.FixtureRequest) -> Iterator[str]:
 
 
 def test_a_session(address: str) -> None:
-    with Mic488(address, timeout_s=5.0) as mic:
+    with Mic488(address, timeout_s=60.0) as mic:
         assert mic.firmware == "1.70"
         mic.enable(1, 2)
         assert mic.status().axes == (1, 1, 0, 0)
@@ -96,7 +96,7 @@ def test_a_session(address: str) -> None:
 
 def test_a_session_of_several_tasks(address: str) -> None:
     async def main() -> None:
-        async with AsyncMic488(address, timeout_s=5.0) as mic:
+        async with AsyncMic488(address, timeout_s=60.0) as mic:
             await mic.enable()
 
             async def use(axis: int) -> None:
@@ -115,7 +115,7 @@ def test_it_is_found_again_after_the_connection_was_closed(program: str) -> None
         slave = stack.enter_context(subprocess.Popen([program, "tcp", "-"], stdout=subprocess.PIPE, text=True))
         stack.callback(slave.kill)
         assert slave.stdout is not None
-        mic = Mic488(f"tcp://127.0.0.1:{slave.stdout.readline().strip()}", timeout_s=5.0)
+        mic = Mic488(f"tcp://127.0.0.1:{slave.stdout.readline().strip()}", timeout_s=60.0)
         for _ in range(3):
             with mic:
                 assert len(mic.positions()) == 4

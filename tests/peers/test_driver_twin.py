@@ -26,7 +26,7 @@ def place(twin: Any, way: str) -> str:
 
 @pytest.mark.parametrize("way", ["pty", "rtu-tcp"])
 def test_a_session(serve: Callable[..., Any], way: str) -> None:
-    with Mic488(place(serve("--demo"), way), timeout_s=5.0) as mic:
+    with Mic488(place(serve("--demo"), way), timeout_s=60.0) as mic:
         mic.enable(1, 2)
         mic.axis(1).set_ramp(acc=1000.0, dec=1000.0, velocity=100.0)
         mic.axis(1).move_to(5.0)
@@ -44,7 +44,7 @@ def test_a_session_of_tasks(serve: Callable[..., Any]) -> None:
     twin = serve("--demo")
 
     async def main() -> None:
-        async with AsyncMic488(place(twin, "tcp"), timeout_s=5.0) as mic:
+        async with AsyncMic488(place(twin, "tcp"), timeout_s=60.0) as mic:
             await mic.enable()
             await asyncio.gather(*(mic.axis(n).set_ramp(acc=1000.0, dec=1000.0, velocity=100.0) for n in (1, 2, 3, 4)))
 
@@ -71,7 +71,7 @@ def test_two_controllers_and_two_threads_on_one_line(serve: Callable[..., Any]) 
             failed.append(error)
 
     with ModbusLine(place(twin, "pty")) as line:
-        drivers = [Mic488(line, unit, timeout_s=5.0) for unit in (1, 2)]
+        drivers = [Mic488(line, unit, timeout_s=60.0) for unit in (1, 2)]
         for mic in drivers:
             mic.open()
         threads = [threading.Thread(target=use, args=(mic, 100 + mic.unit)) for mic in drivers]
@@ -102,7 +102,7 @@ def test_a_client_that_is_killed_leaves_the_axis_stopping(serve: Callable[..., A
             assert client.stdout.readline() == "\n"
         client.send_signal(signal.SIGKILL)
         client.wait()
-    with Mic488(place(twin, "tcp"), observe=True, timeout_s=5.0) as mic:
+    with Mic488(place(twin, "tcp"), observe=True, timeout_s=60.0) as mic:
         killed_at = mic.axis(1).position()
         assert killed_at > 0.0
         end = mic.axis(1).wait(check=False)

@@ -27,14 +27,14 @@ def three_axes(
 def test_three_axes_arrive(three_axes: str, serve: Callable[..., Any], way: str) -> None:
     twin = serve("--demo")
     where = str(twin.tcp_port) if way == "tcp" else str(twin.pty)
-    run = subprocess.run([three_axes, way, where], capture_output=True, text=True, check=False, timeout=30)
+    run = subprocess.run([three_axes, way, where], capture_output=True, text=True, check=False, timeout=100)
     assert run.returncode == 0, run.stderr
     polls = [[axis.split() for axis in line.split("  ")] for line in run.stdout.splitlines()]
     positions = [[float(position) for _, position in poll] for poll in polls]
-    assert positions[-1] == [4.25, 8.5, -2.5]
+    assert positions[-1] == [42.5, 85.0, -7.5]
     assert {status for poll in polls for status, _ in poll} == {"3", "4"}
     for one, two in pairwise(positions):
         assert one[0] <= two[0]
         assert one[1] <= two[1]
         assert one[2] >= two[2]
-    assert len({tuple(poll) for poll in positions}) > 10
+    assert len({tuple(poll) for poll in positions}) > 3

@@ -32,7 +32,7 @@ def test_two_chips_over_a_pty(serve_m1486: Serve) -> None:
         assert [chip.wait().position for chip in chips] == [200.0, 200.0]
         chips[1].run(-1)
         chips[1].stop()
-        assert chips[1].wait(5.0, check=False).reason is ChipReason.STOPPED
+        assert chips[1].wait(60.0, check=False).reason is ChipReason.STOPPED
         assert chips[1].position() < 200.0
         chips[0].move_by(20000.0)
         chips[0].stop()
@@ -49,7 +49,7 @@ def test_a_download_for_asyncio_over_tcp(serve_m1486: Serve, tmp_path: Path) -> 
             chip = AsyncM1486(line)
             await chip.open()
             await chip.download("[\nf640\nl3\nr\ne\n]\n")
-            assert (await chip.wait(20.0)).reason is ChipReason.DONE
+            assert (await chip.wait(60.0)).reason is ChipReason.DONE
             assert await chip.counter() == 1920
 
     asyncio.run(main())

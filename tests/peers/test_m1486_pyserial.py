@@ -19,7 +19,7 @@ Serve = Callable[..., Any]
 
 @contextmanager
 def opened(twin: Any, baud: int) -> Generator[serial.Serial]:
-    with serial.Serial(str(twin.pty), baudrate=baud, timeout=20) as port:
+    with serial.Serial(str(twin.pty), baudrate=baud, timeout=60) as port:
         yield port
 
 

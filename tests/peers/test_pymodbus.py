@@ -15,7 +15,7 @@ pytestmark = pytest.mark.peers
 
 def test_rtu_over_tcp(serve: Callable[..., Any]) -> None:
     port = serve("--demo").rtu_tcp_port
-    with ModbusTcpClient("127.0.0.1", port=port, framer=FramerType.RTU, timeout=5, retries=0) as client:
+    with ModbusTcpClient("127.0.0.1", port=port, framer=FramerType.RTU, timeout=60, retries=0) as client:
         assert not client.write_registers(100, [1, 2, 65535], device_id=1).isError()
         assert client.read_holding_registers(99, count=5, device_id=1).registers == [0, 1, 2, 65535, 0]
         refused = client.read_holding_registers(9000, count=1, device_id=1)
@@ -23,7 +23,7 @@ def test_rtu_over_tcp(serve: Callable[..., Any]) -> None:
 
 
 def test_pty(serve: Callable[..., Any]) -> None:
-    with ModbusSerialClient(str(serve("--demo").pty), baudrate=38400, timeout=5, retries=0) as client:
+    with ModbusSerialClient(str(serve("--demo").pty), baudrate=38400, timeout=60, retries=0) as client:
         assert not client.write_coil(6001, True, device_id=1).isError()
         assert client.read_coils(6000, count=8, device_id=1).bits == [False, True, *[False] * 6]
         assert not client.write_register(1999, 7, device_id=1).isError()
@@ -35,7 +35,7 @@ def test_asynchronous_clients_at_once(serve: Callable[..., Any]) -> None:
     port = serve("--demo").tcp_port
 
     async def work(number: int) -> list[list[int]]:
-        client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=10, retries=0)
+        client = AsyncModbusTcpClient("127.0.0.1", port=port, timeout=60, retries=0)
         assert await client.connect()
         seen = []
         for turn in range(10):
@@ -53,8 +53,8 @@ def test_asynchronous_clients_at_once(serve: Callable[..., Any]) -> None:
 
 def test_several_units_on_every_link(serve: Callable[..., Any]) -> None:
     twin = serve("--units", "1,2,5")
-    tcp = ModbusTcpClient("127.0.0.1", port=twin.tcp_port, timeout=5, retries=0)
-    line = ModbusSerialClient(str(twin.pty), baudrate=38400, timeout=5, retries=0)
+    tcp = ModbusTcpClient("127.0.0.1", port=twin.tcp_port, timeout=60, retries=0)
+    line = ModbusSerialClient(str(twin.pty), baudrate=38400, timeout=60, retries=0)
     with tcp, line:
         for unit in (1, 2, 5):
             assert not tcp.write_register(0, 100 + unit, device_id=unit).isError()

@@ -51,7 +51,7 @@ def ser2net(require_peer: Callable[[str], str], tmp_path: Path) -> Iterator[Call
 
 def connected(address: str) -> Mic488:
     """A driver, as soon as somebody listens and answers there."""
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60.0
     while True:
         mic = Mic488(address, timeout_s=2.0)
         try:
@@ -68,7 +68,7 @@ def connected(address: str) -> Mic488:
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")
 def test_pyserial_sees_a_port(serve: Callable[..., Any]) -> None:
     twin = serve("--demo", "--rfc2217", "127.0.0.1:0")
-    with serial.serial_for_url(f"rfc2217://127.0.0.1:{network_port(twin)}", 9600, timeout=5) as port:
+    with serial.serial_for_url(f"rfc2217://127.0.0.1:{network_port(twin)}", 9600, timeout=60) as port:
         port.write(READ_POSITION)
         assert port.read(len(AT_ZERO)) == AT_ZERO
         port.baudrate = 115200
@@ -134,7 +134,7 @@ def test_chips_behind_a_port_are_talked_to_by_pyserial_and_by_our_driver(serve_m
     """They speak unasked: what U uploads comes when a move has ended."""
     twin = serve_m1486("--variant", "B", "--chain", "0,7", "--rfc2217", "127.0.0.1:0")
     address = f"rfc2217://127.0.0.1:{network_port(twin)}"
-    with serial.serial_for_url(address, 4800, timeout=20) as port:
+    with serial.serial_for_url(address, 4800, timeout=60) as port:
         port.write(b"x7\rf16320\rr\ru1\r")
         assert port.read(1) == bytes([16320 & 0xFF])
     with M1486Line(address) as line:
@@ -148,10 +148,10 @@ def test_chips_behind_a_port_are_talked_to_by_pyserial_and_by_our_driver(serve_m
 
 def opened(address: str) -> serial.Serial:
     """The port, as soon as somebody listens there."""
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60.0
     while True:
         try:
-            return serial.serial_for_url(address, 9600, timeout=5)
+            return serial.serial_for_url(address, 9600, timeout=60)
         except serial.SerialException:
             if time.monotonic() > deadline:
                 raise

@@ -21,7 +21,7 @@ static void check(int outcome, const char *what) {
 
 int main(int argc, char **argv) {
   const float vmax[AXES] = {60.0f, 80.0f, 100.0f};
-  const float target[AXES] = {4.25f, 8.5f, -2.5f};
+  const float target[AXES] = {42.5f, 85.0f, -7.5f};
   uint16_t words[2 * AXES];
   modbus_t *bus;
 
@@ -32,6 +32,8 @@ int main(int argc, char **argv) {
     bus = modbus_new_rtu(argv[2], 38400, 'N', 8, 1);
   if (bus == NULL) return 2;
   check(modbus_set_slave(bus, 1), "slave");
+  check(modbus_set_response_timeout(bus, 60, 0), "time-out");
+  check(modbus_set_byte_timeout(bus, 60, 0), "time-out");
   check(modbus_connect(bus), "connect");
 
   for (int axis = 0; axis < AXES; axis++) check(modbus_write_bit(bus, COIL_EN + axis, 1), "Mx_EN");

@@ -18,9 +18,11 @@ from steptwin.live.cell import Cell
 from steptwin.live.links import Feed
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
-from steptwin.m1486.chip import EVENTS_KEPT
+from steptwin.m1486.events import EVENTS_KEPT
 from steptwin.wire.crc import crc16
-from steptwin.world.small import LINE, Whole, m1486_world, mic488_world
+from steptwin.world.kinds.m1486.small import m1486_world
+from steptwin.world.kinds.mic488.small import mic488_world
+from steptwin.world.small import LINE, Whole
 
 REQUESTS = 1_000_000
 PIECES = 150_000

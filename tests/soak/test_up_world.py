@@ -48,7 +48,7 @@ def grown(work: Callable[[], None], times: int) -> int:
 
 def live_world(*, keep_inputs: bool = False) -> LiveWorld:
     text = (EXAMPLES / "feeder.toml").read_text().replace('timing = "real"', 'timing = "off"')
-    files = {path.name: path.read_bytes() for path in EXAMPLES.iterdir() if path.suffix != ".toml"}
+    files = {path.name: path.read_bytes() for path in EXAMPLES.iterdir() if path.is_file() and path.suffix != ".toml"}
     return LiveWorld(World.from_toml(text, files, keep_trace=False, keep_inputs=keep_inputs))
 
 
@@ -85,7 +85,7 @@ def test_answers_that_scripts_do_not_fetch_are_dropped() -> None:
     live = live_world()
     step = do.Write((("table", "USER_REGISTER[10]", 1.0),))
     for _ in range(scaled(REQUESTS // 10)):
-        live.outside(step)
+        live.apply_input(step)
         live.advance(live.now + 20 * MILLISECOND)
     line = live.world.lines["bus"]
     assert isinstance(line, ModbusBus)
@@ -112,7 +112,7 @@ def test_a_recorded_session_is_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(live_world_module, "MOST_INPUT_BYTES", 10_000)
     live = live_world(keep_inputs=True)
     for _ in range(40):
-        live.outside(Bytes("chips", "raw-1", "raw", b" " * 1000))
+        live.apply_input(Bytes("chips", "raw-1", "raw", b" " * 1000))
     assert len(live.session().inputs) == 10
 
 

@@ -44,6 +44,9 @@ WORLD = """
     address = 7
 """
 
+FILES: dict[str, str] = {}
+"""Those that it names."""
+
 
 class Process:
     """``steptwin studio`` on free ports, with a small world, ``--demo`` with the demo machine; ``--itself`` without a file."""
@@ -54,6 +57,8 @@ class Process:
         world = directory / "hall.toml"
         world.write_text(describe_demo(free_ports=True) if "--demo" in options else WORLD)
         shutil.copy(FOLDER / "demo.prg", directory)
+        for name, text in FILES.items():
+            (directory / name).write_text(text)
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(directory), "TERM": "dumb"}
         self._opened = ExitStack()
         self._err = (directory / "err").open("w+")
@@ -87,8 +92,8 @@ class Process:
     def url(self) -> str:
         return self.end_points["http"]["url"].rstrip("/")
 
-    def connect(self, **options: Any) -> ClientConnection:
-        return self._opened.enter_context(connect(f"{self.url.replace('http', 'ws', 1)}/ws", max_size=None, **options))
+    def connect(self, path: str = "/ws", **options: Any) -> ClientConnection:
+        return self._opened.enter_context(connect(f"{self.url.replace('http', 'ws', 1)}{path}", max_size=None, **options))
 
     def end(self) -> None:
         """As Ctrl-C does; nothing may be left behind and nothing complained about."""

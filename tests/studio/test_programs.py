@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tests.support.studio_rig import VIEWER, Studio
+from tests.support.studio_rig import ENGINEER, OPERATOR, VIEWER, Studio
+
+from steptwin.world import script as do
 
 WORLD = """
     [world]
@@ -31,15 +33,21 @@ def test_texts_are_listed_with_the_line_of_the_one_that_runs() -> None:
     studio = Studio(WORLD, files=FILES)
     tab = studio.open()
     listed = tab.ok("programs")
-    assert [(one["machine"], one["place"], one["name"], one["language"]) for one in listed] == [
+    assert [(one["machine"], one["place"], one["name"], one["language"]) for one in listed if not one["empty"]] == [
         ("table", "program 0", "a.prg", "wbc"),
         ("table", "program 2", "b.prg", "wbc"),
         ("table", "positions 0", "p.csv", "csv"),
     ]
-    assert [(one["running"], one["line"]) for one in listed] == [(False, None)] * 3
+    assert [one["place"] for one in listed if one["empty"]] == [
+        *(f"program {bank}" for bank in (1, 3, 4, 5)),
+        *(f"positions {bank}" for bank in range(1, 6)),
+        "program",
+    ]
+    assert not any(one["running"] or one["line"] for one in listed)
     tab.ok("program", machine="table", action="start")
     studio.run(200)
-    assert [(one["running"], one["line"]) for one in tab.ok("programs")] == [(True, 2), (False, None), (False, None)]
+    assert [one["place"] for one in tab.ok("programs") if one["running"]] == ["program 0"]
+    assert tab.ok("program_text", machine="table", place="program 0")["line"] == 2
     tab.ok("program", machine="table", action="pause")
     studio.run(2000)
     paused = tab.ok("programs")[0]
@@ -63,15 +71,35 @@ def test_a_text_of_a_chip_runs_only_while_it_is_what_is_stored() -> None:
     studio.run(200)
     text = tab.ok("program_text", machine="drum", place="program")
     assert (text["language"], text["running"], text["line"]) == ("m1486", True, None)
-    studio.world.m1486["drum"].chip.image = b""
+    for step in (b"k\r", b"\\\r", b"w3000\r"):
+        studio.world.apply_input(do.Send("chips", step))
+    studio.run(100)
+    assert studio.world.m1486["drum"].chip.program.ready > studio.world.now
     assert tab.ok("program_text", machine="drum", place="program")["running"] is False
 
 
 def test_a_text_that_is_not_there_is_named_with_those_that_are() -> None:
     tab = Studio(WORLD, files=FILES).open()
-    assert tab.error("program_text", machine="drum", place="program") == (
+    assert tab.error("program_text", machine="drum", place="program 0") == (
         "misuse",
-        "drum was given no text 'program': texts are none",
+        "drum has no place 'program 0' for a program: places are program",
     )
-    assert tab.error("program_text", machine="table", place="x")[1].endswith("texts are program 0, program 2, positions 0")
+    assert "places are program 0, program 1, " in tab.error("program_text", machine="table", place="x")[1]
     assert tab.error("program_text", machine="x", place="x") == ("misuse", "there is no controller 'x': there are table, drum")
+
+
+def test_an_engineer_downloads_a_program_and_the_log_has_it() -> None:
+    studio = Studio(WORLD, files=FILES, tokens=True)
+    operator = studio.open(token=OPERATOR)
+    fields = {"machine": "table", "place": "program 0", "text": "$R4 = 7\nEND\n"}
+    assert operator.error("download", **fields)[0] == "refusal"
+    tab = studio.open(token=ENGINEER)
+    tab.ok("download", **fields)
+    tab.ok("program", machine="table", action="start")
+    studio.run(200)
+    assert tab.ok("read", points=["table.USER_REGISTER[4]:real"])[0]["value"] == 7.0
+    text = tab.ok("program_text", machine="table", place="program 0")
+    assert (text["text"], text["name"], text["diagnostics"]) == (fields["text"], "a.prg", [])
+    entry = tab.ok("audit")[0]
+    assert (entry["do"], entry["viewer"], entry["outcome"]) == ("download", "piotr (viewer 1)", "refusal")
+    assert [entry["do"] for entry in tab.ok("audit") if entry["outcome"] == "done"][:2] == ["download", "program"]

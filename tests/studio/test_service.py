@@ -26,6 +26,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
 from steptwin.machine import MILLISECOND
+from steptwin.subject.dispatch import LONGEST_REQUEST
 
 Start = Callable[..., Process]
 
@@ -51,7 +52,7 @@ class Page:
         assert "ok" in answer, answer
         return answer["ok"]
 
-    def next(self, timeout: float = 30.0) -> dict[str, Any]:
+    def next(self, timeout: float = 60.0) -> dict[str, Any]:
         message = json.loads(self.socket.recv(timeout))
         check_message(message)
         if "seq" in message:
@@ -125,7 +126,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Any:
         ("/api/do/move", b"[1]", 400, "a body is an object of JSON"),
         ("/api/do/move", b"[" * 60_000, 400, "a body is an object of JSON"),
         ("/api/do/move", b'{"do": "stop"}', 400, "no field 'do'"),
-        ("/api/do/move", b"x" * 70_000, 413, "a body has at most 65536 bytes"),
+        ("/api/do/move", b"x" * (LONGEST_REQUEST + 1), 413, f"a body has at most {LONGEST_REQUEST} bytes"),
         ("/api/do/state", b'{"machine": "tabel"}', 400, "did you mean 'table'?"),
         ("/api/do/jog", b'{"machine": "table", "axis": 2, "velocity": 1}', 409, "not enabled"),
         ("/api/do/resume", b'{"speed": "max"}', 400, "--speed max"),
@@ -281,7 +282,7 @@ def test_hostile_messages_end_in_an_error_or_the_end_of_the_connection(shared: P
             check_message(answer)
             assert answer["error"]["code"] == "misuse"
     with contextlib.closing(shared.connect()) as socket:
-        socket.send("x" * 200_000)
+        socket.send("x" * (LONGEST_REQUEST + 1))
         with pytest.raises(ConnectionClosed):
             socket.recv()
     viewer = page(shared)
@@ -356,6 +357,7 @@ def test_an_axis_stands_in_time_when_the_page_is_gone(start_studio: Start, fate:
             assert jogging.stdout.readline() == "renewed\n"
         until(lambda: watcher.ok("read", points=["table.M1.velocity"])[0]["value"] == 20.0, "the axis runs")
         jogging.send_signal(signal.SIGSTOP if fate == "stopped" else signal.SIGKILL)
+        watcher.ask("time")  # with it, what was sent before is done
         gone = int(watcher.ask("time")["time_ns"])  # no renewal comes later
         until(lambda: watcher.ok("read", points=["table.M1.velocity"])[0]["value"] == 0.0, "the axis stands")
         watcher.wait_for("leases", lambda leases: leases == [])

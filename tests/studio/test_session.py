@@ -352,7 +352,7 @@ def test_a_slow_reader_loses_the_oldest_events_and_is_told_how_many() -> None:
         tab.ok("follow", id="a", kinds=["note"], bound=100)
     seen: list[str] = []
     for n in range(1000):
-        studio.world.outside(sessions_note(n))
+        studio.world.apply_input(sessions_note(n))
         if n % 50 == 0:
             studio.run(40)
             seen += [event["note"] for one in quick.read() if "events" in one for event in one["events"]]
@@ -413,7 +413,7 @@ def test_whatever_the_fields_are_there_is_one_answer_and_nothing_breaks(name: st
     entered = Tab(STUDIO)
     entered.session.receive('{"do": "hello"}', STUDIO.now)
     for one in (Tab(STUDIO), entered):
-        answer = json.loads(one.session.receive(json.dumps({"do": name, **fields}), STUDIO.now))
+        answer = one.session.receive(json.dumps({"do": name, **fields}), STUDIO.now).result()
         check_message(answer)
         one.close()
     assert STUDIO.errors == []
@@ -423,7 +423,7 @@ def test_whatever_the_fields_are_there_is_one_answer_and_nothing_breaks(name: st
 @given(st.text() | st.binary().map(lambda data: data.decode("latin-1")))
 def test_whatever_the_text_is_there_is_one_answer(text: str) -> None:
     tab = Tab(STUDIO)
-    check_message(json.loads(tab.session.receive(text, STUDIO.now)))
+    check_message(tab.session.receive(text, STUDIO.now).result())
     assert STUDIO.errors == []
 
 
@@ -437,7 +437,7 @@ HOSTILE = [
 @pytest.mark.parametrize("text", HOSTILE, ids=lambda text: ascii(text[:16]))
 def test_hostile_messages_are_answered_with_an_error(text: str) -> None:
     tab = Tab(Studio())
-    answer = json.loads(tab.session.receive(text, 0))
+    answer: Any = tab.session.receive(text, 0).result()
     assert answer["error"]["code"] == "misuse"
     assert len(answer["error"]["message"]) < 3000
 
@@ -493,7 +493,7 @@ def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
 
 
 def rest(session: Session, studio: Studio, name: str, **fields: object) -> Any:
-    return session.answer(json.dumps({"do": name, **fields}), studio.now)
+    return session.receive(json.dumps({"do": name, **fields}), studio.now).result()
 
 
 def test_who_asks_over_rest_needs_no_hello_and_has_no_stream() -> None:

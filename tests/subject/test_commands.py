@@ -16,7 +16,7 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, plain_command, read_command
 from steptwin.subject.schema import schema
 from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS, Bytes, Leave, See
+from steptwin.world.actions import ACTIONS, Bytes, Download, Leave, See, SetVariable
 from steptwin.world.faults import read as read_fault
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "control.schema.json"
@@ -61,6 +61,10 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "stop", "machine": "a"}, command.StopAxes("a")),
     ({"do": "stop", "machine": "a", "axis": 2}, command.StopAxes("a", 2)),
     ({"do": "program", "machine": "a", "action": "start"}, command.ControlProgram("a", "start")),
+    (
+        {"do": "download", "machine": "a", "place": "program 0", "text": "END\n"},
+        Download("a", "program 0", "END\n"),
+    ),
     ({"do": "pause"}, command.Pause()),
     ({"do": "resume"}, command.Resume()),
     ({"do": "resume", "speed": 0.1}, command.Resume(0.1)),
@@ -89,8 +93,8 @@ def test_every_command_is_among_the_examples() -> None:
 
 
 def test_every_step_that_is_not_only_for_scripts_is_a_command() -> None:
-    # Bytes and Leave belong to the connections of programs, which are no commands.
-    assert {row.kind for row in COMMANDS.values()} >= set(ACTIONS) - {Bytes, Leave}
+    # Bytes and Leave belong to the connections of programs, SetVariable to debuggers; these are no commands.
+    assert {row.kind for row in COMMANDS.values()} >= set(ACTIONS) - {Bytes, Leave, SetVariable}
 
 
 @pytest.mark.parametrize(
@@ -121,7 +125,7 @@ def test_every_step_that_is_not_only_for_scripts_is_a_command() -> None:
         ("follow", {"kinds": ["plans"]}, "follow: kinds: no kind of event 'plans' (did you mean 'plan'?); there are plan, "),
         ("couple", {"machine": "a", "axis": 1, "to": "wheel"}, "couple: to: 'wheel': expected 'drive' or 'free' or 'blocked'"),
         ("request", {"line": "b", "unit": 1, "pdu": "0"}, "request: pdu: '0': expected bytes as hexadecimal digits"),
-        ("send", {"line": "b", "text": "ż"}, "send: text: 'ż' is not a character of a line, which has 8 bits for each"),
+        ("send", {"line": "b", "text": "ż"}, "send: text: 'ż' is not an 8-bit character"),
         ("fault", {"fault": "crk"}, "fault: fault: fault: kind = 'crk': permitted are"),
         ("move", {"machine": "a", "axis": 1}, "move: give either to (a position) or by (a distance)"),
         ("move", {"machine": "a", "axis": 1, "to": 1, "by": 1}, "move: give either to (a position) or by (a distance)"),

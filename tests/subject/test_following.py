@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from steptwin.motion.profile import at_rest
-from steptwin.subject.events import EdgePayload, Event, FramePayload, NotePayload, PlanPayload, StatusPayload
-from steptwin.subject.following import Followers, Following, Taken, filter_of
+from steptwin.subject.events import Event
+from steptwin.subject.following import EventBatch, Followers, Following, filter_of
+from steptwin.subject.payloads import EdgePayload, FramePayload, NotePayload, PlanPayload, StatusPayload
 
 EDGE = EdgePayload("IN1", 1.0)
 
@@ -18,8 +19,8 @@ def test_events_come_in_order_and_once() -> None:
     following = followers.follow(filter_of(), 10)
     followers.publish(event(1))
     followers.publish(event(2))
-    assert following.take() == Taken(0, [event(1), event(2)])
-    assert following.take() == Taken(0, [])
+    assert following.take() == EventBatch(0, [event(1), event(2)])
+    assert following.take() == EventBatch(0, [])
 
 
 def test_beyond_the_bound_the_oldest_are_dropped_and_counted() -> None:
@@ -27,9 +28,9 @@ def test_beyond_the_bound_the_oldest_are_dropped_and_counted() -> None:
     slow, quick = followers.follow(filter_of(), 2), followers.follow(filter_of(), 10)
     for number in range(5):
         followers.publish(event(number))
-    assert slow.take() == Taken(3, [event(3), event(4)])
-    assert slow.take() == Taken(0, [])
-    assert quick.take() == Taken(0, [event(number) for number in range(5)])
+    assert slow.take() == EventBatch(3, [event(3), event(4)])
+    assert slow.take() == EventBatch(0, [])
+    assert quick.take() == EventBatch(0, [event(number) for number in range(5)])
 
 
 def test_part_of_what_waits_can_be_taken() -> None:
@@ -37,7 +38,7 @@ def test_part_of_what_waits_can_be_taken() -> None:
     following = followers.follow(filter_of(), 3)
     for number in range(4):
         followers.publish(event(number))
-    assert following.take(2) == Taken(1, [event(1), event(2)])
+    assert following.take(2) == EventBatch(1, [event(1), event(2)])
     assert len(following) == 1
 
 
@@ -89,4 +90,4 @@ def test_closed_followers_get_nothing_more_and_nobody_is_followed_then() -> None
 def test_what_was_lost_on_its_way_is_counted() -> None:
     following = Followers().follow(filter_of(), 9)
     following.miss(3)
-    assert following.take() == Taken(3, [])
+    assert following.take() == EventBatch(3, [])

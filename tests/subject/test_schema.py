@@ -10,8 +10,8 @@ import jsonschema_rs
 import pytest
 
 from steptwin import World
-from steptwin.subject.events import KINDS
 from steptwin.subject.following import filter_of
+from steptwin.subject.payloads import KINDS
 from steptwin.subject.schema import definitions
 from steptwin.subject.shapes import shape
 from steptwin.subject.world import WorldSubject

@@ -18,9 +18,9 @@ from steptwin.subject.commands import (
     State,
     TakeSnapshot,
 )
-from steptwin.subject.events import PlanPayload, RestoredPayload
 from steptwin.subject.following import filter_of
 from steptwin.subject.motion import Motions
+from steptwin.subject.payloads import PlanPayload, RestoredPayload
 from steptwin.subject.snapshots import MOST_SNAPSHOTS
 from steptwin.subject.world import WorldSubject
 from steptwin.world.script import Note, Set

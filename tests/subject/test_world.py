@@ -20,14 +20,16 @@ from steptwin.motion.divisions import profile_of
 from steptwin.motion.plain import read_plan
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.contract import read_description
+from steptwin.subject.contract import ElementPart, SignalPart, read_description
+from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import respond
-from steptwin.subject.events import Event, FramePayload, InputPayload, PlanPayload
+from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
+from steptwin.subject.payloads import FramePayload, InputPayload, PlanPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes
+from steptwin.world.actions import Bytes, Download
 from steptwin.world.faults import read as read_fault
 from steptwin.world.faults.kinds import KINDS
 
@@ -153,7 +155,7 @@ def test_what_is_not_there_is_misuse_and_changes_nothing() -> None:
 
 
 def test_what_a_world_in_virtual_time_cannot_do_is_refused_with_what_it_can() -> None:
-    with pytest.raises(Refusal, match=r"^save cannot be done here; what can: describe, read, pins"):
+    with pytest.raises(Refusal, match=r"^save is not supported here; supported are describe, read, pins"):
         of(small()).do(command.Save("/tmp/x.json"))
 
 
@@ -228,26 +230,26 @@ def test_nobody_who_follows_costs_nothing() -> None:
 def test_frames_are_followed_on_connections_that_are_there_and_where_nothing_is_recorded() -> None:
     world = feeder()
     subject = of(world)
-    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
     world.stop_recording()
     following = subject.follow(filter_of(["frame"], ["bus"]), 99)
-    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
     frames = [plain for event in following.take().events if (plain := event.payload.plain())["client"] == "tcp-1"]
     assert frames[0] == {"client": "tcp-1", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"}
     assert [frame["direction"] for frame in frames] == ["in", "out"]
     following.close()
-    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     assert following.take().events == []
 
 
 def test_bytes_that_belong_to_no_frame_are_counted_among_the_frames() -> None:
     world = feeder()
     following = of(world).follow(filter_of(["frame"], ["bus"]), 99)
-    world.outside(Bytes("bus", "tcp-1", "rtu", b"\x55\x55\x55"))
+    world.apply_input(Bytes("bus", "tcp-1", "rtu", b"\x55\x55\x55"))
     world.run(for_=5)
-    world.outside(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
+    world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
     frames = [event.payload.plain() for event in following.take().events]
     rubbish = [str(frame["words"]).split(maxsplit=1) for frame in frames if not frame["data"]]
@@ -259,7 +261,7 @@ def test_frames_of_chips_are_lines_and_characters() -> None:
     text = "[[m1486]]\nname = 'drum'\nline = 'bus'\naddress = 7\n[[line]]\nname = 'bus'\nkind = 'm1486'\n"
     world = World.from_toml(text)
     following = of(world).follow(filter_of(["frame"]), 99)
-    world.outside(Bytes("bus", "tcp-1", "raw", b"X7\rU3\r"))
+    world.apply_input(Bytes("bus", "tcp-1", "raw", b"X7\rU3\r"))
     world.run(for_=1)
     assert [event.payload.plain() for event in following.take().events] == [
         {"client": "tcp-1", "direction": "in", "data": b"X7\r".hex(), "words": "X7  indeX 7"},
@@ -333,6 +335,7 @@ def test_every_line_has_an_answer(line: bytes) -> None:
     assert respond(lambda wanted, _: subject.do(wanted), line, fail)["error"]
 
 
+TEXTS = ("$R0 = 5\nDELAY 100\n", "A;1;2;3;4\n", "f640\nr\n", "[\nw100\n]\n", "x1\n")
 DEEDS = st.one_of(
     st.builds(command.Advance, duration=st.integers(0, 2 * SECOND)),
     st.builds(command.Advance, duration=st.just(SECOND), until=st.sampled_from(["x.position < 110", "drum.moving"])),
@@ -351,6 +354,9 @@ DEEDS = st.one_of(
     st.builds(do.Expect, st.sampled_from(["table.IN8", "idle"])),
     st.builds(do.SetFault, st.sampled_from(["crc nth=2", "no-answer"]).map(read_fault)),
     st.builds(do.ClearFault, st.sampled_from(["crc", "no-answer"])),
+    st.builds(command.ControlProgram, st.just("table"), st.sampled_from(["start", "pause", "stop"])),
+    st.builds(Download, st.just("table"), st.sampled_from(["program 0", "positions 1"]), st.sampled_from(TEXTS)),
+    st.builds(Download, st.just("drum"), st.just("program"), st.sampled_from(TEXTS)),
     st.builds(command.ReadPins),
     st.builds(command.State, st.sampled_from(["table", "drum"])),
     st.tuples(st.just("bus"), st.sampled_from([READ_POSITION, READ_POSITION[:3], b"\0"])),
@@ -367,7 +373,7 @@ def test_any_interleaving_of_commands_bytes_and_scripts_replays_to_the_same_dige
     for deed in deeds:
         if isinstance(deed, tuple) and len(deed) == 2 and deed[0] in ("bus", "chips"):
             line, data = deed
-            world.outside(Bytes(line, "tcp-1", world.lines[line].kinds[0], data))
+            world.apply_input(Bytes(line, "tcp-1", world.lines[line].kinds[0], data))
             continue
         try:
             subject.do(deed)
@@ -446,6 +452,7 @@ def test_an_m1486_is_commanded_by_what_its_host_types() -> None:
             r"microstep: F16000064 is out of range: permitted is 1 to",
         ),
         (command.Move("lift", 1, by=7.0), "distance 7 microstep: no multiple of"),
+        (command.Move("lift", 1, by=0.0), "distance 0 microstep: F0 is out of range: permitted is 1 to"),
         (command.Move("lift", 2, by=640.0), "no axis 2: an M1486 has one, 1"),
         (command.Jog("lift", 1, 640.0), "velocity 640 microstep/s, V10: V10 is out of range: permitted is 16 to"),
         (command.Home("lift", 1, 5.0), "'lift' is an M1486, which cannot do home; it can do move, jog, stop"),
@@ -492,8 +499,21 @@ def test_the_description_has_the_geometry_of_axes() -> None:
         pulses_per_unit = 10
     """
     x, dial = of(World.from_toml(text)).description.axes
-    assert (x.kind, x.travel) == ("linear", (-5.0, 90.0))
+    assert (x.kind, x.travel, x.pulses_per_unit) == ("linear", (-5.0, 90.0), 10.0)
     assert [(one.pin, one.low, one.high, one.period) for one in x.switches] == [
         ("a.IN1", None, -1.0, None), ("a.IN2", 80.0, None, None), ("a.IN3", 3.0, 5.0, 20.0),
     ]  # fmt: skip
     assert (dial.kind, dial.travel, dial.switches) == ("rotary", None, ())
+
+
+def test_elements_are_described_with_terminals_and_signals() -> None:
+    world = World.from_toml(
+        '[[mic488]]\nname = "a"\n[[button]]\nname = "b"\nto = "both.in2"\n[[cylinder]]\nname = "clamp"\nextend = "a.OUT1"\n'
+        'stroke = 40.0\n[[gate]]\nname = "both"\nkind = "and"\ninputs = 2\n[[wire]]\nfrom = "clamp.extended"\nto = "both.in1"\n'
+    )
+    description = describe(world)
+    assert description.elements == (
+        ElementPart("both", "gate", ("in1", "in2"), ("out",), ()),
+        ElementPart("clamp", "cylinder", ("extend",), ("extended", "retracted"), (SignalPart("position", "mm", 0.0, 40.0),)),
+    )
+    assert read_description(json.loads(json.dumps(description.plain()))) == description

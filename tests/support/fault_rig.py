@@ -9,7 +9,7 @@ from steptwin.wire.gateway import Gateway, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
-from steptwin.world.faults import Active, Faults, FaultyPort, LineProtocol, read, rig
+from steptwin.world.faults import ActiveFault, Faults, FaultyPort, LineProtocol, read, rig
 from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.kinds.mic488.faults import Mic488Body
 from steptwin.world.trace import TraceRecord
@@ -81,7 +81,7 @@ class FaultRig:
     def device(self) -> Mic488Device:
         return next(iter(self.devices.values()))
 
-    def add(self, *faults: str) -> list[Active]:
+    def add(self, *faults: str) -> list[ActiveFault]:
         self.kernel.advance(self.now)
         added = [self.faults.add(read(fault), self.now) for fault in faults]
         self.kernel.settle()

@@ -192,7 +192,7 @@ def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchan
     observer = None
     if log is not None:
         frames = FrameWords(tcp=wire.tcp)
-        frames.sinks.append(lambda heard: log.append(f"{heard.direction.value if heard.direction else '?'} {heard.meaning}"))
+        frames.sinks.append(lambda frame: log.append(f"{frame.direction.value if frame.direction else '?'} {frame.meaning}"))
         notes["frames"] = frames
         observer = frames.observe
     discipline = TcpMaster("memory", on_frame=observer) if wire.tcp else RtuMaster(on_frame=observer)

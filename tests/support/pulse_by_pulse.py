@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan
-from steptwin.world.course import Build, Standing
+from steptwin.world.course import Build, MechanicalState
 
 
 def changes(plan: Plan, after: Nanos, until: Nanos) -> list[tuple[Nanos, int]]:
@@ -20,9 +20,9 @@ def changes(plan: Plan, after: Nanos, until: Nanos) -> list[tuple[Nanos, int]]:
         found.append((now, plan.count(now)))
 
 
-def pulse_by_pulse(build: Build, plan: Plan, standing: Standing, begin: Nanos, until: Nanos) -> list[tuple[Nanos, int, int]]:
+def pulse_by_pulse(build: Build, plan: Plan, state: MechanicalState, begin: Nanos, until: Nanos) -> list[tuple[Nanos, int, int]]:
     """(moment, rotor, load) after every pulse: each pushes the rotor, stops hold it, it pushes the load."""
-    rotor, load = standing[:2]
+    rotor, load = state[:2]
     count = plan.count(begin)
     low = None if build.low is None else build.low - build.play
     way = [(begin, rotor, load)]

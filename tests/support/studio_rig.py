@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from textwrap import dedent
 from typing import Any
 
@@ -12,15 +13,19 @@ import jsonschema_rs
 from steptwin.access.audit import Audit
 from steptwin.access.control import Viewer
 from steptwin.access.roles import Role
-from steptwin.access.tokens import Gate, Token
+from steptwin.access.tokens import AccessGate, Token
+from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.hub import Hub, Moment, Surroundings
 from steptwin.studio.jogs import WorldJogs
+from steptwin.studio.looking import Lookback
 from steptwin.studio.schema import schema
 from steptwin.studio.session import Session
+from steptwin.studio.shown import Shown
+from steptwin.studio.shownworld import ShownWorld
 from steptwin.subject.world import WorldSubject
-from steptwin.world.programtexts import WorldPrograms
+from steptwin.world.programtexts import WorldPrograms, configuration_text
 
 WORLD = """
     [world]
@@ -74,25 +79,50 @@ def check_answer(name: str, message: dict[str, Any]) -> None:
         ANSWERS[name].validate(message["ok"])
 
 
+class NoConnections:
+    """To devices."""
+
+    async def ports(self) -> Sequence[Mapping[str, object]]:
+        return ({"address": "/dev/ttyUSB0", "what": "serial port"},)
+
+    async def connect(self, address: str, name: str | None) -> str:
+        raise Refusal(f"no device is at {address}")
+
+    async def disconnect(self, machine: str) -> None:
+        raise Misuse(f"no device is called {machine!r}; there is none")
+
+
 class Studio:
     """The world, its hub and time."""
 
-    def __init__(self, text: str = WORLD, *, tokens: bool = False, files: Mapping[str, bytes] | None = None) -> None:
+    def __init__(
+        self,
+        text: str = WORLD,
+        *,
+        tokens: bool = False,
+        files: Mapping[str, bytes] | None = None,
+        lookback: Callable[[Studio], Lookback] | None = None,
+    ) -> None:
         self.world = World.from_toml(dedent(text), files)
         self.subject = WorldSubject(self.world)
         self.jogs = WorldJogs(self.subject)
         self.speed = 1.0
         self.errors: list[Exception] = []
-        gate = Gate(TOKENS) if tokens else Gate(open_to=Role.ENGINEER)
+        gate = AccessGate(TOKENS) if tokens else AccessGate(open_to=Role.ENGINEER)
         around = Surroundings(
             moment=lambda: Moment(self.world.now, running=True, speed=self.speed),
             gate=gate,
             audit=Audit(lambda: "2026-01-01T00:00:00Z"),
             program="0",
             programs=WorldPrograms(self.world),
+            configuration=partial(configuration_text, self.world),
+            lookback=None if lookback is None else lookback(self),
+            connections=NoConnections(),
             on_internal=self.errors.append,
         )
-        self.hub = Hub(self.subject, self.jogs, around)
+        world = ShownWorld(self.subject, self.subject.followers, self.jogs)
+        shown = Shown(world, lambda: self.world.now, self.subject.numbering)
+        self.hub = Hub(shown, shown, around)
         self.now: Nanos = 5 * SECOND
         """Of the wall clock."""
         self.tabs: list[Tab] = []
@@ -143,7 +173,7 @@ class Tab:
     def ask(self, name: str, /, **fields: object) -> dict[str, Any]:
         self._id += 1
         text = json.dumps({"do": name, "id": self._id, **fields})
-        answer = json.loads(self.session.receive(text, self.studio.now))
+        answer = json.loads(json.dumps(self.session.receive(text, self.studio.now).result()))
         check_answer(name, answer)
         assert answer["id"] == fields.get("id", self._id)
         return answer

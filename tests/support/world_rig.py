@@ -12,7 +12,9 @@ from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.machine import Nanos
 from steptwin.world.actions import Bytes
-from steptwin.world.small import LINE, Whole, m1486_world, mic488_world
+from steptwin.world.kinds.m1486.small import m1486_world
+from steptwin.world.kinds.mic488.small import mic488_world
+from steptwin.world.small import LINE, Whole
 from steptwin.world.trace import Trace
 
 SMALL = """
@@ -91,7 +93,7 @@ def mic488_run() -> Run:
     machine, line = world.mic488["m"], world.line[LINE]
 
     def ask(pdu: bytes) -> None:
-        world.outside(Bytes(LINE, "tcp-1", "tcp", b"\0\1\0\0" + (len(pdu) + 1).to_bytes(2, "big") + b"\1" + pdu))
+        world.apply_input(Bytes(LINE, "tcp-1", "tcp", b"\0\1\0\0" + (len(pdu) + 1).to_bytes(2, "big") + b"\1" + pdu))
         assert line.received("tcp-1")[7] == pdu[0]
 
     def put(key: str, value: float, axis: int) -> None:

@@ -80,7 +80,7 @@ def test_virtual_time_gives_the_same_each_time(run: Run) -> None:
             axis.enable()
             axis.home(-10.0)
             axis.wait()
-            stories.append((mic488.time, mic488.story(), mic488.faults))
+            stories.append((mic488.time, mic488.log(), mic488.faults))
             assert mic488.faults[0].happened > 0
             assert stories[0] == stories[-1]
     """).assert_outcomes(passed=2)

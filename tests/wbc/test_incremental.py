@@ -75,6 +75,18 @@ def test_a_name_that_cannot_be_a_variable_is_refused_everywhere() -> None:
     assert [d.code for d in check("sin = 3\nOUT1 = 1\nsin = 4\nsin = 5\nEND\n").diagnostics] == ["W103"] * 3
 
 
+def test_a_name_that_means_something_else_now_is_looked_up_again() -> None:
+    """Table and setup stay, so that steps are kept."""
+    edited = Edited()
+    for value in ("60", "70", "OUT3", "bad word"):
+        text = f"#speed {value}\nSET x = speed + 1\nOUT1 = x\n"
+        edited.update(text)
+        found, _ = edited.check(TABLE, SETUP, DIALECT)
+        whole = check(text, TABLE, SETUP, DIALECT)
+        assert (found.diagnostics, found.executable) == (whole.diagnostics, whole.executable)
+        assert found.program == whole.program
+
+
 def test_only_changed_lines_are_read_again() -> None:
     edited = Edited()
     edited.update("x = 1\nOUT1 = x\nDELAY x\n")

@@ -92,6 +92,22 @@ def test_two_ends_joined(new_bank: NewBank, request_: Request) -> None:
     assert answer(request_, replies[-1][1:-2]) == expected
 
 
+@pytest.mark.parametrize("said", range(12))
+@pytest.mark.parametrize("has", [2, 4, 6])
+def test_a_write_with_a_wrong_number_of_bytes_is_the_same_whole_and_in_pieces(new_bank: NewBank, said: int, has: int) -> None:
+    """The values look like the number of bytes that there are."""
+    frame = with_crc(bytes.fromhex("01 10 00 00 00 01") + bytes((said,)) + bytes((has,)) * has)
+
+    def outcome(pieces: list[bytes]) -> tuple[list[bytes], list[object], list[int]]:
+        bank = new_bank()
+        port = RtuSlavePort({1: bank})
+        answers = [answer for piece in pieces if (answer := port.exchange(piece, 0))]
+        answers += [answer for _, answer in port.to_send(GAP)]
+        return answers, bank.executed, bank.registers[:8]
+
+    assert outcome([frame]) == outcome([bytes((byte,)) for byte in frame])
+
+
 def test_a_refusal_of_the_device_reaches_the_master(bank: Any) -> None:
     with pytest.raises(ModbusException) as refusal:
         over_rtu(RtuSlavePort({1: bank}), 1, ReadRequest(3, 2999, 2))

@@ -9,7 +9,7 @@ from pulse_by_pulse import changes, pulse_by_pulse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import Microstepping, step_train
-from steptwin.world.course import Build, Course, Standing
+from steptwin.world.course import Build, Course, MechanicalState
 
 END = 20 * SECOND
 
@@ -64,14 +64,14 @@ def test_what_is_lost_at_a_stop_is_a_whole_number_of_electrical_periods(
     plan = there_and_back(first, second)
     build = Build(sign=sign, low=stops[0], high=stops[1], period_p=period)
     behind = sign * plan.count(plan.start)
-    course = Course(build, plan, plan.start, Standing(0, 0, behind=behind))
+    course = Course(build, plan, plan.start, MechanicalState(0, 0, behind=behind))
     found = []
     way = pressed(build, plan, END)
     for moment, _, _ in way:
-        standing = course.at(moment)
-        found.append((moment, standing.rotor, standing.behind))
-        assert (standing.behind - behind) % period == 0
-        assert stops[0] <= standing.rotor <= stops[1]
+        state = course.at(moment)
+        found.append((moment, state.rotor, state.behind))
+        assert (state.behind - behind) % period == 0
+        assert stops[0] <= state.rotor <= stops[1]
     assert found == way
     # What comes after it is the same whether the way is taken in one course or begun again in the middle.
     middle = SECOND + (END - SECOND) // 40
@@ -85,7 +85,7 @@ def test_homing_against_a_stop_ends_up_to_two_full_steps_from_it() -> None:
     for more in range(64):
         build = Build(high=60, period_p=64)
         out = plan_position(MotionState(0, 0, 0.0, 0.0), 1000 + more, 4000.0, 4000.0, 1000.0)
-        course = Course(build, out, 0, Standing(0, 0))
+        course = Course(build, out, 0, MechanicalState(0, 0))
         pressed_at = course.at(10 * SECOND)
         assert 60 - 32 <= pressed_at.rotor <= 60
         back = plan_position(MotionState(10 * SECOND, 1000 + more, 0.0, 0.0), 800 + more, 4000.0, 4000.0, 1000.0)
@@ -117,14 +117,14 @@ def test_rotor_and_load_are_where_a_simulation_has_them(
     plan = there_and_back(first, second)
     low, high = stops or (None, None)
     build = Build(sign=sign, zero=0, low=low, high=high, play=play)
-    standing = Standing(0, 0)
-    course = Course(build, plan, plan.start, standing)
-    way = pulse_by_pulse(build, plan, standing, plan.start, END)
+    state = MechanicalState(0, 0)
+    course = Course(build, plan, plan.start, state)
+    way = pulse_by_pulse(build, plan, state, plan.start, END)
     for now in sorted(looks):
         _, rotor, load = [step for step in way if step[0] <= now][-1]
         assert course.at(now)[:2] == (rotor, load)
         # What a trace is told, in the pulses of the drive.
-        _, follows, pulses = [said for said in course.carried() if said.begin <= now][-1]
+        _, follows, pulses = [said for said in course.load_pieces() if said.begin <= now][-1]
         assert (pulses + (plan.count(now) if follows else 0)) * sign == load
 
 
@@ -139,9 +139,9 @@ def test_rotor_and_load_are_where_a_simulation_has_them(
 def test_it_reaches_a_position_when_a_simulation_does(first: int, second: int, play: int, position: int, direction: int) -> None:
     plan = there_and_back(first, second)
     build = Build(low=-80, high=70, play=play)
-    standing = Standing(0, 0)
-    course = Course(build, plan, plan.start, standing)
-    way = pulse_by_pulse(build, plan, standing, plan.start, END)
+    state = MechanicalState(0, 0)
+    course = Course(build, plan, plan.start, state)
+    way = pulse_by_pulse(build, plan, state, plan.start, END)
     if (way[0][2] - position) * direction >= 0:
         return  # there already: nobody asks
     expected = next((moment for moment, _, load in way if (load - position) * direction >= 0), None)
@@ -152,17 +152,17 @@ def test_an_axis_that_is_stopped_slips_and_comes_back_at_once() -> None:
     """100 pulses against a stop at 60, then back by 30: 40 pulses are lost, and the way back begins at the stop."""
     out = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 1000.0, 1000.0, 1000.0)
     build = Build(high=60)
-    course = Course(build, out, 0, Standing(0, 0))
-    assert course.at(10 * SECOND) == Standing(60, 60, behind=40)
+    course = Course(build, out, 0, MechanicalState(0, 0))
+    assert course.at(10 * SECOND) == MechanicalState(60, 60, behind=40)
     back = plan_position(MotionState(10 * SECOND, 100, 0.0, 0.0), 70, 1000.0, 1000.0, 1000.0)
     course = Course(build, back, 10 * SECOND, course.at(10 * SECOND))
-    assert course.at(20 * SECOND) == Standing(30, 30, behind=40)
+    assert course.at(20 * SECOND) == MechanicalState(30, 30, behind=40)
 
 
 def test_the_division_of_an_m1486_is_seen() -> None:
     """Pulses of 64 units: the load stands on multiples of 64 only, and crosses 100 with the second."""
     profile = plan_position(MotionState(0, 0, 0.0, 0.0), 640, 10_000.0, 10_000.0, 1000.0)
     train = step_train(profile, 0, Microstepping(64, 64, 1e9))
-    course = Course(Build(high=300), train, 0, Standing(0, 0))
+    course = Course(Build(high=300), train, 0, MechanicalState(0, 0))
     assert course.reaches(100, 0, 1) == train.pulse_time(128, 0)
     assert course.at(10 * SECOND).load == 300

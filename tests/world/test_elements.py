@@ -89,17 +89,17 @@ def test_it_is_described_built_recorded_and_asked_for() -> None:
     assert notes == [("lit", 50 * MILLISECOND), ("dark", 200 * MILLISECOND)]
     # At the end of the move the lamp is dark in the same moment.
     assert [record.value for record in world.failures] == ["busy.lit == 1"]
-    assert world.plan.built(LAMP)["busy"].lit is False
+    assert world.parts.built(LAMP)["busy"].lit is False
 
 
 def test_its_faults_are_recorded_set_and_cleared() -> None:
     world = World.from_toml(TEXT)
     world.run(for_=0.1)
-    world.outside(SetFault(read("burnt-out element=busy name=now")))
+    world.apply_input(SetFault(read("burnt-out element=busy name=now")))
     world.run(for_=0)
     assert world.read("busy.lit") == 0.0
     assert [(record.subject, record.value) for record in world.trace.of("fault")] == [("now", "it is burnt out")]
-    world.plan.faults.remove("now", world.now)
+    world.parts.faults.remove("now", world.now)
     assert world.read("busy.lit") == 1.0
     world.run(for_=1)
     texts = [(record.time, record.value) for record in world.trace.of("fault") if record.subject == "burnt-out"]

@@ -117,8 +117,8 @@ def test_pins_that_the_driver_interface_has_are_no_inputs_and_no_outputs() -> No
     world = World.from_toml(TAKEN)
     for step in (Set((("chip", "b12", 0.0),)), SetFault(read("stuck machine=chip pin=B12 value=0"))):
         with pytest.raises(Misuse, match=said):
-            world.outside(step)
-    world.outside(Set((("chip", "B7", 0.0),)))
+            world.apply_input(step)
+    world.apply_input(Set((("chip", "B7", 0.0),)))
     assert world.read("chip.B7") == 0.0
     for more in ('[[wire]]\nfrom = "chip.B12"\nto = "chip.B1"\n', '[[button]]\nname = "b"\nto = "chip.B12"\n'):
         with pytest.raises(Misuse, match=said):

@@ -32,9 +32,9 @@ def test_the_next_request_goes_a_pause_after_the_answer_to_the_one_before() -> N
     assert (master.asked, master.finished, master.deadline()) == (2, 0, MILLISECOND)
     master.answered(b"a", 100)
     assert (master.finished, master.deadline()) == (1, 105)
-    master.look(104)
+    master.update(104)
     assert line.sent == [(0, b"A")]
-    master.look(105)
+    master.update(105)
     assert line.sent == [(0, b"A"), (105, b"B")]
 
 
@@ -44,9 +44,9 @@ def test_a_request_without_an_answer_is_given_up_and_what_comes_late_is_nobodys(
     master.wanted |= {1, 2}
     master.ask(b"A", 100, 0)
     master.ask(b"B", 100, 50)
-    master.look(99)
+    master.update(99)
     assert master.finished == 0
-    master.look(100)
+    master.update(100)
     assert (master.finished, master.unanswered, line.sent[-1]) == (1, 1, (100, b"B"))
     master.answered(b"b", 150)
     master.answered(b"late", 151)
@@ -70,7 +70,7 @@ def test_a_state_in_the_middle_goes_on_elsewhere() -> None:
     other.master.set_state(one.master.copy_state())
     for line in (one, other):
         line.master.answered(b"a", 20)
-        line.master.look(25)
+        line.master.update(25)
         line.master.answered(b"b", 30)
     assert other.master.copy_state() == one.master.copy_state()
     assert other.sent == one.sent[1:] == [(25, b"B")]
@@ -80,5 +80,5 @@ def test_requests_that_come_faster_than_the_line_answers_are_refused_in_the_end(
     line = Line()
     for _ in range(MOST_WAITING + 1):
         line.master.ask(b"A", 100, 0)
-    with pytest.raises(Misuse, match="10000 requests of scripts wait for this line already"):
+    with pytest.raises(Misuse, match="10000 requests of scripts are queued for this line"):
         line.master.ask(b"A", 100, 0)

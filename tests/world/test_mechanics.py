@@ -18,7 +18,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
 from steptwin.motion import MotionState, plan_position
 from steptwin.world import script as do
-from steptwin.world.course import Build, Carried, Standing
+from steptwin.world.course import Build, LoadPiece, MechanicalState
 from steptwin.world.faults import read
 from steptwin.world.kernel import Kernel
 from steptwin.world.mechanics import EncoderBuild, Mechanism
@@ -177,8 +177,8 @@ def test_faults_that_are_set_and_cleared_after_a_snapshot_are_undone_by_it() -> 
     axis.move_to(30.0)
     world.run(for_=0.5)
     before = world.snapshot()
-    world.outside(do.SetFault(read("stall name=late machine=m for_s=9")))
-    world.outside(do.ClearFault("early"))
+    world.apply_input(do.SetFault(read("stall name=late machine=m for_s=9")))
+    world.apply_input(do.ClearFault("early"))
     world.run(for_=0.25)
     after = world.snapshot()
     world.run(for_=3)
@@ -238,16 +238,16 @@ def test_a_mechanism_follows_replaced_plans_as_a_simulation_does(moves: list[tup
     build = Build(zero=5, low=-90 if stops else None, high=110 if stops else None, play=play)
     mechanism = Mechanism(kernel, "m", 1, build)
     kernel.add_part(mechanism)
-    standing, now = Standing(5, 5), 0
+    state, now = MechanicalState(5, 5), 0
     for target, pause in moves:
         motor.go(target, now)
         kernel.settle()
-        way = pulse_by_pulse(build, motor.axis.plan, standing, now, now + pause)
+        way = pulse_by_pulse(build, motor.axis.plan, state, now, now + pause)
         now += pause
         kernel.advance(now)
         motor.advance(now)
-        standing = Standing(*way[-1][1:])
-        assert mechanism.at(now)[:2] == standing[:2]
+        state = MechanicalState(*way[-1][1:])
+        assert mechanism.at(now)[:2] == state[:2]
 
 
 def test_steps_taken_away_are_lost_until_the_end() -> None:
@@ -282,7 +282,7 @@ def rigged(build: Build, **options: object) -> tuple[Kernel, Driven, Mechanism, 
 def test_an_axis_begins_within_its_stops(zero: int, is_within: bool) -> None:
     build = Build(zero=zero, low=-10, high=20)
     if is_within:
-        assert rigged(build)[2].at(0) == Standing(zero, zero)
+        assert rigged(build)[2].at(0) == MechanicalState(zero, zero)
         return
     with pytest.raises(Misuse, match=f"m axis 1 stands at {zero} imp, outside its hard stops -10 to 20 imp"):
         rigged(build)
@@ -292,7 +292,7 @@ def test_what_is_ideal_has_no_deadline_and_no_stops_either() -> None:
     kernel, drive, mechanism, told = rigged(Build(sign=-1, zero=7))
     drive.go(100, 0)
     kernel.advance(20 * SECOND)
-    assert (mechanism.at(kernel.now), mechanism.lost(kernel.now), mechanism.deadline()) == (Standing(-93, -93), 0, None)
+    assert (mechanism.at(kernel.now), mechanism.lost(kernel.now), mechanism.deadline()) == (MechanicalState(-93, -93), 0, None)
     assert [record.kind for record in told] == ["plan"]
 
 
@@ -302,7 +302,7 @@ def test_pulses_are_taken_away_as_far_as_stops_permit(taken: int) -> None:
     kernel, drive, mechanism, _ = rigged(Build(low=-30, high=120, play=5))
     drive.go(100, 0)
     kernel.advance(20 * SECOND)
-    assert mechanism.at(kernel.now) == Standing(100, 100)
+    assert mechanism.at(kernel.now) == MechanicalState(100, 100)
     mechanism.lose(taken, kernel.now)
     rotor = min(max(100 - taken, -35), 120)
     load = min(max(100, rotor), rotor + 5)
@@ -349,8 +349,8 @@ def test_the_trace_is_told_where_the_load_is_only_when_it_does_not_go_with_its_d
     held = met.pulse_time(56, 0)
     assert held is not None
     first = loads[0].value
-    assert first == (Carried(0, True, 0), Carried(held, False, 55), Carried(met.end or 0, True, -45))
-    assert all(carried == Carried(10 * SECOND, True, -45) for record in loads[1:] for carried in record.value)  # type: ignore[attr-defined]
+    assert first == (LoadPiece(0, True, 0), LoadPiece(held, False, 55), LoadPiece(met.end or 0, True, -45))
+    assert all(carried == LoadPiece(10 * SECOND, True, -45) for record in loads[1:] for carried in record.value)  # type: ignore[attr-defined]
 
 
 def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_caught() -> None:
@@ -387,7 +387,7 @@ def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
     mechanism.block(False, kernel.now)
     assert mechanism.version() != version
     kernel.advance(6 * SECOND)
-    assert mechanism.at(kernel.now) == Standing(8, 8, behind=192)
+    assert mechanism.at(kernel.now) == MechanicalState(8, 8, behind=192)
 
 
 def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None:

@@ -14,7 +14,7 @@ from steptwin.machine import SECOND
 from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
 from steptwin.motion.paths import Circular
 from steptwin.motion.ramps import SpeedCurve, plan_endless
-from steptwin.world.course import Build, Course, Standing
+from steptwin.world.course import Build, Course, MechanicalState
 from steptwin.world.motor import StepperMotor, _first_below_0, _first_not_below_0
 
 PER_REV = 3200
@@ -35,8 +35,8 @@ def motor(
     return StepperMotor(curve, inertia, friction, load, start)
 
 
-def final(build: Build, plan: Profile) -> Standing:
-    return Course(build, plan, plan.start, Standing(0, 0)).at(1000 * SECOND)
+def final(build: Build, plan: Profile) -> MechanicalState:
+    return Course(build, plan, plan.start, MechanicalState(0, 0)).at(1000 * SECOND)
 
 
 def accelerated(rate: float, speed: float = 30_000.0) -> Profile:
@@ -51,7 +51,7 @@ def test_the_acceleration_from_which_steps_are_lost_is_that_of_the_torque() -> N
     limit = 0.6 / INERTIA
     build = Build(period_p=64, motor=motor())
     below, above = accelerated(limit * 0.9999, 16_000.0), accelerated(limit * 1.0001, 16_000.0)
-    assert final(build, below) == Standing(200_000, 200_000)
+    assert final(build, below) == MechanicalState(200_000, 200_000)
     assert final(build, above).rotor < 200_000
 
 
@@ -61,7 +61,7 @@ def test_the_speed_at_which_steps_are_lost_is_where_the_curve_meets_the_need() -
     plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 30_000.0, rate, rate)
     lost = motor().loses(plan.segments[0], 0.0, plan.segments[0].end_s, 1)
     assert lost == pytest.approx(20_000.0 / rate, rel=1e-12)
-    course = Course(Build(period_p=64, motor=motor()), plan, 0, Standing(0, 0))
+    course = Course(Build(period_p=64, motor=motor()), plan, 0, MechanicalState(0, 0))
     moment = round(20_000.0 / rate * SECOND)
     assert not course.at(moment - 10).stalled
     assert course.at(moment + 10).stalled
@@ -94,22 +94,22 @@ def test_a_start_above_the_start_speed_is_not_followed() -> None:
     plan = plan_endless(0, 0, 1, SpeedCurve(500.0, 1000.0, 2000.0, 2000.0))
     for start, follows in ((499.0, False), (500.0, True), (None, True)):
         build = Build(period_p=64, motor=motor(inertia=0.0, start=start))
-        course = Course(build, plan, 0, Standing(0, 0), jump=500.0)
+        course = Course(build, plan, 0, MechanicalState(0, 0), jump=500.0)
         assert (course.at(SECOND).rotor > 0) is follows
 
 
 def test_what_is_lost_is_a_whole_number_of_electrical_periods() -> None:
-    standing = final(Build(period_p=64, motor=motor()), accelerated(0.9 / INERTIA))
-    assert 200_000 - standing.rotor > 0
-    assert (200_000 - standing.rotor) % 64 == 0
-    assert not standing.stalled
+    state = final(Build(period_p=64, motor=motor()), accelerated(0.9 / INERTIA))
+    assert 200_000 - state.rotor > 0
+    assert (200_000 - state.rotor) % 64 == 0
+    assert not state.stalled
 
 
 def test_a_stalled_rotor_is_caught_below_the_start_speed() -> None:
     slow, fast = Build(period_p=64, motor=motor(start=2000.0)), Build(period_p=64, motor=motor())
     plan = accelerated(0.9 / INERTIA)
     assert final(slow, plan).rotor > final(fast, plan).rotor
-    course = Course(slow, plan, 0, Standing(0, 0))
+    course = Course(slow, plan, 0, MechanicalState(0, 0))
     end = plan.end or 0
     caught = end - round(2000.0 / 1000.0 * SECOND)
     assert course.at(caught - 1000).stalled
@@ -126,7 +126,7 @@ def test_a_rotor_is_caught_when_speed_and_torque_both_allow_it() -> None:
     curve = ((0.0, 1.0), (300 * per_rpm, 0.2), (1200 * per_rpm, 0.2))
     build = Build(period_p=64, motor=motor(curve, inertia=8.8e-4 * 2 * pi / PER_REV, start=280 * per_rpm))
     plan = plan_position(MotionState(0, 0, 0.0, 0.0), 20_000, 50_000.0, 300_000.0, 600 * per_rpm)
-    course = Course(build, plan, 0, Standing(0, 0))
+    course = Course(build, plan, 0, MechanicalState(0, 0))
     assert 20_000 - course.at(1000 * SECOND).rotor == 24 * 64
     speed = next(n for n in range(28_000, 0, -1) if at_speed(curve, n / 100 * per_rpm) >= 300_000 * build.motor.inertia) / 100  # type: ignore[union-attr]
     assert speed == pytest.approx(180.6, abs=0.1)
@@ -174,9 +174,9 @@ def test_the_moment_of_being_caught_is_the_first_that_a_walk_finds(
 
 def test_a_motor_too_weak_for_its_load_never_catches_it() -> None:
     build = Build(period_p=64, motor=motor(load=2.0))
-    standing = final(build, accelerated(1000.0))
-    assert standing.stalled
-    assert standing.rotor == 0
+    state = final(build, accelerated(1000.0))
+    assert state.stalled
+    assert state.rotor == 0
 
 
 # ---------------------------------------------------------------------- against a walk through time
@@ -367,9 +367,9 @@ def test_a_motor_on_an_arc_loses_the_field_where_the_curve_is_too_tight() -> Non
     profile = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(way, 0, 0)
     for need, follows in ((0.99, True), (1.01, False)):
         build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (32_000.0, 1.0)), need / 50_000.0, 0.0, 0.0, 20_000.0))
-        course = Course(build, profile, 0, Standing(0, 0))
+        course = Course(build, profile, 0, MechanicalState(0, 0))
         assert (course.next_stall(0) is None) is follows, need
-        assert (course.at(1000 * SECOND) == Standing(0, 0)) is follows or course.at(1000 * SECOND).behind % 64 == 0
+        assert (course.at(1000 * SECOND) == MechanicalState(0, 0)) is follows or course.at(1000 * SECOND).behind % 64 == 0
 
 
 # ---------------------------------------------------------------------- motions without end
@@ -409,7 +409,7 @@ def test_a_rotor_that_would_be_caught_and_lost_at_once_stays_lost() -> None:
     build = Build(period_p=64, motor=motor(((0.0, 0.5), (32_000.0, 0.5)), inertia=1e-9, friction=0.6))
     plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 5000.0, 1000.0, 1000.0)
     turned = plan_velocity(MotionState.of(plan, SECOND), -5000.0, 1000.0, 1000.0)
-    course = Course(build, turned, SECOND, Standing(0, 0, stalled=True))
+    course = Course(build, turned, SECOND, MechanicalState(0, 0, stalled=True))
     for moment in (SECOND, 2 * SECOND, 3 * SECOND, 9 * SECOND):
         assert course.at(moment).stalled, moment
         assert course.at(moment).rotor == 0

@@ -221,17 +221,17 @@ def test_inputs_say_whether_the_scripts_had_done_what_was_due() -> None:
 def test_what_comes_from_outside_acts_and_is_in_the_trace() -> None:
     """Characters of a script to a chip, a hand on a shaft, a program that leaves its place, power off and on."""
     world = small('[[line]]\nname = "bus"\nkind = "m1486"\n[[m1486]]\nname = "d"\nline = "bus"\naddress = 3\n')
-    world.outside(do.Send("bus", b"x3\rf640\rr\r"))
+    world.apply_input(do.Send("bus", b"x3\rf640\rr\r"))
     world.run(until="idle")
     assert world.m1486["d"].position == 640
-    world.outside(do.Turn("a", 2, -7))
+    world.apply_input(do.Turn("a", 2, -7))
     assert world.mic488["a"].axis[2].encoder == -7
     world.line["bus"].send(b"x3\ru20\r", "plc")
     assert "plc" in world.lines["bus"].places
-    world.outside(Leave("bus", "plc"))
+    world.apply_input(Leave("bus", "plc"))
     assert "plc" not in world.lines["bus"].places
-    world.outside(Leave("bus", "plc"))
-    world.outside(do.PowerCycle("d"))
+    world.apply_input(Leave("bus", "plc"))
+    world.apply_input(do.PowerCycle("d"))
     world.run(for_=0.1)
     assert world.m1486["d"].counter == 0
     recorded = [(r.machine, r.subject, r.value) for r in world.trace if r.kind == "input"]
@@ -240,16 +240,16 @@ def test_what_comes_from_outside_acts_and_is_in_the_trace() -> None:
         (do.Send("bys", b"x"), r"no line is called 'bys' \(did you mean 'bus'\?\); there are bus"),
         (do.Turn("d", 1, 1), "'d' is an M1486, which has no encoder"),
         (do.PowerCycle("e"), "no machine is called 'e'"),
-        (do.Wait(1), "this is for scripts"),
+        (do.Wait(1), "only scripts can execute this step"),
     ):
         with pytest.raises(Misuse, match=message):
-            world.outside(step)
+            world.apply_input(step)
 
 
 def test_what_an_action_leads_to_happens_at_once() -> None:
     world = small()
-    world.outside(do.Write((("a", "M1_EN", 1.0), ("a", "M1_POS_ABS", 60.0))))
-    world.outside(do.Press("go"))
+    world.apply_input(do.Write((("a", "M1_EN", 1.0), ("a", "M1_POS_ABS", 60.0))))
+    world.apply_input(do.Press("go"))
     happened = list(world.trace)
     assert [r.time for r in happened if (r.machine, r.kind, r.subject) == ("b", "edge", "IN4")][-1:] == [0]
     plan = [r for r in happened if (r.machine, r.kind, r.subject) == ("a", "plan", "1")][-1]
@@ -258,7 +258,7 @@ def test_what_an_action_leads_to_happens_at_once() -> None:
 
 def test_an_encoder_that_nothing_turns_stands_still() -> None:
     world = small()
-    world.outside(do.Couple("b", 1, "free"))
+    world.apply_input(do.Couple("b", 1, "free"))
     world.mic488["b"].axis[1].enable()
     world.mic488["b"].axis[1].move_to(1000.0)
     world.run(for_="10 s")
@@ -298,7 +298,7 @@ READ, WRITE = with_crc(bytes.fromhex("01 03 00 64 00 01")), with_crc(bytes.fromh
 def test_a_read_changes_nothing_unless_it_takes_time_or_may_fail(timing: str, fault: str, data: bytes, idle: bool) -> None:
     world = World.from_toml(f'[[line]]\nname = "bus"\ntiming = "{timing}"\n[[mic488]]\nname = "t"\nline = "bus"\n')
     if fault:
-        world.outside(do.SetFault(read(fault)))
+        world.apply_input(do.SetFault(read(fault)))
     line = world.lines["bus"]
     line.connect("plc", "rtu")
     assert line.is_idle_read(line.places["plc"], data) is idle
@@ -336,7 +336,7 @@ def test_whoever_watches_kernels_sees_those_that_scripts_wait_for_as_well() -> N
     world.watch_kernels(lambda kernel: seen.append(next(iter(kernel.machines))))
     for machine, pin in (("a", "IN7"), ("c", "IN7"), ("a", "IN5"), ("a", "IN6"), ("a", "IN8")):
         seen.clear()
-        world.outside(do.Set(((machine, pin, 1.0),)))
+        world.apply_input(do.Set(((machine, pin, 1.0),)))
         assert set(seen) == {machine}, pin
         world.run(for_=0.1)
 
@@ -344,17 +344,17 @@ def test_whoever_watches_kernels_sees_those_that_scripts_wait_for_as_well() -> N
 def test_what_was_to_be_done_later_is_done_once_and_may_be_called_off() -> None:
     world = small()
     steps = (do.Wait(SECOND), do.Press("go"))
-    world.do_later("press it", steps)
+    world.schedule("press it", steps)
     world.run(for_=0.5)
-    world.do_later("press it", steps)
+    world.schedule("press it", steps)
     world.run(for_=0.75)
     assert world.read("go.pressed") == 0.0, "begun anew: the first was called off"
     world.run(for_=0.25)
     assert world.read("go.pressed") == 1.0
     world.release("go")
-    world.do_later("press it", steps)
-    world.call_off("press it")
-    world.call_off("press it")
+    world.schedule("press it", steps)
+    world.unschedule("press it")
+    world.unschedule("press it")
     world.run(for_=2)
     assert world.read("go.pressed") == 0.0
 
@@ -404,9 +404,9 @@ def test_the_gap_of_a_line_is_waited_for_where_a_length_is_not_known(timing: str
     line = world.lines["bus"]
     line.follow_frames(heard)
     unknown, refusal = with_crc(bytes.fromhex("01 41 01 02")), with_crc(bytes.fromhex("01 C1 01"))
-    world.outside(Bytes("bus", "plc", "rtu", unknown))
+    world.apply_input(Bytes("bus", "plc", "rtu", unknown))
     world.run(for_=0.1)
-    world.outside(Bytes("bus", "plc", "rtu", b"\xff\xfe"))
+    world.apply_input(Bytes("bus", "plc", "rtu", b"\xff\xfe"))
     world.run(for_=0.1)
     ((moment, data),) = line.places["plc"].received
     assert data == refusal
@@ -420,8 +420,31 @@ def test_the_gap_of_a_line_is_waited_for_where_a_length_is_not_known(timing: str
 def test_a_record_of_a_vision_system_reaches_its_controller() -> None:
     world = World.from_toml('[[mic488]]\nname = "t"\n[mic488.M1]\ngear = 1.0\n', name="w.toml")
     before = [record for record in world.trace if record.kind == "input"]
-    world.outside(See("t", 2.0, 12.5, -3.0, 90.0))
+    world.apply_input(See("t", 2.0, 12.5, -3.0, 90.0))
     assert before == []
     (record,) = [record for record in world.trace if record.kind == "input"]
     assert (record.machine, record.subject, record.value) == ("t", "vision", (2.0, 12.5, -3.0, 90.0))
     assert world.mic488["t"].device.program.registers.vision.tolist() == [1.0, 2.0, 12.5, -3.0, 90.0]
+
+
+def test_a_record_of_a_vision_system_for_a_chip_is_refused() -> None:
+    world = World.from_toml('[[m1486]]\nname = "d"\n', name="w.toml")
+    with pytest.raises(Misuse, match="'d' is an M1486, which has no vision registers"):
+        world.apply_input(See("d", 2.0, 12.5, -3.0, 90.0))
+
+
+def test_frames_can_be_followed_on_a_link_that_is_in_use() -> None:
+    """A follower sees what goes over it from then on, also where nothing is recorded."""
+    world = World.from_toml('[[line]]\nname = "bus"\n[[mic488]]\nname = "t"\nline = "bus"\n', name="w.toml")
+    request = bytes.fromhex("01 03 27 24 00 02 8E B4")
+    answer = bytes.fromhex("01 03 04 00 00 00 00 FA 33")
+    line, heard = world.lines["bus"], Heard()
+    world.stop_recording()
+    world.apply_input(Bytes("bus", "plc", "rtu", request))
+    line.follow_frames(heard)
+    assert heard.frames == []
+    world.apply_input(Bytes("bus", "plc", "rtu", request))
+    assert [frame[1:] for frame in heard.frames] == [("plc", "in", request), ("plc", "out", answer)]
+    line.unfollow_frames(heard)
+    world.apply_input(Bytes("bus", "plc", "rtu", request))
+    assert len(heard.frames) == 2

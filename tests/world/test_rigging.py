@@ -260,7 +260,7 @@ def test_who_is_connected_counts_as_well() -> None:
 def test_a_fault_that_can_happen_is_taken(world: str, fault: str) -> None:
     found = World.from_toml(world)
     found.put_fault(read(fault))
-    assert [str(active.fault) for active in found.plan.faults.active] == [fault]
+    assert [str(active.fault) for active in found.parts.faults.active] == [fault]
 
 
 # ---------------------------------------------------------------------- faults of one line alone
@@ -387,8 +387,8 @@ def test_what_steps_set_and_the_file_sets_can_be_cleared_by_name_or_kind_and_aga
     """
     world = World.from_toml(STEPS.replace("{steps}", steps))
     world.run(for_=2)
-    assert [active.name for active in world.plan.faults.active] == ["lost-steps", "stall"]
+    assert [active.name for active in world.parts.faults.active] == ["lost-steps", "stall"]
     assert [record.value for record in world.trace if record.subject == "note"] == ["done"]
     with pytest.raises(Misuse, match=r"no fault 'mine': set are lost-steps, stall"):
-        world.outside(ClearFault("mine"))
+        world.apply_input(ClearFault("mine"))
     assert world.inputs == []

@@ -31,5 +31,5 @@ def test_values_come_back_as_they_were_sent(first: list[object], more: list[obje
 
 @pytest.mark.parametrize("value", [1, "text", Decimal(1)])
 def test_what_no_step_gives_is_refused(value: object) -> None:
-    with pytest.raises(Misuse, match="a step gives nothing, a truth value, a number or bytes"):
+    with pytest.raises(Misuse, match="the result of a step is None, a truth value, a number or bytes"):
         SentValues().add(value)

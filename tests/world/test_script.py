@@ -72,7 +72,7 @@ def test_a_generator_is_brought_back_by_sending_it_the_same(values: list[object]
         while True:
             seen.append((yield do.Note(f"{len(seen)}")))
 
-    script = Script(3, "operator", operator, is_outside=True)
+    script = Script(3, "operator", operator, is_external=True)
     script.send(None)
     for value in values:
         script.send(value)
@@ -84,5 +84,5 @@ def test_a_generator_is_brought_back_by_sending_it_the_same(values: list[object]
 
 
 def test_what_a_step_cannot_give_is_not_sent() -> None:
-    with pytest.raises(do.Misuse, match="5: a step gives nothing, a truth value, a number or bytes"):
+    with pytest.raises(do.Misuse, match="5: the result of a step is None, a truth value, a number or bytes"):
         SentValues().add(5)

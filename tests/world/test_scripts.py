@@ -118,7 +118,7 @@ def test_what_begins_in_a_restored_world_does_not_take_the_place_of_what_goes_on
     snapshot = world.snapshot()
     other = small()
     other.restore(snapshot)
-    other.do_later("note it", (do.Wait(SECOND // 2), do.Note("noted")))
+    other.schedule("note it", (do.Wait(SECOND // 2), do.Note("noted")))
     other.run(for_=1)
     assert [(r.time, r.value) for r in other.trace.events("world")] == [(SECOND, "noted")]
     assert other.read("go.pressed") == 1.0
@@ -309,7 +309,7 @@ def test_a_snapshot_between_requests_and_answers_changes_nothing(moment: float) 
 def test_a_request_needs_a_line_of_controllers() -> None:
     world = World.from_toml('[[line]]\nname = "chips"\nkind = "m1486"\n[[m1486]]\nname = "a"\nline = "chips"\n')
     with pytest.raises(Misuse, match="line 'chips' carries no Modbus: requests need a line of kind modbus"):
-        world.outside(do.Request("chips", 1, b"\x03\x27\x19\x00\x01", SECOND))
+        world.apply_input(do.Request("chips", 1, b"\x03\x27\x19\x00\x01", SECOND))
 
 
 def test_scripts_that_have_ended_are_forgotten() -> None:

@@ -58,20 +58,20 @@ def test_turns_are_the_ends_of_segments_that_are_still_to_come() -> None:
     world = moving()
     world.run(for_=0.5)
     for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "a.M1.encoder"):
-        signal = find_signal(world.plan, name)
+        signal = find_signal(world.parts, name)
         assert signal.continuous, name
         assert list(signal.turns(world.now)) == pytest.approx([0.625 * SECOND, 1.025 * SECOND], abs=2), name
         assert list(signal.turns(0)) == pytest.approx([0.4 * SECOND, 0.625 * SECOND, 1.025 * SECOND], abs=2), name
         (first, *_) = signal.turns(world.now)
         assert first not in signal.turns(first), "a turn at the moment itself is not to come"
     for name in ("x.position", "x.lost", "x.stalled"):
-        turns = list(find_signal(world.plan, name).turns(world.now))
+        turns = list(find_signal(world.parts, name).turns(world.now))
         assert turns == sorted(set(turns)), name
         assert turns[:1] == pytest.approx([0.625 * SECOND], abs=2), name
     for name in ("a.M1.status", "a.M1.enabled", "a.status", "a.program", "a.IN1", "d.variable", "d.moving", "go.pressed"):
-        signal = find_signal(world.plan, name)
+        signal = find_signal(world.parts, name)
         assert (signal.continuous, list(signal.turns(0)), signal.version()) == (False, [], None), name
-    time = find_signal(world.plan, "time")
+    time = find_signal(world.parts, "time")
     assert (time.continuous, list(time.turns(0)), time.bring(0), time.version()) == (True, [], (), "time")
 
 
@@ -79,12 +79,12 @@ def test_an_endless_motion_has_no_last_turn() -> None:
     world = small()
     world.mic488["a"].write("M1_EN", 1)
     world.mic488["a"].write("M1_VEL_ABS", -40.0)
-    assert list(find_signal(world.plan, "a.M1.velocity").turns(0)) == pytest.approx([0.4 * SECOND], abs=2)
+    assert list(find_signal(world.parts, "a.M1.velocity").turns(0)) == pytest.approx([0.4 * SECOND], abs=2)
 
 
 def test_a_version_changes_with_the_plan_and_with_the_coordinate() -> None:
     world = moving()
-    signals = {name: find_signal(world.plan, name) for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "x.position")}
+    signals = {name: find_signal(world.parts, name) for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "x.position")}
     before = {name: signal.version() for name, signal in signals.items()}
     world.run(for_=0.1)
     assert {name: signal.version() for name, signal in signals.items()} == before
@@ -107,7 +107,7 @@ def test_a_chip_has_signals_of_its_own() -> None:
     assert start == {"position": 0.0, "velocity": 0.0, "counter": 0.0, "moving": 0.0, "variable": float(chip.unit.variable)}
     idle = world.read("idle")
     world.line["bus"].send(b"x3\rf12800\rr\r")
-    signals = {name: find_signal(world.plan, f"d.{name}") for name in names}
+    signals = {name: find_signal(world.parts, f"d.{name}") for name in names}
     versions = {name: signals[name].version() for name in ("position", "velocity")}
     world.run(for_=0.05)
     now = world.now
@@ -139,18 +139,27 @@ def test_controllers_have_status_program_and_pins() -> None:
 
 def test_to_bring_a_signal_is_to_bring_its_kernel() -> None:
     world = small()
-    signal = find_signal(world.plan, "c.status")
+    signal = find_signal(world.parts, "c.status")
     assert isinstance(signal, SignalOf)
-    assert signal.bring(SECOND) == (world.plan.kernel_of["c"],)
+    assert signal.bring(SECOND) == (world.parts.kernel_of["c"],)
     assert [kernel.now for kernel in world.kernels] == [0, SECOND]
+
+
+def test_a_condition_makes_no_kernel_attentive_unless_requests_change_its_signal() -> None:
+    """What a controller counts changes with events; what a master stores does not."""
+    for is_kept in (False, True):
+        kernel = small().kernels[0]
+        options = {"is_kept": True} if is_kept else {}
+        SignalOf((kernel,), lambda now: 0.0, **options).watch("c.status")  # type: ignore[arg-type]
+        assert kernel.is_attentive is is_kept
 
 
 def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
     world = moving()
-    idle = find_signal(world.plan, "idle")
+    idle = find_signal(world.parts, "idle")
     assert isinstance(idle, Idle)
     assert (idle.continuous, list(idle.turns(0)), idle.version()) == (False, [], None)
-    assert idle.bring(world.now) == (world.plan.kernel_of["a"],)
+    assert idle.bring(world.now) == (world.parts.kernel_of["a"],)
     assert idle.value(world.now) == 0.0
     assert [kernel.now for kernel in world.kernels] == [0, 0, 0]
     world.run(for_=1.1)
@@ -159,7 +168,7 @@ def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
     assert [kernel.now for kernel in world.kernels] == [world.now] * 3
     world.mic488["c"].axis[1].enable()
     world.mic488["c"].axis[1].move_to(100.0)
-    assert idle.bring(world.now) == (world.plan.kernel_of["c"],)
+    assert idle.bring(world.now) == (world.parts.kernel_of["c"],)
     assert world.read("idle") == 0.0
 
 
@@ -189,7 +198,7 @@ def test_a_program_and_a_line_keep_a_world_busy() -> None:
 )  # fmt: skip
 def test_a_name_that_is_no_signal_is_refused_with_those_that_are(name: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
-        find_signal(small(CHIP).plan, name)
+        find_signal(small(CHIP).parts, name)
 
 
 MASTER = """

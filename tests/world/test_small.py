@@ -13,7 +13,9 @@ import pytest
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.world.faults import read
-from steptwin.world.small import AxisSwitches, InputChange, Whole, m1486_world, mic488_world
+from steptwin.world.kinds.m1486.small import m1486_world
+from steptwin.world.kinds.mic488.small import AxisSwitches, mic488_world
+from steptwin.world.small import InputChange, Whole
 
 GOLDEN = Path(__file__).parent / "golden" / "small.txt"
 HERE = {"tcp": "127.0.0.1:0"}

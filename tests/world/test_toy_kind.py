@@ -28,7 +28,7 @@ from steptwin.live.world import LiveWorld, PlacePort, announced
 from steptwin.live.world_frames import follow_frames
 from steptwin.subject.commands import Advance, Describe, Home, Move, ReadPins, State
 from steptwin.subject.world import WorldSubject
-from steptwin.words.frames import FrameLine
+from steptwin.wire.frameline import FrameLine
 from steptwin.world.reader import WorldError
 
 TEXT = """

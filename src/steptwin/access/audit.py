@@ -1,4 +1,4 @@
-"""The audit log: who did what, and what came of it; the last entries are kept."""
+"""The audit log: clients, commands and outcomes; the last entries are kept."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from steptwin.machine import Nanos
 
 MOST_ENTRIES = 10_000
 LONGEST_FIELDS = 1000
-"""Characters of the fields of an entry, as JSON; longer ones are left out."""
+"""Characters of the fields of an entry; of more the long values are left out."""
+LONGEST_VALUE = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +32,12 @@ class Entry:
         return {**head, "do": self.do, "fields": dict(self.fields), "outcome": self.outcome}
 
 
+def _short(value: object) -> object:
+    """Of fields that are too long to be kept: texts such as programs are only counted."""
+    text = str(value)
+    return value if len(text) <= LONGEST_VALUE else f"({len(text)} characters)"
+
+
 class Audit:
     """``clock`` gives the wall clock as text; ``sink`` is called with every entry, to keep it elsewhere."""
 
@@ -40,7 +47,7 @@ class Audit:
         self._sink = sink
 
     def add(self, viewer: Viewer, time: Nanos, do: str, fields: Mapping[str, object], outcome: str) -> None:
-        kept = fields if len(str(fields)) <= LONGEST_FIELDS else {"left_out": len(fields)}
+        kept = fields if len(str(fields)) <= LONGEST_FIELDS else {name: _short(value) for name, value in fields.items()}
         entry = Entry(self._clock(), time, str(viewer), viewer.role.title, do, kept, outcome)
         self._entries.append(entry)
         self._sink(entry)

@@ -37,6 +37,7 @@ PERMITS: Mapping[str, Permit] = complete(
         "home": ACT,
         "jog": ACT,
         "program": ACT,
+        "download": SERVICE,
         "note": ACT,
         "expect": ACT,
         "pause": ACT,

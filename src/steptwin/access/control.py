@@ -1,4 +1,4 @@
-"""Who holds control of a subject: one viewer at most, or nobody."""
+"""Control of a subject, which at most one viewer holds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steptwin.errors import Refusal
 
 @dataclass(frozen=True, slots=True)
 class Viewer:
-    """Somebody who is connected, or asks over REST. ``number`` is not used again."""
+    """A connected client, or a client of REST. ``number`` is never reused."""
 
     number: int
     name: str
@@ -21,39 +21,39 @@ class Viewer:
         return f"{self.name} (viewer {self.number})"
 
 
-class Taken(NamedTuple):
-    """What taking control has changed."""
+class ControlChange(NamedTuple):
+    """The holder of control before and after a change."""
 
     before: Viewer | None
     after: Viewer | None
 
 
 class Control:
-    """Held by ``holder``."""
+    """The control of a subject; ``holder`` is None if it is free."""
 
     def __init__(self) -> None:
         self.holder: Viewer | None = None
 
-    def take(self, viewer: Viewer, *, over: bool) -> Taken:
-        """``viewer`` holds it from now on; from another one only with ``over``. Raises `Refusal`."""
+    def take(self, viewer: Viewer, *, over: bool) -> ControlChange:
+        """Give control to ``viewer``. Raises `Refusal` if another viewer holds it, unless ``over``."""
         before = self.holder
         if before is not None and before.number != viewer.number and not over:
             raise Refusal(f"{before} holds control: take_control with over = true takes it")
         self.holder = viewer
-        return Taken(before, viewer)
+        return ControlChange(before, viewer)
 
-    def release(self, viewer: Viewer) -> Taken:
-        """``viewer`` holds it no more; nothing where it does not."""
+    def release(self, viewer: Viewer) -> ControlChange:
+        """Release control, if ``viewer`` holds it."""
         before = self.holder
         if before is not None and before.number == viewer.number:
             self.holder = None
-        return Taken(before, self.holder)
+        return ControlChange(before, self.holder)
 
 
 def check(name: str, permit: Permit, viewer: Viewer, control: Control) -> bool:
-    """Whether ``viewer`` has to take control, which nobody holds, to do what ``name`` is the name of.
+    """Whether ``viewer`` must first take control, which is free, to execute the command ``name``.
 
-    Raises `Refusal` where the role is too low, or another one holds control.
+    Raises `Refusal` if the role is insufficient, or another viewer holds control.
     """
     if viewer.role < permit.role:
         raise Refusal(f"{name} is for the role {permit.role.title}; {viewer.name} has the role {viewer.role.title}")

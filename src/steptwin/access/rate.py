@@ -1,4 +1,4 @@
-"""How many requests somebody may make: so many a second, and a few more at once."""
+"""Rate limits of requests: a sustained rate, and a burst."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from steptwin.machine import SECOND, Nanos
 
 
 class RateLimit:
-    """``rate`` requests a second, ``burst`` at once. Moments must not go back."""
+    """Permits ``rate`` requests per second, ``burst`` at once. Moments must not go back."""
 
     __slots__ = ("_burst", "_left", "_rate", "_since")
 

@@ -1,4 +1,4 @@
-"""Roles, and what a command needs of whoever gives it."""
+"""Roles, and the rights that commands require."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Role(IntEnum):
     OPERATOR = 2
     """Moves axes, sets inputs, starts and stops programs, changes the pace of time."""
     ENGINEER = 3
-    """Also sends raw requests, switches faults and power, writes files."""
+    """Also writes programs and files, sends raw requests, switches faults and power."""
 
     @property
     def title(self) -> str:
@@ -25,7 +25,7 @@ ROLES = {role.title: role for role in Role}
 
 
 class Permit(NamedTuple):
-    """What a command needs: a role, and whether its giver must hold control."""
+    """The rights that a command requires: a role, and whether the client must hold control."""
 
     role: Role
     control: bool = False

@@ -1,4 +1,4 @@
-"""Tokens: who has one has a role. Where no tokens are asked for, everybody has one role."""
+"""Tokens grant roles. Without tokens, all clients have the same role."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ SHORTEST_TOKEN, LONGEST_TOKEN = 16, 200
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """``text`` is the secret; ``name`` is what others see of whoever has it."""
+    """``text``: the secret; ``name``: the name of its owner, visible to other clients."""
 
     role: Role
     name: str
     text: str
 
 
-class Gate:
-    """Lets in who has one of the ``tokens``; without any, everybody with the role ``open_to``."""
+class AccessGate:
+    """Admits clients with one of the ``tokens``; without tokens, all clients with the role ``open_to``."""
 
     def __init__(self, tokens: Iterable[Token] = (), *, open_to: Role | None = None) -> None:
         self._tokens = tuple(tokens)
@@ -31,14 +31,14 @@ class Gate:
 
     @property
     def asks(self) -> bool:
-        """Whether a token is asked for."""
+        """Whether a token is required."""
         return self._open_to is None
 
     def enter(self, given: str | None) -> tuple[Role, str | None]:
         """The role, and the name of the token. Raises `Refusal`."""
         found: Token | None = None
         data = (given or "").encode("utf-8", "replace")
-        for token in self._tokens:  # all of them, so that the time tells nothing
+        for token in self._tokens:  # all of them, against timing attacks
             if hmac.compare_digest(data, token.text.encode("utf-8")):
                 found = token
         if found is not None:

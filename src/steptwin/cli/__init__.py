@@ -21,8 +21,10 @@ from typer.exceptions import TyperException
 from steptwin import __version__
 from steptwin.cli import (
     build,
+    calc,
     check,
     commands,
+    dap,
     datasheet,
     decompile,
     export,
@@ -75,6 +77,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "replay": replay.replay,
         "export": export.export,
         "lsp": lsp.lsp,
+        "dap": dap.dap,
     },
     "Devices and twins": {
         "ports": scan.ports,
@@ -98,6 +101,7 @@ COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
         "diff": record.diff,
     },
     "Reference": {
+        "calc": calc.calc,
         "registers": registers.registers,
         "commands": commands.commands,
         "datasheet": datasheet.datasheet,

@@ -35,7 +35,7 @@ def build(
     labels INT_INn; with --inferred also the other motions and PROGRESET. Variables, END, $I, $D and $R have none.
     """
     from steptwin.diagnostics import Severity, render
-    from steptwin.files.programfiles import Companions, read_program
+    from steptwin.files.programfiles import CompanionFiles, read_program
     from steptwin.files.textfiles import write_bytes
     from steptwin.wbc.decompile import IMAGE
     from steptwin.wbc.dialect import dialect_for
@@ -44,7 +44,7 @@ def build(
 
     if file.suffix.lower() == IMAGE:
         raise Misuse(f"{file} is a compiled image already: steptwin decompile makes a program of it")
-    files = Companions.of(file, positions, None)
+    files = CompanionFiles.of(file, positions, None)
     read = read_program(file, files.positions, dialect=dialect_for(firmware))
     for source, diagnostics in read.findings:
         if diagnostics:

@@ -164,12 +164,12 @@ def _memory_data(source: SourceText, chip: ChipMemory) -> dict[str, Any]:
 
 
 def _check_wbc(source: SourceText, options: CheckOptions) -> CheckReport:
-    from steptwin.files.programfiles import Companions, check_source
+    from steptwin.files.programfiles import CompanionFiles, check_source
     from steptwin.wbc.dialect import DEFAULT, dialect_for
 
     options.refuse("WBC", "variant", "interface", "memory")
     dialect = DEFAULT if options.firmware is None else dialect_for(options.firmware)
-    files = Companions.of(Path(source.name), options.positions, options.config)
+    files = CompanionFiles.of(Path(source.name), options.positions, options.config)
     read = check_source(source, files.positions, files.config, dialect)
     lines = read.checked.lines
     shown = f"MIC488 firmware {dialect.firmware}, {_count(lines, 'executable line')} of {dialect.max_steps}"

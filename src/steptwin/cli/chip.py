@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from steptwin.cli.device import HeldUp, complain, number_of, print_json, shown, table
+from steptwin.cli.device import SuspensionDetector, complain, number_of, print_json, shown, table
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _on(states: Mapping[int, bool]) -> str:
     return " ".join(str(number) for number, on in states.items() if on) or "none"
 
 
-def _tell(values: Shown, *, as_json: bool) -> None:
+def _print(values: Shown, *, as_json: bool) -> None:
     if as_json:
         print_json({name: {"value": value, "unit": unit} for name, (value, unit) in values.items()})
     else:
@@ -108,7 +108,7 @@ def info(address: DeviceAddress, *, json: bool, log_frames: bool) -> None:
 def get(address: DeviceAddress, names: Sequence[str], *, json: bool, log_frames: bool) -> None:
     wanted = checked(names)
     with opened_chip(address, log_frames=log_frames) as chip:
-        _tell(read(chip, wanted), as_json=json)
+        _print(read(chip, wanted), as_json=json)
 
 
 # ---------------------------------------------------------------------- changing
@@ -170,12 +170,12 @@ def send(address: DeviceAddress, file: Path, *, json: bool, log_frames: bool) ->
     addresses = _addressed(text, address.chip, file)
     with M1486Line(address.place, baud=address.baud, log=complain if log_frames else None) as line:
         chips = {a: M1486(line, a, variant=address.variant, timeout_s=address.timeout) for a in addresses}
-        held_up = HeldUp()
+        held_up = SuspensionDetector()
         for chip in chips.values():
             chip.open()
             held_up.check()
-        with _progress(file.name) as tell:
-            uploaded = download_to(chips.values(), text, first=chips.get(address.chip), progress=tell, name=str(file))
+        with _progress(file.name) as progress:
+            uploaded = download_to(chips.values(), text, first=chips.get(address.chip), progress=progress, name=str(file))
     title = next(iter(chips.values())).variant.title
     started = _started(text)
     if json:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import typer
 
 from steptwin.cli.chip import opened_chip
-from steptwin.cli.device import HeldUp, complain, print_json, tell_under_way
+from steptwin.cli.device import SuspensionDetector, complain, print_json, print_started
 from steptwin.cli.keys import interruptible
 from steptwin.errors import Misuse
 
@@ -41,19 +41,19 @@ def axis_value(given: Sequence[str], form: str) -> str:
     return value
 
 
-class Sought(NamedTuple):
+class SeekTarget(NamedTuple):
     """A line to seek, and the direction: 1 or -1."""
 
     direction: int
     line: int
 
 
-def sought(given: Sequence[str]) -> Sought:
+def sought(given: Sequence[str]) -> SeekTarget:
     """``1=-B8``. Raises `Misuse`."""
     match = _SOUGHT.fullmatch(axis_value(given, "-B8").strip())
     if match is None:
         raise Misuse(f"{' '.join(given)!r}: expected the direction and the line of an M1486, such as 1=-B8 or 1=+B8")
-    return Sought(1 if match[1] == "+" else -1, int(match[2]))
+    return SeekTarget(1 if match[1] == "+" else -1, int(match[2]))
 
 
 def move(
@@ -79,7 +79,7 @@ def move(
 
 
 def seek(
-    address: DeviceAddress, wanted: Sought, *, home: bool, wait: bool, timeout: float | None, json: bool, log_frames: bool
+    address: DeviceAddress, wanted: SeekTarget, *, home: bool, wait: bool, timeout: float | None, json: bool, log_frames: bool
 ) -> None:
     """Move at start/stop speed until a line has its end level; ``home``: that is position 0 then."""
     if home and not wait:
@@ -163,8 +163,8 @@ def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
 
 
 @contextlib.contextmanager
-def _opened(address: DeviceAddress, *, log_frames: bool) -> Generator[tuple[M1486, HeldUp]]:
-    held_up = HeldUp()
+def _opened(address: DeviceAddress, *, log_frames: bool) -> Generator[tuple[M1486, SuspensionDetector]]:
+    held_up = SuspensionDetector()
     with opened_chip(address, log_frames=log_frames) as chip:
         held_up.check()
         yield chip, held_up
@@ -184,7 +184,7 @@ def _stopping(chip: M1486, note: str = "") -> Generator[None]:
 
 def _wait(chip: M1486, timeout: float | None) -> ChipMoveEnd:
     """Wait for the end of the motion, and stop it at the timeout."""
-    tell_under_way(["M1"])
+    print_started(["M1"])
     end = chip.wait(timeout, check=False)
     if end.reason.name == "OVERDUE":
         chip.stop()

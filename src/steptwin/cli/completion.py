@@ -48,13 +48,14 @@ def pins(context: typer.Context, incomplete: str) -> list[str]:
 
 def faults(context: typer.Context, incomplete: str) -> list[str]:
     """The kinds of faults, then ``NAME=`` of what the kind takes."""
-    from steptwin.world.faults.kinds import KINDS
+    from steptwin.world.elements import fault_kinds
 
+    kinds = fault_kinds()
     words = context.params.get("words") or []
-    if not words or words[0] not in KINDS:
-        return _beginning(KINDS, incomplete)
+    if not words or words[0] not in kinds:
+        return _beginning(kinds, incomplete)
     given = {word.partition("=")[0] for word in words[1:]}
-    return _beginning((f"{each.name}=" for each in KINDS[words[0]].parameters if each.name not in given), incomplete)
+    return _beginning((f"{each.name}=" for each in kinds[words[0]].parameters if each.name not in given), incomplete)
 
 
 def _beginning(names: Iterable[str], incomplete: str) -> list[str]:

@@ -146,7 +146,7 @@ def number_of(value: str, whole: str) -> float:
 # ---------------------------------------------------------------------- what people read
 
 
-class HeldUp:
+class SuspensionDetector:
     """Detects that the command was suspended between two of its steps, so that no motion starts late."""
 
     LIMIT_S = 20.0
@@ -163,7 +163,7 @@ class HeldUp:
         self._at = time.monotonic()
 
 
-def tell_under_way(names: Sequence[str]) -> None:
+def print_started(names: Sequence[str]) -> None:
     """Print to a terminal that axes are moving and how to stop them."""
     if sys.stderr.isatty():
         typer.echo(f"{', '.join(names)} under way; Ctrl-C stops", err=True)

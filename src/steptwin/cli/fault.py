@@ -66,7 +66,8 @@ def fault(
 
 def sections() -> list[PageSection]:
     """The table of faults for people."""
-    from steptwin.world.faults.kinds import rows, shared
+    from steptwin.world.elements import failing, fault_kinds
+    from steptwin.world.faults.kinds import shared
     from steptwin.world.faults.table import Layer
 
     def described(parameter: Parameter) -> str:
@@ -81,11 +82,12 @@ def sections() -> list[PageSection]:
             (
                 kind.name,
                 kind.meaning,
-                ", ".join(line.value for line in kind.lines) or "machines",
+                ", ".join(failing(kind) or (line.value for line in kind.lines)) or "machines",
                 kind.occasion.value,
                 " ".join(described(parameter) for parameter in kind.own),
             )
-            for kind in rows(layer)
+            for kind in fault_kinds().values()
+            if kind.layer is layer
         ]
         heads = ("kind", "what happens", "on", "at each", "its own parameters")
         found.append(PageSection(f"Faults of {layer.value}", heads, table))

@@ -17,16 +17,16 @@ from steptwin.cli import chip_motion
 from steptwin.cli.device import (
     Axes,
     Device,
-    HeldUp,
     Json,
     LogFrames,
+    SuspensionDetector,
     axes_of,
     complain,
     find,
     number_of,
     opened,
     print_json,
-    tell_under_way,
+    print_started,
     tied,
 )
 from steptwin.cli.keys import interruptible, keys
@@ -97,7 +97,7 @@ def move(
         return
     values = tied(targets)
 
-    held_up = HeldUp()
+    held_up = SuspensionDetector()
 
     def begin(mic: Mic488, begun: set[int]) -> None:
         held_up.check()
@@ -142,7 +142,7 @@ def home(
         return
     values = tied(velocities)
 
-    held_up = HeldUp()
+    held_up = SuspensionDetector()
 
     def begin(mic: Mic488, begun: set[int]) -> None:
         for axis, velocity in values.items():
@@ -194,7 +194,7 @@ def _do(
             begin(mic, begun)
             if not wait:
                 return
-            tell_under_way([f"M{axis}" for axis in values])
+            print_started([f"M{axis}" for axis in values])
             ends = mic.wait(*values, timeout_s=timeout, check=False)
         except (Misuse, Refusal):
             if begun:
@@ -250,7 +250,7 @@ def jog(
         with keys() as pressed:
             chip_motion.jog(address, speed, seconds=seconds, hold=hold, pressed=pressed, json=json, log_frames=log_frames)
         return
-    held_up = HeldUp()
+    held_up = SuspensionDetector()
     with opened(address, observe=False, log_frames=log_frames) as mic, interruptible(), keys() as pressed:
         held_up.check()
         held = mic.axis(axis).jog(speed, hold_s=hold)
@@ -265,10 +265,10 @@ def jog(
             complain("released")
         end = held.end
         rest = mic.axis(axis).wait(check=False)
-    told = rest if end is None else dataclasses.replace(end, position_u=rest.position_u)
+    result = rest if end is None else dataclasses.replace(end, position_u=rest.position_u)
     if json:
-        print_json(_data(told))
+        print_json(_data(result))
     else:
-        typer.echo(str(told))
-    if not told.ok:
+        typer.echo(str(result))
+    if not result.ok:
         raise typer.Exit(1)

@@ -17,7 +17,7 @@ def pause(twin: Twin = None, json: Json = False) -> None:
     """Pause a running world."""
     from steptwin.subject.commands import Pause
 
-    _tell(ask_twin(twin, Pause()), json)
+    _print(ask_twin(twin, Pause()), json)
 
 
 def resume(
@@ -29,7 +29,7 @@ def resume(
     from steptwin.live.pace import read_speed
     from steptwin.subject.commands import Resume
 
-    _tell(ask_twin(twin, Resume(None if speed is None else read_speed(speed))), json)
+    _print(ask_twin(twin, Resume(None if speed is None else read_speed(speed))), json)
 
 
 def step(
@@ -68,7 +68,7 @@ def step(
         typer.echo("nothing happens any more by itself", err=True)
     if there["stopped"] is None and until is not None and not there["came"]:
         typer.echo(f"warning: {until} did not come true", err=True)
-    _tell({**there, "events": events}, json)
+    _print({**there, "events": events}, json)
 
 
 def save(
@@ -91,10 +91,10 @@ def save(
     if not json:
         what = f"{there['inputs']} inputs, digest {there['digest']}" if is_session(file) else f"{there['records']} records"
         typer.echo(f"wrote {file}: {what}")
-    _tell(there, json)
+    _print(there, json)
 
 
-def _tell(there: dict[str, Any], json: bool) -> None:
+def _print(there: dict[str, Any], json: bool) -> None:
     if json:
         import json as json_
 

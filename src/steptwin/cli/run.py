@@ -61,75 +61,84 @@ class RunOptions:
                 raise Misuse(f"--{_NAMES.get(name, name).replace('_', '-')} is not for {files}")
 
 
+File = Annotated[Path, typer.Argument(help="File to run: a program (.prg, .wbc, .m1486), a world (.toml) or a session (.json).")]
+Duration = Annotated[
+    str | None,
+    typer.Option("--for", metavar="TIME", help="Longest virtual time to run, such as 10s. Default 60s; 1h with --until."),
+]
+Until = Annotated[
+    str | None,
+    typer.Option(
+        metavar="idle", help="'idle': end as soon as only an input could cause anything further. A world: any condition."
+    ),
+]
+Inputs = Annotated[
+    list[str] | None,
+    typer.Option("--input", metavar="PIN=VALUE@TIME,...", help="Changes of inputs: B3=0@1.5s,B3=1@2s. 7.B3 selects the chip."),
+]
+Trace = Annotated[Path | None, typer.Option(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")]
+Variant = Annotated[
+    str | None,
+    typer.Option(help="M1486: type A, B, C, E1, E2, or A2x and so on. Default A.", autocompletion=completion.variants),
+]
+Wire = Annotated[
+    list[str] | None, typer.Option(help="M1486: wire from a pin of one chip to an input of another, 0.B1=7.B3; repeatable.")
+]
+Firmware = Annotated[
+    str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70. Default 1.70.", autocompletion=completion.firmwares)
+]
+Travel = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="Mn=LOW..HIGH,...",
+        help="MIC488: positions of the switches KL and KR, relative to the position at power-on: M1=-10..250, M1=-50.. or "
+        "M1=..250.",
+    ),
+]
+StatementTime = Annotated[
+    str | None, typer.Option(metavar="TIME", help="MIC488: execution time of a statement. Default 1ms; 0 for none.")
+]
+Fault = Annotated[
+    list[str] | None,
+    typer.Option(help="World: fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
+]
+State = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="World: directory of the non-volatile memory. Default: that of its file, or none."),
+]
+Begin = Annotated[
+    str | None,
+    typer.Option("--from", metavar="TIME", help="Session: continue from this moment, such as 2.5s. Default: its end."),
+]
+PrintWorld = Annotated[
+    bool, typer.Option("--print-world", help="Program: print the description of the world it would run in, and end.")
+]
+AllowOutside = Annotated[bool, typer.Option("--allow-outside", help="World: permit files outside the folder of its file.")]
+
+
 def run(
-    file: Annotated[
-        Path, typer.Argument(help="File to run: a program (.prg, .wbc, .m1486), a world (.toml) or a session (.json).")
-    ],
-    duration: Annotated[
-        str | None,
-        typer.Option("--for", metavar="TIME", help="Longest virtual time to run, such as 10s. Default 60s; 1h with --until."),
-    ] = None,
-    until: Annotated[
-        str | None,
-        typer.Option(
-            metavar="idle", help="'idle': end as soon as only an input could cause anything further. A world: any condition."
-        ),
-    ] = None,
-    inputs: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--input", metavar="PIN=VALUE@TIME,...", help="Changes of inputs: B3=0@1.5s,B3=1@2s. 7.B3 selects the chip."
-        ),
-    ] = None,
-    trace: Annotated[
-        Path | None, typer.Option(help="Write a trace to a file (.jsonl, .html, .vcd, .csv, ...) or into a directory.")
-    ] = None,
+    file: File,
+    duration: Duration = None,
+    until: Until = None,
+    inputs: Inputs = None,
+    trace: Trace = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    variant: Annotated[
-        str | None,
-        typer.Option(help="M1486: type A, B, C, E1, E2, or A2x and so on. Default A.", autocompletion=completion.variants),
-    ] = None,
+    variant: Variant = None,
     interface: Annotated[str | None, typer.Option(help="M1486: driver interface sd, dual or two. Default sd.")] = None,
-    wire: Annotated[
-        list[str] | None, typer.Option(help="M1486: wire from a pin of one chip to an input of another, 0.B1=7.B3; repeatable.")
-    ] = None,
+    wire: Wire = None,
     positions: Annotated[Path | None, typer.Option(help="MIC488: position table. Default: the .csv of the same name.")] = None,
     config: Annotated[Path | None, typer.Option(help="MIC488: configuration. Default: the .cfg of the same name.")] = None,
-    firmware: Annotated[
-        str | None, typer.Option(help="MIC488: 1.23, 1.40 or 1.70. Default 1.70.", autocompletion=completion.firmwares)
-    ] = None,
-    travel: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="Mn=LOW..HIGH,...",
-            help="MIC488: positions of the switches KL and KR, relative to the position at power-on: M1=-10..250, M1=-50.. or "
-            "M1=..250.",
-        ),
-    ] = None,
-    statement_time: Annotated[
-        str | None, typer.Option(metavar="TIME", help="MIC488: execution time of a statement. Default 1ms; 0 for none.")
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(help="World: fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
-    ] = None,
+    firmware: Firmware = None,
+    travel: Travel = None,
+    statement_time: StatementTime = None,
+    fault: Fault = None,
     seed: Annotated[int | None, typer.Option(help="World: random seed. Default: that of its file.")] = None,
-    state: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="World: directory of the non-volatile memory. Default: that of its file, or none."),
-    ] = None,
+    state: State = None,
     session: Annotated[Path | None, typer.Option(help="World: write a session for 'steptwin replay'.")] = None,
-    begin: Annotated[
-        str | None,
-        typer.Option("--from", metavar="TIME", help="Session: continue from this moment, such as 2.5s. Default: its end."),
-    ] = None,
+    begin: Begin = None,
     strict: Annotated[bool, typer.Option("--strict", help="World: exit code 1 also for a wait that timed out.")] = False,
-    print_world: Annotated[
-        bool, typer.Option("--print-world", help="Program: print the description of the world it would run in, and end.")
-    ] = False,
-    allow_outside: Annotated[
-        bool, typer.Option("--allow-outside", help="World: permit files outside the folder of its file.")
-    ] = False,
+    print_world: PrintWorld = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Run a program or a world in virtual time and print its moves, waits, outputs and uploads. A session is continued."""
     from steptwin.files.timedinputs import parse_duration, parse_inputs
@@ -142,14 +151,7 @@ def run(
     limit = None if duration is None else parse_duration(duration, "--for")
     if limit == 0:
         raise Misuse(f"--for {duration}: must be more than 0")
-    if trace is not None:
-        from steptwin.files.export import check_target
-
-        check_target(trace)
-    if session is not None:
-        from steptwin.files.beginning import check_session_target
-
-        check_session_target(session)
+    _check_targets(trace, session)
     options = RunOptions(
         limit=limit,
         until=until,
@@ -175,6 +177,18 @@ def run(
     )
     if not runner(file, options):
         raise typer.Exit(1)
+
+
+def _check_targets(trace: Path | None, session: Path | None) -> None:
+    """Raises `Misuse` where nothing can be written, before anything runs."""
+    if trace is not None:
+        from steptwin.files.export import check_target
+
+        check_target(trace)
+    if session is not None:
+        from steptwin.files.beginning import check_session_target
+
+        check_session_target(session)
 
 
 _WORLDS = ("fault", "session", "seed", "state", "moment", "allow_outside", "strict")

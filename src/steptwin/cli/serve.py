@@ -40,6 +40,51 @@ SaveWorld = Annotated[
 ]
 
 
+Firmware = Annotated[str, typer.Option(help="Register map: 1.23, 1.40 or 1.70.", autocompletion=completion.firmwares)]
+Units = Annotated[str | None, typer.Option(help="Slave addresses, such as 1,2,5. Default: that of the configuration, or 1.")]
+Rfc2217 = Annotated[str | None, typer.Option(metavar="HOST:PORT", help="A network serial port (RFC 2217) with Modbus RTU.")]
+Program = Annotated[
+    list[str] | None, typer.Option(help="WBC program (.prg) for a bank: BANK=FILE; repeatable. FILE alone is for bank 0.")
+]
+Vision = Annotated[
+    str | None, typer.Option(metavar="HOST:PORT", help="Records of a vision system ('N1 X12.5 Y-3 A90' and a line end).")
+]
+StatementTime = Annotated[str, typer.Option(metavar="TIME", help="What one statement of a program takes; 0 for none.")]
+State = Annotated[Path | None, typer.Option(help="Directory of the non-volatile memory. Without it, memory ends with the twin.")]
+Lenient = Annotated[bool, typer.Option("--lenient", help="Holes of the register map read as 0 instead of being refused.")]
+LineTiming = Annotated[
+    str,
+    typer.Option(
+        help="'real': requests take the time of the wire and of the controller; 'strict': and a pause above 0.75 ms inside a "
+        "frame drops it; 'off'."
+    ),
+]
+Gap = Annotated[
+    float | None,
+    typer.Option(
+        help="Silence in ms after which bytes outside a frame are discarded: shorten it if requests after noise are lost. "
+        "It does not split frames, which may pause for 2 s. Default: 0.75 on a serial port, else 20."
+    ),
+]
+ReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")]
+LogFrames = Annotated[bool, typer.Option("--log-frames", help="Print every frame with time, direction, bytes and meaning.")]
+ChipVariant = Annotated[
+    str, typer.Option(help="Type: A, B, C, E1, E2, or A2x and so on (24 MHz).", autocompletion=completion.variants)
+]
+ChipWire = Annotated[
+    list[str] | None, typer.Option(help="Wire from a pin of one chip to an input of another: 0.B1=7.B3; repeatable.")
+]
+ChipRfc2217 = Annotated[str | None, typer.Option(metavar="HOST:PORT", help="The line as a network serial port (RFC 2217).")]
+ChipState = Annotated[
+    Path | None,
+    typer.Option(help="Directory that keeps the EEPROMs of E types. Without it their contents are lost when the twin ends."),
+]
+ChipReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")]
+ChipLogFrames = Annotated[
+    bool, typer.Option("--log-frames", help="Print everything on the line with time, direction, bytes and meaning.")
+]
+
+
 def _default_host(listen_any: bool) -> str:
     return "0.0.0.0" if listen_any else "127.0.0.1"
 
@@ -57,58 +102,26 @@ def _text(path: Path | None) -> str | None:
 
 @app.command()
 def mic488(
-    firmware: Annotated[
-        str, typer.Option(help="Register map: 1.23, 1.40 or 1.70.", autocompletion=completion.firmwares)
-    ] = "1.70",
-    units: Annotated[
-        str | None, typer.Option(help="Slave addresses, such as 1,2,5. Default: that of the configuration, or 1.")
-    ] = None,
+    firmware: Firmware = "1.70",
+    units: Units = None,
     pty: Annotated[Path | None, typer.Option(help="Modbus RTU on a pseudo terminal, with PATH as a link to it.")] = None,
     serial: Annotated[str | None, typer.Option(help="Modbus RTU on a real serial port, 8N1.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate. Default: that of the configuration, or 38400.")] = None,
     tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="Modbus TCP; port 0 takes a free one.")] = None,
     rtu_tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="RTU frames over TCP.")] = None,
-    rfc2217: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="A network serial port (RFC 2217) with Modbus RTU.")
-    ] = None,
+    rfc2217: Rfc2217 = None,
     config: Annotated[Path | None, typer.Option(help="The vendor tool's .cfg file.")] = None,
-    program: Annotated[
-        list[str] | None, typer.Option(help="WBC program (.prg) for a bank: BANK=FILE; repeatable. FILE alone is for bank 0.")
-    ] = None,
+    program: Program = None,
     positions: Annotated[list[str] | None, typer.Option(help="Position table (.csv) for a bank: BANK=FILE; repeatable.")] = None,
-    vision: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Records of a vision system ('N1 X12.5 Y-3 A90' and a line end).")
-    ] = None,
-    statement_time: Annotated[
-        str, typer.Option(metavar="TIME", help="What one statement of a program takes; 0 for none.")
-    ] = "1ms",
-    state: Annotated[
-        Path | None, typer.Option(help="Directory of the non-volatile memory. Without it, memory ends with the twin.")
-    ] = None,
-    lenient: Annotated[
-        bool, typer.Option("--lenient", help="Holes of the register map read as 0 instead of being refused.")
-    ] = False,
+    vision: Vision = None,
+    statement_time: StatementTime = "1ms",
+    state: State = None,
+    lenient: Lenient = False,
     trace: Trace = None,
-    line_timing: Annotated[
-        str,
-        typer.Option(
-            help="'real': requests take the time of the wire and of the controller; 'strict': and a pause above 0.75 ms inside a "
-            "frame drops it; 'off'."
-        ),
-    ] = "off",
-    gap: Annotated[
-        float | None,
-        typer.Option(
-            help="Silence in ms after which bytes outside a frame are discarded: shorten it if requests after noise are lost. "
-            "It does not split frames, which may pause for 2 s. Default: 0.75 on a serial port, else 20."
-        ),
-    ] = None,
-    ready_file: Annotated[
-        Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")
-    ] = None,
-    log_frames: Annotated[
-        bool, typer.Option("--log-frames", help="Print every frame with time, direction, bytes and meaning.")
-    ] = False,
+    line_timing: LineTiming = "off",
+    gap: Gap = None,
+    ready_file: ReadyFile = None,
+    log_frames: LogFrames = False,
     name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "mic488",
     listen_any: ListenAny = False,
     fault: Fault = None,
@@ -123,7 +136,7 @@ def mic488(
     system has them), on 127.0.0.1:5020 (Modbus TCP) and on
     127.0.0.1:5021 (RTU over TCP).
     """
-    from steptwin.commands.serve import ServeMic488, serve_mic488
+    from steptwin.commands.serve_mic488 import ServeMic488, serve_mic488
     from steptwin.files.timedinputs import parse_duration
 
     links = {"pty": _text(pty), "serial": serial, "tcp": tcp, "rtu_tcp": rtu_tcp, "rfc2217": rfc2217}
@@ -161,34 +174,21 @@ def mic488(
 
 @app.command()
 def m1486(
-    variant: Annotated[
-        str, typer.Option(help="Type: A, B, C, E1, E2, or A2x and so on (24 MHz).", autocompletion=completion.variants)
-    ] = "A",
+    variant: ChipVariant = "A",
     chain: Annotated[str, typer.Option(help="Addresses of the chips on the line, such as 0,7; hexadecimal digits.")] = "F",
     interface: Annotated[str, typer.Option(help="Driver interface: sd, dual or two.")] = "sd",
-    wire: Annotated[
-        list[str] | None, typer.Option(help="Wire from a pin of one chip to an input of another: 0.B1=7.B3; repeatable.")
-    ] = None,
+    wire: ChipWire = None,
     pty: Annotated[Path | None, typer.Option(help="The line on a pseudo terminal, with PATH as a link to it.")] = None,
     serial: Annotated[str | None, typer.Option(help="The line on a real serial port, 8N1.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate selected by the BR pins. Default: the highest of the type.")] = None,
     tcp: Annotated[str | None, typer.Option(metavar="HOST:PORT", help="The line as raw TCP; port 0 takes a free one.")] = None,
-    rfc2217: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="The line as a network serial port (RFC 2217).")
-    ] = None,
-    state: Annotated[
-        Path | None,
-        typer.Option(help="Directory that keeps the EEPROMs of E types. Without it their contents are lost when the twin ends."),
-    ] = None,
+    rfc2217: ChipRfc2217 = None,
+    state: ChipState = None,
     program: Annotated[Path | None, typer.Option(help="Program in the memory of a single chip at power-on.")] = None,
     trace: Trace = None,
     line_timing: Annotated[str, typer.Option(help="'real': characters take their time on the wire; 'off': none.")] = "off",
-    ready_file: Annotated[
-        Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")
-    ] = None,
-    log_frames: Annotated[
-        bool, typer.Option("--log-frames", help="Print everything on the line with time, direction, bytes and meaning.")
-    ] = False,
+    ready_file: ChipReadyFile = None,
+    log_frames: ChipLogFrames = False,
     name: Annotated[str, typer.Option(help="Name under which 'steptwin pin' and its like find this twin.")] = "m1486",
     listen_any: ListenAny = False,
     fault: Fault = None,
@@ -200,7 +200,7 @@ def m1486(
 
     Without any of --pty, --serial, --tcp and --rfc2217 it listens on a pty and on 127.0.0.1:5022 (raw TCP).
     """
-    from steptwin.commands.serve import ServeM1486, serve_m1486
+    from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
 
     links = {"pty": _text(pty), "serial": serial, "tcp": tcp, "rfc2217": rfc2217}
     if not any(links.values()):

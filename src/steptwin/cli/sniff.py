@@ -16,7 +16,7 @@ from steptwin.cli import completion
 from steptwin.cli.device import complain
 
 if TYPE_CHECKING:
-    from steptwin.words.frames import FrameLine
+    from steptwin.wire.frameline import FrameLine
 
 
 class SniffedLanguage(enum.StrEnum):

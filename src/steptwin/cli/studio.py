@@ -1,4 +1,4 @@
-"""``steptwin studio``: a world in a browser. Exit code 1 if an expectation of the world's scripts did not hold.
+"""``steptwin studio``: a world, or devices, in a browser. Exit code 1 if an expectation of the world's scripts did not hold.
 
 From another program: the WebSocket and REST, which docs/studio.md explains.
 """
@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from steptwin.cli import completion
 from steptwin.cli.worldoptions import (
     AllowOutside,
     Begin,
@@ -48,6 +49,17 @@ def studio(
         typer.Option(metavar="FILE", help="Lines ROLE NAME TOKEN; roles are viewer, operator, engineer. Default: new tokens."),
     ] = None,
     audit: Annotated[Path | None, typer.Option(metavar="FILE", help="Append who did what to a file of JSON lines.")] = None,
+    device: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--device",
+            "-d",
+            metavar="DEVICE",
+            help="A device to show, as for the other commands: /dev/ttyUSB0,unit=2, HOST:PORT, /dev/ttyUSB1,kind=m1486,chip=7. "
+            "Several times for several. Without MACHINE.toml there is no world then.",
+            autocompletion=completion.devices,
+        ),
+    ] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page where there is a desktop.")] = True,
     speed: Speed = "1",
     name: Name = None,
@@ -64,10 +76,10 @@ def studio(
     strict: Strict = False,
     allow_outside: AllowOutside = False,
 ) -> None:
-    """Run a world in real time and show it in a browser, until Ctrl-C.
+    """Show a world or devices in a browser, until Ctrl-C.
 
-    Its lines are open as with 'steptwin up', for any other program. The page can move axes, so only this computer reaches
-    it unless another address is permitted.
+    The lines of a world are open as with 'steptwin up', for any other program. The page can move axes, so only this computer
+    reaches it unless another address is permitted.
     """
     try:
         from steptwin.commands.studio import StudioOptions
@@ -79,7 +91,16 @@ def studio(
     from steptwin.commands.up_world import UpOptions
     from steptwin.files.timedinputs import parse_duration
 
-    own = StudioOptions(http=http, remote=remote, certificate=certificate, key=key, tokens=tokens, audit=audit, browser=browser)
+    own = StudioOptions(
+        http=http,
+        remote=remote,
+        certificate=certificate,
+        key=key,
+        tokens=tokens,
+        audit=audit,
+        browser=browser,
+        devices=tuple(device or ()),
+    )
     options = UpOptions(
         world=world,
         moment=None if begin is None else parse_duration(begin, "--from"),

@@ -42,20 +42,20 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
     def prompt() -> str:
         return f"{connection.selected or 'all'}> "
 
-    def tell(text: str) -> None:
+    def show(text: str) -> None:
         if not interactive:
             typer.echo(text)
             return
         import readline
 
-        # It comes while somebody types: above his line, which is written anew.
+        # It may arrive while a line is typed: it is printed above that line, which is redrawn.
         sys.stdout.write(f"\r\x1b[K{text}\n{prompt()}{readline.get_line_buffer()}")
         sys.stdout.flush()
 
-    connection = _ChipConnection(address, kind, tell, log_frames=log_frames)
+    connection = _ChipConnection(address, kind, show, log_frames=log_frames)
     try:
         if interactive:
-            with _told():
+            with _errors_as_text():
                 connection.verified()
             complain(f"M1486 on {address.place}; 'help' helps, k stops the motor, Ctrl-D ends")
         for line in typed_lines(prompt, lambda line: line.upper().startswith("K")):
@@ -72,7 +72,7 @@ def chip_terminal(address: DeviceAddress, *, log_frames: bool) -> None:
 
 
 @contextlib.contextmanager
-def _told() -> Generator[None]:
+def _errors_as_text() -> Generator[None]:
     try:
         yield
     except SteptwinError as error:
@@ -82,12 +82,12 @@ def _told() -> Generator[None]:
 class _ChipConnection:
     """The line to the chips. Before the first command the chip is selected and verified by its echo; only K does without."""
 
-    def __init__(self, address: DeviceAddress, kind: Variant | None, tell: Callable[[str], object], *, log_frames: bool) -> None:
+    def __init__(self, address: DeviceAddress, kind: Variant | None, show: Callable[[str], object], *, log_frames: bool) -> None:
         from steptwin.drivers.m1486.lines import line_endpoint
 
         self._address = address
         self._kind = kind
-        self._tell = tell
+        self._show = show
         self._log_frames = log_frames
         self._endpoint = line_endpoint(address.place, address.baud)
         self._terminal: ChipTerminal | None = None
@@ -133,7 +133,7 @@ class _ChipConnection:
     def _opened(self, channel: Channel) -> ChipTerminal:
         from steptwin.commands.m1486_terminal import ChipTerminal
 
-        self._terminal = ChipTerminal(channel, self._address.baud, self._kind, self._tell)
+        self._terminal = ChipTerminal(channel, self._address.baud, self._kind, self._show)
         self._terminal.selected = "" if self._address.chip is None else f"{self._address.chip:X}"
         return self._terminal
 

@@ -8,12 +8,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import OPEN_ADDRESS
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.m1486.pins import known_pin, refuse_taken
+from steptwin.m1486.pins import OPEN_ADDRESS, known_pin, refuse_taken
 from steptwin.m1486.variants import DEFAULT, Variant
 from steptwin.world.kernel import PinName, Wire
-from steptwin.world.small import chip_name
+from steptwin.world.kinds.m1486.small import chip_name
 
 _WIRE = re.compile(r"\s*([0-9A-Fa-f])\.([^.=]+)=\s*([0-9A-Fa-f])\.([^.=]+)\Z")
 

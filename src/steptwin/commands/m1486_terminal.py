@@ -63,14 +63,14 @@ class TerminalWords:
 
     def __init__(self) -> None:
         self._typed: list[bytes] = []
-        self._asked: deque[int] = deque()
+        self._requested: deque[int] = deque()
         self.refused = 0
         """Number of characters that found no room so far."""
 
     @property
     def is_awaiting(self) -> bool:
         """Whether a requested upload has not arrived yet."""
-        return bool(self._asked)
+        return bool(self._requested)
 
     def typed(self, line: str) -> None:
         """Register a line that was sent, given without its CR."""
@@ -78,23 +78,23 @@ class TerminalWords:
         self._typed.append(data + b"\r")
         upload = _UPLOAD.fullmatch(data)
         if upload is not None:
-            self._asked.append(int(upload[1]))
+            self._requested.append(int(upload[1]))
 
-    def heard(self, data: bytes) -> list[str]:
+    def decode(self, data: bytes) -> list[str]:
         """Decode all bytes received between two silences."""
-        told: list[str] = []
+        texts: list[str] = []
         for line in self._typed:
-            data = self._answered(line, data, told)
+            data = self._answered(line, data, texts)
         self._typed.clear()
         # More than was asked for: function 57 reports before what is uploaded.
-        reports = len(data) - len(self._asked)
+        reports = len(data) - len(self._requested)
         for byte in data:
             is_report = byte in _ROOM and reports > 0
             reports -= is_report
-            told.append(self._room(byte) if is_report or not self._asked else self._upload(byte))
-        return told
+            texts.append(self._room(byte) if is_report or not self._requested else self._upload(byte))
+        return texts
 
-    def _answered(self, line: bytes, data: bytes, told: list[str]) -> bytes:
+    def _answered(self, line: bytes, data: bytes, texts: list[str]) -> bytes:
         """The bytes that remain after the echo of a line and reports about room are removed."""
         place = 0
         notes: list[str] = []
@@ -117,13 +117,13 @@ class TerminalWords:
             place += 1
         else:
             if notes or echoed == len(line):
-                told += notes
+                texts += notes
                 self.refused += refused
                 return data[place:]
         return data
 
     def _upload(self, byte: int) -> str:
-        number = self._asked.popleft()
+        number = self._requested.popleft()
         name = UPLOADS.get(number, "reserved").partition(":")[0]
         doubt = f" (or: {_ROOM[byte]})" if byte in _ROOM else ""
         return f"{byte:02X}H  U{number} {name}: {_value(number, byte)}{doubt}"
@@ -153,7 +153,7 @@ def _on(numbers: range | tuple[int, ...], byte: int) -> str:
 
 
 class ChipTerminal:
-    """A line for typed commands. ``tell`` is called with each decoded answer, from a separate thread.
+    """A line for typed commands. ``show`` is called with each decoded answer, from a separate thread.
 
     ``variant``: for E types the terminal waits after each command until the EEPROM is written.
     """
@@ -163,7 +163,7 @@ class ChipTerminal:
         channel: Channel,
         baud: int,
         variant: Variant | None,
-        tell: Callable[[str], object],
+        show: Callable[[str], object],
         *,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -172,13 +172,13 @@ class ChipTerminal:
         self._serial = SerialLine(baud)
         self._quiet_s = QUIET_S + self._serial.duration(3) / SECOND
         self._write_s = variant.write_ns / SECOND if variant is not None and variant.store is Store.EEPROM else 0.0
-        self._tell = tell
+        self._show = show
         self._words = TerminalWords()
         self._changed = threading.Condition()
         self._outgoing: deque[str] = deque()
         self._unsettled = 0  # lines whose echo may be to come
         self._sent = 0  # those of them that have gone out
-        self._heard = bytearray()
+        self._received = bytearray()
         self._quiet_at = self._ready_at = 0.0
         self._failure: LineFailure | None = None
         self._dropped: LineFailure | None = None  # to be raised once
@@ -245,10 +245,10 @@ class ChipTerminal:
                 self._send()
                 data = self._channel.read(LOOK_S)
                 if data:
-                    self._heard += data
+                    self._received += data
                     self._quiet_at = self._clock() + self._quiet_s
-                elif (self._heard or self._sent) and self._clock() >= self._quiet_at:
-                    self._put_into_words()
+                elif (self._received or self._sent) and self._clock() >= self._quiet_at:
+                    self._show_received()
         except LineFailure as failure:
             with self._changed:
                 self._failure = failure
@@ -291,11 +291,11 @@ class ChipTerminal:
                 break
         return waiting.popleft() if waiting and self._clock() >= self._ready_at else None
 
-    def _put_into_words(self) -> None:
-        told = self._words.heard(bytes(self._heard))
-        self._heard.clear()
-        for text in told:
-            self._tell(text)
+    def _show_received(self) -> None:
+        texts = self._words.decode(bytes(self._received))
+        self._received.clear()
+        for text in texts:
+            self._show(text)
         with self._changed:
             self._unsettled -= self._sent
             self._sent = 0

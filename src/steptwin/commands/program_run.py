@@ -66,7 +66,7 @@ def changes_of(inputs: Sequence[TimedInput], controller: str) -> Iterator[InputC
 def world_of(
     text: str, files: Mapping[str, bytes], program: Path, *, keep_trace: bool, overrides: Overrides = NO_OVERRIDES
 ) -> Generator[World]:
-    name = f"run {program}"
+    name = f"run {program.name}"
     with World.from_toml(text, files, name=name, overrides=overrides, keep_trace=keep_trace, keep_inputs=False) as world:
         yield world
 

@@ -25,18 +25,20 @@ from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.m1486.check import CheckedChipProgram, check
-from steptwin.m1486.chip import OPEN_ADDRESS, M1486Chip
+from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.events import M1486Event
 from steptwin.m1486.lines import interface
 from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.m1486.pins import refuse_taken, settable_pin
+from steptwin.m1486.pins import OPEN_ADDRESS, refuse_taken, settable_pin
 from steptwin.m1486.present import program_words, velocity
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.machine import SECOND, Nanos
 from steptwin.wire.slave import FrameDirection
+from steptwin.world.kinds.m1486.small import chip_name, m1486_world
 from steptwin.world.lines import SCRIPTS
-from steptwin.world.small import InputChange, Whole, chip_name, m1486_world
+from steptwin.world.programs import StatementFollower
+from steptwin.world.small import InputChange, Whole
 from steptwin.world.trace import TraceRecord
 
 JSON_VERSION = 1
@@ -74,7 +76,7 @@ class M1486Run:
     print_world: bool = False
 
 
-def run(options: M1486Run, say: Print, warn: Print) -> bool:
+def run(options: M1486Run, out: Print, warn: Print) -> bool:
     """Run a program in its own world and print what it did. Returns whether no error occurred. ``warn`` gets the findings of
     the checker.
 
@@ -97,15 +99,17 @@ def run(options: M1486Run, say: Print, warn: Print) -> bool:
 
     files = {str(options.program): read_bytes(options.program)} if is_stored else {}
     with world_of(text, files, options.program, keep_trace=options.trace is not None) as world:
+        if options.trace is not None:
+            StatementFollower(world, world.trace.add)
         chips = Chips(world, len(typed))
         limit = limit_of(options.limit, until_idle=options.until_idle)
         begin = time.perf_counter()
         why = run_on(world, limit, lambda: chips.due(limit), chips.are_idle, until_idle=options.until_idle)
         outcome = Outcome(Ending(limit if why == "limit" else chips.end(), why), time.perf_counter() - begin)
         if options.as_json:
-            say(json.dumps(_data(options, chips, outcome), ensure_ascii=False, indent=2))
+            out(json.dumps(_data(options, chips, outcome), ensure_ascii=False, indent=2))
         else:
-            _say_lines(chips, outcome, say)
+            _print_lines(chips, outcome, out)
         write(world, options.trace, options.program.name, outcome.ending.at)
     return not chips.went_wrong
 
@@ -214,24 +218,24 @@ def _change(change: TimedInput, chain: Chain) -> InputChange:
 # ---------------------------------------------------------------------- what is said
 
 
-def _say_lines(chips: Chips, outcome: Outcome, say: Print) -> None:
+def _print_lines(chips: Chips, outcome: Outcome, out: Print) -> None:
     """Print a line for each event, and how the run ended."""
     several, now = len(chips.chips) > 1, chips.world.now
     for happening in sorted(chips.happened, key=lambda h: h.event.time):
         if happening.event.code not in _HIDDEN:
             chip = f"{_address(happening.chip)}  " if several else ""
-            say(f"{happening.event.time / SECOND:14.6f} s  {chip}{happening.event.text}")
+            out(f"{happening.event.time / SECOND:14.6f} s  {chip}{happening.event.text}")
     for name, chip in chips.chips.items():
-        say(f"{f'chip {_address(name)}: ' if several else ''}{_position(chip, now)}")
+        out(f"{f'chip {_address(name)}: ' if several else ''}{_position(chip, now)}")
         if outcome.ending.why != "ended":
-            say(f"  {program_words(chip, now)}")
+            out(f"  {program_words(chip, now)}")
     if chips.sent:
-        say(f"  sent {chips.sent.hex(' ').upper()}")
+        out(f"  sent {chips.sent.hex(' ').upper()}")
     if chips.unsent:
-        say(f"{chips.unsent} lines of the file were not sent: the chips had no room for them")
+        out(f"{chips.unsent} lines of the file were not sent: the chips had no room for them")
     if outcome.ending.why == "limit":
-        say("ended at the time limit; --for sets a longer one")
-    say(str(outcome))
+        out("ended at the time limit; --for sets a longer one")
+    out(str(outcome))
 
 
 def _address(name: str) -> str:

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 from steptwin.commands.descriptions import Named, print_world
 from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, changes_of, limit_of, run_on, world_of, write
-from steptwin.commands.travels import Placed, Travel, place_switches
+from steptwin.commands.travels import PlacedSwitches, Travel, place_switches
 from steptwin.datasheet import plain
 from steptwin.diagnostics import Severity, render, visible
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.files.programbanks import Findings, read_banks
-from steptwin.files.programfiles import Companions
+from steptwin.files.programfiles import CompanionFiles
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
@@ -39,14 +39,14 @@ from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.real import real_text
 from steptwin.wbc.usage import homing_sides
 from steptwin.world.kinds.mic488.program_watch import ProgramEvent, ProgramWatch
+from steptwin.world.kinds.mic488.small import mic488_world
 from steptwin.world.overrides import NO_OVERRIDES
-from steptwin.world.small import Whole, mic488_world
+from steptwin.world.programs import StatementFollower
+from steptwin.world.small import Whole
 from steptwin.world.trace import TraceRecord
 
 NAME = "mic488"
 """The name of the controller in the world."""
-PROGRAM = "program"
-"""The subject of the program's statements in traces."""
 JSON_VERSION = 1
 
 _WRONG = frozenset({"program-error", "position-error", "overrun"})
@@ -71,13 +71,13 @@ class WbcRun:
     print_world: bool = False
 
 
-def run(options: WbcRun, say: Print, warn: Print) -> bool:
+def run(options: WbcRun, out: Print, warn: Print) -> bool:
     """Run a program in its own world and print what it did. Returns whether no error occurred. ``warn`` gets the findings of
     the checker.
 
     Raises `Misuse` for options or files that cannot be run, `ProgramErrors` for a program with errors.
     """
-    given = _read(options, warn)
+    given = prepare(options, warn)
     if options.print_world:
         print_world(given.describe(str), f"run {options.program}")
         return True
@@ -88,6 +88,8 @@ def run(options: WbcRun, say: Print, warn: Print) -> bool:
     keep_trace = options.trace is not None
     with world_of(given.describe(str), files, options.program, keep_trace=keep_trace, overrides=late) as world:
         watch = RunWatch(world)
+        if keep_trace:
+            StatementFollower(world, world.trace.add)
         if is_late:
             given.start(watch.device)
         limit = limit_of(options.limit, until_idle=options.until_idle)
@@ -96,14 +98,14 @@ def run(options: WbcRun, say: Print, warn: Print) -> bool:
         end = limit if why == "limit" else min(watch.settled(), limit)
         world.run_to(max(end, world.now))
         outcome = Outcome(Ending(end, why), time.perf_counter() - begin)
-        ran = Ran(options, given, watch, outcome)
+        ran = WbcRunResult(options, given, watch, outcome)
         wrong = any(happening.code in _WRONG for happening in watch.happened)
         if options.as_json:
-            say(json.dumps(_data(ran, wrong=wrong), ensure_ascii=False, indent=2))
+            out(json.dumps(_data(ran, wrong=wrong), ensure_ascii=False, indent=2))
         else:
             if given.companions.found:
-                say(str(given.companions))
-            _say_lines(ran, say)
+                out(str(given.companions))
+            _print_lines(ran, out)
         write(world, options.trace, options.program.name, outcome.ending.at)
     return not wrong
 
@@ -112,8 +114,8 @@ class Prepared(NamedTuple):
     """The checked input of a run."""
 
     options: WbcRun
-    companions: Companions
-    placed: Placed
+    companions: CompanionFiles
+    placed: PlacedSwitches
     banks: ProgramConfig
     """The banks that the configuration starts."""
 
@@ -141,9 +143,9 @@ class Prepared(NamedTuple):
         return mic488_world(Whole(name=options.program.stem), [None], values, switches=self.placed.switches, changes=changes)
 
 
-def _read(options: WbcRun, warn: Print) -> Prepared:
+def prepare(options: WbcRun, warn: Print) -> Prepared:
     """Read and check the files. ``warn`` gets their warnings."""
-    files = Companions.of(options.program, options.positions, options.config)
+    files = CompanionFiles.of(options.program, options.positions, options.config)
     config = ControllerConfig() if files.config is None else load_config(files.config, options.firmware, warn)
     for change in options.inputs:
         check_pin(change.pin, change.value)
@@ -178,9 +180,8 @@ class RunWatch(ProgramWatch):
     """Observes the program of the only controller; ``happened`` includes events and inputs."""
 
     def __init__(self, world: World) -> None:
-        self._trace = world.trace
         device = world.mic488[NAME].device
-        super().__init__(device, world.plan.kernel_of[NAME], NAME)
+        super().__init__(device, world.parts.kernel_of[NAME], NAME)
         for event in device.events:  # those of power-on
             self._tell(event.time, event.code, event.text)
         world.trace.watchers.append(self._recorded)
@@ -190,10 +191,6 @@ class RunWatch(ProgramWatch):
             self._tell(record.time, record.subject, str(record.value), self._caused(record.time))
         elif record.kind == "event" and record.subject == NOTE:
             self._tell(record.time, "input", str(record.value))
-
-    def _executed(self, now: Nanos, number: int) -> None:
-        if self._trace.is_kept:
-            self._trace.add(TraceRecord(now, NAME, "statement", PROGRAM, self.line(number)))
 
     def has_ended(self, due: Nanos | None) -> bool:
         return due is None and self.device.program.state is ProgramState.STOPPED
@@ -230,7 +227,7 @@ def _missing(device: Mic488Device, axis: Axis, switched: Collection[str]) -> str
     return f"to {side} on {pin}, which nothing operates: --travel M{axis.number}={'LOW..' if side == 'KL' else '..HIGH'}"
 
 
-class Ran(NamedTuple):
+class WbcRunResult(NamedTuple):
     """The result of a run."""
 
     options: WbcRun
@@ -246,23 +243,23 @@ class Ran(NamedTuple):
 # ---------------------------------------------------------------------- what is said
 
 
-def _say_lines(ran: Ran, say: Print) -> None:
+def _print_lines(ran: WbcRunResult, out: Print) -> None:
     watch, outcome = ran.watch, ran.outcome
     for text in ran.given.placed.assumed:
-        say(text)
+        out(text)
     if watch.happened:
-        say("\n".join(_line(happening) for happening in watch.happened))
-    say(_ending(watch, outcome.ending))
+        out("\n".join(_line(happening) for happening in watch.happened))
+    out(_ending(watch, outcome.ending))
     for text in ran.missing:
-        say(f"  {text}")
+        out(f"  {text}")
     shown = state_of(watch.device, outcome.ending.at)
     for axis in shown.axes:
         if axis.enabled or axis.position:
             speed = f", {real_text(axis.velocity)} {axis.unit}/s" if axis.velocity else ""
-            say(f"  {axis.name} at {real_text(axis.position or 0.0)} {axis.unit}{speed}, {axis.status.text}")
+            out(f"  {axis.name} at {real_text(axis.position or 0.0)} {axis.unit}{speed}, {axis.status.text}")
     on = [name for name, level in shown.pins.items() if level and not name.startswith("AIN")]
-    say(f"  on: {', '.join(on) or 'nothing'}")
-    say(str(outcome))
+    out(f"  on: {', '.join(on) or 'nothing'}")
+    out(str(outcome))
 
 
 def _line(happening: ProgramEvent) -> str:
@@ -291,7 +288,7 @@ def _ending(watch: RunWatch, ending: Ending) -> str:
     return f"ended at the time limit (--for sets a longer one) in line {place.line}: {place.text}"
 
 
-def _data(ran: Ran, *, wrong: bool) -> dict[str, object]:
+def _data(ran: WbcRunResult, *, wrong: bool) -> dict[str, object]:
     options, files, watch, outcome = ran.options, ran.given.companions, ran.watch, ran.outcome
     return {
         "version": JSON_VERSION,

@@ -62,7 +62,7 @@ class WorldRun:
     as_json: bool = False
 
 
-def run(options: WorldRun, say: Print, warn: Print) -> bool:
+def run(options: WorldRun, out: Print, warn: Print) -> bool:
     """Run a world and report what happened. Returns whether all expectations held. ``warn`` gets the warnings about its files.
 
     Raises `Misuse` for a file or option that cannot be run. After Ctrl-C everything is written, then `KeyboardInterrupt`
@@ -78,12 +78,13 @@ def run(options: WorldRun, say: Print, warn: Print) -> bool:
         allow_outside=options.allow_outside,
         state=options.state,
     ) as world:
-        return _run_and_report(world, options, say)
+        return _run_and_report(world, options, out)
 
 
-def _run_and_report(world: World, options: WorldRun, say: Print) -> bool:
+def _run_and_report(world: World, options: WorldRun, out: Print) -> bool:
     began = world.now
-    known = Counter(record.machine for record in filter(is_shown, world.trace))
+    before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
+    known = Counter(record.machine for record in before)
     _arrange(world, options)
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual
@@ -100,10 +101,10 @@ def _run_and_report(world: World, options: WorldRun, say: Print) -> bool:
     in_vain = options.until if reason is None else None
     outcome = WorldRunResult(began, known, reason, in_vain, wall_s, session.digest, written)
     if options.as_json:
-        _json(world, outcome, say)
+        _json(world, outcome, out)
     else:
-        _print_happened(world, outcome, watches, say)
-        _print_end(world, outcome, say)
+        _print_happened(world, outcome, watches, out)
+        _print_end(world, outcome, out)
     if reason is INTERRUPTED:
         raise KeyboardInterrupt
     in_time = not world.overdue and in_vain is None
@@ -113,7 +114,7 @@ def _run_and_report(world: World, options: WorldRun, say: Print) -> bool:
 def _watched(world: World) -> dict[str, ProgramReport]:
     """Watches for the programs of all controllers that have any."""
     found = {
-        name: world.kind(name).watch_program(machine, world.plan.kernel_of[name], name)
+        name: world.kind(name).watch_program(machine, world.parts.kernel_of[name], name)
         for name, machine in world.machines.items()
     }
     return {name: watch for name, watch in found.items() if watch is not None}
@@ -193,7 +194,7 @@ def _write_trace(world: World, where: Path) -> list[Path]:
 # ---------------------------------------------------------------------- output
 
 
-def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramReport], say: Print) -> None:
+def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str, ProgramReport], out: Print) -> None:
     """Print in order of time what happened in the world, and what programs did with the statements that caused it."""
     shown: list[tuple[Nanos, str]] = []
     for record in filter(is_shown, world.trace):
@@ -204,46 +205,46 @@ def _print_happened(world: World, outcome: WorldRunResult, watches: Mapping[str,
     for name, watch in watches.items():
         shown += [(each.time, _with_statement(name, each)) for each in watch.happened]
     for _, text in sorted(shown, key=itemgetter(0)):
-        say(text)
+        out(text)
 
 
 def _with_statement(controller: str, happening: ProgramAct) -> str:
     return f"{happening.time / SECOND:12.6f} s  {controller:<10} {happening.text:<34}  {happening.place}".rstrip()
 
 
-def _print_end(world: World, outcome: WorldRunResult, say: Print) -> None:
-    say("")
+def _print_end(world: World, outcome: WorldRunResult, out: Print) -> None:
+    out("")
     for name, axis in world.axis.items():
         lost = f"   {axis.lost} pulses lost" if axis.lost else ""
-        say(f"{name:<10} {axis.position:12.4f} {axis.unit}{lost}")
+        out(f"{name:<10} {axis.position:12.4f} {axis.unit}{lost}")
     driven = {fitted.spec.drive for fitted in world.axes.values()}
     for name, state in _states(world).items():
         for axis in state.axes:
             if (name, axis.name) not in driven and (axis.position or axis.enabled):
-                say(f"{f'{name}.{axis.name}':<10} {axis.position or 0.0:12.4f} {axis.unit}")
+                out(f"{f'{name}.{axis.name}':<10} {axis.position or 0.0:12.4f} {axis.unit}")
     ended = "" if outcome.reason is None else f", ended by: {outcome.reason}"
     begun = f", from {outcome.began / SECOND:g} s on" if outcome.began else ""
-    say(f"{world.time:g} s of {world.spec.name}{begun} in {outcome.wall_s:.2f} s{ended}")
+    out(f"{world.time:g} s of {world.spec.name}{begun} in {outcome.wall_s:.2f} s{ended}")
     for failure in world.failures:
-        say(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
+        out(f"expectation failed at {failure.time / SECOND:g} s: {failure.value}")
     if world.failures.more:
-        say(f"{world.failures.more} more expectations failed")
+        out(f"{world.failures.more} more expectations failed")
     for late in world.overdue:
-        say(f"warning: at {late.time / SECOND:g} s {late.value}")
+        out(f"warning: at {late.time / SECOND:g} s {late.value}")
     if world.overdue.more:
-        say(f"warning: {world.overdue.more} more of these")
+        out(f"warning: {world.overdue.more} more of these")
     if outcome.in_vain is not None:
-        say(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
+        out(f"warning: {outcome.in_vain} did not come true in {(world.now - outcome.began) / SECOND:g} s")
     for path in outcome.written:
-        say(f"wrote {path}")
-    say(f"digest {outcome.digest}")
+        out(f"wrote {path}")
+    out(f"digest {outcome.digest}")
 
 
 def _states(world: World) -> dict[str, ControllerState]:
     return {name: world.kind(name).state(machine, world.now) for name, machine in world.machines.items()}
 
 
-def _json(world: World, outcome: WorldRunResult, say: Print) -> None:
+def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
     data: dict[str, Any] = {
         "version": JSON_VERSION,
         "world": world.spec.name,
@@ -262,10 +263,10 @@ def _json(world: World, outcome: WorldRunResult, say: Print) -> None:
         "files": [str(path) for path in outcome.written],
         "digest": outcome.digest,
     }
-    say(json.dumps(data, ensure_ascii=False, indent=2))
+    out(json.dumps(data, ensure_ascii=False, indent=2))
 
 
-def replay(path: Path, trace: Path | None, say: Print, warn: Print, *, as_json: bool = False) -> bool:
+def replay(path: Path, trace: Path | None, out: Print, warn: Print, *, as_json: bool = False) -> bool:
     """Run a session again. Returns whether the result was the same. Raises `Misuse` for a file that is not a session."""
     session = sessions.load(path)
     world = session.replay()
@@ -283,12 +284,12 @@ def replay(path: Path, trace: Path | None, say: Print, warn: Print, *, as_json: 
             "inputs": len(session.inputs),
             "files": [str(each) for each in written],
         }
-        say(json.dumps(data, ensure_ascii=False, indent=2))
+        out(json.dumps(data, ensure_ascii=False, indent=2))
         return is_same
     for each in written:
-        say(f"wrote {each}")
+        out(f"wrote {each}")
     if is_same:
-        say(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")
+        out(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")
     else:
         recorded = f"recorded {session.digest} (steptwin {session.version})"
         warn(f"{path}: the run differs from the recorded one: digest {digest}, {recorded}")

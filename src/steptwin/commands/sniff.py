@@ -19,14 +19,14 @@ from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
 from steptwin.live.tcp import TcpLink
+from steptwin.m1486.characterlog import REPORTS, CharacterLog, LineSplitter
 from steptwin.m1486.receiver import CR
 from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
 from steptwin.mic488.registers import register_map
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.words.characters import REPORTS, CharacterLog, LineSplitter
-from steptwin.words.frames import FrameLine
 from steptwin.world.addresses import Address
 from steptwin.world.kernel import Kernel
 
@@ -41,7 +41,7 @@ ARROWS = {FrameDirection.IN: "→", FrameDirection.OUT: "←"}
 class Decoder(Protocol):
     """Decodes bytes. ``direction`` is None if both directions share one wire."""
 
-    def heard(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None: ...
+    def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None: ...
     def deadline(self) -> Nanos | None: ...
     def expire(self, now: Nanos) -> None: ...
 
@@ -55,11 +55,11 @@ class ModbusDecoder:
         self._tcp = TcpListener(words) if tcp else None
         self._rtu = RtuListener(words)
 
-    def heard(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
+    def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
         if self._tcp is not None and direction is not None:
-            self._tcp.heard(data, now, direction)
+            self._tcp.feed(data, now, direction)
         else:
-            self._rtu.heard(data, now)
+            self._rtu.feed(data, now)
 
     def deadline(self) -> Nanos | None:
         return self._rtu.deadline()
@@ -78,31 +78,31 @@ class M1486Decoder:
     def __init__(self, sink: Sink, kind: str) -> None:
         self._sink = sink
         self._log = CharacterLog(variant(kind))
-        self._log.sinks.append(self._told)
+        self._log.sinks.append(self._observe)
         self._lines = LineSplitter(self._log, "")
-        self._typed: deque[int] = deque(maxlen=MOST_TYPED)  # whose echo may come
+        self._typed: deque[int] = deque(maxlen=MOST_TYPED)  # whose echo may follow
         self._count = 0  # of all characters typed
         self._uploads: deque[tuple[int, int]] = deque()  # numbers, with the count of characters up to their CR
-        self._repeated = b""  # what came and repeats what was typed
+        self._repeated = b""  # received bytes that match the echo so far
         self._repeated_ns: Nanos = 0
 
-    def _told(self, line: FrameLine) -> None:
+    def _observe(self, line: FrameLine) -> None:
         upload = re.match(rb"\s*[Uu]\s*(\d+)\s*\r", line.raw) if line.direction is FrameDirection.IN else None
         if upload is not None:
             self._uploads.append((int(upload[1]), self._count))
         self._sink(line)
 
-    def heard(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
+    def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
         for byte in data:
             if direction is FrameDirection.OUT:
-                self._came(byte, now)
+                self._received(byte, now)
                 continue
             if direction is FrameDirection.IN:
                 self._typed.append(byte)
                 self._count += 1
             self._lines.take(bytes((byte,)), now)
 
-    def _came(self, byte: int, now: Nanos) -> None:
+    def _received(self, byte: int, now: Nanos) -> None:
         if not self._uploads and byte in self._typed:
             while byte != self._typed[0]:
                 self._typed.popleft()  # typed before function 41 was ON
@@ -154,8 +154,8 @@ class M1486Decoder:
             self._settle()
 
 
-class _Between:
-    """A port that passes the bytes of its client to the device, and those of the device to the client. See `TalkingPort`."""
+class _RelayPort:
+    """A port that passes the bytes of its client to the device, and those of the device to the client. See `SendingPort`."""
 
     broken: str | None = None
 
@@ -169,15 +169,15 @@ class _Between:
         self._tap.pass_on(data)
         return b""
 
-    def say(self, data: bytes, now: Nanos) -> None:
+    def send(self, data: bytes, now: Nanos) -> None:
         self._waiting.append((now, data))
         if self.on_output is not None:
             self.on_output()
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        said = list(self._waiting)
+        waiting = list(self._waiting)
         self._waiting.clear()
-        return said
+        return waiting
 
     def deadline(self) -> Nanos | None:
         return None
@@ -190,11 +190,11 @@ class _Between:
 class Tap(asyncio.Protocol):
     """The connection to the device; programs that use it through this relay are `clients`."""
 
-    def __init__(self, decoder: Decoder, *, stands_between: bool) -> None:
-        self.clients: list[_Between] = []
+    def __init__(self, decoder: Decoder, *, is_relay: bool) -> None:
+        self.clients: list[_RelayPort] = []
         self.ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._decoder = decoder
-        self._stands_between = stands_between
+        self._is_relay = is_relay
         self._begin = time.monotonic_ns()
         self._transport: asyncio.Transport | None = None
 
@@ -208,20 +208,20 @@ class Tap(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         now = self._now()
         for client in self.clients:
-            client.say(data, now)
-        self._heard(data, FrameDirection.OUT if self._stands_between else None)
+            client.send(data, now)
+        self._decode(data, FrameDirection.OUT if self._is_relay else None)
 
     def pass_on(self, data: bytes) -> None:
         if self._transport is not None:
             self._transport.write(data)
-        self._heard(data, FrameDirection.IN)
+        self._decode(data, FrameDirection.IN)
 
     def _now(self) -> Nanos:
         return time.monotonic_ns() - self._begin
 
-    def _heard(self, data: bytes, direction: FrameDirection | None) -> None:
+    def _decode(self, data: bytes, direction: FrameDirection | None) -> None:
         decoder = self._decoder
-        decoder.heard(data, self._now(), direction)
+        decoder.feed(data, self._now(), direction)
         due = decoder.deadline()
         if due is not None:
             delay_s = max(due - self._now(), 0) / SECOND
@@ -242,13 +242,13 @@ async def sniff(
     """
     if place.framed and listen is None:
         raise Misuse("a Modbus TCP connection cannot be monitored from outside: use a relay, --listen HOST:PORT")
-    tap = Tap(decoder, stands_between=listen is not None or pty is not None)
+    tap = Tap(decoder, is_relay=listen is not None or pty is not None)
     transport = await place.endpoint.connect(lambda: tap)
     cell = Cell(Kernel(), Clock())
     links: list[TcpLink | PtyLink] = []
 
     def port() -> Port:
-        return _Between(tap)
+        return _RelayPort(tap)
 
     try:
         if listen is not None:

@@ -1,4 +1,5 @@
-"""`steptwin studio`: a world in real time with a page for it; its lines are open as with `steptwin up`."""
+"""`steptwin studio`: a world in real time, or devices, or both, with a page for them; the lines of a world are open as with
+`steptwin up`."""
 
 from __future__ import annotations
 
@@ -8,8 +9,9 @@ import secrets
 import socket
 import sys
 import threading
+import time
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -20,19 +22,30 @@ from steptwin import __version__
 from steptwin.access.audit import Audit
 from steptwin.access.origin import Origins
 from steptwin.access.roles import Role
-from steptwin.access.tokens import Gate, Token, read_tokens
+from steptwin.access.tokens import AccessGate, Token, read_tokens
 from steptwin.commands.auditfile import AuditFile
 from steptwin.commands.demo import demo_world
+from steptwin.commands.keptsettings import keep_settings
+from steptwin.commands.studio_devices import check_without_world, serve_without_world
 from steptwin.commands.up_world import Running, UpOptions, up, up_with
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.inputfiles import read_bytes
-from steptwin.live.server import EndPoint
-from steptwin.studio.hub import Hub, Moment, Surroundings
+from steptwin.live.lookback import Lookback
+from steptwin.live.ports import serial_ports, twin_ports
+from steptwin.live.server import EndPoint, Server
+from steptwin.live.twins import find_device
+from steptwin.studio.connections import Computer, DeviceConnections
+from steptwin.studio.device import DeviceSurroundings
+from steptwin.studio.hub import Hub, Moment, Programs, Surroundings
 from steptwin.studio.jogs import WorldJogs
 from steptwin.studio.service import Service, Tls, listen
+from steptwin.studio.shown import Shown
+from steptwin.studio.shownworld import ShownWorld
+from steptwin.subject.events import Numbering
 from steptwin.textcodec import decode
 from steptwin.world.addresses import Address, is_loopback, parse_address
-from steptwin.world.programtexts import WorldPrograms
+from steptwin.world.programtexts import WorldPrograms, configuration_text
 
 DEFAULT = Address("127.0.0.1", 8488)
 ANY = ("0.0.0.0", "::")
@@ -50,10 +63,12 @@ class StudioOptions:
     tokens: Path | None = None
     audit: Path | None = None
     browser: bool = True
+    devices: Sequence[str] = ()
+    """Addresses of devices. With them there is no demo machine."""
 
 
 def studio(own: StudioOptions, options: UpOptions) -> bool:
-    """Run a world, by default the demo machine, with its page; whether all expectations of its scripts held.
+    """Show a world, devices, or both; by default the demo machine. Whether all expectations of the world's scripts held.
 
     Raises `Misuse` or another `SteptwinError` with a text for the user.
     """
@@ -61,15 +76,19 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
     with ExitStack() as stack:
         audit = Audit(_now) if own.audit is None else Audit(_now, stack.enter_context(AuditFile(own.audit)).add)
         listening = stack.enter_context(listen(entrance.address, is_fixed=own.http is not None))
-        shown = _Shown(own, entrance, listening, audit)
+        page = _Page(own, entrance, listening, audit)
         if options.world is not None:
-            return up(options, shown.open)
+            return up(options, page.open)
+        if own.devices:
+            check_without_world(options)
+            asyncio.run(serve_without_world(options, page.open_without_world))
+            return True
         with demo_world(options) as world:
-            return up_with(world, options, shown.open)
+            return up_with(world, options, page.open)
 
 
 @dataclass(frozen=True, slots=True)
-class _Entrance:
+class _AccessInfo:
     """Where the studio is, and who may come in."""
 
     address: Address
@@ -77,11 +96,11 @@ class _Entrance:
     tokens: tuple[Token, ...]
 
     @property
-    def gate(self) -> Gate:
-        return Gate(self.tokens) if self.tokens else Gate(open_to=Role.ENGINEER)
+    def gate(self) -> AccessGate:
+        return AccessGate(self.tokens) if self.tokens else AccessGate(open_to=Role.ENGINEER)
 
 
-def _entrance(own: StudioOptions) -> _Entrance:
+def _entrance(own: StudioOptions) -> _AccessInfo:
     """Raises `Misuse` for options that do not go together."""
     if (own.certificate is None) is not (own.key is None):
         raise Misuse("--certificate and --key go together: both or none")
@@ -96,19 +115,19 @@ def _entrance(own: StudioOptions) -> _Entrance:
     if own.remote and is_local:
         raise Misuse(f"--remote permits an --http address that others can reach, but {address} is none; such as 0.0.0.0:8488")
     if own.tokens is not None:
-        return _Entrance(address, tls, read_tokens(decode(read_bytes(own.tokens), str(own.tokens)).text, str(own.tokens)))
+        return _AccessInfo(address, tls, read_tokens(decode(read_bytes(own.tokens), str(own.tokens)).text, str(own.tokens)))
     fresh = () if is_local else tuple(Token(role, role.title, secrets.token_urlsafe(24)) for role in reversed(Role))
-    return _Entrance(address, tls, fresh)
+    return _AccessInfo(address, tls, fresh)
 
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-class _Shown:
-    """The page of a world that is about to run."""
+class _Page:
+    """The page of a world that is about to run, of devices, or of both."""
 
-    def __init__(self, own: StudioOptions, entrance: _Entrance, listening: socket.socket, audit: Audit) -> None:
+    def __init__(self, own: StudioOptions, entrance: _AccessInfo, listening: socket.socket, audit: Audit) -> None:
         self._own = own
         self._entrance = entrance
         self._listening = listening
@@ -117,27 +136,67 @@ class _Shown:
     async def open(self, running: Running) -> None:
         """Serve it in the event loop of the world."""
         live, pace, server = running.live, running.pace, running.server
-        loop = asyncio.get_running_loop()
 
         def moment() -> Moment:
             clock = server.cell.clock
             goes = not pace.is_paused and live.world.stopped is None
             return Moment(max(clock.now(), live.now) if goes and pace.speed != inf else live.now, goes, pace.speed)
 
+        jogs = WorldJogs(live.subject)
+        live.companion = jogs
+        world = ShownWorld(running.control, live.subject.followers, jogs)
+        shown = Shown(world, lambda: moment().time, live.subject.numbering)
+
+        def configuration(machine: str) -> SourceText | None:
+            return configuration_text(live.world, machine) if machine in live.world.machines else None
+
+        lookback = Lookback(live, server.cell, pace)
+        server.join(lookback)
+        await self._serve(server, shown, moment, WorldPrograms(live.world), configuration, lookback)
+
+    async def open_without_world(self, server: Server) -> None:
+        """Serve it in the event loop of ``server``."""
+        begin = time.monotonic_ns()
+
+        def moment() -> Moment:
+            return Moment(time.monotonic_ns() - begin, running=True, speed=1.0)
+
+        await self._serve(server, Shown(None, lambda: moment().time, Numbering({})), moment, _NoPrograms(), lambda machine: None)
+
+    async def _serve(
+        self,
+        server: Server,
+        shown: Shown,
+        moment: Callable[[], Moment],
+        programs: Programs,
+        configuration: Callable[[str], SourceText | None],
+        lookback: Lookback | None = None,
+    ) -> None:
+        loop = asyncio.get_running_loop()
+
         def report(error: Exception) -> None:
             loop.call_exception_handler({"message": "a request to the studio failed", "exception": error})
 
+        of_devices = DeviceSurroundings(clock=time.monotonic_ns, keep=keep_settings, on_internal=report)
+        connections = DeviceConnections(shown, of_devices, Computer(ports=_ports, find=find_device))
         around = Surroundings(
             moment=moment,
             gate=self._entrance.gate,
             audit=self._audit,
             program=__version__,
-            programs=WorldPrograms(live.world),
+            programs=programs,
+            connections=connections,
+            configuration=configuration,
+            lookback=lookback,
             on_internal=report,
         )
-        jogs = WorldJogs(live.subject)
-        live.companion = jogs
-        hub = Hub(running.control, jogs, around)
+        hub = Hub(shown, shown, around)
+        try:
+            for device in self._own.devices:
+                await connections.open(device)
+        except BaseException:
+            await connections.close()
+            raise
         host, port = self._listening.getsockname()[:2]
         entrance = self._entrance
         is_local = is_loopback(entrance.address.host)
@@ -147,12 +206,41 @@ class _Shown:
         service.start()
         url = f"{'http' if entrance.tls is None else 'https'}://{Address(_reached(host), port)}/"
         details = {"host": host, "port": port, "url": url}
-        server.join(service, EndPoint("http", _place(url, entrance.tokens), "studio", details))
+        server.join(_Links(service, connections), EndPoint("http", _place(url, entrance.tokens), "studio", details))
         if self._own.http is None and port != DEFAULT.port:
             server.notice(f"port {DEFAULT.port} is taken: the studio is at {url}")
         if self._own.browser and has_desktop():
             token = f"#token={entrance.tokens[0].text}" if entrance.tokens else ""
             threading.Thread(target=webbrowser.open, args=(url + token,), name="browser", daemon=True).start()
+
+
+@dataclass(frozen=True, slots=True)
+class _Links:
+    """Of viewers and of devices: when viewers have gone, jogs end, and then devices can be left."""
+
+    service: Service
+    connections: DeviceConnections
+
+    async def close(self) -> None:
+        await self.service.close()
+        await self.connections.close()
+
+
+class _NoPrograms:
+    """Of devices: nobody knows the texts of the programs in them."""
+
+    def list(self) -> Sequence[Mapping[str, object]]:
+        return ()
+
+    def files(self) -> Mapping[str, bytes]:
+        return {}
+
+    def text(self, machine: str, place: str) -> Mapping[str, object]:
+        raise Misuse(f"{machine} was given no text {place!r} here: it is a device")
+
+
+def _ports() -> Sequence[Mapping[str, object]]:
+    return [{"address": port.address, "what": port.what} for port in serial_ports() + twin_ports()]
 
 
 def _reached(host: str) -> str:
@@ -166,7 +254,7 @@ def _place(url: str, tokens: Sequence[Token]) -> str:
 
 
 def has_desktop() -> bool:
-    """Whether somebody sits at a terminal in front of a browser."""
+    """Whether it runs in a terminal of a desktop with a browser."""
     if not sys.stdout.isatty() or os.environ.get("SSH_CONNECTION"):
         return False
     return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -9,7 +9,7 @@ from steptwin.errors import Misuse
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.registers import AXES, INPUTS
 from steptwin.wbc.real import real_text
-from steptwin.world.small import AxisSwitches
+from steptwin.world.kinds.mic488.small import AxisSwitches
 
 ASSUMED_TRAVEL_S = 0.1
 """Distance of an assumed homing switch from the position at power-on, as travel time at VMAX, s."""
@@ -25,7 +25,7 @@ class Travel(NamedTuple):
     high_u: float | None
 
 
-class Placed(NamedTuple):
+class PlacedSwitches(NamedTuple):
     """The switches of a run. ``assumed``: texts about switches that were not placed; ``pins``: inputs driven by switches or by
     the run."""
 
@@ -36,7 +36,7 @@ class Placed(NamedTuple):
 
 def place_switches(
     config: ControllerConfig, travels: Sequence[Travel], homed: Mapping[int, frozenset[int]], driven: Collection[str]
-) -> Placed:
+) -> PlacedSwitches:
     """Place switches from ``travels``; for axes not named there, assume those that ``homed`` (`homing_sides`) needs.
 
     No switch is assumed on a pin in ``driven``. Raises `Misuse` for a switch without an input in the configuration.
@@ -58,7 +58,7 @@ def place_switches(
         pins = f"IN{axis.in_kl + 1}", f"IN{axis.in_kr + 1}"
         switches.append(AxisSwitches(number, travel.low_u, travel.high_u, *pins, (low, high)))
     pins = {pin for one in switches for pin, edge in ((one.low_pin, one.low), (one.high_pin, one.high)) if edge is not None}
-    return Placed(switches, assumed, frozenset(pins | set(driven)))
+    return PlacedSwitches(switches, assumed, frozenset(pins | set(driven)))
 
 
 def _contact(config: ControllerConfig, pin: int) -> str:

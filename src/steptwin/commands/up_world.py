@@ -136,7 +136,7 @@ def _send_away(world: World) -> None:
     """Disconnect the clients of a continued session: they are not connected now."""
     for line in world.lines.values():
         for place in [place for place in line.places if place != SCRIPTS]:
-            world.outside(Leave(line.name, place))
+            world.apply_input(Leave(line.name, place))
 
 
 async def _serve(options: UpOptions, world: World, past: Sequence[TraceRecord], kept: Kept, addition: Addition | None) -> None:

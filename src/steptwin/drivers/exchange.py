@@ -98,12 +98,12 @@ class NoAnswer(LineFailure):
     ``uncertain``: the device may have executed the request nevertheless.
     """
 
-    def __init__(self, place: str, request: LineRequest, attempts: int, timeout_ns: Nanos, heard: bytes) -> None:
+    def __init__(self, place: str, request: LineRequest, attempts: int, timeout_ns: Nanos, received: bytes) -> None:
         self.attempts = attempts
-        self.heard = heard
+        self.received = received
         self.uncertain = request.changes
         tries = "" if attempts == 1 else f", tried {attempts} times"
-        what = f"only {heard.hex(' ')} was received, which is not an answer" if heard else "nothing was received"
+        what = f"only {received.hex(' ')} was received, which is not an answer" if received else "nothing was received"
         doubt = "; it is unknown whether the device has executed it" if self.uncertain else ""
         super().__init__(f"{place}: no answer to '{request}' within {timeout_ns / SECOND:g} s{tries}; {what}{doubt}")
 
@@ -148,11 +148,11 @@ class Job(Generic[Q, A]):
     """A request in the queue of a line, and its result.
 
     ``most``: how often it may be sent; more than once only if repeating it cannot move anything twice. ``permission`` is
-    checked before anything of it is sent. ``tell`` is called at the end.
+    checked before anything of it is sent. ``on_done`` is called at the end.
     """
 
     __slots__ = (
-        "_answer", "_error", "attempts", "done", "is_late", "missed", "most", "permission", "request", "tell", "timeout_ns",
+        "_answer", "_error", "attempts", "done", "is_late", "missed", "most", "on_done", "permission", "request", "timeout_ns",
         "urgent",
     )  # fmt: skip
 
@@ -177,7 +177,7 @@ class Job(Generic[Q, A]):
         self.is_late = False
         """Whether it was sent after its permission had expired: the program was suspended between check and sending."""
         self.done = False
-        self.tell: Callable[[], object] | None = None
+        self.on_done: Callable[[], object] | None = None
         self._answer: A | None = None
         self._error: SteptwinError | None = None
 
@@ -204,14 +204,14 @@ class Job(Generic[Q, A]):
             return
         self._answer = answer
         self.done = True
-        if self.tell is not None:
-            self.tell()
+        if self.on_done is not None:
+            self.on_done()
 
     def fail(self, error: SteptwinError) -> None:
         self._error = error
         self.done = True
-        if self.tell is not None:
-            self.tell()
+        if self.on_done is not None:
+            self.on_done()
 
 
 class Exchanger(Generic[Q, A]):
@@ -285,9 +285,9 @@ class Exchanger(Generic[Q, A]):
                 return b""
             if self._more is not None:
                 return self._go_on(current, now)
-            heard = self.discipline.abandon(now)
+            received = self.discipline.abandon(now)
             self._current = None
-            self._missed(current, NoAnswer(self.place, current.request, current.attempts + 1, current.timeout_ns, heard))
+            self._missed(current, NoAnswer(self.place, current.request, current.attempts + 1, current.timeout_ns, received))
         return self._begin(now)
 
     def _begin(self, now: Nanos) -> bytes:

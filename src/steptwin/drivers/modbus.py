@@ -83,7 +83,7 @@ class Query:
         return len(answer) == self.size and answer.startswith(self.head)
 
 
-class _Owed(NamedTuple):
+class _LateAnswer(NamedTuple):
     """A late answer that may still arrive."""
 
     query: Query
@@ -101,7 +101,7 @@ class RtuMaster:
     """
 
     __slots__ = (
-        "_asked", "_busy_until", "_gap_ns", "_held", "_owed", "_serial", "_then", "echo", "free_ns", "on_frame",
+        "_asked", "_busy_until", "_gap_ns", "_held", "_late_answers", "_serial", "_then", "echo", "free_ns", "on_frame",
     )  # fmt: skip
 
     def __init__(self, serial: SerialLine | None = None, *, on_frame: FrameObserver | None = None) -> None:
@@ -113,7 +113,7 @@ class RtuMaster:
         self.reset()
 
     def reset(self) -> None:
-        self._owed: list[_Owed] = []
+        self._late_answers: list[_LateAnswer] = []
         self._asked: Query | None = None
         self._then: Query | None = None  # what a marker was sent for
         self._held = b""
@@ -122,7 +122,7 @@ class RtuMaster:
 
     @property
     def wary(self) -> bool:
-        return bool(self._owed)
+        return bool(self._late_answers)
 
     def allowance_ns(self, request: Query) -> Nanos:
         return (
@@ -134,8 +134,8 @@ class RtuMaster:
     def start(self, request: Query, now: Nanos, *, urgent: bool) -> bytes:
         self._held = b""
         self._then = None
-        # A stop waits for nothing; an earlier stop's answer tells the same.
-        if self._owed and not urgent and self._could_be_confused(request, now):
+        # A stop is sent at once; the answer of an earlier stop is equivalent.
+        if self._late_answers and not urgent and self._could_be_confused(request, now):
             self._then = request
             request = self._marker(request.device)
         return self._send(request, now)
@@ -147,14 +147,14 @@ class RtuMaster:
         return query.rtu_frame
 
     def _could_be_confused(self, request: Query, now: Nanos) -> bool:
-        self._owed = [owed for owed in self._owed if owed.until > now]
+        self._late_answers = [owed for owed in self._late_answers if owed.until > now]
         return any(
             owed.query is not request and owed.query.device == request.device and owed.query.function == request.function
-            for owed in self._owed
+            for owed in self._late_answers
         )
 
     def _marker(self, unit: int) -> Query:
-        taken = {owed.query.rtu_size for owed in self._owed if owed.query.function == pdu.READ_HOLDING_REGISTERS}
+        taken = {owed.query.rtu_size for owed in self._late_answers if owed.query.function == pdu.READ_HOLDING_REGISTERS}
         count = next((n for n in range(1, pdu.MAX_REGISTERS) if 2 * n + 5 not in taken), pdu.MAX_REGISTERS)
         return Query(
             unit, pdu.ReadRequest(pdu.READ_HOLDING_REGISTERS, 0, count), lambda _: "a read to find out what is still to come"
@@ -179,7 +179,7 @@ class RtuMaster:
         self.free_ns = now + self._gap_ns
         self._held = b""
         self._asked = None
-        if self._owed:
+        if self._late_answers:
             self._settle(asked)
         then, self._then = self._then, None
         if then is not None:
@@ -216,21 +216,21 @@ class RtuMaster:
 
     def _settle(self, asked: Query) -> None:
         """Forget earlier requests to the device after ``asked`` was answered, unless this was the answer to one of them."""
-        of_device = [owed for owed in self._owed if owed.query.device == asked.device]
+        of_device = [owed for owed in self._late_answers if owed.query.device == asked.device]
         if self._then is not None or all(owed.query.function != asked.function for owed in of_device):
-            self._owed = [owed for owed in self._owed if owed.query.device != asked.device]
+            self._late_answers = [owed for owed in self._late_answers if owed.query.device != asked.device]
 
     def abandon(self, now: Nanos) -> bytes:
-        heard, self._held = self._held, b""
+        received, self._held = self._held, b""
         if self._asked is not None:
-            self._owed.append(_Owed(self._asked, now + LATE_NS))
+            self._late_answers.append(_LateAnswer(self._asked, now + LATE_NS))
             self._asked = None
         self._then = None
         self.free_ns = now + QUIET_NS
         self._busy_until = now + NOISE_NS
-        if heard and self.on_frame is not None:
-            self.on_frame(now, FrameDirection.OUT, heard)
-        return heard
+        if received and self.on_frame is not None:
+            self.on_frame(now, FrameDirection.OUT, received)
+        return received
 
     def stray(self, data: bytes, now: Nanos) -> None:
         if now < self._busy_until:

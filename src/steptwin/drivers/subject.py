@@ -12,9 +12,11 @@ are followers.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from types import TracebackType
 from typing import Any, Protocol, TypeAlias
 
-from steptwin.datasheet import Datasheet
+from steptwin.controllerstate import ControllerState
+from steptwin.datasheet import Datasheet, plain
 from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.errors import Misuse, Refusal
@@ -24,8 +26,9 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, row_of
 from steptwin.subject.contract import GOOD, UNKNOWN, Description, LinePart, MachinePart, Reading, Result
 from steptwin.subject.controls import controls_of
-from steptwin.subject.events import Numbering, Payload
-from steptwin.subject.following import Filter, Followers, Following, Taken
+from steptwin.subject.events import Event, Numbering
+from steptwin.subject.following import EventBatch, Filter, Followers, Following
+from steptwin.subject.payloads import Payload, SamplePayload
 
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
@@ -57,6 +60,23 @@ class DevicePart(Protocol):
         """The values by name. Raises `Misuse` for an unknown point."""
         ...
 
+    async def state(self) -> ControllerState:
+        """Its present state, as of a twin; what no exchange shows is None."""
+        ...
+
+    @property
+    def answers_in_motion(self) -> bool:
+        """Whether its values are known while it moves."""
+        ...
+
+    async def reconnect(self) -> None:
+        """After the line was lost: whether the same device is there. Raises `LineFailure`, and `Refusal` for another one."""
+        ...
+
+    def unit_of(self, point: str) -> str:
+        """The unit of a point. Raises `Misuse` for an unknown point."""
+        ...
+
     def actions(self) -> Mapping[type, Action]:
         """The commands that the device can execute; names of machine and line have been checked."""
         ...
@@ -65,42 +85,87 @@ class DevicePart(Protocol):
         """The changes since the last call, and samples, of the wanted kinds."""
         ...
 
+    def unknown(self) -> list[SamplePayload]:
+        """Of each axis: that nothing is known of it."""
+        ...
+
+    def forget(self) -> None:
+        """Forget the last call of `look`: the next one gives samples of all axes."""
+        ...
+
+    def held_jog(self, wanted: command.Jog) -> DeviceJog:
+        """A jog of bounded motions that lasts while it is held. Raises `Misuse`."""
+        ...
+
+    async def settings_text(self) -> str:
+        """What can be read and written, as JSON, to keep it before it is changed."""
+        ...
+
+
+class DeviceJog(Protocol):
+    """A jog that has to be held: ``async with jog: while ...: await jog.hold()``. At the end of the block the axis brakes."""
+
+    @property
+    def end(self) -> object:
+        """Why the axis has stopped, as text; None while it runs."""
+        ...
+
+    async def __aenter__(self) -> object: ...
+
+    async def hold(self) -> bool:
+        """The axis runs on for a short time, after which this returns; False when it has stopped. It may be cancelled."""
+        ...
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None: ...
+
 
 class AsyncDeviceSubject:
     """The controller ``name`` as a subject. Other programs may drive it over the same line. `poll` makes the events; `run`
     polls repeatedly.
 
-    Times begin with the subject. An event has a cause only if a command leads to it at once.
+    Times begin with the subject, or are those of ``clock``; subjects that are shown together share a ``numbering``. An event has
+    a cause only if a command leads to it at once.
     """
 
-    def __init__(self, name: str, device: DevicePart, period_s: float = PERIOD_S) -> None:
+    def __init__(
+        self,
+        name: str,
+        device: DevicePart,
+        period_s: float = PERIOD_S,
+        *,
+        clock: Callable[[], Nanos] | None = None,
+        numbering: Numbering | None = None,
+    ) -> None:
         if not PERIODS_S[0] <= period_s <= PERIODS_S[1]:
             raise Misuse(f"period_s = {period_s:g}: permitted are {PERIODS_S[0]:g} to {PERIODS_S[1]:g} s")
         self.name = name
         self.period_ns: Nanos = round(period_s * SECOND)
         self._device = device
         self._line = device.line
-        self._begin = self._line.now()
+        begin = self._line.now()
+        self.now = (lambda: self._line.now() - begin) if clock is None else clock
+        """The present moment, ns."""
         self._actions: dict[type, Action] = {
             **device.actions(),
             command.Describe: self._describe,
             command.ReadPoints: self._read,
             command.ReadPins: self._pins,
+            command.State: self._state,
             command.Time: self._time,
         }
         self.description = self._described()
         self.followers = Followers()
-        self._numbering = Numbering({})
+        self._numbering = Numbering({}) if numbering is None else numbering
+        self._samples: dict[str, Event] = {}
 
     def _described(self) -> Description:
         place = self._line.place
         sheet = self._device.datasheet
-        machine = MachinePart(self.name, sheet, place, self._device.address, controls_of(sheet, self._actions))
+        machine = MachinePart(self.name, sheet, place, self._device.address, controls_of(sheet, self._actions), is_real=True)
         names = tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
         return Description(self.name, (machine,), lines=(LinePart(place, self._device.line_kind, None),), commands=names)
-
-    def now(self) -> Nanos:
-        return self._line.now() - self._begin
 
     # ------------------------------------------------------------------ what a subject is
 
@@ -111,6 +176,10 @@ class AsyncDeviceSubject:
         found: dict[str, Value] = {point: values[path] for point, path in paths.items()}
         found["time"] = self.now() / SECOND, "s"
         return tuple(Reading(point, *found[point], UNKNOWN if found[point][0] is None else GOOD) for point in points)
+
+    def unit_of(self, point: str) -> str:
+        """The unit of a point, without asking the device. Raises `Misuse` for an unknown one."""
+        return "s" if point == "time" else self._device.unit_of(self._path(point))
 
     def _path(self, point: str) -> str:
         owner, _, path = point.partition(".")
@@ -139,7 +208,24 @@ class AsyncDeviceSubject:
         """Poll once, if there are followers, and make events of the changes. Raises `LineFailure`."""
         if self.followers:
             for payload in await self._device.look(self.followers.kinds):
-                self.followers.publish(self._numbering.event(self.now(), self.name, payload))
+                self.publish(payload)
+
+    def publish(self, payload: Payload) -> None:
+        """Send followers an event of now."""
+        event = self._numbering.event(self.now(), self.name, payload)
+        if type(payload) is SamplePayload:
+            self._samples[payload.axis] = event
+        self.followers.publish(event)
+
+    def samples(self) -> list[Event]:
+        """The newest sample of each axis that there is one of."""
+        return list(self._samples.values())
+
+    def forget(self) -> None:
+        """Nothing is known of the device until it is polled again."""
+        for payload in self._device.unknown():
+            self.publish(payload)
+        self._device.forget()
 
     async def run(self) -> None:
         """Poll until cancelled. Raises `LineFailure`."""
@@ -175,6 +261,9 @@ class AsyncDeviceSubject:
         pins = (f"{self.name}.{pin.name}" for pin in self._device.datasheet.pins)
         return {one.point: one.value for one in await self.read(*pins)}
 
+    async def _state(self, _: command.State) -> object:
+        return plain(await self._device.state())
+
     async def _time(self, _: command.Time) -> object:
         now = self.now()
         return {"world": self.name, "time_ns": str(now), "time_s": now / SECOND, "paused": False, "speed": 1.0, "stopped": None}
@@ -209,7 +298,7 @@ class _Polled(Following):
         self._due = subject.now() + subject.period_ns
         subject.followers.add(self)
 
-    def take(self, most: int | None = None) -> Taken:
+    def take(self, most: int | None = None) -> EventBatch:
         now = self._subject.now()
         if now >= self._due:
             self._due = now + self._subject.period_ns

@@ -82,7 +82,7 @@ class TaskLine(Generic[Q, A]):
         if self._closed:
             raise Misuse(f"the line {self.place} is closed")
         done: asyncio.Future[None] = self._running().create_future()
-        job.tell = lambda: None if done.done() else done.set_result(None)
+        job.on_done = lambda: None if done.done() else done.set_result(None)
         self._engine.submit(job)
         self._run()
         try:

@@ -70,7 +70,7 @@ class ThreadLine(Generic[Q, A]):
 
     def _follow(self, job: Job[Q, A]) -> None:
         """Wait until another thread has finished the job, or none runs the line."""
-        job.tell = self._changed.notify_all
+        job.on_done = self._changed.notify_all
         while self._leading and not job.done:
             self._changed.wait()
 

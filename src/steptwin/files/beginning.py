@@ -49,7 +49,7 @@ def begin_world(
         world = World.load(
             path, seed=seed, keep_trace=keep_trace, keep_inputs=keep_inputs, allow_outside=allow_outside, state=state
         )
-        for warning in world.plan.warnings:
+        for warning in world.parts.warnings:
             warn(warning)
         return world
     if seed is not None:
@@ -70,4 +70,4 @@ def begin_world(
 def set_faults(world: World, faults: Sequence[str]) -> None:
     """Set faults of the command line. Raises `Misuse`."""
     for fault in faults:
-        world.outside(do.SetFault(read_fault(fault)))
+        world.apply_input(do.SetFault(read_fault(fault)))

@@ -31,7 +31,7 @@ class ProgramFiles:
 
 
 @dataclass(frozen=True, slots=True)
-class Companions:
+class CompanionFiles:
     """The files that belong to a program: those the user named, else those of the same name that lie beside it.
 
     ``found`` are the names of the latter.
@@ -42,7 +42,7 @@ class Companions:
     found: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, program: Path, positions: Path | None, config: Path | None) -> Companions:
+    def of(cls, program: Path, positions: Path | None, config: Path | None) -> CompanionFiles:
         """A machine is three files of one name, as the vendor's tool keeps them: ``.prg``, ``.csv`` and ``.cfg``.
 
         A compiled image has its positions in it.

@@ -21,11 +21,12 @@ from steptwin.inputfiles import MOST_RECORDED_BYTES, read_bytes
 from steptwin.machine import SECOND, Nanos
 from steptwin.plaintypes import fitting
 from steptwin.world import script as do
-from steptwin.world.actions import ACTIONS, Outside
+from steptwin.world.actions import ACTIONS, ExternalInput
 from steptwin.world.description import read_world
 from steptwin.world.faults import Fault, parse
+from steptwin.world.history import replay
 from steptwin.world.overrides import Overrides
-from steptwin.world.plant import Given
+from steptwin.world.plant import RecordedInput
 
 FORMAT = 1
 LONGEST_NUMBER = 100
@@ -44,7 +45,7 @@ class Session:
     files: Mapping[str, bytes]
     firmware: Mapping[str, str]
     seed: int
-    inputs: tuple[Given, ...]
+    inputs: tuple[RecordedInput, ...]
     until: Nanos
     digest: str
     overrides: Overrides = field(default_factory=dict)
@@ -77,25 +78,11 @@ class Session:
         if end > self.until:
             raise Misuse(f"the session ends at {self.until / SECOND:g} s, before {end / SECOND:g} s")
         world = self.world(keep_trace=keep_trace, keep_inputs=keep_inputs)
-        for time, what, settled in self.inputs:
-            if time > self.until:
-                raise Misuse(f"the session ends at {self.until} ns, before an input at {time} ns")
-            if time > end:
-                break
-            _bring(world, time)
-            if settled:
-                world.advance(time)
-            world.outside(what)
-        _bring(world, end)
-        _settle(world)
+        if self.inputs and self.inputs[-1].time > self.until:
+            raise Misuse(f"the session ends at {self.until} ns, before an input at {self.inputs[-1].time} ns")
+        for _ in replay(world, self.inputs, end):
+            pass
         return world
-
-
-def _bring(world: World, moment: Nanos) -> None:
-    """To a moment, past those at which runs were stopped."""
-    while world.now < moment:
-        world.go_on()
-        world.advance(moment)
 
 
 def _settle(world: World) -> None:
@@ -188,7 +175,7 @@ def _session(data: Mapping[str, Any]) -> Session:
     until = fitting("until_ns", data["until_ns"], int)
     if not 0 <= until <= LONGEST_NS:
         raise ValueError(f"until_ns is {until}: permitted are 0 to {LONGEST_NS}")
-    inputs = tuple(_given(fitting("an input", item, dict)) for item in fitting("inputs", data["inputs"], list))
+    inputs = tuple(_input(fitting("an input", item, dict)) for item in fitting("inputs", data["inputs"], list))
     times = [given.time for given in inputs]
     if times != sorted(times) or (times and times[0] < 0):
         raise ValueError("the moments of the inputs are not in order")
@@ -219,7 +206,7 @@ def _failed(item: object) -> FailedSave:
     )
 
 
-def _plain(what: Outside) -> dict[str, Any]:
+def _plain(what: ExternalInput) -> dict[str, Any]:
     if isinstance(what, tuple):
         return {name: _value(value) for name, value in what._asdict().items()}
     return {field.name: _value(getattr(what, field.name)) for field in fields(what)} if is_dataclass(what) else {}
@@ -235,17 +222,17 @@ def _value(value: Any) -> Any:
     return value
 
 
-def _given(item: dict[str, Any]) -> Given:
+def _input(item: dict[str, Any]) -> RecordedInput:
     kind = _STEPS[item["do"]]
     values = {key: _back(value) for key, value in item.items() if key not in ("time_ns", "settled", "do")}
     if kind is do.SetFault:
-        told = fitting("fault of SetFault", item["fault"], dict)
-        fault = {key: tuple(value) if isinstance(value, list) else value for key, value in told.items()}
+        item_fault = fitting("fault of SetFault", item["fault"], dict)
+        fault = {key: tuple(value) if isinstance(value, list) else value for key, value in item_fault.items()}
         values = {"fault": parse({key: value for key, value in fault.items() if value != ""})}
     for name, wanted in get_type_hints(kind).items():
         if name in values:
             fitting(f"{name} of {item['do']}", values[name], wanted)
-    return Given(fitting("time_ns", item["time_ns"], int), kind(**values), fitting("settled", item["settled"], bool))
+    return RecordedInput(fitting("time_ns", item["time_ns"], int), kind(**values), fitting("settled", item["settled"], bool))
 
 
 def _back(value: Any) -> Any:

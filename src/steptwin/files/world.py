@@ -252,38 +252,38 @@ class World(Plant):
         moment = duration(time)
         if moment < self.now:
             raise Misuse(f"at {moment / SECOND:g} s: this world is at {self.time:g} s already")
-        return self.start(name, partial(do.run_through, (do.At(moment), *_steps(reaction))), is_outside=True)
+        return self.start(name, partial(do.run_through, (do.At(moment), *_steps(reaction))), is_external=True)
 
     def when(self, condition: str, reaction: Reaction, *, once: bool = False, name: str = "when") -> Script:
         """Execute an action whenever a condition comes true, or only the first time. Raises `Misuse`."""
         self.condition(condition)
-        return self.start(name, partial(do.run_when, _steps(reaction), condition, once=once), is_outside=True)
+        return self.start(name, partial(do.run_when, _steps(reaction), condition, once=once), is_external=True)
 
     def script(self, operator: Callable[[], do.Steps], name: str | None = None) -> Script:
         """Let an operator work from now on: a function that yields steps (`steptwin.world.script`) and is sent what they give.
 
         It touches the world by its steps only; so it can be brought back to any moment.
         """
-        return self.start(name or getattr(operator, "__name__", "script"), operator, is_outside=True)
+        return self.start(name or getattr(operator, "__name__", "script"), operator, is_external=True)
 
     def press(self, button: str, for_: Duration | None = None) -> None:
         """Press a button, until it is released or for a time."""
-        self.outside(do.Press(button, None if for_ is None else duration(for_)))
+        self.apply_input(do.Press(button, None if for_ is None else duration(for_)))
 
     def release(self, button: str) -> None:
-        self.outside(do.Release(button))
+        self.apply_input(do.Release(button))
 
     def fault(self, fault: str | Fault) -> str:
         """Set a fault from now on, such as ``"crc unit=1 nth=3"`` (`steptwin fault --kinds`); gives its name.
 
         Raises `Misuse` for one that cannot happen here.
         """
-        self.outside(do.SetFault(read_fault(fault) if isinstance(fault, str) else fault))
-        return self.plan.faults.active[-1].name
+        self.apply_input(do.SetFault(read_fault(fault) if isinstance(fault, str) else fault))
+        return self.parts.faults.active[-1].name
 
     def clear_fault(self, name: str) -> None:
         """Remove a fault. Raises `Misuse` with the names there are."""
-        self.outside(do.ClearFault(name))
+        self.apply_input(do.ClearFault(name))
 
     # ------------------------------------------------------------------ branches
 

@@ -17,7 +17,7 @@ LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 """Delay of a deadline, in real time, above which the process was stopped or cannot keep up, ns; below it is jitter."""
 
 
-class Advancing(Protocol):
+class Advanceable(Protocol):
     """What a cell advances in real time: a kernel or a whole world. The methods are those of `Kernel`."""
 
     stale: bool
@@ -36,7 +36,7 @@ class Cell:
 
     __slots__ = ("_armed_for", "_batch", "_batches", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
 
-    def __init__(self, kernel: Advancing, clock: Clock) -> None:
+    def __init__(self, kernel: Advanceable, clock: Clock) -> None:
         self.kernel = kernel
         self.clock = clock
         self.on_lag: Callable[[Nanos], None] | None = None

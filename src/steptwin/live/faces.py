@@ -45,12 +45,12 @@ class Lines:
     def begin(self, head: Sequence[str], past: Sequence[TraceRecord] = ()) -> None:
         for text in (*head, *map(describe, past)):
             self._output.line(text)
-        self._live.world.trace.watchers.append(self._tell)
+        self._live.world.trace.watchers.append(self._print)
 
     async def show(self, server: Server) -> None:
         await server.until_ended()
 
-    def _tell(self, record: TraceRecord) -> None:
+    def _print(self, record: TraceRecord) -> None:
         if is_shown(record):
             self._output.line(describe(record))
 
@@ -90,7 +90,7 @@ def title_of(world: World) -> str:
 
 
 def _titled(world: World, name: str) -> str:
-    kind, on = world.kind(name), world.plan.line_of.get(name)
+    kind, on = world.kind(name), world.parts.line_of.get(name)
     _, _, title = kind.title.partition(" ")  # the article
     where = {} if on is None else kind.announced(world.machines[name], on[1])
     return ", ".join([title, *(f"{key} {value}" for key, value in where.items() if key != "kind")])

@@ -27,7 +27,7 @@ from steptwin.subject.fields import FASTEST, SLOWEST
 from steptwin.subject.following import Following
 from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
 from steptwin.world.expression import SignalCondition
-from steptwin.world.plant import WORLD
+from steptwin.world.plant import WORLD, PlantSnapshot
 
 if TYPE_CHECKING:
     from steptwin.live.world import LiveWorld
@@ -133,6 +133,16 @@ class Pace:
             self._turn.cancel()
             self._turn = None
 
+    def go_back(self, snapshot: PlantSnapshot, name: str | None = None) -> None:
+        """To a state, under its name where it has one; time stands from now on. Raises `Refusal`."""
+        self.pause()
+        try:
+            self._live.go_back(snapshot, name)
+        finally:
+            self._cell.clock.stop(self._live.now)
+            self._cell.close()
+            self._cell.moments += 1  # what was read at this moment is shared no more
+
     # ------------------------------------------------------------------ steps
 
     def step(self, end: Nanos, condition: SignalCondition | None, following: Following) -> bool | None:
@@ -207,14 +217,7 @@ class Pace:
         }
 
     def _restore(self, wanted: command.RestoreSnapshot) -> object:
-        """Time stands from now on, at the moment of the snapshot."""
-        self.pause()
-        try:
-            self._live.restore(wanted)
-        finally:
-            self._cell.clock.stop(self._live.now)
-            self._cell.close()
-            self._cell.moments += 1  # what was read at this moment is shared no more
+        self.go_back(self._live.subject.snapshots.find(wanted), wanted.name)
         return self.where()
 
     def _statements(self) -> dict[str, str]:

@@ -21,7 +21,7 @@ from steptwin.subject.commands import plain_command
 from steptwin.subject.contract import Description, Reading, Result, read_description
 from steptwin.subject.dispatch import raised
 from steptwin.subject.events import Event, read_event
-from steptwin.subject.following import Filter, Following, Taken
+from steptwin.subject.following import EventBatch, Filter, Following
 from steptwin.system import reason
 
 LONGEST_ANSWER = 64 << 20
@@ -240,7 +240,7 @@ class _RemoteFollowing(Following):
         super().__init__(what, bound, lambda _: remote.unfollow(identity))
         self._remote = remote
 
-    def take(self, most: int | None = None) -> Taken:
+    def take(self, most: int | None = None) -> EventBatch:
         self._remote.pump()
         return super().take(most)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from steptwin.machine import Nanos, Port, TalkingPort
+from steptwin.machine import Nanos, Port, SendingPort
 
 IAC, DONT, DO, WONT, WILL, SB, SE = 255, 254, 253, 252, 251, 250, 240
 BINARY, SUPPRESS_GO_AHEAD, COM_PORT = 0, 3, 44
@@ -129,10 +129,10 @@ class Telnet:
             if option in side:
                 return b""
             side.add(option)
-            told = bytes((IAC, agree, option))
+            answer = bytes((IAC, agree, option))
             if option == COM_PORT and not self._com_port_elsewhere(side):
-                told += self._say(NOTIFY_MODEM_STATE, bytes((CTS_DSR_CD,)))
-            return told
+                answer += self._encode(NOTIFY_MODEM_STATE, bytes((CTS_DSR_CD,)))
+            return answer
         if option not in side:
             return b""
         side.discard(option)
@@ -147,18 +147,18 @@ class Telnet:
             return b""
         command, value = content[1], content[2:]
         if command == SIGNATURE:
-            return self._say(SIGNATURE, WHO) if not value else b""
+            return self._encode(SIGNATURE, WHO) if not value else b""
         if command == BAUD_RATE and len(value) == 4:
             self.baud = int.from_bytes(value, "big") or self.baud
-            return self._say(command, self.baud.to_bytes(4, "big"))
+            return self._encode(command, self.baud.to_bytes(4, "big"))
         if len(value) != 1:
             return b""
         if command in self._sizes:
             self._sizes[command] = value[0] or self._sizes[command]
-            return self._say(command, bytes((self._sizes[command],)))
+            return self._encode(command, bytes((self._sizes[command],)))
         if command == CONTROL:
-            return self._say(command, bytes((self._controlled(value[0]),)))
-        return self._say(command, value) if command in (LINE_STATE_MASK, MODEM_STATE_MASK, PURGE) else b""
+            return self._encode(command, bytes((self._controlled(value[0]),)))
+        return self._encode(command, value) if command in (LINE_STATE_MASK, MODEM_STATE_MASK, PURGE) else b""
 
     def _controlled(self, value: int) -> int:
         group = _CONTROL_GROUPS.get(value)
@@ -167,7 +167,7 @@ class Telnet:
             return value
         return self._control.get(value, value)
 
-    def _say(self, command: int, value: bytes) -> bytes:
+    def _encode(self, command: int, value: bytes) -> bytes:
         return bytes((IAC, SB, COM_PORT, command + ANSWER)) + escaped(value) + bytes((IAC, SE))
 
 
@@ -211,11 +211,11 @@ class Rfc2217Port:
         if telnet.fits(baud):
             self._reported = ""
             return True
-        told = f"{telnet.settings} is set by its client, the line has {baud} bit/s 8N1"
-        if told != self._reported:
-            self._reported = told
+        mismatch = f"{telnet.settings} is set by its client, the line has {baud} bit/s 8N1"
+        if mismatch != self._reported:
+            self._reported = mismatch
             effect = "no character gets through" if line.is_timed else "served all the same, as line timing is off"
-            line.notice(f"network port: {told}: {effect}")
+            line.notice(f"network port: {mismatch}: {effect}")
         return not line.is_timed
 
     def deadline(self) -> Nanos | None:
@@ -225,22 +225,22 @@ class Rfc2217Port:
         self._port.close()
 
 
-class TalkingRfc2217Port(Rfc2217Port):
+class SendingRfc2217Port(Rfc2217Port):
     """The same for a port with unsolicited output."""
 
-    def __init__(self, port: TalkingPort, line: TwinLine) -> None:
+    def __init__(self, port: SendingPort, line: TwinLine) -> None:
         super().__init__(port, line)
-        self._talking = port
+        self._sending = port
 
     @property
     def on_output(self) -> Callable[[], None] | None:
-        return self._talking.on_output
+        return self._sending.on_output
 
     @on_output.setter
-    def on_output(self, told: Callable[[], None] | None) -> None:
-        self._talking.on_output = told
+    def on_output(self, callback: Callable[[], None] | None) -> None:
+        self._sending.on_output = callback
 
 
 def over_network(port: Port, line: TwinLine) -> Port:
     """``port``, which is on ``line``, as a network serial port."""
-    return TalkingRfc2217Port(port, line) if isinstance(port, TalkingPort) else Rfc2217Port(port, line)
+    return SendingRfc2217Port(port, line) if isinstance(port, SendingPort) else Rfc2217Port(port, line)

@@ -21,7 +21,7 @@ from steptwin.live.filelimit import allow_many_files
 from steptwin.live.links import Link
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.signals import on_end
-from steptwin.live.transports import Opening, Transport
+from steptwin.live.transports import LinkArguments, Transport
 from steptwin.machine import SECOND, Nanos, Port
 from steptwin.system import process_exists, reason
 from steptwin.world.addresses import Address
@@ -83,7 +83,7 @@ class Server:
     def notice(self, text: str) -> None:
         """Show a notice to the user, but not the same one repeatedly."""
         now = asyncio.get_running_loop().time()
-        self._reported = {told: at for told, at in self._reported.items() if now - at < REPEAT_S}
+        self._reported = {known: at for known, at in self._reported.items() if now - at < REPEAT_S}
         if text not in self._reported:
             self._reported[text] = now
             self._show(text)
@@ -105,7 +105,9 @@ class Server:
         """
         wire = replace(wire, notice=self.notice)
         opened = await transport.open(
-            Opening(where=where, make_port=make_port, line=wire, cell=self.cell, clients=self._clients, listen_any=listen_any)
+            LinkArguments(
+                where=where, make_port=make_port, line=wire, cell=self.cell, clients=self._clients, listen_any=listen_any
+            )
         )
         self._links.append(opened.link)
         self.end_points.append(EndPoint(transport.kind, opened.place, protocol, opened.details, line))
@@ -126,10 +128,11 @@ class Server:
         if endpoint.listening is not None:
             self.end_points.append(EndPoint("control", str(endpoint.listening), "control", {"file": str(endpoint.announcement)}))
 
-    def join(self, link: Link, end_point: EndPoint) -> None:
-        """A link that is open already; it is closed with the others."""
+    def join(self, link: Link, end_point: EndPoint | None = None) -> None:
+        """A link that is open already; it is closed with the others. Without an end point nobody reaches it from outside."""
         self._links.append(link)
-        self.end_points.append(end_point)
+        if end_point is not None:
+            self.end_points.append(end_point)
 
     def announcement(self) -> dict[str, object]:
         """The announcement of the twin: name, process, file, controllers, end points."""

@@ -26,7 +26,7 @@ class AsyncioListener:
         self._cell = cell
         self._make_port = make_port
         self._clients = clients
-        self._connections: WeakSet[Connection] = WeakSet()
+        self._connections: WeakSet[AsyncioConnection] = WeakSet()
         self._server: asyncio.Server | None = None
 
     async def start(self) -> None:
@@ -36,7 +36,7 @@ class AsyncioListener:
     def _welcome(self) -> asyncio.Protocol:
         if not self._clients.have_room():
             return _TurnedAway()
-        connection = Connection(self._cell, self._make_port(), self._clients)
+        connection = AsyncioConnection(self._cell, self._make_port(), self._clients)
         self._connections.add(connection)
         return connection
 
@@ -55,7 +55,7 @@ class _TurnedAway(asyncio.Protocol):
         cast(asyncio.Transport, transport).abort()
 
 
-class Connection(asyncio.Protocol):
+class AsyncioConnection(asyncio.Protocol):
     """One client of a port. While it does not read its answers, its requests are not read; large input is served in slices."""
 
     def __init__(self, cell: Cell, port: Port, clients: Clients) -> None:
@@ -76,7 +76,7 @@ class Connection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
-        self._transport.set_write_buffer_limits(high=0)  # told as soon as something waits
+        self._transport.set_write_buffer_limits(high=0)  # report pending data at once
         with contextlib.suppress(OSError):  # the client is gone already; the loop will notice
             set_up(transport.get_extra_info("socket"))
         host, port, *_ = transport.get_extra_info("peername") or ("unknown", 0)

@@ -20,7 +20,7 @@ AT_ONCE = 64
 """Clients accepted before the existing ones are served."""
 
 
-class Connection:
+class EpollConnection:
     """One client of a port. While it does not read its answers, its requests are not read; large input is served in slices."""
 
     __slots__ = (
@@ -122,7 +122,7 @@ class EpollListener:
         self._cell = cell
         self._make_port = make_port
         self._clients = clients
-        self._connections: WeakSet[Connection] = WeakSet()
+        self._connections: WeakSet[EpollConnection] = WeakSet()
         self._retry: asyncio.TimerHandle | None = None
 
     async def start(self) -> None:
@@ -147,7 +147,7 @@ class EpollListener:
             client.close()
             return
         client.setblocking(False)
-        self._connections.add(Connection(client, Address(*peer[:2]), self._cell, self._make_port(), self._clients))
+        self._connections.add(EpollConnection(client, Address(*peer[:2]), self._cell, self._make_port(), self._clients))
 
     async def close(self) -> None:
         if self._retry is not None:

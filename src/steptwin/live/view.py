@@ -17,8 +17,8 @@ from steptwin.live.view_controller import controller_lines
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_frames import follow_frames
 from steptwin.machine import SECOND
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.words.frames import FrameLine
 from steptwin.world.records import describe, is_shown
 from steptwin.world.trace import TraceRecord
 

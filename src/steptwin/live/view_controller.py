@@ -73,7 +73,8 @@ def _group(prefix: str, pins: Iterable[Pin], state: ControllerState) -> Text:
         if level is None:
             text.append(f"{label}?", style="not bold dim")
         elif pin.is_analog:
-            text.append(f"{level:.2f} {pin.unit} ", style="not bold")
+            number = f"{level:.2f}" if pin.unit else f"{label} {level:g}"
+            text.append(f"{number} {pin.unit} ", style="not bold")
         else:
             text.append(label, style="not bold black on green" if level else "not bold dim")
     return text

@@ -15,9 +15,10 @@ from steptwin.live.remote import RemoteSubject
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.subject import commands as command
 from steptwin.subject.contract import MachinePart
-from steptwin.subject.events import Event, PacePayload
+from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, filter_of
 from steptwin.subject.motion import Motions
+from steptwin.subject.payloads import PacePayload
 from steptwin.world.plant import WORLD
 
 BOUND = 10_000
@@ -49,11 +50,17 @@ class TwinWatch:
         self._begin()
 
     def _begin(self) -> None:
-        what = filter_of(USUAL - {"load"}, (self._part.name, WORLD))
+        # What a master writes shows in the frames of the line alone.
+        places = (self._part.name, WORLD, *(() if self._part.line is None else (self._part.line,)))
+        what = filter_of(USUAL - {"load"} | {"frame"}, places)
         self._following, plans = self._subject.follow_from_now(what, BOUND)
         self._motions = Motions(self._part, plans)
         self._ask_time()
         self._due = self.now()
+
+    def close(self) -> None:
+        """Follow no more; ``subject`` stays open."""
+        self._following.close()
 
     # ------------------------------------------------------------------ time
 

@@ -13,12 +13,13 @@ from steptwin.files.world import World
 from steptwin.live.cell import Cell
 from steptwin.live.sharedreads import share_reads
 from steptwin.machine import Nanos
-from steptwin.subject.commands import RestoreSnapshot
 from steptwin.subject.world import WorldSubject
-from steptwin.world.actions import Bytes, Leave, Outside, See
+from steptwin.world.actions import Bytes, ExternalInput, Leave, See, size_of
+from steptwin.world.history import History
 from steptwin.world.kernel import Kernel
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineEndPoint
+from steptwin.world.plant import PlantSnapshot
 
 MOST_INPUTS = 200_000
 MOST_INPUT_BYTES = 16 << 20
@@ -29,7 +30,7 @@ def announced(world: World) -> list[dict[str, object]]:
     """The announced controllers of a world: name, kind, line and present address."""
     found: list[dict[str, object]] = []
     for name, machine in world.machines.items():
-        kind, on = world.kind(name), world.plan.line_of.get(name)
+        kind, on = world.kind(name), world.parts.line_of.get(name)
         where = {"line": None} if on is None else {"line": on[0].name, **kind.announced(machine, on[1])}
         found.append({"name": name, "kind": kind.name, **where})
     return found
@@ -49,7 +50,7 @@ class LiveWorld:
         self.world = world
         self.show = show
         """Called with notices for the user."""
-        self._recorded_bytes = sum(_size(given.what) for given in world.inputs)
+        self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
         self._full: sessions.Session | None = None
         self.stale = True
         """Whether the deadline must be computed again, because something may have happened."""
@@ -59,7 +60,9 @@ class LiveWorld:
         world.watch_kernels(self._changed)
         self.ring: Ring | None = None
         """The ring of last records, if kept."""
-        self.subject = WorldSubject(world, self.outside)
+        self.history: History | None = None
+        """Its past, if kept."""
+        self.subject = WorldSubject(world, self.apply_input)
         self.writes_trace = False
         """Whether its trace is written to a file as it happens."""
         self.ports: set[PlacePort] = set()
@@ -80,19 +83,19 @@ class LiveWorld:
 
     # ------------------------------------------------------------------ what comes from outside
 
-    def outside(self, what: Outside) -> None:
+    def apply_input(self, what: ExternalInput) -> None:
         """Apply an input at the present moment; it is recorded if there is a session. Raises `Misuse`."""
         self.make_room(what)
-        self.world.outside(what)
+        self.world.apply_input(what)
 
-    def make_room(self, what: Outside) -> None:
+    def make_room(self, what: ExternalInput) -> None:
         """End the session if it has no room for one more input."""
         world = self.world
         if world.keeps_inputs:
             if len(world.inputs) >= MOST_INPUTS or self._recorded_bytes >= MOST_INPUT_BYTES:
                 self._end_session()
             else:
-                self._recorded_bytes += _size(what)
+                self._recorded_bytes += size_of(what)
 
     def _end_session(self) -> None:
         world = self.world
@@ -101,10 +104,12 @@ class LiveWorld:
         world.inputs.clear()
         self.show(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
 
-    def restore(self, wanted: RestoreSnapshot) -> None:
-        """Go back to a snapshot. Programs stay connected to their lines; what was under way there, at either moment, is lost.
+    def go_back(self, snapshot: PlantSnapshot, name: str | None) -> None:
+        """Go back to a state, under its name where it has one.
 
-        Raises `Misuse`, and `Refusal` where not everything can go back.
+        Programs stay connected to their lines; what was under way there, at either moment, is lost.
+
+        Raises `Refusal` where not everything can go back.
         """
         world = self.world
         if world.state is not None:
@@ -117,17 +122,19 @@ class LiveWorld:
             )
         if self.companion is not None and self.companion.deadline() is not None:
             raise Refusal("an axis is being jogged: end the jog first")
-        self.subject.restore(wanted)
-        self._recorded_bytes = sum(_size(given.what) for given in world.inputs)
+        self.subject.go_back(snapshot, name)
+        self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
         self._dues = _Dues(world.kernels)
         if self.ring is not None:
             self.ring.clear()
         for line in world.spec.lines:
             links = {link.place for link in line_kinds()[line.kind].links.values()}
             for place in [place for place in world.lines[line.name].places if place.partition("-")[0] in links]:
-                self.outside(Leave(line.name, place))
+                self.apply_input(Leave(line.name, place))
         for port in list(self.ports):
             port.join()
+        if self.history is not None:
+            self.history.gone_back()
         self.stale = True
 
     def session(self) -> sessions.Session:
@@ -209,10 +216,6 @@ class _Dues:
             self.changed[kernel] = None
 
 
-def _size(what: Outside) -> int:
-    return len(what.data) if isinstance(what, Bytes) else 0
-
-
 class VisionPort:
     """A connection of a vision system; its records are inputs of the world."""
 
@@ -225,7 +228,7 @@ class VisionPort:
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         for record in self._records(data):
-            self._live.outside(See(self._machine, *record))
+            self._live.apply_input(See(self._machine, *record))
             self._live.stale = True
         return b""
 
@@ -249,7 +252,7 @@ class PlacePort:
         self._direct: LineEndPoint | None = None
         """Where it is connected, if nothing that it exchanges is recorded there and its port answers at once."""
         self._line = world.lines[line]
-        self._kernel = world.plan.kernel_of[line]
+        self._kernel = world.parts.kernel_of[line]
         self._places = self._line.places
         self._name = place
         self._kind = kind
@@ -261,7 +264,7 @@ class PlacePort:
     def join(self) -> None:
         """Where a line is shared it receives what others are sent, from now on."""
         if self._line.is_shared:
-            self._live.outside(Bytes(self._line.name, self._name, self._kind, b""))
+            self._live.apply_input(Bytes(self._line.name, self._name, self._kind, b""))
             self._live.stale = True
             self._connected()
 
@@ -295,7 +298,7 @@ class PlacePort:
         place = self._places.get(self._name)
         if place is None or place.on_output is None:
             place = self._connected()
-        if world.keeps_inputs or world.trace.is_recorded:
+        if world.notes_inputs or world.trace.is_recorded:
             answer = self._recorded(place, data, now)
         else:
             answer = self._line.exchange(self._name, place, data, now)
@@ -314,8 +317,7 @@ class PlacePort:
         if world.keeps_inputs:
             self._live.make_room(given)
         answer = line.exchange(self._name, place, data, now)
-        if world.keeps_inputs:
-            world.note(given)
+        world.note(given)
         return answer
 
     def _with_the_rest(self, place: LineEndPoint, answer: bytes, now: Nanos) -> bytes:
@@ -341,4 +343,4 @@ class PlacePort:
 
     def close(self) -> None:
         self._live.ports.discard(self)
-        self._live.outside(Leave(self._line.name, self._name))
+        self._live.apply_input(Leave(self._line.name, self._name))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 from functools import partial
 
 from steptwin.live.world import LiveWorld
-from steptwin.words.frames import FrameLine
+from steptwin.wire.frameline import FrameLine
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords
 from steptwin.world.trace import TraceRecord
@@ -22,7 +22,7 @@ def follow_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:
         line = world.lines[spec.name]
         words = line_kinds()[spec.kind].words(line, "" if len(world.lines) == 1 else f"{line.name}/", sink)
         line.follow_frames(words)
-        members = {name for name, (on, _) in world.plan.line_of.items() if on is line}
+        members = {name for name, (on, _) in world.parts.line_of.items() if on is line}
         world.trace.watchers.append(partial(_recorded, words, members))
 
 

@@ -19,7 +19,7 @@ from steptwin.lsp.answers import (
     Signature,
 )
 from steptwin.lsp.positions import LineIndex
-from steptwin.symbols import Role, Symbol, Use
+from steptwin.symbols import Symbol, SymbolRole, Use
 
 
 class Analysis:
@@ -96,7 +96,7 @@ class Analysis:
     # -- for all languages
 
     def definitions(self, symbol: Symbol) -> list[Span]:
-        return [use.span for use in self.uses if use.symbol == symbol and use.role is Role.DEFINE]
+        return [use.span for use in self.uses if use.symbol == symbol and use.role is SymbolRole.DEFINE]
 
     def format_edits(self) -> list[Edit]:
         """The edits that give the formatted text: of the lines that differ."""

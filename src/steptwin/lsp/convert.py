@@ -46,6 +46,7 @@ SYMBOL_KINDS = {
     SymbolKind.LINE: lsp.SymbolKind.Interface,
     SymbolKind.AXIS: lsp.SymbolKind.Object,
     SymbolKind.BUTTON: lsp.SymbolKind.Event,
+    SymbolKind.ELEMENT: lsp.SymbolKind.Object,
     SymbolKind.SCRIPT: lsp.SymbolKind.Method,
 }
 TOKEN_TYPES = [kind.value for kind in a.TokenKind]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 from urllib.parse import quote_from_bytes, unquote_to_bytes, urlsplit, urlunsplit
@@ -42,6 +43,24 @@ class NoFiles:
 
     def beside(self, uri: str, suffix: str) -> list[str]:
         return []
+
+
+class GivenTexts:
+    """Texts by normal address, which do not change. Each is beside all others."""
+
+    def __init__(self, texts: Mapping[str, bytes]) -> None:
+        self._texts = texts
+
+    def stamp(self, uri: str) -> object | None:
+        return 0 if uri in self._texts else None
+
+    def read(self, uri: str) -> bytes:
+        if uri not in self._texts:
+            raise Misuse(f"{uri} is not open")
+        return self._texts[uri]
+
+    def beside(self, uri: str, suffix: str) -> list[str]:
+        return sorted(name for name in self._texts if name.lower().endswith(suffix) and name != uri)
 
 
 class DiskFiles:

@@ -1,4 +1,4 @@
-"""Questions about names, over all texts: where one is defined and used, what a rename changes, who calls what; and fixes."""
+"""Navigation by names over all texts: definitions, references, renaming, callers; and quick fixes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import SHARED, CallEdge, CodeAction, Edit, Location, OutlineItem
 from steptwin.lsp.files import normal
 from steptwin.lsp.session import EditorSession
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
 MOST_SYMBOLS = 500
 """Answers to a search over all texts."""
@@ -57,7 +57,7 @@ def references(session: EditorSession, uri: str, place: int, *, with_definition:
         Location(where, other.span)
         for where, analysis in _texts_with(session, uri, use.symbol)
         for other in analysis.uses
-        if other.symbol == use.symbol and (with_definition or other.role is not Role.DEFINE)
+        if other.symbol == use.symbol and (with_definition or other.role is not SymbolRole.DEFINE)
     ]
 
 
@@ -176,7 +176,7 @@ def caller_at(session: EditorSession, uri: str, place: int) -> Caller | None:
 
 def callers_of(uri: str, analysis: Analysis) -> dict[str, Caller]:
     """By key. The program before its first label comes first."""
-    labels = [use for use in analysis.uses if use.symbol.kind is SymbolKind.LABEL and use.role is Role.DEFINE]
+    labels = [use for use in analysis.uses if use.symbol.kind is SymbolKind.LABEL and use.role is SymbolRole.DEFINE]
     sections = {section.name_span: section for section in analysis.outline() if section.kind is SymbolKind.LABEL}
     first = min((use.span.start for use in labels), default=len(analysis.text))
     main = OutlineItem("program", SymbolKind.SECTION, Span(0, first), Span(0, 0))

@@ -19,7 +19,7 @@ class Encoding(enum.Enum):
 
 
 class LineIndex:
-    """A text and its lines, which end where the protocol says: at a line feed, a carriage return or both."""
+    """A text and its lines, which end as defined by the protocol: at a line feed, a carriage return or both."""
 
     __slots__ = ("_ascii", "ends", "starts", "text")
     starts: list[int]

@@ -32,7 +32,7 @@ from steptwin.lsp.files import DiskFiles, Files, normal
 from steptwin.lsp.languages import SUFFIXES
 from steptwin.lsp.positions import Encoding
 from steptwin.lsp.session import EditorSession
-from steptwin.symbols import Role
+from steptwin.symbols import SymbolRole
 
 FIRST_DELAY_S = 0.004
 LONGEST_DELAY_S = 0.5
@@ -109,6 +109,12 @@ class EditorServer(LanguageServer):
         self._delays.pop(normal(uri), None)
         self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
 
+    def end(self) -> None:
+        """The client has gone: nothing is looked at any more."""
+        for timer in self._timers.values():
+            timer.cancel()
+        self._timers.clear()
+
     def _later(self, uri: str, seconds: float) -> None:
         timer = self._timers.pop(uri, None)
         if timer is not None:
@@ -124,7 +130,7 @@ class EditorServer(LanguageServer):
         analysis = self.session.analysis(uri)
         converter = Converter(document.lines, self.session.encoding)
         found = [] if analysis is None else [converter.diagnostic(diagnostic) for diagnostic in analysis.diagnostics()]
-        # A text that takes long is looked at less often while somebody types.
+        # A text whose analysis takes long is analysed less often during typing.
         taken = perf_counter() - begin
         self._delays[uri] = FIRST_DELAY_S if taken < 0.05 else min(taken, LONGEST_DELAY_S)
         self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(document.uri, found, document.version))
@@ -169,7 +175,7 @@ def _initialize(server: EditorServer, params: lsp.InitializeParams) -> None:
 
 
 async def _initialized(server: EditorServer, params: lsp.InitializedParams) -> None:
-    """Ask to be told of files that change outside, where the client can."""
+    """Register for notifications of files that change outside the editor, if the client supports them."""
     capabilities = server.client_capabilities
     if not get_capability(capabilities, "workspace.did_change_watched_files.dynamic_registration", False):
         return
@@ -259,7 +265,7 @@ def _document_highlight(server: EditorServer, params: lsp.DocumentHighlightParam
         found = navigation.highlights(server.session, params.text_document.uri, place)
         kinds = lsp.DocumentHighlightKind
         return [
-            lsp.DocumentHighlight(converter.range(use.span), kinds.Read if use.role is Role.READ else kinds.Write)
+            lsp.DocumentHighlight(converter.range(use.span), kinds.Read if use.role is SymbolRole.READ else kinds.Write)
             for use in found
         ]
 

@@ -21,7 +21,7 @@ from steptwin.lsp.positions import Encoding, LineIndex
 from steptwin.lsp.table import TableAnalysis, UsedRows
 from steptwin.lsp.toolong import TooLong
 from steptwin.lsp.wbc.analysis import WbcAnalysis
-from steptwin.lsp.wbc.surroundings import Surroundings
+from steptwin.lsp.wbc.surroundings import ProgramContext
 from steptwin.lsp.world.analysis import WorldAnalysis
 from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.variants import DEFAULT as DEFAULT_VARIANT
@@ -201,12 +201,12 @@ class EditorSession:
             kept.firmware = firmware
         return kept.config
 
-    def _surroundings(self, program: str) -> Surroundings:
+    def _surroundings(self, program: str) -> ProgramContext:
         controller = self._controller(program)
         table = (controller.table_of(program) if controller else None) or self.beside(program, ".csv")
         config = (controller.config if controller else None) or self.beside(program, ".cfg")
         dialect = controller.dialect if controller else DEFAULT_DIALECT
-        return Surroundings(self._table(table), self._config(config, dialect.firmware), dialect)
+        return ProgramContext(self._table(table), self._config(config, dialect.firmware), dialect)
 
     def _firmware(self, config: str) -> str:
         return next((c.dialect.firmware for c in self._controllers() if c.config == config), DEFAULT_DIALECT.firmware)
@@ -242,7 +242,7 @@ class EditorSession:
         return next((chip for world in self.worlds() for chip in self._machines(world)[1] if chip.program == program), None)
 
     def _machines(self, world: str) -> tuple[list[ControllerFiles], list[Chip]]:
-        """Those of a world; while it is not TOML, because somebody types, those it had before."""
+        """Those of a world; while its text is not valid TOML, during typing, the previous ones."""
         before = self._kept.get(world)
         kept = self._keep(world)
         if kept is not before and kept.lines is not None:

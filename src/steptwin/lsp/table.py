@@ -20,7 +20,7 @@ from steptwin.lsp.answers import (
     TokenKind,
 )
 from steptwin.lsp.positions import LineIndex
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.wbc.lexer import is_name
 from steptwin.wbc.positions import PARAMETERS, PositionRow, parse_positions
 
@@ -117,7 +117,7 @@ class TableAnalysis(Analysis):
     def _uses(self) -> Iterator[Use]:
         for row in self._table.rows:
             if row.name:
-                yield Use(Symbol(SymbolKind.POSITION, row.name.upper(), row.name), self._name_span(row), Role.DEFINE)
+                yield Use(Symbol(SymbolKind.POSITION, row.name.upper(), row.name), self._name_span(row), SymbolRole.DEFINE)
 
     def new_name_problem(self, symbol: Symbol, text: str) -> str | None:
         if not is_name(text):

@@ -9,9 +9,9 @@ from steptwin.m1486.argument_rules import argument_rules
 from steptwin.m1486.flow_rules import flow_rules
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.position_rules import position_rules
-from steptwin.m1486.structure import Stream, stored_bits, streams
+from steptwin.m1486.structure import CommandStream, stored_bits, streams
 from steptwin.m1486.structure_rules import structure_rules
-from steptwin.m1486.syntax import Command, ProgramText, parse
+from steptwin.m1486.syntax import Command, ParsedProgram, parse
 from steptwin.m1486.variants import DEFAULT, Variant
 
 
@@ -19,7 +19,7 @@ from steptwin.m1486.variants import DEFAULT, Variant
 class CheckedChipProgram:
     """The result: the parsed program, the findings in text order, the memory of each chip."""
 
-    program: ProgramText
+    program: ParsedProgram
     diagnostics: list[Diagnostic]
     memory: list[ChipMemory]
 
@@ -67,7 +67,7 @@ def check(text: str, variant: Variant = DEFAULT, interface: Interface = STEP_DIR
     return CheckedChipProgram(program, in_order(dict.fromkeys(diagnostics)), [memory_of(s, variant) for s in chips])
 
 
-def memory_of(stream: Stream, variant: Variant) -> ChipMemory:
+def memory_of(stream: CommandStream, variant: Variant) -> ChipMemory:
     commands = tuple(
         CommandSize(command, stored_bits(command), stream.in_file[index] is not None)
         for index, command in enumerate(stream.commands)

@@ -27,12 +27,12 @@ from steptwin.errors import Misuse, TimeReversal
 from steptwin.m1486.drive import ChipDrive, MotionMode
 from steptwin.m1486.eeprom import pack, unpack
 from steptwin.m1486.effects import WrongData
-from steptwin.m1486.events import M1486Event
+from steptwin.m1486.events import EVENTS_KEPT, M1486Event
 from steptwin.m1486.functions import COMPLEMENT, CONTINUE, EDGE, LIMITOFF, OUTPUTS, RECOVER, RUNSIGN
 from steptwin.m1486.lines import LINES, STEP_DIRECTION, Interface
 from steptwin.m1486.memory import CommandMemory, FileState
 from steptwin.m1486.motor import MotorControl
-from steptwin.m1486.pins import LINE_PINS, WAVEFORM, ChipPins, baud_pins, settable_pin
+from steptwin.m1486.pins import LINE_PINS, OPEN_ADDRESS, WAVEFORM, ChipPins, baud_pins, settable_pin
 from steptwin.m1486.program import ProgramExecution
 from steptwin.m1486.receiver import Receiver
 from steptwin.m1486.signals import data_level
@@ -41,11 +41,6 @@ from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import DEFAULT, Store, Variant
 from steptwin.machine import MILLISECOND, Fact, Nanos, PinEdge
 from steptwin.state import Plain, Stateful
-
-EVENTS_KEPT = 1000
-
-#: Open address pins; a chip alone needs no other address (chapter II, Serial interface).
-OPEN_ADDRESS = 15
 
 #: RST has to be high for so long to end shutdown (chapter IV, Shutdown mode).
 SHUTDOWN_RESET_NS: Nanos = 10 * MILLISECOND
@@ -289,7 +284,8 @@ class M1486Chip(Stateful):
 
     def pins(self) -> Mapping[str, float]:
         shown = {f"B{line}": float(self.level(line, self.now)) for line in LINES}
-        return shown | {name: float(level) for name, level in self.io.others.items()}
+        shown |= {name: float(level) for name, level in self.io.others.items()}
+        return {**shown, WAVEFORM: float(self.drive.characteristic)}
 
     def take_edges(self) -> list[PinEdge]:
         waveform = self.motor.drive.characteristic
@@ -486,12 +482,6 @@ class M1486Chip(Stateful):
         self.io.tie_low(False, now)
         self.uart.set_baud(self.variant.baud(*self.io.baud_pins()))
         self._restart(now)
-
-    def resume(self, now: Nanos) -> None:
-        """Execute the command before which a hook (`ProgramExecution.watch`) has halted the program, and continue."""
-        self.advance(now)
-        self.program.resume(now)
-        self._settle()
 
     # ------------------------------------------------------------------ snapshots
 

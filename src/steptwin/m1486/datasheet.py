@@ -20,7 +20,7 @@ from steptwin.m1486.commands import TABLE, ArgType, CommandSpec
 from steptwin.m1486.details import DETAILS
 from steptwin.m1486.events import EVENTS
 from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS
+from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, WAVEFORM
 from steptwin.m1486.points import POINTS, UNIT
 from steptwin.m1486.variants import Variant
 
@@ -41,7 +41,7 @@ def datasheet_of(variant: Variant) -> Datasheet:
         title="M1486",
         variant=variant.name,
         axes=(axis(variant, UNIT, 1.0),),
-        pins=tuple(_pins()),
+        pins=tuple(_pins(variant)),
         points=tuple(POINTS.values()),
         commands=tuple(_command(spec, variant) for spec in TABLE),
         events=tuple(EVENTS.values()),
@@ -65,13 +65,16 @@ def axis(variant: Variant, unit: str, pulses_per_unit: float) -> AxisDescription
     )
 
 
-def _pins() -> Iterator[Pin]:
+def _pins(variant: Variant) -> Iterator[Pin]:
+    numbers = {spec.key: spec.permitted(variant) for spec in TABLE}
     for name in LINE_PINS:
         yield Pin(name=name, direction=PinDirection.BOTH, is_active_low=True)
     for name in CONTROL_PINS:
         yield Pin(name=name, direction=PinDirection.INPUT, is_active_low=name in ACTIVE_LOW)
     for name in OUTPUT_PINS:
         yield Pin(name=name, direction=PinDirection.OUTPUT, is_active_low=name in ACTIVE_LOW)
+    waveforms = numbers[WAVEFORM]
+    yield Pin(name=WAVEFORM, direction=PinDirection.OUTPUT, is_analog=True, limits=Limits(waveforms[0], waveforms[-1]))
 
 
 def _command(spec: CommandSpec, variant: Variant) -> CommandDescription:

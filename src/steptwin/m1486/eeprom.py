@@ -11,7 +11,7 @@ from steptwin.m1486.commands import When, when
 from steptwin.m1486.encoding import encode
 from steptwin.m1486.memory import StoredFile
 from steptwin.m1486.ranges import out_of_range
-from steptwin.m1486.syntax import ProgramText
+from steptwin.m1486.syntax import Command, ParsedProgram
 from steptwin.m1486.variants import Variant
 
 _VERSION = 1
@@ -40,14 +40,19 @@ def unpack(data: bytes, variant: Variant) -> StoredFile | None:
     return StoredFile(code, labels)
 
 
-def image_of(program: ProgramText, variant: Variant) -> bytes:
+def stored_commands(program: ParsedProgram) -> list[Command]:
+    """The commands and labels between ``[`` and ``]``; all of a program that has none around it."""
+    commands = program.all_commands
+    is_file = len(commands) > 1 and (commands[0].key, commands[-1].key) == ("[", "]")
+    return commands[1:-1] if is_file else commands
+
+
+def image_of(program: ParsedProgram, variant: Variant) -> bytes:
     """A program as the stored file that downloading it gives; with or without ``[ ]`` around it.
 
     Raises `Misuse` for a program that is more than one file for one chip, or that the variant does not take.
     """
-    commands = program.all_commands
-    if len(commands) > 1 and (commands[0].key, commands[-1].key) == ("[", "]"):
-        commands = commands[1:-1]
+    commands = stored_commands(program)
     code = b""
     labels: dict[int, int] = {}
     for command in commands:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from steptwin.datasheet import EventDescription, FactDescription, FactType
+from steptwin.datasheet import EventDescription, EventSeverity, FactDescription, FactType
 from steptwin.machine import Fact, Nanos
 
+EVENTS_KEPT = 1000
+"""The last so many events of a chip are kept."""
 _UNIT = "microstep"
 
 
@@ -18,8 +20,11 @@ def _fact(name: str, type: FactType = FactType.WHOLE, unit: str = "", *, is_opti
 _AXIS, _LINE, _DIRECTION = _fact("axis"), _fact("line"), _fact("direction")
 
 
-def _event(code: str, meaning: str, *facts: FactDescription) -> EventDescription:
-    return EventDescription(code=code, meaning=meaning, facts=facts)
+_INFORMATION, _WARNING, _ALARM = EventSeverity.INFORMATION, EventSeverity.WARNING, EventSeverity.ALARM
+
+
+def _event(code: str, meaning: str, *facts: FactDescription, severity: EventSeverity = _INFORMATION) -> EventDescription:
+    return EventDescription(code=code, meaning=meaning, facts=facts, severity=severity)
 
 
 EVENTS: Mapping[str, EventDescription] = {
@@ -46,14 +51,20 @@ EVENTS: Mapping[str, EventDescription] = {
         _event("upload", "U sends a byte.", _fact("command"), _fact("byte")),
         _event("kill", "K was received."),
         _event("clear-kill", "C75 was received."),
-        _event("wrong-data", "A command was dropped (M-11).", _fact("why", FactType.TEXT), _fact("stops", FactType.TRUTH)),
+        _event(
+            "wrong-data",
+            "A command was dropped (M-11).",
+            _fact("why", FactType.TEXT),
+            _fact("stops", FactType.TRUTH),
+            severity=_ALARM,
+        ),
         _event("file", "] has closed a file.", _fact("size", unit="bit")),
-        _event("file-refused", "A file was larger than the memory (M-12).", _fact("memory", unit="bit")),
+        _event("file-refused", "A file was larger than the memory (M-12).", _fact("memory", unit="bit"), severity=_ALARM),
         _event("reset", "Defaults, by \\ or RST."),
         _event("restart", "The program begins again, by RST."),
         _event("power-on", "Off and on again."),
-        _event("shutdown", "SD is low."),
-        _event("store-failed", "The EEPROM's new content could not be kept.", _fact("why", FactType.TEXT)),
+        _event("shutdown", "SD is low.", severity=_WARNING),
+        _event("store-failed", "The EEPROM's new content could not be kept.", _fact("why", FactType.TEXT), severity=_ALARM),
     )
 }
 

@@ -16,7 +16,7 @@ from steptwin.m1486.commands import find
 from steptwin.m1486.functions import INPUT, REGISTER, RUNSIGN
 from steptwin.m1486.lines import Interface, line_group
 from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, DEFAULT_PROFILE, DEFAULT_VELOCITY, microstep_size
-from steptwin.m1486.structure import Stream
+from steptwin.m1486.structure import CommandStream
 from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import Variant
 
@@ -92,7 +92,7 @@ def value(command: Command, state: Settings) -> int | None:
     return state.variable if command.from_variable else command.number
 
 
-def follow(stream: Stream, variant: Variant, interface: Interface) -> FlowAnalysis:
+def follow(stream: CommandStream, variant: Variant, interface: Interface) -> FlowAnalysis:
     """Follow every path of the stream from its beginning and from each reset."""
     return _Walk(stream, variant, interface).run()
 
@@ -127,7 +127,7 @@ def _join(a: Settings, b: Settings) -> Settings:
 
 
 class _Walk:
-    def __init__(self, stream: Stream, variant: Variant, interface: Interface) -> None:
+    def __init__(self, stream: CommandStream, variant: Variant, interface: Interface) -> None:
         self.stream = stream
         self.variant = variant
         self.start = defaults(variant, interface)

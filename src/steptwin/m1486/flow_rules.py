@@ -15,7 +15,7 @@ from steptwin.m1486.flow import FlowAnalysis, Settings, follow, value
 from steptwin.m1486.lines import LINES, RUNSIGN_LINE, Interface, line_group
 from steptwin.m1486.microsteps import HIGHEST_SPEED, PAIRS, low_range_limit, microstep_size
 from steptwin.m1486.registers import GENERAL
-from steptwin.m1486.structure import Stream, written_label
+from steptwin.m1486.structure import CommandStream, written_label
 from steptwin.m1486.structure_rules import label_problem
 from steptwin.m1486.syntax import Command
 from steptwin.m1486.variants import Variant
@@ -31,7 +31,7 @@ _Fault = tuple[ChipFinding, str, str | None]
 _Rule = Callable[[Command, Settings], _Fault | None]
 
 
-def flow_rules(stream: Stream, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
+def flow_rules(stream: CommandStream, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
     flow = follow(stream, variant, interface)
     for index, states in sorted(flow.states.items()):
         command = stream.commands[index]
@@ -139,7 +139,7 @@ def _profile(command: Command, state: Settings) -> _Fault | None:
 
 
 def _acceleration(command: Command, state: Settings) -> _Fault | None:
-    # M-4: nothing is enforced; the table that would tell is missing.
+    # M-4: nothing is enforced; the table with the limits is missing.
     if command.key != "R" or state.acceleration is None or state.start_stop is None:
         return None
     if state.acceleration <= ACCELERATION_PER_START_STOP * state.start_stop:
@@ -187,7 +187,7 @@ def _dividend(divisor: int, state: Settings) -> _Fault | None:
 
 
 def _from_variable(
-    stream: Stream, index: int, states: set[Settings], variant: Variant, interface: Interface
+    stream: CommandStream, index: int, states: set[Settings], variant: Variant, interface: Interface
 ) -> Iterator[Diagnostic]:
     """A command whose number is the internal variable: the numbers it can be."""
     command = stream.commands[index]
@@ -203,7 +203,9 @@ def _from_variable(
         yield findings.MAY_FAIL(command.span, f"the internal variable can give: {first.message}", first.hint)
 
 
-def _variable_problem(stream: Stream, index: int, number: int, variant: Variant, interface: Interface) -> Diagnostic | None:
+def _variable_problem(
+    stream: CommandStream, index: int, number: int, variant: Variant, interface: Interface
+) -> Diagnostic | None:
     command = stream.commands[index]
     problem = number_problem(command, number, variant, interface)
     if problem is None and command.key in ("J", "'"):
@@ -222,7 +224,7 @@ def _runsign(command: Command, states: set[Settings], variant: Variant) -> Itera
         return
 
 
-def _calls(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
+def _calls(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     for index in flow.nested_calls:
         command = stream.commands[index]
         yield findings.NESTED_CALL(command.span, f"{command} inside a subroutine", "one level only")
@@ -233,7 +235,7 @@ def _calls(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
         yield findings.NEVER_RETURNS(command.span, f"{command} does not come back", "a subroutine ends with a dot")
 
 
-def _labels(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
+def _labels(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     """Labels of a file, or of what comes between resets, that nothing jumps to, and those given twice: one finding for each."""
     used = set().union(*flow.targets.values())
     for index, command in enumerate(stream.commands):
@@ -251,7 +253,7 @@ def _labels(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
                 yield findings.LABEL_TWICE(stream.commands[later].span, message, "the later one counts")
 
 
-def _never_reached(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
+def _never_reached(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     """One warning for each run of commands that no path leads to."""
     run: list[int] = []
     for index in range(len(stream.commands) + 1):
@@ -269,7 +271,7 @@ def _never_reached(stream: Stream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
             run = []
 
 
-def _shared_registers(stream: Stream, flow: FlowAnalysis, variant: Variant) -> Iterator[Diagnostic]:
+def _shared_registers(stream: CommandStream, flow: FlowAnalysis, variant: Variant) -> Iterator[Diagnostic]:
     """Registers 1 to 8 where they lie in the command memory: safe after a reset and with a short file only (chapter VII.7)."""
     limit = variant.memory_bits - variant.shared_bits
     if not variant.shared_bits or (stream.commands and stream.commands[0].key == "\\" and stream.bits <= limit):

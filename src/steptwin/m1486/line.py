@@ -59,7 +59,8 @@ class SerialChain(Stateful):
 
     def port(self) -> LinePort:
         """A port of the line for one more program. Every port receives all characters of the chips from now on."""
-        self.collect(max(chip.now for chip in self.chips.values()))
+        if self._ports:  # the first one also receives what chips have sent at the moment at which they were made
+            self.collect(max(chip.now for chip in self.chips.values()))
         port = LinePort(self)
         self._ports.append(port)
         return port

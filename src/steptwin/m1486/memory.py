@@ -172,6 +172,13 @@ class CommandMemory(Stateful):
         self._reader.labels_changed()
         return image
 
+    def holds(self, place: int, file: StoredFile) -> bool:
+        """Whether the commands from ``place`` on are those of a file, none of them overwritten."""
+        if self.is_lost(place) or self.age(place) < len(file.code):
+            return False
+        bytes_are = all(self._bytes[(place + offset) % self.size] == byte for offset, byte in enumerate(file.code))
+        return bytes_are and all(self.labels.get(label) == (place + at) % self.span for label, at in file.labels.items())
+
     def load(self, image: StoredFile) -> None:
         """Put a stored file at the beginning of the empty memory; it may run."""
         registers = self._own

@@ -24,8 +24,10 @@ ALIASES = {
     "ADDR0": "B18", "ADDR1": "B19", "ADDR2": "B20", "ADDR3": "B21",
 }  # fmt: skip
 
+OPEN_ADDRESS = 15
+"""Open address pins; a chip alone needs no other address (chapter II, Serial interface)."""
 WAVEFORM = "N"
-"""A pseudo pin: its edges give the waveform of the phase currents from then on."""
+"""A pseudo pin: its level is the number of the waveform of the phase currents (command N)."""
 JOG_DIRECTION_LINE = 7
 _BAUD_LINES = (5, 6)
 _ADDRESS_LINES = (18, 19, 20, 21)

@@ -20,7 +20,7 @@ UNIT = "microstep"
 POSITION_BITS = 24
 
 
-class _Row(NamedTuple):
+class _PointRow(NamedTuple):
     point: Point
     read: Callable[[M1486Chip, Nanos], float]
     follows: bool = False
@@ -53,31 +53,31 @@ def _has_room(chip: M1486Chip, now: Nanos) -> bool:
     return not receiver.is_listening or not (receiver.is_stalled or receiver.busy_until is not None)
 
 
-def _values() -> Iterator[_Row]:
-    yield _Row(
+def _values() -> Iterator[_PointRow]:
+    yield _PointRow(
         _value("position", "Where the pulses given so far have led, since power-on.", UNIT),
         lambda chip, now: chip.drive.true_u(now),
         follows=True,
         has_version=True,
     )
-    yield _Row(
+    yield _PointRow(
         _value("velocity", "Commanded velocity.", f"{UNIT}/s"),
         lambda chip, now: chip.drive.profile.velocity(now),
         follows=True,
         has_version=True,
     )
-    yield _Row(
+    yield _PointRow(
         _value("counter", "Position counter, 24 bits.", UNIT, "VII.7"),
         lambda chip, now: chip.drive.counter_u(now),
         follows=True,
         bits=POSITION_BITS,
     )
-    yield _Row(_value("moving", "Whether a motion is being made."), lambda chip, now: chip.drive.is_busy)
-    yield _Row(_value("room", "Whether a host may send the next line: chips not addressed take any."), _has_room)
-    yield _Row(_value("variable", "Internal variable, 24 bits.", "", "VII.7"), lambda chip, now: chip.unit.variable)
+    yield _PointRow(_value("moving", "Whether a motion is being made."), lambda chip, now: chip.drive.is_busy)
+    yield _PointRow(_value("room", "Whether a host may send the next line: chips not addressed take any."), _has_room)
+    yield _PointRow(_value("variable", "Internal variable, 24 bits.", "", "VII.7"), lambda chip, now: chip.unit.variable)
 
 
-def _registers() -> Iterator[_Row]:
+def _registers() -> Iterator[_PointRow]:
     """Numeric registers: ``<`` reads one into the internal variable, ``>`` writes it."""
     for register in REGISTERS:
         number = register.number
@@ -94,18 +94,18 @@ def _registers() -> Iterator[_Row]:
             source="VII.7",
         )
         if number == POSITION_REGISTER:
-            yield _Row(point, lambda chip, now: chip.drive.counter_u(now), follows=True, bits=POSITION_BITS)
+            yield _PointRow(point, lambda chip, now: chip.drive.counter_u(now), follows=True, bits=POSITION_BITS)
         elif number == REMAINDER_REGISTER:
-            yield _Row(point, lambda chip, now: chip.unit.remainder)
+            yield _PointRow(point, lambda chip, now: chip.unit.remainder)
         else:
-            yield _Row(point, partial(_general, number))
+            yield _PointRow(point, partial(_general, number))
 
 
 def _general(number: int, chip: M1486Chip, now: Nanos) -> float:
     return chip.memory.register(number)
 
 
-def _uploads() -> Iterator[_Row]:
+def _uploads() -> Iterator[_PointRow]:
     for number, what in UPLOADS.items():
         point = Point(
             path=f"U{number}",
@@ -118,10 +118,10 @@ def _uploads() -> Iterator[_Row]:
             source="VII.1",
         )
         is_of_position = number <= POSITION_BITS // 8
-        yield _Row(point, UPLOADED[number], follows=is_of_position, bits=8 * number if is_of_position else None)
+        yield _PointRow(point, UPLOADED[number], follows=is_of_position, bits=8 * number if is_of_position else None)
 
 
-_ROWS: Mapping[str, _Row] = {row.point.path.upper(): row for row in (*_values(), *_registers(), *_uploads())}
+_ROWS: Mapping[str, _PointRow] = {row.point.path.upper(): row for row in (*_values(), *_registers(), *_uploads())}
 POINTS: Mapping[str, Point] = {path: row.point for path, row in _ROWS.items()}
 """By path in capitals."""
 
@@ -135,7 +135,7 @@ def live_point(chip: M1486Chip, text: str) -> LivePoint | None:
     return LivePoint(point=row.point, read=partial(row.read, chip), turns=_turns(chip, row), version=version)
 
 
-def _turns(chip: M1486Chip, row: _Row) -> Turns | None:
+def _turns(chip: M1486Chip, row: _PointRow) -> Turns | None:
     if not row.follows:
         return None
     profile = partial(_profile, chip)

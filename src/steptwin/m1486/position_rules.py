@@ -13,7 +13,7 @@ from steptwin.diagnostics import Diagnostic
 from steptwin.m1486 import findings
 from steptwin.m1486.commands import CLEAR_POSITION, When, find, grouped, when
 from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U
-from steptwin.m1486.structure import Stream
+from steptwin.m1486.structure import CommandStream
 from steptwin.m1486.syntax import Command, JumpCondition
 from steptwin.m1486.variants import Variant
 
@@ -32,9 +32,9 @@ class _State(NamedTuple):
     loops: tuple[tuple[int, int], ...] = ()
 
 
-def position_rules(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
+def position_rules(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:
     """A warning for each G and H that some path reaches while the position counter has passed its end."""
-    told: set[int] = set()
+    reported: set[int] = set()
     seen: set[_State] = set()
     waiting = deque((_State(0),))
     while waiting and len(seen) < MOST_COMMANDS:
@@ -43,8 +43,8 @@ def position_rules(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
             continue
         seen.add(state)
         command, position = stream.commands[state.index], state.position
-        if command.key in "GH" and position is not None and position not in _COUNTER and state.index not in told:
-            told.add(state.index)
+        if command.key in "GH" and position is not None and position not in _COUNTER and state.index not in reported:
+            reported.add(state.index)
             shown = position % len(_COUNTER)
             target = command.number or 0
             message = f"at position {_signed(position)} the counter shows {grouped(shown)}"
@@ -62,7 +62,7 @@ def _distance_to(target: int | None, position: int | None) -> int | None:
     return None if target is None or position is None else target - position % len(_COUNTER)
 
 
-def _after(stream: Stream, state: _State, variant: Variant) -> list[_State]:
+def _after(stream: CommandStream, state: _State, variant: Variant) -> list[_State]:
     index, position, distance, back, loops = state
     command = stream.commands[index]
     following = state._replace(index=index + 1)
@@ -114,7 +114,7 @@ def _end_of_loop(following: _State, loops: tuple[tuple[int, int], ...]) -> _Stat
     return following._replace(loops=loops[:-1])
 
 
-def _jumps(stream: Stream, following: _State, index: int) -> list[_State]:
+def _jumps(stream: CommandStream, following: _State, index: int) -> list[_State]:
     command = stream.commands[index]
     label = command.argument.label if isinstance(command.argument, JumpCondition) else command.number
     target = None if label is None else stream.resolve(index, label)

@@ -32,8 +32,6 @@ def program_words(chip: M1486Chip, now: Nanos) -> str:
         return "stopped by Kill (C75 lets it go on)"
     if program.is_limited:
         return "stopped by LIMIT"
-    if program.is_halted:
-        return "halted"
     if program.waiting is WaitReason.MOTION:
         return f"waits for the end of the {_MOTIONS.get(chip.drive.motion, 'motion')}"
     if program.waiting is WaitReason.LINE:

@@ -2,21 +2,20 @@
 
 Each command is compiled, when it is first met, into a closure that does it and returns the place of the next one. Those that
 only compute run in a bare loop; a closure that is not there yet or does more raises `_Look`, and the command is done with the
-chip's clock set to its moment. With a hook on commands every one is looked at.
+chip's clock set to its moment. With a hook on statements every one is looked at.
 """
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
 from typing import ClassVar, NamedTuple, NoReturn, Protocol
 
 from steptwin.m1486.effects import CommandHost, Effect, WrongData
 from steptwin.m1486.encoding import LONGEST, decode
 from steptwin.m1486.execute import compile_command
-from steptwin.m1486.syntax import Command
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Plain, Stateful
+from steptwin.statements import StatementHook, StatementHooks, joined, without
 
 #: Where commands take no time, so many of them happen at one moment; then a while passes, so that a loop without end lets
 #: time go on. The while is long enough for a chip that polls a line to cost little.
@@ -25,10 +24,6 @@ BURST_NS: Nanos = MILLISECOND
 
 LOST = -1
 """The place of a loop's beginning, or of a return, that has been overwritten."""
-
-CommandHook = Callable[[Nanos, int, Command | None], bool | None]
-"""Called before every command is done: moment, place in memory, command (None where the bytes are none). True halts the
-program before it."""
 
 
 class WaitReason(enum.Enum):
@@ -50,7 +45,6 @@ def _look(now: Nanos) -> NoReturn:
 class _Compiled(NamedTuple):
     effect: Effect
     following: int
-    command: Command | None
 
 
 class ProgramHost(CommandHost, Protocol):
@@ -72,10 +66,10 @@ class ProgramExecution(Stateful):
         "_chip",
         "_code",
         "_compiled",
+        "_hook",
+        "_hooks",
         "_linked",
-        "_on_command",
         "back",
-        "is_halted",
         "is_killed",
         "is_limited",
         "line",
@@ -87,7 +81,7 @@ class ProgramExecution(Stateful):
         "statement_ns",
         "waiting",
     )
-    FIXED: ClassVar[frozenset[str]] = frozenset({"_chip", "_code", "_compiled", "_linked", "_on_command", "statement_ns"})
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_chip", "_code", "_compiled", "_hook", "_hooks", "_linked", "statement_ns"})
 
     def __init__(self, chip: ProgramHost, places: int, statement_ns: Nanos) -> None:
         self._chip = chip
@@ -95,7 +89,9 @@ class ProgramExecution(Stateful):
         self._compiled: dict[int, _Compiled] = {}
         #: Places of commands whose closures know where labels are.
         self._linked: set[int] = set()
-        self._on_command: CommandHook | None = None
+        self._hooks: StatementHooks = ()
+        self._hook: StatementHook | None = None
+        """Calls all of them."""
         self.statement_ns = statement_ns
         self._burst = 0
         self._burst_at: Nanos = 0
@@ -108,7 +104,6 @@ class ProgramExecution(Stateful):
         self.ready: Nanos = now
         self.is_killed = False
         self.is_limited = False
-        self.is_halted = False
         self._forget_nesting()
 
     def _forget_nesting(self) -> None:
@@ -123,8 +118,8 @@ class ProgramExecution(Stateful):
 
     @property
     def is_held(self) -> bool:
-        """Whether it is held: by K or LIMIT without function 51, or by a debugger."""
-        return self.is_killed or self.is_limited or self.is_halted
+        """Whether it is held by K or LIMIT without function 51."""
+        return self.is_killed or self.is_limited
 
     @property
     def is_at_end(self) -> bool:
@@ -222,12 +217,8 @@ class ProgramExecution(Stateful):
         if place == self._chip.memory.end:
             return
         compiled = self._compiled.get(place) or self._compile(place)
-        if self._on_command is not None and self._on_command(now, place, compiled.command):
-            self.is_halted = True
-            return
-        self._do(compiled, now)
-
-    def _do(self, compiled: _Compiled, now: Nanos) -> None:
+        if self._hook is not None:
+            self._hook(now, place)
         self._pass(now, 1)
         self.pc = compiled.following
         try:
@@ -239,13 +230,13 @@ class ProgramExecution(Stateful):
         chip = self._chip
         stored = decode(chip.memory.fetch(place))
         if stored is None:
-            compiled = _Compiled(_no_command, self._after(place, 1), None)
+            compiled = _Compiled(_no_command, self._after(place, 1))
         else:
             command, size = stored
             following = self._after(place, size)
             code = compile_command(chip, command, place, following)
-            compiled = _Compiled(code.effect, following, command)
-            if code.computes and self._on_command is None:
+            compiled = _Compiled(code.effect, following)
+            if code.computes and self._hook is None:
                 self._code[place] = code.effect
             if code.is_linked:
                 self._linked.add(place)
@@ -288,18 +279,19 @@ class ProgramExecution(Stateful):
         super().set_state(plain)
         self._forget_code()
 
-    # ------------------------------------------------------------------ watching
+    # ------------------------------------------------------------------ hooks
 
-    def watch(self, hook: CommandHook | None) -> None:
-        """Call ``hook`` before every command; None: no longer."""
-        self._on_command = hook
+    def hook(self, hook: StatementHook) -> None:
+        """Call ``hook`` before each command from now on."""
+        self._set_hooks((*self._hooks, hook))
+
+    def unhook(self, hook: StatementHook) -> None:
+        self._set_hooks(without(self._hooks, hook))
+
+    def _set_hooks(self, hooks: StatementHooks) -> None:
+        self._hooks = hooks
+        self._hook = joined(hooks) if hooks else None
         self._forget_code()
-
-    def resume(self, now: Nanos) -> None:
-        """Do the command before which a hook has halted the program, and go on."""
-        if self.is_halted:
-            self.is_halted = False
-            self._do(self._compile(self.pc), now)
 
 
 def _no_command(now: Nanos) -> NoReturn:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from steptwin.m1486.commands import When, memory_bits, when
-from steptwin.m1486.syntax import Command, JumpCondition, ProgramText
+from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram
 
 
 def stored_bits(command: Command) -> int:
@@ -36,7 +36,7 @@ class File:
 
 
 @dataclass(slots=True)
-class Stream:
+class CommandStream:
     """The commands one chip receives, in order, and how they hang together. Indices count its commands from 0.
 
     ``address`` is None where the program has no ``X``: a single chip.
@@ -103,7 +103,7 @@ class Stream:
         return self.bits_before[self.present(index) + 1] - self.bits_before[start]
 
 
-def streams(program: ProgramText) -> list[Stream]:
+def streams(program: ParsedProgram) -> list[CommandStream]:
     """What each chip gets. Without ``X`` there is one stream; with it one for each address named, and commands sent while all
     listen go to each of them."""
     commands = program.all_commands
@@ -121,8 +121,8 @@ def streams(program: ProgramText) -> list[Stream]:
     return [_stream(address, taken) for address, taken in received.items()]
 
 
-def _stream(address: int | None, commands: list[Command]) -> Stream:
-    stream = Stream(address, tuple(commands))
+def _stream(address: int | None, commands: list[Command]) -> CommandStream:
+    stream = CommandStream(address, tuple(commands))
     _measure(stream)
     _find_files(stream)
     _find_loops(stream)
@@ -132,7 +132,7 @@ def _stream(address: int | None, commands: list[Command]) -> Stream:
     return stream
 
 
-def _measure(stream: Stream) -> None:
+def _measure(stream: CommandStream) -> None:
     bits = 0
     for command in stream.commands:
         stream.bits_before.append(bits)
@@ -140,7 +140,7 @@ def _measure(stream: Stream) -> None:
     stream.bits_before.append(bits)
 
 
-def _find_files(stream: Stream) -> None:
+def _find_files(stream: CommandStream) -> None:
     opens: int | None = None
     resets = 0
     for index, command in enumerate(stream.commands):
@@ -163,7 +163,7 @@ def _find_files(stream: Stream) -> None:
         stream.files.append(File(opens, None, stream.bits - stream.bits_before[opens]))
 
 
-def _find_loops(stream: Stream) -> None:
+def _find_loops(stream: CommandStream) -> None:
     running: list[int] = []
     for index, command in enumerate(stream.commands):
         if command.key == "\\" and stream.in_file[index] is None:

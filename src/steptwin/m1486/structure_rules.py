@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from steptwin.diagnostics import Diagnostic, Fix, Span
 from steptwin.m1486 import findings
 from steptwin.m1486.commands import When, find, when
-from steptwin.m1486.structure import Stream, written_label
+from steptwin.m1486.structure import CommandStream, written_label
 from steptwin.m1486.syntax import JumpCondition
 from steptwin.m1486.variants import VARIANTS, Store, Variant
 
@@ -15,7 +15,7 @@ from steptwin.m1486.variants import VARIANTS, Store, Variant
 LOOP_LEVELS = 4
 
 
-def structure_rules(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
+def structure_rules(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:
     yield from _brackets(stream)
     yield from _memory(stream, variant)
     yield from _resets(stream, variant)
@@ -30,7 +30,7 @@ def structure_rules(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
         yield from _stored_file(stream)
 
 
-def label_problem(stream: Stream, index: int, label: int, variant: Variant) -> Iterator[Diagnostic]:
+def label_problem(stream: CommandStream, index: int, label: int, variant: Variant) -> Iterator[Diagnostic]:
     """Why the command at ``index`` does not find ``label``."""
     command = stream.commands[index]
     span = command.argument.label_span if isinstance(command.argument, JumpCondition) else command.argument_span
@@ -50,7 +50,7 @@ def label_problem(stream: Stream, index: int, label: int, variant: Variant) -> I
     yield findings.NO_SUCH_LABEL(span, f"there is no label {label}", hint)
 
 
-def _overwritten(stream: Stream, index: int, target: int, variant: Variant) -> int:
+def _overwritten(stream: CommandStream, index: int, target: int, variant: Variant) -> int:
     """How many bits back ``target`` lies if the ring has overwritten it when the command at ``index`` runs; otherwise 0 (M-12).
 
     Inside a file that does not fit at all, that is the thing to say.
@@ -62,7 +62,7 @@ def _overwritten(stream: Stream, index: int, target: int, variant: Variant) -> i
     return bits if bits > variant.memory_bits else 0
 
 
-def _brackets(stream: Stream) -> Iterator[Diagnostic]:
+def _brackets(stream: CommandStream) -> Iterator[Diagnostic]:
     for index in stream.nested_opens:
         yield findings.FILE_IN_FILE(stream.commands[index].span, "[ inside [ ]", "close the first file with ]")
     for index in stream.lone_closes:
@@ -74,7 +74,7 @@ def _brackets(stream: Stream) -> Iterator[Diagnostic]:
             yield findings.FILE_NOT_CLOSED(stream.commands[file.opens].span, "[ without ]", "] runs what [ began", fix)
 
 
-def _memory(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
+def _memory(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:
     for file in stream.files:
         if file.bits > variant.memory_bits:
             larger = [v.title for v in VARIANTS if v.clock == variant.clock and v.memory_bits >= file.bits]
@@ -84,7 +84,7 @@ def _memory(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
             yield findings.FILE_TOO_LARGE(stream.commands[file.opens].span, f"this file takes {file.bits} bits", hint)
 
 
-def _resets(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
+def _resets(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:
     alone = all(command.key == "\\" for command in stream.commands)
     for index, command in enumerate(stream.commands):
         if command.key != "\\":
@@ -97,13 +97,13 @@ def _resets(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
             yield findings.RESET_WITH_OTHERS(command.span, "reset together with other commands", hint)
 
 
-def _immediate(stream: Stream) -> Iterator[Diagnostic]:
+def _immediate(stream: CommandStream) -> Iterator[Diagnostic]:
     for index, command in enumerate(stream.commands):
         if stream.in_file[index] is not None and when(command.key, command.number) is When.RECEIVED:
             yield findings.ACTS_AT_ONCE(command.span, f"{command} inside [ ] acts while the file is being sent, once")
 
 
-def _loops(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
+def _loops(stream: CommandStream, variant: Variant) -> Iterator[Diagnostic]:
     for index in stream.open_loops:
         yield findings.LOOP_OPEN(stream.commands[index].span, "L without E", "E ends what L repeats")
     for index in stream.lone_ends:
@@ -121,7 +121,7 @@ def _loops(stream: Stream, variant: Variant) -> Iterator[Diagnostic]:
             yield findings.LABEL_OVERWRITTEN(stream.commands[end].span, message, hint)
 
 
-def _crossing(stream: Stream, index: int, label: int) -> Iterator[Diagnostic]:
+def _crossing(stream: CommandStream, index: int, label: int) -> Iterator[Diagnostic]:
     target = stream.resolve(index, label)
     if target is None:
         return
@@ -133,7 +133,7 @@ def _crossing(stream: Stream, index: int, label: int) -> Iterator[Diagnostic]:
         yield findings.LOOP_CROSSED(command.span, f"{command} leads out of a loop", "the loop stays unfinished")
 
 
-def _stored_file(stream: Stream) -> Iterator[Diagnostic]:
+def _stored_file(stream: CommandStream) -> Iterator[Diagnostic]:
     outside = [c for i, c in enumerate(stream.commands) if stream.in_file[i] is None and c.key not in "[]\\K"]
     if outside:
         count = "1 command stands" if len(outside) == 1 else f"{len(outside)} commands stand"

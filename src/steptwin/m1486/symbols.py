@@ -9,14 +9,14 @@ from steptwin.m1486.commands import ArgType, rows
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.structure import written_label
-from steptwin.m1486.syntax import Command, JumpCondition, ProgramText
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
 _WRITES = frozenset("TC>")
 FLAGS = range(USER_FLAGS.start, CARRY + 1)
 
 
-def by_chip(program: ProgramText) -> Iterator[tuple[int | None, Command]]:
+def by_chip(program: ParsedProgram) -> Iterator[tuple[int | None, Command]]:
     """The commands with the address of the chip that listens; None while all do, or there is only one."""
     listening: int | None = None
     for command in program.all_commands:
@@ -30,20 +30,20 @@ def label_key(chip: int | None, label: int) -> str:
     return f"{'' if chip is None else f'{chip:X}:'}{label}"
 
 
-def uses(program: ProgramText) -> Iterator[Use]:
+def uses(program: ParsedProgram) -> Iterator[Use]:
     """In the order of the program."""
     for chip, command in by_chip(program):
         if command.key == "@" and command.number is not None:
-            yield _label(chip, command.number, command.argument_span, Role.DEFINE)
+            yield _label(chip, command.number, command.argument_span, SymbolRole.DEFINE)
             continue
         yield from _of_number(command)
         label = written_label(command)
         if label is not None:
             span = command.argument.label_span if isinstance(command.argument, JumpCondition) else command.argument_span
-            yield _label(chip, label, span, Role.READ)
+            yield _label(chip, label, span, SymbolRole.READ)
 
 
-def _label(chip: int | None, label: int, span: Span, role: Role) -> Use:
+def _label(chip: int | None, label: int, span: Span, role: SymbolRole) -> Use:
     return Use(Symbol(SymbolKind.LABEL, label_key(chip, label), str(label)), span, role)
 
 
@@ -51,7 +51,7 @@ def _of_number(command: Command) -> Iterator[Use]:
     number = command.number
     if number is None:
         return
-    role = Role.WRITE if command.key in _WRITES else Role.READ
+    role = SymbolRole.WRITE if command.key in _WRITES else SymbolRole.READ
     found = _symbol(command.key, number)
     if found is not None:
         yield Use(found, command.argument_span, role)

@@ -93,7 +93,7 @@ class ProgramLine:
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramText:
+class ParsedProgram:
     lines: tuple[ProgramLine, ...]
 
     @property
@@ -108,7 +108,7 @@ class ProgramText:
 
 
 class Parsed(NamedTuple):
-    program: ProgramText
+    program: ParsedProgram
     diagnostics: list[Diagnostic]
 
 
@@ -130,7 +130,7 @@ def parse(text: str) -> Parsed:
             diagnostics += found
         if end is not None:
             start = end.end()
-    return Parsed(ProgramText(tuple(lines)), diagnostics)
+    return Parsed(ParsedProgram(tuple(lines)), diagnostics)
 
 
 def parse_line(text: str, offset: int = 0) -> ParsedLine:
@@ -149,7 +149,7 @@ def parse_line(text: str, offset: int = 0) -> ParsedLine:
     return ParsedLine(ProgramLine(commands[0] if commands else None, rest.strip() if semicolon else None), reader.diagnostics)
 
 
-def format_program(program: ProgramText, end: str = "\n") -> str:
+def format_program(program: ParsedProgram, end: str = "\n") -> str:
     """The program as text in one form: capitals, no blanks, comments in a column, each line followed by ``end``."""
     return "".join(f"{line}{end}" for line in program.lines)
 

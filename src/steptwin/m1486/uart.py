@@ -29,7 +29,6 @@ class Uart(Stateful):
         self.sent: deque[tuple[Nanos, int]] = deque(maxlen=MOST_WAITING)
         self.overrun = 0
         """Characters that found no room on the line, in either direction."""
-        self._incoming = self._outgoing = CharacterClock(SerialLine(baud))
         self.set_baud(baud)
 
     @property

@@ -371,12 +371,8 @@ class AxisMotion(Stateful):
     def _guard_switches(self, now: Nanos) -> None:
         """Stop now, or know when to stop, where the profile moves into an active limit switch (MIC-12)."""
         self._blocked_leg = None
-        if not self.config.limit_mode:
-            return
         blocked = [direction for direction in (-1, 1) if self._switch_blocks(direction)]
-        if not blocked:
-            return
-        for begin, direction in self.profile.legs(now):
+        for begin, direction in self.profile.legs(now) if blocked else ():
             if direction in blocked:
                 if begin <= now:
                     self._limit_stop(now, direction)

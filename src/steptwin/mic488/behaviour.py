@@ -40,7 +40,7 @@ class Bit:
 
 
 @dataclass(frozen=True, slots=True)
-class OfDevice:
+class DeviceBehaviour:
     """A holding register of the controller. ``quiet``: a write only keeps the value, nothing happens earlier or later for it."""
 
     read: Getter = _nothing
@@ -49,10 +49,10 @@ class OfDevice:
 
 
 @dataclass(frozen=True, slots=True)
-class OfAxis:
+class AxisBehaviour:
     """A holding register of an axis. REAL/DINT values are read in units (``read``) or pulses (``read_p``), written in pulses.
 
-    ``quiet`` as in `OfDevice`. ``waits``: in TRIGGER mode a write is kept for the trigger register (MIC-16).
+    ``quiet`` as in `DeviceBehaviour`. ``waits``: in TRIGGER mode a write is kept for the trigger register (MIC-16).
     """
 
     read: Getter = _nothing
@@ -62,7 +62,7 @@ class OfAxis:
     waits: bool = False
 
 
-Behaviour: TypeAlias = Bit | OfDevice | OfAxis
+Behaviour: TypeAlias = Bit | DeviceBehaviour | AxisBehaviour
 
 
 def checked(rows: Iterable[MapRow], given: Mapping[str, Behaviour]) -> Mapping[str, Any]:
@@ -72,12 +72,12 @@ def checked(rows: Iterable[MapRow], given: Mapping[str, Behaviour]) -> Mapping[s
     found = complete("register", served, "behaviour", given)
     for key, behaviour in found.items():
         row = served[key]
-        kind = Bit if row.type is Type.BIT else OfAxis if row.per is Per.AXIS else OfDevice
+        kind = Bit if row.type is Type.BIT else AxisBehaviour if row.per is Per.AXIS else DeviceBehaviour
         if not isinstance(behaviour, kind):
             raise IncompleteTable(f"register {key} needs the behaviour {kind.__name__}, not {type(behaviour).__name__}")
         _check("read", row, behaviour.read, wanted=bool(row.reads))
         _check("write", row, behaviour.write, wanted=bool(row.writes))
-        if isinstance(behaviour, OfAxis):
+        if isinstance(behaviour, AxisBehaviour):
             _check("read_p", row, behaviour.read_p, wanted=bool(row.reads) and row.type is Type.VALUE)
     return found
 
@@ -160,12 +160,12 @@ def _axes_chosen(device: ControllerCore, mask: float) -> list[Axis]:
     return [device.axes[number - 1] for number in axes_of_mask(int(mask))]
 
 
-def _drives(action: Callable[[Axis, Nanos], None]) -> OfDevice:
+def _drives(action: Callable[[Axis, Nanos], None]) -> DeviceBehaviour:
     def act(device: ControllerCore, value: float, now: Nanos) -> None:
         for axis in _axes_chosen(device, value):
             action(axis, now)
 
-    return OfDevice(write=act)
+    return DeviceBehaviour(write=act)
 
 
 # ---------------------------------------------------------------------- motion registers and their trigger registers
@@ -183,7 +183,7 @@ MOTIONS: Mapping[str, AxisAction] = complete(
 )
 
 
-def _trigger(key: str, move: AxisAction) -> OfDevice:
+def _trigger(key: str, move: AxisAction) -> DeviceBehaviour:
     def trigger(device: ControllerCore, value: float, now: Nanos) -> None:
         """MIC-16: starts the chosen axes that have a stored value, and uses it up, unless values are kept."""
         device.triggered[key] = int(value)
@@ -197,7 +197,7 @@ def _trigger(key: str, move: AxisAction) -> OfDevice:
             else:
                 move(axis, stored, now)
 
-    return OfDevice(lambda device, now: device.triggered[key], trigger)
+    return DeviceBehaviour(lambda device, now: device.triggered[key], trigger)
 
 
 # ---------------------------------------------------------------------- registers of an axis
@@ -250,63 +250,63 @@ BEHAVIOUR: Mapping[str, Any] = checked(
             lambda device, number, on, now: device.set_output(number, on, now),
         ),
         "IN": Bit(lambda number: lambda device: device.inputs.filtered[number]),
-        "DATA_TYPE": OfDevice(lambda device, now: device.data_type, _set_data_type, quiet=True),
-        "PROG_BANK_SEL": OfDevice(lambda device, now: device.program.program_bank, _set_program_bank, quiet=True),
-        "POS_BANK_SEL": OfDevice(lambda device, now: device.program.position_bank, _set_position_bank, quiet=True),
-        "PROGRAM_CTRL": OfDevice(
+        "DATA_TYPE": DeviceBehaviour(lambda device, now: device.data_type, _set_data_type, quiet=True),
+        "PROG_BANK_SEL": DeviceBehaviour(lambda device, now: device.program.program_bank, _set_program_bank, quiet=True),
+        "POS_BANK_SEL": DeviceBehaviour(lambda device, now: device.program.position_bank, _set_position_bank, quiet=True),
+        "PROGRAM_CTRL": DeviceBehaviour(
             lambda device, now: device.program.state,
             lambda device, value, now: device.program.command(int(value), now),
         ),
-        "AXIS_CTR_MODE": OfDevice(lambda device, now: device.trigger_mode, _set_mode, quiet=True),
+        "AXIS_CTR_MODE": DeviceBehaviour(lambda device, now: device.trigger_mode, _set_mode, quiet=True),
         **{f"AXIS_{key}_TRIG": _trigger(key, move) for key, move in MOTIONS.items()},
-        "M_ALL_STATUS": OfDevice(lambda device, now: 0),
-        "M_STATUS": OfDevice(lambda device, now: device.status()),
-        "STATUS": OfAxis(lambda axis, now: axis.status),
+        "M_ALL_STATUS": DeviceBehaviour(lambda device, now: 0),
+        "M_STATUS": DeviceBehaviour(lambda device, now: device.status()),
+        "STATUS": AxisBehaviour(lambda axis, now: axis.status),
         "M_ENABLE": _drives(lambda axis, now: axis.enable(now)),
         "M_DISABLE": _drives(lambda axis, now: axis.disable(now)),
         "M_STOP": _drives(lambda axis, now: axis.stop(now)),
-        "JOG_SPEED": OfDevice(write=_set_jog_speed, quiet=True),
-        "POS_ACT": OfAxis(
+        "JOG_SPEED": DeviceBehaviour(write=_set_jog_speed, quiet=True),
+        "POS_ACT": AxisBehaviour(
             _position_u,
             lambda axis, now: axis.coordinate_p(now),
             lambda axis, value, now: axis.set_coordinate(int(value), now),
         ),
-        "VEL_ACT": OfAxis(
+        "VEL_ACT": AxisBehaviour(
             lambda axis, now: axis.profile.velocity(now) / axis.gear,
             lambda axis, now: round(axis.profile.velocity(now)),
         ),
-        "ACC": OfAxis(
+        "ACC": AxisBehaviour(
             lambda axis, now: axis.acc_p / axis.gear,
             lambda axis, now: max(1, round(axis.acc_p)),
             _set_acc,
             quiet=True,
         ),
-        "DEC": OfAxis(
+        "DEC": AxisBehaviour(
             lambda axis, now: axis.dec_p / axis.gear,
             lambda axis, now: max(1, round(axis.dec_p)),
             _set_dec,
             quiet=True,
         ),
-        "VMAX": OfAxis(
+        "VMAX": AxisBehaviour(
             lambda axis, now: axis.vmax_p / axis.gear,
             lambda axis, now: max(1, round(axis.vmax_p)),
             _set_vmax,
             quiet=True,
         ),
-        "HOME": OfAxis(write=lambda axis, value, now: axis.home(value, now)),
-        **{key: OfAxis(write=move, waits=True) for key, move in MOTIONS.items()},
-        "ENC_IMP": OfAxis(lambda axis, now: axis.encoder_counts(now), write=_set_encoder),
-        "ENC_XPOS": OfAxis(
+        "HOME": AxisBehaviour(write=lambda axis, value, now: axis.home(value, now)),
+        **{key: AxisBehaviour(write=move, waits=True) for key, move in MOTIONS.items()},
+        "ENC_IMP": AxisBehaviour(lambda axis, now: axis.encoder_counts(now), write=_set_encoder),
+        "ENC_XPOS": AxisBehaviour(
             lambda axis, now: axis.encoder.pulses(axis.encoder_counts(now)) / axis.gear,
             lambda axis, now: round(axis.encoder.pulses(axis.encoder_counts(now))),
             _set_encoder_position,
         ),
-        "POSLIM_L": OfAxis(
+        "POSLIM_L": AxisBehaviour(
             lambda axis, now: axis.limit_l_p / axis.gear,
             lambda axis, now: axis.limit_l_p,
             lambda axis, value, now: axis.set_limits(now, left_p=int(value)),
         ),
-        "POSLIM_R": OfAxis(
+        "POSLIM_R": AxisBehaviour(
             lambda axis, now: axis.limit_r_p / axis.gear,
             lambda axis, now: axis.limit_r_p,
             lambda axis, value, now: axis.set_limits(now, right_p=int(value)),

@@ -11,7 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.core import NO_BANKS, ControllerCore
-from steptwin.mic488.program import LoadedProgram
+from steptwin.mic488.program import BankContents, LoadedProgram
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.slave import slave
 from steptwin.state import Plain
@@ -27,8 +27,7 @@ class ControllerSnapshot:
     config: ControllerConfig
     firmware: str
     state: Plain
-    banks: tuple[tuple[int, str], ...] = ()
-    """Texts of programs and position tables."""
+    banks: BankContents
 
 
 def pause_observer(devices: Mapping[int, Mic488Device]) -> Callable[[int, Nanos], None]:
@@ -101,12 +100,12 @@ class Mic488Device(ControllerCore):
         return ControllerSnapshot(self.config, self.firmware.name, self.copy_state(), self.program.contents())
 
     def restore(self, snapshot: ControllerSnapshot) -> None:
-        """Take the state of a snapshot, its moment too. `Misuse` when it is of another configuration, firmware or program."""
+        """Take the state of a snapshot, its moment and the contents of its banks too. `Misuse` when it is of another
+        configuration or firmware."""
         if snapshot.firmware != self.firmware.name:
             raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {self.firmware.name}")
         if snapshot.config != self.config:
             raise Misuse("the snapshot is of a controller with another configuration")
-        if snapshot.banks != self.program.contents():
-            raise Misuse("the snapshot is of a controller with other programs or positions in its banks")
+        self.program.hold(snapshot.banks)
         self.set_state(snapshot.state)
         self.changed()

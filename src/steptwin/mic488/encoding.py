@@ -86,7 +86,7 @@ def saturated_real(value: float) -> float:
 
 
 def shortest_real(value: float) -> str:
-    """A REAL for people, with as few digits (6 to 9) as tell it from its neighbours: 10.11 for 10.109999656677246."""
+    """A REAL as text, with the fewest digits (6 to 9) that distinguish it from its neighbours: 10.11 for 10.109999656677246."""
     try:
         words = real_to_words(value)
     except Misuse:

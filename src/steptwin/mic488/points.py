@@ -7,9 +7,10 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from steptwin.datasheet import Access, Limits, Point, PointAddress, PointEffect
+from steptwin.datasheet import Access, Condition, Limits, Point, PointAddress, PointEffect
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.mic488 import registermap
@@ -20,6 +21,7 @@ from steptwin.mic488.encoding import DINT_MIN, word_to_int, words_to_dint, words
 from steptwin.mic488.ranges import Range
 from steptwin.mic488.registermap import Register, RegisterMap, Space, Type, UnknownRegister
 from steptwin.mic488.registers import AXES
+from steptwin.mic488.status import AXIS_CONDITIONS, CONTROLLER_CONDITIONS
 from steptwin.mic488.values import RegisterItem, View, named
 from steptwin.motion import Profile
 from steptwin.points import LivePoint, Turns, turns_of, turns_of_round
@@ -53,14 +55,15 @@ class ShortName(NamedTuple):
     meaning: str = ""
     read: Callable[[Any, Nanos], float] | None = None
     """Where no register can be read for it in every firmware."""
+    conditions: Mapping[int, Condition] = MappingProxyType({})
 
 
 SHORT_NAMES = (
-    ShortName("status", "M_STATUS", "Status of the controller.", lambda device, now: device.status()),
+    ShortName("status", "M_STATUS", "Status of the controller.", lambda device, now: device.status(), CONTROLLER_CONDITIONS),
     ShortName("program", "PROGRAM_CTRL", "State of the program."),
 )
 AXIS_SHORT_NAMES = (
-    ShortName("status", "STATUS"),
+    ShortName("status", "STATUS", conditions=AXIS_CONDITIONS),
     ShortName("enabled", "EN", "Whether the drive is switched on.", lambda axis, now: axis.enabled),
     ShortName("moving", "", "Whether a motion is being made.", lambda axis, now: axis.profile.moving(now)),
     ShortName("position", "POS_ACT", "Counted position."),
@@ -90,13 +93,21 @@ def _short(registers: RegisterMap, units: Sequence[str], short: ShortName, axis:
     except UnknownRegister:
         # No register of this firmware shows it: WBC programs and mechanics see it.
         return Point(
-            path=path, meaning=short.meaning, type="number", values={}, access=Access.READ, effect=PointEffect.NONE, source=""
+            path=path,
+            meaning=short.meaning,
+            type="number",
+            values={},
+            conditions=short.conditions,
+            access=Access.READ,
+            effect=PointEffect.NONE,
+            source="",
         )
     found = _point(register, units)
     return replace(
         found,
         path=path,
         meaning=short.meaning or found.meaning,
+        conditions=short.conditions,
         access=Access.READ,
         effect=PointEffect.NONE,
         limits=None,

@@ -24,7 +24,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus, ControllerStatus, ProgramState
 
-_ACTIVITIES: Mapping[ProgramState, ProgramActivity] = {
+ACTIVITIES: Mapping[int, ProgramActivity] = {
     ProgramState.STOPPED: ProgramActivity.STOPPED,
     ProgramState.RUNNING: ProgramActivity.RUNNING,
     ProgramState.PAUSED: ProgramActivity.PAUSED,
@@ -78,16 +78,12 @@ def empty_banks(name: str, device: Mic488Device) -> list[str]:
 
 def state_of(device: Mic488Device, now: Nanos) -> ControllerState:
     """Positions in configured units; user registers that are 0 are left out."""
-    status, sheet = device.status(), datasheet(device)
+    sheet = datasheet(device)
     return ControllerState(
         kind=sheet.kind,
         variant=sheet.variant,
         time_s=now / SECOND,
-        status=StateStatus(
-            code=int(status),
-            text=CONTROLLER_STATUS_TEXTS[status],
-            level=StatusLevel.OK if status is ControllerStatus.OK else StatusLevel.ERROR,
-        ),
+        status=controller_status(device.status()),
         program=_program(device, now),
         axes=tuple(_axis(axis, described, now) for axis, described in zip(device.axes, sheet.axes, strict=True)),
         pins=dict(device.pins()),
@@ -97,7 +93,7 @@ def state_of(device: Mic488Device, now: Nanos) -> ControllerState:
 
 def _program(device: Mic488Device, now: Nanos) -> StateProgram:
     place, fault = place_of(device), device.program.fault
-    activity = _ACTIVITIES[device.program.state]
+    activity = ACTIVITIES[device.program.state]
     text = activity.value
     if place is not None:
         text += f" at line {place.line}: {place.text}"
@@ -127,7 +123,13 @@ def _axis(axis: Axis, described: AxisDescription, now: Nanos) -> StateAxis:
     )
 
 
+def controller_status(code: int) -> StateStatus:
+    """What register M_STATUS shows."""
+    level = StatusLevel.OK if code == ControllerStatus.OK else StatusLevel.ERROR
+    return StateStatus(code=int(code), text=CONTROLLER_STATUS_TEXTS.get(code, f"unknown status {code}"), level=level)
+
+
 def axis_status(code: int) -> StateStatus:
-    """What a register Mx_STATUS says."""
+    """What a register Mx_STATUS shows."""
     text = AXIS_STATUS_TEXTS.get(code, f"unknown status {code}")
     return StateStatus(code=int(code), text=text, level=_LEVELS.get(code, StatusLevel.OK))

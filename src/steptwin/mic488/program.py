@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 from typing import NamedTuple
 
@@ -21,14 +21,14 @@ from steptwin.mic488.registers import OUTPUTS
 from steptwin.mic488.status import ProgramState
 from steptwin.state import Stateful
 from steptwin.wbc import steps as s
-from steptwin.wbc.check import CheckedProgram
+from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.compile import Code, compile_program
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.events import EVENTS
 from steptwin.wbc.machine import Interpreter
-from steptwin.wbc.positions import PositionTable
+from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.wbc.real import ProgramFault, real_text
-from steptwin.wbc.registers import ROW_0
+from steptwin.wbc.registers import REAL_MAX, ROW_0
 from steptwin.wbc.usage import Setup, sources
 
 _MODBUS = next(number for number, event in enumerate(EVENTS) if event.name == "MODBUS")
@@ -51,6 +51,19 @@ class LoadedProgram:
     """It needs a position table: for more than a row 0 that it writes itself (WBC-25)."""
     variables: tuple[str, ...] = ()
     """Their names; their values are the first cells."""
+    labels: Mapping[str, int] = field(default_factory=dict)
+    """Steps at labels, by name in upper case."""
+    positions: str | None = None
+    """The text of the table in which names after @ were found; None without one."""
+
+
+class BankContents(NamedTuple):
+    """The texts in all banks, from which programs and tables can be made again."""
+
+    programs: tuple[tuple[int, str, str, str | None], ...] = ()
+    """Bank, name, text, text of the table in which its names were found."""
+    positions: tuple[tuple[int, str], ...] = ()
+    """Bank, text."""
 
 
 class ProgramError(NamedTuple):
@@ -76,7 +89,9 @@ def load(checked: CheckedProgram, name: str = "program") -> LoadedProgram:
     steps = executable.steps
     code = compile_program(executable, ACCESS)
     source, records = SourceText(name, checked.text), executable.position_records
-    return LoadedProgram(source, steps, code, records, _uses_positions(steps), executable.variables)
+    table = None if checked.positions is None else checked.positions.text
+    used = _uses_positions(steps)
+    return LoadedProgram(source, steps, code, records, used, executable.variables, executable.labels, table)
 
 
 def setup_of(config: ControllerConfig) -> Setup:
@@ -92,6 +107,10 @@ def setup_of(config: ControllerConfig) -> Setup:
         ),
         most_speed_p=MAX_SPEED_P,
     )
+
+
+def _table(text: str | None) -> PositionTable | None:
+    return None if text is None else parse_positions(text)[0]
 
 
 def _uses_positions(steps: Sequence[s.Step]) -> bool:
@@ -169,7 +188,7 @@ class ProgramControl(Stateful):
 
     def load_program(self, bank: int, program: LoadedProgram) -> None:
         """Fill a program bank. `Misuse` for a bank that does not exist or whose program is running or paused."""
-        self._check_bank("program", bank, self._program)
+        self._check_bank("program", bank, in_use=self.runs_program(bank))
         if len(program.steps) > self.dialect.max_steps:
             lines = f"{len(program.steps)} executable lines"
             raise Misuse(f"{program.source.name}: {lines}, firmware {self.dialect.firmware} holds {self.dialect.max_steps}")
@@ -177,23 +196,42 @@ class ProgramControl(Stateful):
 
     def load_positions(self, bank: int, table: PositionTable) -> None:
         """Fill a position bank. `Misuse` for a bank that does not exist or is in use."""
-        self._check_bank("position", bank, self._table)
+        self._check_bank("position", bank, in_use=self.runs_positions(bank))
         if len(table.rows) > self.dialect.max_positions:
             raise Misuse(f"{len(table.rows)} positions: a bank holds {self.dialect.max_positions}")
         self.positions[bank] = table
 
-    def _check_bank(self, kind: str, bank: int, in_use: int) -> None:
+    def runs_program(self, bank: int) -> bool:
+        """Whether the program of a bank runs or is paused."""
+        return self.state is not STOPPED and bank == self._program
+
+    def runs_positions(self, bank: int) -> bool:
+        """Whether the positions of a bank are those of a program that runs or is paused."""
+        return self.state is not STOPPED and bank == self._table
+
+    def _check_bank(self, kind: str, bank: int, *, in_use: bool) -> None:
         last = self.device.firmware.banks - 1
         if not 0 <= bank <= last:
             raise Misuse(f"{kind} bank {bank}: permitted are 0…{last}")
-        if self.state is not STOPPED and bank == in_use:
+        if in_use:
             raise Misuse(f"{kind} bank {bank} is in use: stop the program first")
 
-    def contents(self) -> tuple[tuple[int, str], ...]:
-        """What a snapshot belongs to: the texts of all banks."""
-        programs = [(bank, self.programs[bank].source.text) for bank in sorted(self.programs)]
-        tables = [(bank, self.positions[bank].text) for bank in sorted(self.positions)]
-        return (*programs, *tables)
+    def contents(self) -> BankContents:
+        """What is in all banks."""
+        programs = [(bank, one.source.name, one.source.text, one.positions) for bank, one in sorted(self.programs.items())]
+        return BankContents(tuple(programs), tuple((bank, table.text) for bank, table in sorted(self.positions.items())))
+
+    def hold(self, contents: BankContents) -> None:
+        """Have these contents of all banks, which were those of a controller with this firmware; whatever runs."""
+        before = self.contents()
+        if contents == before:
+            return
+        kept = {row[0] for row in contents.programs if row in before.programs}
+        self.programs = {
+            bank: self.programs[bank] if bank in kept else load(check(text, _table(positions), dialect=self.dialect), name)
+            for bank, name, text, positions in contents.programs
+        }
+        self.positions = {bank: parse_positions(text)[0] for bank, text in contents.positions}
 
     # ------------------------------------------------------------------ start, stop, pause
 
@@ -290,10 +328,30 @@ class ProgramControl(Stateful):
         """The program that runs or is paused, whatever bank is selected."""
         return None if self.state is STOPPED else self.programs[self._program]
 
+    @property
+    def running_bank(self) -> int:
+        """Of the program that runs or is paused, or did last."""
+        return self._program
+
     def variables(self, now: Nanos) -> dict[str, float]:
         """Values of the variables of the running or paused program, by name."""
         running = self.running
         return {} if running is None else dict(zip(running.variables, self.machine.cells_at(now), strict=False))
+
+    def set_variable(self, name: str, value: float, now: Nanos) -> None:
+        """Of the running or paused program. Raises `Misuse` for another name, and for what is no REAL."""
+        names = () if self.running is None else self.running.variables
+        if name not in names:
+            raise Misuse(f"the program has no variable {name!r}: there are {', '.join(names) or 'none'}")
+        if not -REAL_MAX <= value <= REAL_MAX:
+            raise Misuse(f"{name} = {value:g}: permitted are {-REAL_MAX:g}…{REAL_MAX:g}")
+        self.machine.disturb(self.machine.after(now))
+        self.machine.cells[names.index(name)] = value
+
+    def rest_in_loops(self, on: bool, now: Nanos) -> None:
+        """Off, every statement of a loop is executed even where nothing can change by it; only the computing time changes."""
+        self.machine.disturb(self.machine.after(now))
+        self.machine.rests_in_loops = on
 
     def statement(self, now: Nanos) -> Span | None:
         """Place, in the source, of the statement in execution at ``now`` or executed next; None when nothing runs."""
@@ -385,7 +443,7 @@ class ProgramControl(Stateful):
         if self.together:
             x, y = axes[:2]
             if not (x.on_path and y.on_path):
-                # WBC-26: what is left of a path nobody runs alone.
+                # WBC-26: the rest of a path is not run by a single axis.
                 self.together = False
                 for axis in (x, y):
                     if axis.on_path:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from steptwin.datasheet import Condition
 
 
 class AxisStatus(enum.IntEnum):
@@ -39,3 +43,26 @@ class ProgramState(enum.IntEnum):
 
 LIMIT = {-1: AxisStatus.LIMIT_L, 1: AxisStatus.LIMIT_R}
 """Status of an axis stopped at a limit while moving in a direction."""
+
+AXIS_CONDITIONS: Mapping[int, Condition] = MappingProxyType(
+    {
+        AxisStatus.OFF: Condition.OFF,
+        AxisStatus.ON: Condition.REST,
+        AxisStatus.VELOCITY: Condition.MOVING,
+        AxisStatus.POSITION: Condition.MOVING,
+        AxisStatus.REACHED: Condition.REST,
+        AxisStatus.ERROR: Condition.ERROR,
+        AxisStatus.HOMING: Condition.MOVING,
+        AxisStatus.CORRECTION: Condition.MOVING,
+        AxisStatus.LIMIT_L: Condition.WARNING,
+        AxisStatus.LIMIT_R: Condition.WARNING,
+    }
+)
+CONTROLLER_CONDITIONS: Mapping[int, Condition] = MappingProxyType(
+    {
+        ControllerStatus.OK: Condition.REST,
+        ControllerStatus.POSITION_ERROR: Condition.ERROR,
+        ControllerStatus.PROGRAM_ERROR: Condition.ERROR,
+        ControllerStatus.MASTER_ERROR: Condition.ERROR,
+    }
+)

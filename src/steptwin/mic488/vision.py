@@ -75,13 +75,13 @@ class Com1Port(Stateful):
         self.modbus = modbus
         self._frames: list[bytes] = []
         if modbus is not None:
-            told = modbus.on_frame
+            observer = modbus.on_frame
 
             def note(now: Nanos, direction: FrameDirection, frame: bytes) -> None:
                 if direction is FrameDirection.IN:
                     self._frames.append(frame)
-                if told is not None:
-                    told(now, direction, frame)
+                if observer is not None:
+                    observer(now, direction, frame)
 
             modbus.on_frame = note
 

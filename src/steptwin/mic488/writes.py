@@ -163,11 +163,7 @@ def _check(register: Register, data_type: DataType) -> Check:
 
 def _position_p(pulses: float) -> int | None:
     """MIC-14: to the nearest pulse."""
-    if DINT_MIN <= pulses <= DINT_MAX:
-        return round(pulses)
-    if not DINT_MIN - 0.5 <= pulses <= DINT_MAX + 0.5:
-        return None
-    return DINT_MIN if pulses < 0.0 else DINT_MAX
+    return round(pulses) if DINT_MIN - 0.5 < pulses < DINT_MAX + 0.5 else None
 
 
 _REAL_STEP = 2.0**-23

@@ -1,6 +1,6 @@
 """The terminal monitor: a MIC488's registers, axes and frames, live. `steptwin monitor` behind its options.
 
-`session` polls the controller, independent of terminals; `app` shows the results.
+`values` polls a device or follows a twin, `session` has them and acts, independent of terminals; `app` shows the results.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from textual.events import Event, InputEvent, Key, Paste
 from textual.widget import Widget
 from textual.widgets import DataTable, Footer, Input, RichLog, Static, TabbedContent, TabPane, Tabs
 
-from steptwin.drivers.mic488.frames import Heard
+from steptwin.drivers.mic488.frames import ObservedFrame
 from steptwin.drivers.stale import BEAT_S, StaleInput
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.machine import SECOND, Nanos
@@ -102,7 +102,7 @@ class Monitor(App[None]):
         self._before: Widget | None = None
         self._answer: Callable[[str], Awaitable[object]] | None = None
         session.on_picture = self._pictured
-        session.on_frame = self._heard
+        session.on_frame = self._on_frame
 
     # ------------------------------------------------------------------ what there is
 
@@ -219,16 +219,16 @@ class Monitor(App[None]):
             text.append("\n" if name == "IN " else "")
         self.query_one("#io", Static).update(text)
 
-    def _heard(self, heard: Heard) -> None:
+    def _on_frame(self, frame: ObservedFrame) -> None:
         if self._began is None:
-            self._began = heard.time
-        is_read = ": read " in heard.meaning
+            self._began = frame.time
+        is_read = ": read " in frame.meaning
         if (is_read and not self._shows_reads) or not self._is_shown:
             return
-        arrow = "?" if heard.direction is None else "→" if heard.direction is FrameDirection.IN else "←"
-        style = "red" if "exception" in heard.meaning or heard.direction is None else "dim" if is_read else ""
-        since = heard.time - self._began
-        self.query_one("#frames", RichLog).write(Text(f"{since / SECOND:10.3f} s {arrow} {heard.meaning}", style=style))
+        arrow = "?" if frame.direction is None else "→" if frame.direction is FrameDirection.IN else "←"
+        style = "red" if "exception" in frame.meaning or frame.direction is None else "dim" if is_read else ""
+        since = frame.time - self._began
+        self.query_one("#frames", RichLog).write(Text(f"{since / SECOND:10.3f} s {arrow} {frame.meaning}", style=style))
 
     # ------------------------------------------------------------------ registers
 

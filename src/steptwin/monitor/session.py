@@ -1,20 +1,20 @@
-"""A session with a controller: it is polled, and found again after a lost connection."""
+"""A session with a controller: its present values, and what the user does; it is found again after a lost connection."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 
 from steptwin.drivers import AsyncMic488, AsyncMic488Jog, Mic488Status
-from steptwin.drivers.mic488.frames import Heard
+from steptwin.drivers.mic488.frames import ObservedFrame
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.errors import Misuse, SteptwinError
-from steptwin.live.twins import find_device
+from steptwin.live.twins import controller_of, find_device
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import register_map
-from steptwin.mic488.values import Value
+from steptwin.monitor.values import FollowedValues, PolledValues, Values, ValueSource
 
 AGAIN_S = 1.0
 """Interval of attempts to reach a controller that does not respond, s."""
@@ -27,20 +27,20 @@ KEY_S = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """The result of the last poll. ``trouble``: why there was no answer; the other values are then from before."""
+    """The result of the last look. ``trouble``: why there was no answer; the other values are then from before."""
 
     status: Mic488Status | None = None
-    values: Mapping[str, tuple[Value, str]] = field(default_factory=dict)
+    values: Values = field(default_factory=dict)
     trouble: str | None = None
 
 
 class MonitorSession:
-    """Polls a controller. ``on_picture`` is called after every poll, ``on_frame`` for every frame.
+    """Looks at a controller. ``on_picture`` is called after every look, ``on_frame`` for every frame of the driver.
 
-    ``watched`` are names of registers to read besides the status, in as few frames as may be.
+    ``watched`` are names of registers to show besides the status. ``values`` gives both; without it the driver is polled.
     """
 
-    def __init__(self, mic: AsyncMic488, place: str, hz: float) -> None:
+    def __init__(self, mic: AsyncMic488, place: str, hz: float, values: ValueSource | None = None) -> None:
         if not HZ[0] <= hz <= HZ[1]:
             raise Misuse(f"--hz {hz:g}: permitted are {HZ[0]:g} to {HZ[1]:g}")
         self.mic = mic
@@ -48,7 +48,8 @@ class MonitorSession:
         self.picture = Picture(trouble="connecting")
         self.watched: Sequence[str] = ()
         self.on_picture: Callable[[Picture], object] = lambda _: None
-        self.on_frame: Callable[[Heard], object] = lambda _: None
+        self.on_frame: Callable[[ObservedFrame], object] = lambda _: None
+        self._values = PolledValues(mic) if values is None else values
         self._period_s = 1.0 / hz
         self._is_open = False
         self._at_once = asyncio.Event()
@@ -57,10 +58,10 @@ class MonitorSession:
         """Time until which a key still held after the end of its jog is ignored, s."""
         frames = mic.line.notes.get("frames")
         if frames is not None:
-            frames.sinks.append(self._heard)
+            frames.sinks.append(self._on_frame)
 
-    def _heard(self, heard: Heard) -> None:
-        self.on_frame(heard)
+    def _on_frame(self, frame: ObservedFrame) -> None:
+        self.on_frame(frame)
 
     @property
     def registers(self) -> RegisterMap:
@@ -74,7 +75,7 @@ class MonitorSession:
     # ------------------------------------------------------------------ looking
 
     async def run(self) -> None:
-        """Poll until cancelled."""
+        """Look until cancelled."""
         try:
             while True:
                 await self._look()
@@ -84,6 +85,7 @@ class MonitorSession:
                     async with asyncio.timeout(self._period_s if self.is_connected else AGAIN_S):
                         await self._at_once.wait()
         finally:
+            await self._values.close()
             await self.mic.close()
 
     async def _look(self) -> None:
@@ -93,12 +95,9 @@ class MonitorSession:
                 self._is_open = True
             elif not self.is_connected:
                 await self.mic.find_firmware()
-            status = await self.mic.status()
-            values = await self.mic.get_shown(*self.watched) if self.watched else {}
+            self.picture = Picture(*await self._values.look(self.watched))
         except SteptwinError as error:
             self.picture = Picture(self.picture.status, {}, str(error))
-        else:
-            self.picture = Picture(status, values)
 
     def watch(self, names: Sequence[str]) -> None:
         """Read these registers from now on."""
@@ -160,7 +159,7 @@ class MonitorSession:
         self._ignored_until = asyncio.get_running_loop().time() + KEY_S
 
     async def do(self, action: Awaitable[object]) -> None:
-        """Execute an action, then poll."""
+        """Execute an action, then look."""
         try:
             await action
         finally:
@@ -190,7 +189,7 @@ class _Jogging:
 
 
 def session_at(device: str | None, hz: float) -> MonitorSession:
-    """A session with the controller that ``device`` names, as of `steptwin.live.twins.find_device`."""
+    """A session with the controller that ``device`` names, as of `steptwin.live.twins.find_device`. A twin is followed."""
     address = find_device(device)
     if address.kind != "mic488":
         raise Misuse("the monitor shows a MIC488; for an M1486 use 'steptwin watch', 'info' or 'terminal'")
@@ -204,4 +203,5 @@ def session_at(device: str | None, hz: float) -> MonitorSession:
         observe=True,
         log=lambda _: None,  # there have to be words for frames to be shown
     )
-    return MonitorSession(mic, str(address), hz)
+    twin = controller_of(device)
+    return MonitorSession(mic, str(address), hz, None if twin is None else FollowedValues(twin))

@@ -35,9 +35,9 @@ class SpeedCurve(NamedTuple):
     """V: highest speed (u/s). At or below ``start`` there is no ramp: constant ``top``, M-8."""
 
 
-def plan_distance(now: Nanos, begin: int, target: int, curve: SpeedCurve) -> Profile:
-    """From rest at ``begin`` to rest at ``target`` (u). A short move leaves the curve half-way, at the speed at which the
-    remaining distance is the braking distance, M-7.
+def plan_distance(now: Nanos, begin: int, target: float, curve: SpeedCurve) -> Profile:
+    """From rest at ``begin`` to rest at ``target`` (u; whole but where a distance is sought). A short move leaves the curve
+    half-way, at the speed at which the remaining distance is the braking distance, M-7.
 
     Raises `Misuse` for speeds and accelerations that are not finite and positive.
     """

@@ -1,20 +1,20 @@
-"""In front of everything that is asked over HTTP: names and origins, rates, headers; and errors that should not be."""
+"""Checks of all HTTP requests: host names and origins, rates, headers; and handling of unexpected errors."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, TypeAlias
 
 from steptwin.access.origin import Origins
 from steptwin.access.rate import RateLimits
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
-from steptwin.studio.viewers import Receive, Scope, Send, Viewers
+from steptwin.studio.viewers import Receive, Scope, Send
 from steptwin.subject.dispatch import failure
 
 RATE, BURST = 100.0, 400.0
-"""HTTP requests of one address in a second, and at once."""
+"""Rate limit of one address: HTTP requests per second, and burst."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; "
     "worker-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -26,17 +26,23 @@ HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"cross-origin-resource-policy", b"same-origin"),
 )
-PATH = "/ws"
+ServeSocket: TypeAlias = Callable[[Scope, Receive, Send], Awaitable[None]]
+"""Serves one WebSocket from its beginning to its end."""
 
 
 class Guard:
-    """An ASGI application before ``app``."""
+    """An ASGI application before ``app``, and before WebSockets by their paths."""
 
     def __init__(
-        self, app: Any, viewers: Viewers, origins: Origins, clock: Callable[[], Nanos], on_internal: Callable[[Exception], object]
+        self,
+        app: Any,
+        sockets: Mapping[str, ServeSocket],
+        origins: Origins,
+        clock: Callable[[], Nanos],
+        on_internal: Callable[[Exception], object],
     ) -> None:
         self._app = app
-        self._viewers = viewers
+        self._sockets = sockets
         self._origins = origins
         self._clock = clock
         self._on_internal = on_internal
@@ -57,11 +63,11 @@ class Guard:
             return
         if not is_socket:
             await self._pass(scope, receive, send)
-        elif scope["path"] != PATH:
-            await _refuse_socket(send, receive, 404, Refusal(f"the WebSocket is at {PATH}"))
+        elif scope["path"] not in self._sockets:
+            await _refuse_socket(send, receive, 404, Refusal(f"WebSockets are at {' and '.join(self._sockets)}"))
         else:
             try:
-                await self._viewers.serve(scope, receive, send)
+                await self._sockets[scope["path"]](scope, receive, send)
             except Exception as error:  # noqa: BLE001  nobody else sees it
                 self._on_internal(error)
 

@@ -1,6 +1,6 @@
-"""What viewers share: who there is, who holds control, jogs that are held, watched points, streams of events, the clock.
+"""State shared by all viewers: list of viewers, control, held jogs, watched points, streams of events, the clock.
 
-Pure: moments of the wall clock are arguments, what is to be sent is taken by sessions (`steptwin.studio.session`).
+Pure: moments of the wall clock are arguments; sessions (`steptwin.studio.session`) fetch the messages to send.
 """
 
 from __future__ import annotations
@@ -15,12 +15,20 @@ from typing import Any, NamedTuple, Protocol
 from steptwin.access.audit import Audit
 from steptwin.access.control import Control, Viewer
 from steptwin.access.roles import Role
-from steptwin.access.tokens import Gate
+from steptwin.access.tokens import AccessGate
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.later import start
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.studio.calculations import Calculations
+from steptwin.studio.configurations import Configurations
 from steptwin.studio.jogs import Held, Jogs
-from steptwin.studio.requests import REQUESTS, permit_of
+from steptwin.studio.looking import Lookback
+from steptwin.studio.machines import Sheets
+from steptwin.studio.programs import Programs
+from steptwin.studio.requests import OF_THE_PAST, REQUESTS, permit_of
 from steptwin.studio.streams import Streams
+from steptwin.studio.tools import tools
 from steptwin.studio.watches import Watches
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command
@@ -31,16 +39,16 @@ from steptwin.subject.following import Filter, Following, filter_of
 MOST_VIEWERS = 64
 MOST_LEASES = 32
 CLOCK_NS: Nanos = SECOND
-"""How often viewers are sent the moment."""
+"""Interval at which viewers receive the present moment."""
 FASTEST_JOG = 5.0
-"""Virtual seconds in a second up to which a jog can be renewed in time."""
+"""Highest speed, relative to real time, at which a jog can be renewed in time."""
 LONGEST_LEASE_MS = 250
 IDLE_NS: Nanos = 60 * SECOND
-"""Control that was taken over REST passes when nothing has been asked for so long."""
+"""Control that was taken over REST ends after this time without a request."""
 
 
 class Moment(NamedTuple):
-    """The present of a subject, and how its time goes; ``speed`` infinite: as fast as possible."""
+    """The present moment of a subject and the speed of its time; ``speed`` infinite: as fast as possible."""
 
     time: Nanos
     running: bool
@@ -51,19 +59,44 @@ class Moment(NamedTuple):
 
 
 class Served(Protocol):
-    """The subject that is shown."""
+    """The subject of the studio. Reading returns the values known now; commands may be answered later."""
 
     @property
-    def description(self) -> Description: ...
-    def read(self, *points: str) -> tuple[Reading, ...]: ...
-    def do(self, wanted: Command, /) -> Result: ...
+    def description(self) -> Description:
+        """A new object after devices were connected or disconnected."""
+        ...
+
+    @property
+    def lost(self) -> str | None:
+        """The reason why a device does not respond; None while all devices respond."""
+        ...
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        """The newest known values. Points that are read repeatedly are polled from devices. Raises `Misuse`."""
+        ...
+
+    async def do(self, wanted: Command, /) -> Result:
+        """Execute a command; awaits only `steptwin.later.Later`. Raises `Misuse`, `Refusal`, `LineFailure`."""
+        ...
+
+    def result_of(self, value: object) -> Result:
+        """A result, at the present moment, of a request that is not a command of the subject."""
+        ...
+
+    def present(self) -> dict[str, Any]:
+        """``state`` by machine and ``faults``, if known."""
+        ...
+
     def follow(self, what: Filter, bound: int) -> Following: ...
-    def plans(self, what: Filter) -> list[Event]: ...
+
+    def plans(self, what: Filter) -> list[Event]:
+        """The present plans of axes as events of now, and the newest samples of those that have none."""
+        ...
 
 
 @dataclass(slots=True)
 class Lease:
-    """A jog, and who holds it."""
+    """A jog and the viewer that holds it."""
 
     number: int
     viewer: Viewer
@@ -75,18 +108,24 @@ class Lease:
         return {**head, "velocity": self.jog.velocity}
 
 
-class Programs(Protocol):
-    """The texts of programs that the controllers of a subject were given, as plain values."""
+class Connections(Protocol):
+    """Connects and disconnects devices of the subject. Awaits only `steptwin.later.Later`."""
 
-    def list(self) -> Sequence[Mapping[str, object]]: ...
+    async def ports(self) -> Sequence[Mapping[str, object]]:
+        """``address`` and ``what`` of the serial ports of this computer."""
+        ...
 
-    def text(self, machine: str, place: str) -> Mapping[str, object]:
-        """Raises `Misuse` where there is none."""
+    async def connect(self, address: str, name: str | None) -> str:
+        """Connect a device; returns its machine name. Raises `Misuse`, `Refusal`, `LineFailure`."""
+        ...
+
+    async def disconnect(self, machine: str) -> None:
+        """Disconnect a device. Raises `Misuse` for a machine that is not a device."""
         ...
 
 
 class Shared:
-    """A part of the state that all viewers are sent when it has changed. ``version`` counts the changes."""
+    """A part of the state that is sent to all viewers after a change. ``version`` counts the changes."""
 
     __slots__ = ("text", "version")
 
@@ -106,12 +145,16 @@ class Surroundings:
     """What a hub is given besides its subject."""
 
     moment: Callable[[], Moment]
-    gate: Gate
+    gate: AccessGate
     audit: Audit
     program: str
     """Version of steptwin."""
     programs: Programs
-    virtual: bool = True
+    connections: Connections
+    configuration: Callable[[str], SourceText | None] = lambda machine: None
+    """The configuration file of a controller by name; None without one."""
+    lookback: Lookback | None = None
+    """The past, where one is kept."""
     on_internal: Callable[[Exception], object] = lambda error: None
 
 
@@ -125,8 +168,14 @@ class Hub:
         self.streams = Streams(subject)
         self.watches = Watches()
         self.viewers: dict[int, Viewer] = {}
-        self.description = json.dumps(subject.description.plain(), separators=(",", ":"))
-        """Of the subject, which does not change, as JSON."""
+        self.description = ""
+        """Of the subject, as JSON."""
+        self.descriptions = 0
+        """How many there were: viewers who have another one are sent the whole state."""
+        self._described: Description | None = None
+        self._describe()
+        sheets = Sheets(lambda: subject.description)
+        self.tools = tools(Calculations(sheets), Configurations(sheets, around.configuration))
         self._jogs = jogs
         self._numbers = count(1)
         self._leases: dict[int, Lease] = {}
@@ -142,6 +191,16 @@ class Hub:
             "leases": Shared([]),
             "clock": Shared(None),
         }
+
+    def _describe(self) -> None:
+        if self.subject.description is not self._described:
+            self._described = self.subject.description
+            self.description = json.dumps(self._described.plain(), separators=(",", ":"))
+            self.descriptions += 1
+
+    @property
+    def is_virtual(self) -> bool:
+        return not any(part.is_real for part in self.subject.description.machines)
 
     # ------------------------------------------------------------------ who there is
 
@@ -167,7 +226,8 @@ class Hub:
     def may(self, role: Role) -> list[str]:
         """Names of requests that a role may use here."""
         of_subject = [name for name in COMMANDS if name in self.subject.description.commands]
-        return [name for name in (*of_subject, *REQUESTS) if permit_of(name).role <= role]
+        own = [name for name in REQUESTS if self.around.lookback is not None or name not in OF_THE_PAST]
+        return [name for name in (*of_subject, *own) if permit_of(name).role <= role]
 
     # ------------------------------------------------------------------ control
 
@@ -195,7 +255,7 @@ class Hub:
 
     # ------------------------------------------------------------------ jogs
 
-    def begin_jog(self, viewer: Viewer, wanted: command.Jog) -> dict[str, object]:
+    async def begin_jog(self, viewer: Viewer, wanted: command.Jog) -> dict[str, object]:
         """Raises `Misuse` and `Refusal`."""
         speed = self.around.moment().speed
         if speed > FASTEST_JOG:
@@ -205,7 +265,10 @@ class Hub:
             self._end(lease, lease.held.release)
         if len(self._leases) >= MOST_LEASES:
             raise Refusal(f"{MOST_LEASES} axes are jogged already, which is the most")
-        held = self._jogs.begin(wanted)
+        held = await self._jogs.begin(wanted)
+        if viewer.number not in self.viewers and viewer.number not in self._asked:
+            held.drop()
+            raise Refusal("the viewer has gone")
         lease = Lease(next(self._lease_numbers), viewer, wanted, held)
         self._leases[lease.number] = lease
         self._say_leases()
@@ -258,47 +321,43 @@ class Hub:
 
     # ------------------------------------------------------------------ what the subject is asked
 
-    def stop(self, wanted: command.StopAxes) -> Result:
+    async def stop(self, wanted: command.StopAxes) -> Result:
         """A stop ends the jogs of what it stops."""
         self._cut(wanted)
-        return self.subject.do(wanted)
+        return await self.subject.do(wanted)
 
     def _cut(self, stopped: command.StopAxes) -> None:
         for lease in list(self._leases.values()):
             if lease.jog.machine == stopped.machine and stopped.axis in (None, lease.jog.axis):
                 self._end(lease, lease.held.cut)
 
-    def stop_all(self) -> dict[str, object]:
-        """Programs first, so that none begins another motion. What cannot be stopped keeps no other from it."""
-        failed: dict[str, str] = {}
+    async def stop_all(self) -> dict[str, object]:
+        """All machines at the same time. What cannot be stopped keeps no other from it."""
         names = [part.name for part in self.subject.description.machines]
-        for name in names:
-            self._cut(command.StopAxes(name))
-        for name in names:
-            try:
-                self.subject.do(command.ControlProgram(name, "stop"))
-            except Refusal:
-                pass  # it has none
-            except SteptwinError as error:
-                failed[name] = str(error)
-        for name in names:
-            try:
-                self.subject.do(command.StopAxes(name))
-            except SteptwinError as error:
-                failed[name] = str(error)
+        stopping = {name: start(self._stand(name)) for name in names}
+        failed = {name: why for name, stopped in stopping.items() if (why := await stopped) is not None}
         return {"machines": [name for name in names if name not in failed], "failed": failed}
+
+    async def _stand(self, name: str) -> str | None:
+        """Stop a machine: its axes at once, its program, and what that has begun meanwhile. Why it could not be, or None."""
+        why: str | None = None
+        for wanted in (command.StopAxes(name), command.ControlProgram(name, "stop"), command.StopAxes(name)):
+            self._cut(command.StopAxes(name))
+            try:
+                await self.subject.do(wanted)
+            except Refusal as refusal:
+                if type(wanted) is command.StopAxes:  # a machine without a program refuses to stop it
+                    why = str(refusal)
+            except SteptwinError as error:
+                why = str(error)
+        return why
 
     def present(self) -> tuple[dict[str, object], int]:
         """The state of the subject for the message hello but its description, and the number of the command that has read it."""
-        subject, can = self.subject, self.subject.description.commands
-        plain: dict[str, Any] = {"state": {}, "faults": []}
-        if "state" in can:
-            plain["state"] = {part.name: subject.do(command.State(part.name)).value for part in subject.description.machines}
-        if "faults" in can:
-            plain["faults"] = subject.do(command.ListFaults()).value
-        plain["plans"] = [plan.plain() for plan in subject.plans(filter_of(["plan"]))]
+        plans = [plan.plain() for plan in self.subject.plans(filter_of(["plan", "sample"]))]
+        plain: dict[str, object] = {**self.subject.present(), "plans": plans}
         self.streams.flush()
-        return plain, subject.do(command.Time()).number
+        return plain, self.subject.result_of(None).number
 
     def read(self, points: Sequence[str]) -> tuple[Reading, ...]:
         if not points:
@@ -309,13 +368,11 @@ class Hub:
 
     def tick(self, now: Nanos) -> None:
         """Called about 30 times a second while there are viewers: reads what is watched, spreads events, looks at the clock."""
+        self._describe()
         points = self.watches.due(now)
         if points:
-            try:
-                self.watches.put(self.subject.read(*points))
-                self.shared["lost"].put(None)
-            except SteptwinError as error:
-                self.shared["lost"].put(str(error))
+            self.watches.put(self.subject.read(*points))
+        self.shared["lost"].put(self.subject.lost)
         self.streams.flush()
         over = [lease for lease in self._leases.values() if lease.held.over is not None]
         for lease in over:

@@ -1,4 +1,4 @@
-"""Jogs that are held by viewers: what the studio asks of a subject for them, and those of a world."""
+"""Jogs held by viewers: the interface that a subject implements, and its implementation for worlds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steptwin.world.heldjog import Given, HeldJog
 
 
 class Held(Protocol):
-    """A jog that has begun."""
+    """An active jog."""
 
     @property
     def lasts_ns(self) -> Nanos:
@@ -21,29 +21,29 @@ class Held(Protocol):
 
     @property
     def over(self) -> str | None:
-        """Why it has ended; None while it has not."""
+        """The reason for its end; None while it is active."""
         ...
 
     def extend(self) -> None:
-        """It goes on. Raises `Refusal` where it is over."""
+        """Extend it. Raises `Refusal` if it has ended."""
         ...
 
     def release(self) -> None:
-        """It ends, with the ramp of the axis."""
+        """End it with the ramp of the axis."""
         ...
 
     def drop(self) -> None:
-        """Whoever held it has gone."""
+        """The connection of its viewer is lost."""
         ...
 
     def cut(self) -> None:
-        """Its axis was stopped otherwise."""
+        """Its axis was stopped by another command."""
         ...
 
 
 class Jogs(Protocol):
-    def begin(self, wanted: Jog) -> Held:
-        """Raises `Misuse` and `Refusal`."""
+    async def begin(self, wanted: Jog) -> Held:
+        """Raises `Misuse`, `Refusal` and `LineFailure`. Waits for nothing but a `steptwin.later.Later`."""
         ...
 
 
@@ -54,7 +54,7 @@ class WorldJogs:
         self._subject = subject
         self._held: list[_Held] = []
 
-    def begin(self, wanted: Jog) -> Held:
+    async def begin(self, wanted: Jog) -> Held:
         held = _Held(self._subject, self._subject.held_jog(wanted))
         held.extend()
         self._held.append(held)

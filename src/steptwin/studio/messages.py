@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from steptwin.access.roles import ROLES
+from steptwin.studio.shapes import MOMENT
 from steptwin.subject.fields import Schema
 from steptwin.subject.shapes import members
 
 VERSION = 1
 """Of the messages; in the message hello."""
 
-MOMENT: Schema = {"type": "string", "pattern": "^[0-9]{1,20}$", "description": "Virtual time, as decimal text [ns]"}
 _COUNT: Schema = {"type": "integer", "minimum": 0}
 _WHOLE: Schema = {"type": "integer"}
 _TEXT: Schema = {"type": "string"}
@@ -40,6 +40,16 @@ LEASES: Schema = {
     ),
 }
 EVENTS: Schema = {"type": "array", "items": {"$ref": "#/$defs/(event)"}}
+_MAY: Schema = {"type": "array", "items": _TEXT}
+_PRESENT: Mapping[str, Schema] = {
+    "state": {
+        "type": "object",
+        "additionalProperties": {"$ref": "#/$defs/(state)"},
+        "description": "By machine, as the answer to state; empty for a device.",
+    },
+    "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},
+    "plans": {"type": "array", "items": {"$ref": "#/$defs/(event)"}, "description": "Present plans of all axes."},
+}
 CLOCK = members({"time_ns": MOMENT, "running": {"type": "boolean"}, "speed": SPEED})
 
 
@@ -69,22 +79,19 @@ _ROWS = (
                 "viewer": {**_WHOLE, "description": "Number of this viewer."},
                 "name": _TEXT,
                 "role": {"enum": list(ROLES)},
-                "may": {"type": "array", "items": _TEXT, "description": "Names of requests that can be done here by this role."},
+                "may": {**_MAY, "description": "Names of requests that can be done here by this role."},
                 "control": CONTROL,
                 "viewers": {**_COUNT, "description": "How many there are."},
                 "leases": LEASES,
                 "number": {**_COUNT, "description": "Events with greater numbers are news."},
                 "time_ns": MOMENT,
                 "pace": members({"running": {"type": "boolean"}, "speed": SPEED}),
-                "virtual": {"type": "boolean", "description": "Whether it is a twin; a device gives samples, not plans."},
-                "description": {"$ref": "#/$defs/(description)"},
-                "state": {
-                    "type": "object",
-                    "additionalProperties": {"$ref": "#/$defs/(state)"},
-                    "description": "By machine, as the answer to state; empty for a device.",
+                "virtual": {
+                    "type": "boolean",
+                    "description": "Whether all machines are twins; a device gives samples, not plans.",
                 },
-                "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},
-                "plans": {"type": "array", "items": {"$ref": "#/$defs/(event)"}, "description": "Present plans of all axes."},
+                "description": {"$ref": "#/$defs/(description)"},
+                **_PRESENT,
             }
         ),
     ),
@@ -112,6 +119,20 @@ _ROWS = (
         {"time_ns": MOMENT},
     ),
     MessageRow("clock", "The present moment: once a second, and whenever time stands or goes on.", CLOCK),
+    MessageRow(
+        "past",
+        "The moment of the past that this viewer looks at from now on; null for the present. Events go on as they happen.",
+        _or_null(
+            members(
+                {
+                    "time_ns": MOMENT,
+                    "from_ns": {**MOMENT, "description": "The oldest moment that is kept. [ns]"},
+                    "may": {**_MAY, "description": "Names of requests that can be done while the past is looked at."},
+                    **_PRESENT,
+                }
+            )
+        ),
+    ),
     MessageRow("control", "Who holds control from now on.", CONTROL),
     MessageRow("viewers", "How many viewers there are now.", _COUNT),
     MessageRow("leases", "The jogs that are held now.", LEASES),

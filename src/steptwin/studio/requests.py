@@ -6,7 +6,7 @@ A request is as at the control endpoint: ``{"do": NAME, FIELD: VALUE, ..., "id":
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -14,10 +14,14 @@ from steptwin.access.commands import PERMITS
 from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
+from steptwin.machine import Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
+from steptwin.studio.requestrow import NOTHING, RequestRow
+from steptwin.studio.shapes import MOMENT
+from steptwin.studio.toolrequests import TOOLS, ToolRequest
 from steptwin.subject.commands import COMMANDS, CommandRow
-from steptwin.subject.fields import FLAG, NAMES, TEXT, Field, Schema, number, read_fields, whole
+from steptwin.subject.fields import FLAG, NAMES, TEXT, TIME, Field, Schema, number, read_fields, whole
 from steptwin.subject.shapes import members
 from steptwin.world.programtexts import LANGUAGES
 
@@ -88,6 +92,18 @@ class StopAll:
 
 
 @dataclass(frozen=True, slots=True)
+class LookAt:
+    """Look at a moment of the past; None: at the present."""
+
+    moment: Nanos | None
+
+
+@dataclass(frozen=True, slots=True)
+class GoBack:
+    """The world itself goes back to the moment that is looked at."""
+
+
+@dataclass(frozen=True, slots=True)
 class ReadAudit:
     """Who did what."""
 
@@ -107,6 +123,26 @@ class ReadProgram:
     place: str
 
 
+@dataclass(frozen=True, slots=True)
+class ListPorts:
+    """The serial ports of the computer on which the studio runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Connect:
+    """A device becomes a machine of the subject."""
+
+    address: str
+    name: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Disconnect:
+    """A device is asked nothing any more."""
+
+    machine: str
+
+
 StudioRequest: TypeAlias = (
     Hello
     | Resync
@@ -117,30 +153,21 @@ StudioRequest: TypeAlias = (
     | Renew
     | LetGo
     | StopAll
+    | LookAt
+    | GoBack
     | ReadAudit
     | ListPrograms
     | ReadProgram
+    | ToolRequest
+    | ListPorts
+    | Connect
+    | Disconnect
 )
 """Another kind of request is a class, its row here, and what does it in `steptwin.studio.session`."""
 
 # ---------------------------------------------------------------------- the table
 
 
-@dataclass(frozen=True, slots=True)
-class RequestRow:
-    """A request: its name, its class, what it needs, its fields, and the schema of its answer."""
-
-    name: str
-    kind: Callable[..., StudioRequest]
-    permit: Permit
-    meaning: str
-    answer: Schema
-    fields: tuple[Field, ...] = ()
-    is_of_connection: bool = False
-    """Whether it is about what is sent to its connection, and so means nothing over REST."""
-
-
-NOTHING: Schema = {"type": "null"}
 _TEXT: Schema = {"type": "string"}
 _WHOLE: Schema = {"type": "integer"}
 _LEASE = Field("lease", whole(1, 2**53), "The number in the answer to jog.")
@@ -153,6 +180,8 @@ _PROGRAM: Mapping[str, object] = {
     "place": {**_TEXT, "description": "Unlike all others of the machine, such as program 0."},
     "name": {**_TEXT, "description": "Of the file."},
     "language": {"enum": list(LANGUAGES)},
+    "address": {**_TEXT, "description": "At the editor server."},
+    "empty": {"type": "boolean", "description": "Whether nothing is there yet."},
     "running": {"type": "boolean"},
     "line": {
         "anyOf": [_WHOLE, {"type": "null"}],
@@ -238,10 +267,29 @@ _ROWS = (
         ),
     ),
     RequestRow(
+        "look",
+        LookAt,
+        LOOK,
+        "Look at a moment of the past while the world goes on. The message past and values of all watches follow. Until the "
+        "present is looked at again, state, read, pins, encoders, faults and programs are of that moment, and nothing can be "
+        "changed but by stop.",
+        {"anyOf": [members({"time_ns": MOMENT, "from_ns": MOMENT}), {"type": "null"}]},
+        (Field("to_ns", TIME, "Which moment; the present without.", None, "ns", "moment"),),
+        is_of_connection=True,
+    ),
+    RequestRow(
+        "go_back",
+        GoBack,
+        ACT,
+        "The world itself goes back to the moment that this viewer looks at; time stands there. What happened since is undone.",
+        NOTHING,
+        is_of_connection=True,
+    ),
+    RequestRow(
         "programs",
         ListPrograms,
         LOOK,
-        "The texts of programs and positions that the description gives to controllers.",
+        "The program memories of controllers: each place, and what is there.",
         {"type": "array", "items": members(_PROGRAM)},
     ),
     RequestRow(
@@ -251,6 +299,32 @@ _ROWS = (
         "One of these texts, with what the checker of its language finds in it.",
         members({**_PROGRAM, "text": _TEXT, "diagnostics": {"type": "array", "items": _FINDING}}),
         (Field("machine", TEXT, "Of a controller."), Field("place", TEXT, "As in the answer to programs.")),
+    ),
+    RequestRow(
+        "ports",
+        ListPorts,
+        LOOK,
+        "The serial ports of the computer on which the studio runs, and the pseudo terminals of running twins.",
+        {"type": "array", "items": members({"address": _TEXT, "what": _TEXT})},
+    ),
+    RequestRow(
+        "connect",
+        Connect,
+        SERVICE,
+        "A device becomes a machine here. Nothing moves by it, and no setting is changed.",
+        members({"machine": _TEXT}),
+        (
+            Field("address", TEXT, "As after --device: /dev/ttyUSB0,unit=2, tcp://192.168.0.9,config=machine.cfg."),
+            Field("name", TEXT, "Of the machine; its kind without one.", None),
+        ),
+    ),
+    RequestRow(
+        "disconnect",
+        Disconnect,
+        SERVICE,
+        "A device is no machine here any more: jogs end, other motions and its program go on.",
+        NOTHING,
+        (Field("machine", TEXT, "Of a device."),),
     ),
     RequestRow(
         "audit",
@@ -275,9 +349,11 @@ _ROWS = (
     ),
 )
 
-REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in _ROWS}
+REQUESTS: Mapping[str, RequestRow] = {row.name: row for row in (*_ROWS, *TOOLS)}
 ALL: Mapping[str, RequestRow | CommandRow] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
+OF_THE_PAST = frozenset({"look", "go_back"})
+"""What needs a past that is kept."""
 OF_CONNECTION = frozenset({"follow", "unfollow", *(row.name for row in _ROWS if row.is_of_connection)})
 
 

@@ -16,6 +16,7 @@ from steptwin.access.control import Viewer
 from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import Nanos
+from steptwin.studio.eventloop import result_of
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
 from steptwin.studio.session import Session
@@ -41,7 +42,7 @@ MOST_POINTS = 1000
 
 
 class Rest:
-    """The routes. Who asks with a token is one viewer for all its requests; without tokens everybody is the same one."""
+    """The routes. All requests with the same token belong to one viewer; without tokens all requests belong to one viewer."""
 
     def __init__(self, hub: Hub, clock: Callable[[], Nanos]) -> None:
         self._hub = hub
@@ -107,39 +108,39 @@ class Rest:
                 fields = await _fields(request)
             except Misuse as error:
                 return _response(failure(error), TOO_LONG if error.args[0] == TOO_LONG_TEXT else MISUSE)
-            return self._answer(request, name, fields)
+            return await self._answer(request, name, fields)
 
         return do
 
     async def _describe(self, request: Request) -> Response:
-        return self._answer(request, "describe", {})
+        return await self._answer(request, "describe", {})
 
     async def _state(self, request: Request) -> Response:
         machine = request.query_params.get("machine")
         if machine is not None:
-            return self._answer(request, "state", {"machine": machine})
+            return await self._answer(request, "state", {"machine": machine})
         names = [part.name for part in self._hub.subject.description.machines]
-        answers = {name: self._ask(request, "state", {"machine": name}) for name in names}
+        answers = {name: await self._ask(request, "state", {"machine": name}) for name in names}
         for answer, status in answers.values():
             if status != DONE:
                 return _response(answer, status)
-        found = self._ask(request, "time", {})[0]
+        found = (await self._ask(request, "time", {}))[0]
         return _response({**found, "ok": {name: answer["ok"] for name, (answer, _) in answers.items()}}, DONE)
 
     async def _points(self, request: Request) -> Response:
         names = [name for name in request.query_params.get("names", "").split(",") if name]
-        return self._answer(request, "read", {"points": names[: MOST_POINTS + 1]})
+        return await self._answer(request, "read", {"points": names[: MOST_POINTS + 1]})
 
-    def _answer(self, request: Request, name: str, fields: Mapping[str, object]) -> Response:
-        return _response(*self._ask(request, name, fields))
+    async def _answer(self, request: Request, name: str, fields: Mapping[str, object]) -> Response:
+        return _response(*await self._ask(request, name, fields))
 
-    def _ask(self, request: Request, name: str, fields: Mapping[str, object]) -> tuple[Message, int]:
+    async def _ask(self, request: Request, name: str, fields: Mapping[str, object]) -> tuple[Message, int]:
         """The answer, and its status."""
         try:
             session = self._session(request)
         except Refusal as error:
             return failure(error), NO_TOKEN
-        answer = session.answer(json.dumps({**fields, "do": name}), self._clock())
+        answer = await result_of(session.receive(json.dumps({**fields, "do": name}), self._clock()))
         error: Any = answer.get("error")
         if error is None:
             return answer, DONE

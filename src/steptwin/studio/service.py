@@ -19,6 +19,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from steptwin import __version__
 from steptwin.access.origin import Origins
 from steptwin.errors import LineFailure
+from steptwin.studio import editors, viewers
+from steptwin.studio.editors import Editors
 from steptwin.studio.guard import Guard
 from steptwin.studio.hub import Hub
 from steptwin.studio.rest import Rest, describe_api
@@ -31,7 +33,7 @@ from steptwin.world.addresses import Address
 PORTS_TRIED = 20
 MOST_CONNECTIONS = 256
 END_S = 1
-"""For connections to end."""
+"""Time-out for connections to end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +45,7 @@ class Tls:
 
 
 def listen(address: Address, *, is_fixed: bool) -> socket.socket:
-    """Listen there, or at one of the next ports where it is taken and not ``is_fixed``. Raises `LineFailure`."""
+    """Listen there; if the port is in use and not ``is_fixed``, on one of the next ports. Raises `LineFailure`."""
     tried = 1 if is_fixed or address.port == 0 else PORTS_TRIED
     for port in range(address.port, address.port + tried):
         try:
@@ -59,7 +61,7 @@ def _family(host: str) -> socket.AddressFamily:
 
 
 class _Protocol(WebSocketsSansIOProtocol):
-    """Lets a connection be cut off whose other end reads nothing."""
+    """Permits closing a connection whose other end does not read."""
 
     def connection_made(self, transport: Any) -> None:
         self.app_state = {**self.app_state, "abort": transport.abort}
@@ -67,7 +69,7 @@ class _Protocol(WebSocketsSansIOProtocol):
 
 
 class _Server(uvicorn.Server):
-    """Signals end the world, which ends this."""
+    """No signal handlers: signals end the world, which ends the service."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None]:
@@ -81,13 +83,16 @@ class Service:
         clock = time.monotonic_ns
         self._socket = listening
         self._viewers = Viewers(hub, clock)
+        around = hub.around
+        self._editors = Editors(around.gate, around.programs.files, clock)
+        sockets = {viewers.PATH: self._viewers.serve, editors.PATH: self._editors.serve}
         app = make_app(hub, clock)
         for name in ("uvicorn.error", "uvicorn.asgi"):  # errors come to `on_internal`; the rest is no news
             logging.getLogger(name).addHandler(logging.NullHandler())
             logging.getLogger(name).propagate = False
         self._server = _Server(
             uvicorn.Config(
-                Guard(app, self._viewers, origins, clock, hub.around.on_internal),
+                Guard(app, sockets, origins, clock, around.on_internal),
                 http="h11",
                 ws=_Protocol,
                 ws_max_size=LONGEST_REQUEST,
@@ -119,6 +124,7 @@ class Service:
         self._server.should_exit = True
         if self._task is not None:
             await self._task
+        self._editors.close()
         self._socket.close()
 
 

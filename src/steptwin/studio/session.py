@@ -1,41 +1,44 @@
-"""The session of one viewer: a request comes in, its answer goes out; and what the viewer is to be sent, when it can be sent.
+"""The session of one viewer: answers to its requests, and the messages to send when its connection accepts them.
 
 Nothing waits here but places in streams and numbers of versions: a viewer that reads slowly gets the present, and less of the
-past.
+past. The answer of a world is there at once, that of a device later: both are a `Later`.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from itertools import count
 from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.access.control import Viewer, check
 from steptwin.access.rate import RateLimit
 from steptwin.access.roles import LOOK, Permit, Role
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.later import Later, start
 from steptwin.machine import SECOND, Nanos
 from steptwin.studio import requests as ask
 from steptwin.studio.hub import Hub
+from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
-from steptwin.studio.requests import OF_CONNECTION, REQUESTS, check_name, permit_of, read_request
+from steptwin.studio.programs import Programs
+from steptwin.studio.requests import OF_CONNECTION, OF_THE_PAST, REQUESTS, check_name, permit_of, read_request
 from steptwin.studio.streams import Batch, Place
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, read_command
 from steptwin.subject.contract import Result
-from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure, fields_of, respond
+from steptwin.subject.dispatch import LONGEST_REQUEST, Message, answer, failure, fields_of, id_of, read_message
 from steptwin.subject.following import Filter, filter_of
 from steptwin.tables import complete
 
 RATE, BURST = 200.0, 1000.0
-"""Requests of a viewer in a second, and at once; stops besides."""
+"""Rate limit of a viewer: requests per second, and burst; stops have a separate limit of the same size."""
 STOPS = frozenset({"stop", "stop_all"})
 """What needs no hello, and has a limit of its own."""
 MOST_WATCHES = 32
 MOST_WATCHED = 2000
-"""Points of one viewer."""
+"""Limit of watched points of a viewer."""
 MOST_FOLLOWS = 16
 EVENTS_NS: Nanos = SECOND // 30
 """Events are sent at most this often."""
@@ -43,47 +46,60 @@ LONGEST_NAME = 40
 
 Identity: TypeAlias = object
 MOST_LEFT_OVER = 4
-"""Batches of events that were waiting when what is followed changed."""
+"""Limit of batches of events that were pending when the followed kinds changed."""
 
 
 class Wanted(NamedTuple):
-    """A request that was read. ``act`` does it; it gets the id of the message."""
+    """A parsed request. ``act`` executes it and takes the id of the message."""
 
     name: str
     fields: Mapping[str, object]
-    act: Callable[[Identity], Result]
+    act: Callable[[Identity], Awaitable[Result]]
 
 
 class Session:
-    """Of a connection, or of one who asks over REST (``is_rest``), whose ``entered`` viewer is there from the beginning."""
+    """The session of a connection, or of a client of REST (``is_rest``), whose viewer ``entered`` exists from the beginning."""
 
     def __init__(self, hub: Hub, peer: str, *, entered: Viewer | None = None) -> None:
         self._hub = hub
         self._peer = peer
         self.is_rest = entered is not None
         self.viewer = entered or Viewer(hub.number(), peer, Role.VIEWER)
-        """Until it has said hello: somebody who may look, and whom nobody sees."""
+        """Before its hello: a viewer with the lowest role that is not listed."""
         self.has_entered = self.is_rest
-        """Whether it has said hello."""
+        """Whether it has sent hello."""
         self.is_refused = False
-        """Whether it is to be cut off: it had a wrong token."""
+        """Whether the connection must be closed because of a wrong token."""
         self._limit = RateLimit(RATE, BURST)
         self._stops = RateLimit(RATE, BURST)
         self._seq = count()
         self._needs_hello = False
+        self._descriptions = hub.descriptions
         self._seen: dict[str, int] = {}
         self._watches: dict[int, Watched] = {}
         self._watch_numbers = count(1)
         self._follows: dict[object, tuple[Filter, int]] = {}
         self._place: Place | None = None
         self._left_over: list[Batch] = []
-        """Events from before the follows were others."""
+        """Pending events from before the last change of the followed kinds."""
         self._missed = 0
         self._events_due: Nanos = 0
         self._now: Nanos = 0
+        self._looking = Looking(hub.around.lookback)
+        self._asking: Mapping[object, Callable[[Any], Awaitable[object]]] = {
+            ask.StopAll: lambda _: hub.stop_all(),
+            ask.LookAt: self._look_at,
+            ask.GoBack: self._go_back,
+            ask.ListPrograms: self._list_programs,
+            ask.ReadProgram: self._read_program,
+            ask.ListPorts: lambda _: hub.around.connections.ports(),
+            ask.Connect: self._connect,
+            ask.Disconnect: lambda wanted: hub.around.connections.disconnect(wanted.machine),
+        }
+        """Requests for which the subject is asked, which may answer later."""
         self._own: Mapping[object, Callable[[Any], object]] = complete(
             "request",
-            [row.kind for row in REQUESTS.values()],
+            [row.kind for row in REQUESTS.values() if row.kind not in self._asking],
             "action",
             {
                 ask.Hello: self._hello,
@@ -94,36 +110,41 @@ class Session:
                 ask.ReleaseControl: lambda _: hub.release_control(self.viewer),
                 ask.Renew: lambda wanted: hub.renew(self.viewer, wanted.lease),
                 ask.LetGo: lambda wanted: hub.let_go(self.viewer, wanted.lease),
-                ask.StopAll: lambda _: hub.stop_all(),
-                ask.ListPrograms: lambda _: hub.around.programs.list(),
-                ask.ReadProgram: lambda wanted: hub.around.programs.text(wanted.machine, wanted.place),
+                **hub.tools,
                 ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
             },
         )
-        self._of_subject: Mapping[object, Callable[[Any, Identity], Result]] = {
-            command.Jog: lambda wanted, _: self._done(hub.begin_jog(self.viewer, wanted)),
+        self._of_subject: Mapping[object, Callable[[Any, Identity], Awaitable[Result]]] = {
+            command.Jog: lambda wanted, _: self._jog(wanted),
             command.StopAxes: lambda wanted, _: hub.stop(wanted),
-            command.Follow: lambda wanted, identity: self._done(self._follow(wanted, identity)),
-            command.Unfollow: lambda wanted, _: self._done(self._unfollow(wanted)),
+            command.Follow: self._follow,
+            command.Unfollow: lambda wanted, _: self._unfollow(wanted),
         }
         """Commands of a subject that mean something else, or more, in the studio."""
 
     # ------------------------------------------------------------------ requests
 
-    def receive(self, text: str, now: Nanos) -> str:
-        """The one answer to a request. ``now`` is a moment of the wall clock."""
-        self._now = now
-        return json.dumps(self.answer(text, now), separators=(",", ":"))
-
-    def answer(self, text: str, now: Nanos) -> Message:
-        """As `receive`, as a value."""
+    def receive(self, text: str, now: Nanos) -> Later[Message]:
+        """The answer to a request. ``now``: a moment of the wall clock."""
         self._now = now
         if self.is_rest:
             self._hub.asked(self.viewer, now)
         data = text.encode("utf-8", "replace")
-        if len(data) > LONGEST_REQUEST:
-            return failure(Misuse(f"a request has at most {LONGEST_REQUEST} bytes"))
-        return respond(self._do, data, self._hub.around.on_internal, self._read)
+        return start(self._answer(data))
+
+    async def _answer(self, data: bytes) -> Message:
+        found: Message = {}
+        try:
+            if len(data) > LONGEST_REQUEST:
+                raise Misuse(f"a request has at most {LONGEST_REQUEST} bytes")
+            message = read_message(data)
+            identity = id_of(message)
+            found = {} if identity is None else {"id": identity}
+            return {**found, **answer(await self._do(self._read(message), identity))}
+        except Exception as error:  # noqa: BLE001  whoever waits is never left without an answer
+            if not isinstance(error, SteptwinError):
+                self._hub.around.on_internal(error)
+            return {**found, **failure(error)}
 
     def _read(self, message: Message) -> Wanted:
         """Raises `Misuse`, and `Refusal` for too many."""
@@ -135,19 +156,28 @@ class Session:
         row = REQUESTS.get(name)
         if row is not None:
             request = read_request(row, fields)
-            return Wanted(name, fields, lambda _: self._done(self._own[type(request)](request)))
+            return Wanted(name, fields, lambda _: self._asked(request))
         wanted = read_command(name, fields)
         return Wanted(name, fields, lambda identity: self._command(wanted, identity))
 
-    def _command(self, wanted: Command, identity: Identity) -> Result:
+    async def _asked(self, request: ask.StudioRequest) -> Result:
+        asking = self._asking.get(type(request))
+        value = self._own[type(request)](request) if asking is None else await asking(request)
+        return self._hub.subject.result_of(value)
+
+    async def _command(self, wanted: Command, identity: Identity) -> Result:
+        if self._looking.is_back and type(wanted) in OF_A_MOMENT:
+            return await self._looking.do(wanted)
         action = self._of_subject.get(type(wanted))
-        return self._hub.subject.do(wanted) if action is None else action(wanted, identity)
+        return await (self._hub.subject.do(wanted) if action is None else action(wanted, identity))
 
-    def _done(self, value: object) -> Result:
-        """The result of what the subject knows nothing of."""
-        return self._hub.subject.do(command.Time())._replace(value=value)
+    async def _connect(self, wanted: ask.Connect) -> object:
+        return {"machine": await self._hub.around.connections.connect(wanted.address, wanted.name)}
 
-    def _do(self, wanted: Wanted, identity: Identity) -> Result:
+    async def _jog(self, wanted: command.Jog) -> Result:
+        return self._hub.subject.result_of(await self._hub.begin_jog(self.viewer, wanted))
+
+    async def _do(self, wanted: Wanted, identity: Identity) -> Result:
         name = wanted.name
         if not self.has_entered and name not in STOPS and name != "hello":
             raise Refusal(f"{name}: the first request is hello")
@@ -155,18 +185,28 @@ class Session:
             raise Refusal(f"{name} is about a connection: ask it over the WebSocket")
         permit = permit_of(name)
         try:
-            result = self._permitted(wanted, permit, identity)
+            result = await self._permitted(wanted, permit, identity)
         except Exception as error:
             self._audit(wanted, permit, _outcome(error))
             raise
         self._audit(wanted, permit, "done")
         return result
 
-    def _permitted(self, wanted: Wanted, permit: Permit, identity: Identity) -> Result:
-        takes = check(wanted.name, permit, self.viewer, self._hub.control)
-        result = wanted.act(identity)
-        if takes and not self.is_rest:
-            self._hub.take_control(self.viewer, over=False)
+    async def _permitted(self, wanted: Wanted, permit: Permit, identity: Identity) -> Result:
+        hub = self._hub
+        if self._looking.is_back and permit.control and wanted.name not in OF_THE_PAST:
+            raise Refusal(f"{wanted.name}: the past is looked at, which cannot be changed: look at the present first")
+        takes = check(wanted.name, permit, self.viewer, hub.control) and not self.is_rest
+        if takes:
+            hub.control.take(self.viewer, over=False)  # nobody else acts while a device is asked
+        try:
+            result = await wanted.act(identity)
+        except Exception:
+            if takes:
+                hub.control.release(self.viewer)
+            raise
+        if takes and hub.control.holder is self.viewer:
+            hub.take_control(self.viewer, over=False)
         return result
 
     def _audit(self, wanted: Wanted, permit: Permit, outcome: str) -> None:
@@ -196,7 +236,7 @@ class Session:
         self._needs_hello = True
 
     def close(self) -> None:
-        """The connection has ended."""
+        """End the session after the connection has ended."""
         for number in list(self._watches):
             self._hub.watches.remove(self._watches.pop(number))
         if self._place is not None:
@@ -204,7 +244,36 @@ class Session:
             self._place = None
         if self.has_entered and not self.is_rest:
             self._hub.leave(self.viewer)
+        self._looking.leave()
         self.has_entered = False
+
+    # ------------------------------------------------------------------ the past
+
+    async def _look_at(self, wanted: ask.LookAt) -> object:
+        if wanted.moment is not None:
+            return await self._looking.go(wanted.moment, self._watches)
+        if self._looking.is_back:
+            self._looking.leave()
+            self._forget_values()
+        return None
+
+    async def _go_back(self, _: ask.GoBack) -> None:
+        await self._looking.go_back()
+        self._forget_values()
+
+    def _forget_values(self) -> None:
+        """The viewer has none of what it watches."""
+        for watched in self._watches.values():
+            watched.forget()
+
+    async def _programs(self) -> Programs:
+        return await self._looking.programs() if self._looking.is_back else self._hub.around.programs
+
+    async def _list_programs(self, _: ask.ListPrograms) -> object:
+        return (await self._programs()).list()
+
+    async def _read_program(self, wanted: ask.ReadProgram) -> object:
+        return (await self._programs()).text(wanted.machine, wanted.place)
 
     # ------------------------------------------------------------------ what it is sent
 
@@ -216,6 +285,8 @@ class Session:
         readings = self._hub.read(wanted.points)
         number = next(self._watch_numbers)
         self._watches[number] = self._hub.watches.add(number, readings, wanted.rate)
+        if self._looking.is_back:
+            self._looking.unsent.add(number)
         return {"watch": number, "points": [{"point": one.point, "unit": one.unit} for one in readings]}
 
     def _unwatch(self, wanted: ask.Unwatch) -> None:
@@ -224,7 +295,7 @@ class Session:
             raise Misuse(f"unwatch: no watch {wanted.watch}; there are {', '.join(map(str, self._watches)) or 'none'}")
         self._hub.watches.remove(watched)
 
-    def _follow(self, wanted: command.Follow, identity: Identity) -> object:
+    async def _follow(self, wanted: command.Follow, identity: Identity) -> Result:
         if identity is None:
             raise Misuse("follow: give an id, by which it is ended")
         if identity in self._follows:
@@ -235,12 +306,13 @@ class Session:
         plans = [plan.plain() for plan in self._hub.subject.plans(what)]
         self._follows[identity] = what, wanted.bound
         self._move()
-        return {"plans": plans}
+        return self._hub.subject.result_of({"plans": plans})
 
-    def _unfollow(self, wanted: command.Unfollow) -> None:
+    async def _unfollow(self, wanted: command.Unfollow) -> Result:
         if self._follows.pop(wanted.id, None) is None:
             raise Misuse(f"no subscription has the id {wanted.id!r}")
         self._move()
+        return self._hub.subject.result_of(None)
 
     def _move(self) -> None:
         """To the stream of what is followed now."""
@@ -258,10 +330,16 @@ class Session:
             self._missed += dropped.count + dropped.missed
 
     def has_news(self, now: Nanos) -> bool:
-        """Whether `take` gives something."""
+        """Whether `take` returns a message."""
         if not self.has_entered or self.is_rest:
             return False
-        return self._needs_hello or self._has_changes() or self._has_events(now) or self._has_values(now)
+        if self._is_to_greet() or self._looking.is_changed:
+            return True
+        return self._has_changes() or self._has_events(now) or self._has_values(now)
+
+    def _is_to_greet(self) -> bool:
+        """Whether the whole state is to be sent: it was asked for, or there are other machines than before."""
+        return self._needs_hello or self._descriptions != self._hub.descriptions
 
     def _has_changes(self) -> bool:
         return any(shared.version != self._seen.get(name) for name, shared in self._hub.shared.items())
@@ -271,26 +349,39 @@ class Session:
         return waiting and now >= self._events_due
 
     def _has_values(self, now: Nanos) -> bool:
+        if self._looking.is_back:
+            return bool(self._looking.unsent)
         return any(watched.is_due(now) for watched in self._watches.values())
 
     def take(self, now: Nanos) -> list[str]:
-        """What is to be sent now. Call it when what it gave last has been sent."""
+        """The messages to send now. Must be called only after the previous ones were sent."""
         if not self.has_entered or self.is_rest:
             return []
         found: list[str] = []
-        if self._needs_hello:
+        if self._is_to_greet():
             found.append(self._whole())
         for name, shared in self._hub.shared.items():
             if shared.version != self._seen.get(name):
                 self._seen[name] = shared.version
                 found.append(f'{{"seq":{next(self._seq)},"{name}":{shared.text}}}')
+        if self._looking.is_changed:
+            found.append(self._past())
         time = self._hub.around.moment().time if self._watches or self._place or self._left_over else 0
         if self._has_values(now):
-            parts = [f'"{one.number}":{one.take(now)}' for one in self._watches.values() if one.is_due(now)]
+            parts = [f'"{number}":{values}' for number, values in self._take_values(now).items()]
             found.append(f'{{"seq":{next(self._seq)},"time_ns":"{time}","values":{{{",".join(parts)}}}}}')
         if self._has_events(now):
             found.append(self._events(now, time))
         return found
+
+    def _take_values(self, now: Nanos) -> Mapping[int, str]:
+        if self._looking.is_back:
+            return self._looking.take(self._watches)
+        return {one.number: one.take(now) for one in self._watches.values() if one.is_due(now)}
+
+    def _past(self) -> str:
+        may = [name for name in self._hub.may(self.viewer.role) if name in OF_THE_PAST or not permit_of(name).control]
+        return json.dumps({"seq": next(self._seq), "past": self._looking.message(may)}, separators=(",", ":"))
 
     def _events(self, now: Nanos, time: Nanos) -> str:
         self._events_due = now + EVENTS_NS
@@ -306,10 +397,12 @@ class Session:
         """The message hello; whatever was to be sent before is in it."""
         hub, viewer = self._hub, self.viewer
         self._needs_hello = False
+        self._descriptions = hub.descriptions
         self._seq = count(1)
         self._seen = {name: shared.version for name, shared in hub.shared.items()}
-        for watched in self._watches.values():
-            watched.forget()
+        self._forget_values()
+        if self._looking.is_back:
+            self._looking.is_changed, self._looking.unsent = True, set(self._watches)
         present, number = hub.present()
         if self._place is not None:
             self._place.take()
@@ -328,7 +421,7 @@ class Session:
             "number": number,
             "time_ns": str(moment.time),
             "pace": {key: value for key, value in moment.plain().items() if key != "time_ns"},
-            "virtual": hub.around.virtual,
+            "virtual": hub.is_virtual,
             **present,
         }
         text = json.dumps(whole, separators=(",", ":"))

@@ -1,4 +1,4 @@
-"""Events for viewers: followed once, written as JSON once, and shared by all viewers that follow the same.
+"""Events for viewers: followed once, encoded as JSON once, and shared by all viewers with the same filters.
 
 A stream has the events for one set of filters, the last of them; each viewer has its place in it. What a slow viewer loses is
 counted.
@@ -16,13 +16,13 @@ from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 
 MOST_WAITING = 10_000
-"""Events of a stream that wait for its viewers, and events that wait to be put into streams."""
+"""Limit of pending events of a stream, and of events that are not distributed to streams yet."""
 
 Filters: TypeAlias = frozenset[Filter]
 
 
 class Batch(NamedTuple):
-    """Events as JSON with commas between them; ``missed``: how many before them were dropped."""
+    """Events as JSON, separated by commas; ``missed``: the number of events dropped before them."""
 
     text: str
     count: int
@@ -30,7 +30,7 @@ class Batch(NamedTuple):
 
 
 class Stream:
-    """The newest events that a set of filters wants."""
+    """The newest events that pass a set of filters."""
 
     __slots__ = ("_begin", "_joined", "_missed", "_texts", "filters", "places")
 
@@ -39,9 +39,9 @@ class Stream:
         self.places: set[Place] = set()
         self._texts: deque[str] = deque()
         self._begin = 0
-        """The number of the first one that is kept."""
+        """The number of the first stored event."""
         self._missed = 0
-        """What was lost before it came here, in all."""
+        """Total number of events lost before they arrived here."""
         self._joined: tuple[int, int, str] = (0, 0, "")
 
     @property
@@ -65,14 +65,14 @@ class Stream:
         self._missed += count
 
     def drop_read(self) -> None:
-        """Forget what all viewers have."""
+        """Delete events that all viewers have received."""
         first = min((place.next for place in self.places), default=self.end)
         while self._begin < first and self._texts:
             self._texts.popleft()
             self._begin += 1
 
     def between(self, first: int) -> str:
-        """What is there from number ``first`` on."""
+        """The stored events from number ``first`` on."""
         end = self.end
         if self._joined[:2] != (first, end):
             self._joined = first, end, ",".join(islice(self._texts, first - self._begin, None))
@@ -84,7 +84,7 @@ class Stream:
 
 
 class Place:
-    """Where a viewer is in a stream. ``bound``: how many events may wait for it."""
+    """The position of a viewer in a stream. ``bound``: limit of its pending events."""
 
     __slots__ = ("_missed", "bound", "next", "stream")
 
@@ -107,13 +107,13 @@ class Place:
 
 
 class Followed(Protocol):
-    """What is followed: a subject."""
+    """The followed subject."""
 
     def follow(self, what: Filter, bound: int) -> Following: ...
 
 
 class Streams:
-    """All streams over one following of ``subject``, which follows only what somebody wants."""
+    """All streams, over one subscription to ``subject`` with the kinds that viewers follow."""
 
     def __init__(self, subject: Followed) -> None:
         self._subject = subject
@@ -121,10 +121,10 @@ class Streams:
         self._kinds: frozenset[str] = frozenset()
         self._streams: dict[Filters, Stream] = {}
         self.on_event: Callable[[], None] | None = None
-        """Called when an event has come and none was waiting."""
+        """Called when an event arrives in an empty queue."""
 
     def enter(self, filters: Iterable[Filter], bound: int) -> Place:
-        """Be given what comes from now on."""
+        """Join a stream with the events from now on."""
         wanted = frozenset(filters)
         self.flush()
         stream = self._streams.get(wanted)
@@ -142,7 +142,7 @@ class Streams:
             self._follow()
 
     def _follow(self) -> None:
-        """Follow the kinds that are wanted now."""
+        """Update the subscription to the kinds followed now."""
         kinds = frozenset[str]().union(*(one.kinds for filters in self._streams for one in filters))
         if kinds == self._kinds:
             return
@@ -156,7 +156,7 @@ class Streams:
             before.close()
 
     def flush(self) -> None:
-        """Put what has come into the streams."""
+        """Distribute new events to the streams."""
         if self._following is not None:
             self._spread(self._following)
 

@@ -1,4 +1,4 @@
-"""Viewers over WebSockets: each request is answered, and what a session has to send is sent as fast as its viewer reads.
+"""Viewers over WebSockets: each request is answered, and messages of a session are sent as fast as its viewer reads.
 
 Everything runs in the event loop of the world, so commands are done between the requests of its other clients, without locks.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+from collections import deque
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any, TypeAlias
 
@@ -15,19 +16,20 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.studio.hub import Hub
 from steptwin.studio.session import Session
-from steptwin.subject.dispatch import failure
+from steptwin.subject.dispatch import Message, failure
 
 Scope: TypeAlias = MutableMapping[str, Any]
 Receive: TypeAlias = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
+PATH = "/ws"
 TICK_S = 1 / 30
 PATIENCE_S = 10.0
-"""For a viewer that reads nothing."""
+"""Time-out for a viewer that does not read."""
 HELLO_S = 10.0
-"""For a connection to say hello."""
+"""Time-out for the hello of a connection."""
 REFUSED, SLOW, SILENT = 4401, 4408, 4400
-"""Codes with which a connection is closed: wrong token, reads nothing, says no hello."""
+"""Close codes: wrong token, does not read, no hello."""
 
 
 class Viewers:
@@ -56,7 +58,7 @@ class Viewers:
             await connection.close()
 
     async def _tick(self) -> None:
-        """While there are connections; whatever one of them does, the others go on."""
+        """Runs while there are connections. An error in one connection does not affect the others."""
         loop = asyncio.get_running_loop()
         due = loop.time()
         while self._connections:
@@ -76,7 +78,7 @@ class Viewers:
 
 
 class _Connection:
-    """Answers are sent in order; what is pushed is written by a task of its own, which alone waits for a slow reader."""
+    """A connection. Answers are sent in order; a separate task sends messages, so that only that task waits for a slow reader."""
 
     def __init__(self, session: Session, send: Send, clock: Callable[[], Nanos], abort: Callable[[], None]) -> None:
         self._session = session
@@ -84,6 +86,8 @@ class _Connection:
         self._clock = clock
         self._abort = abort
         self._news = asyncio.Event()
+        self._answers: deque[str] = deque()
+        """Later answers that are not sent yet."""
         self._writing: asyncio.Task[None] | None = None
 
     async def serve(self, receive: Receive) -> None:
@@ -105,29 +109,39 @@ class _Connection:
             silent.cancel()
 
     async def _answer(self, text: str | None) -> None:
+        """Send an answer when it is available; other requests are served meanwhile."""
         if text is None:
-            answer = json.dumps(failure(Misuse("a message is a text of JSON; this one is binary")))
+            await self._written(_text(failure(Misuse("a message is a text of JSON; this one is binary"))))
+            return
+        answer = self._session.receive(text, self._clock())
+        if answer.is_done:
+            await self._written(_text(answer.result()))
         else:
-            answer = self._session.receive(text, self._clock())
-        await self._written(answer)
+            answer.then(lambda: self._answered(answer.result()))
+
+    def _answered(self, answer: Message) -> None:
+        self._answers.append(_text(answer))
+        self._news.set()
 
     async def _write(self) -> None:
         try:
             while True:
                 await self._news.wait()
                 self._news.clear()
+                while self._answers:
+                    await self._written(self._answers.popleft())
                 for text in self._session.take(self._clock()):
                     await self._written(text)
         except (TimeoutError, OSError):
             self._abort()
 
     async def _written(self, text: str) -> None:
-        """Raises `TimeoutError` for a viewer that does not read, `OSError` for one that has gone."""
+        """Raises `TimeoutError` if the viewer does not read, `OSError` if it has disconnected."""
         async with asyncio.timeout(PATIENCE_S):
             await self._send({"type": "websocket.send", "text": text})
 
     def look(self, now: Nanos) -> None:
-        """Have sent what there is."""
+        """Send the available messages."""
         if not self._news.is_set() and self._session.has_news(now):
             self._news.set()
 
@@ -136,6 +150,10 @@ class _Connection:
             self._writing.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await self._writing
+
+
+def _text(message: Message) -> str:
+    return json.dumps(message, separators=(",", ":"))
 
 
 def _peer(scope: Scope) -> str:

@@ -1,4 +1,4 @@
-"""Values of points for viewers: each point is read once for all of them, at the fastest rate that is asked for.
+"""Values of points for viewers: each point is read once for all of them, at the highest requested rate.
 
 Viewers that watch the same points share a list of values. Each is sent what has changed since it was sent something last, so a
 slow one loses moments, never the present.
@@ -65,20 +65,20 @@ class Watched:
         return self._sent < self.values.version and now >= self._due
 
     def take(self, now: Nanos) -> str:
-        """What has changed since the last time."""
+        """The values changed since the last call."""
         text = self.values.since(self._sent)
         self._sent = self.values.version
         self._due = now + self.interval_ns
         return text
 
     def forget(self) -> None:
-        """Everything has changed."""
+        """Treat all values as changed."""
         self._sent = 0
         self._due = 0
 
 
 class Watches:
-    """All that is watched."""
+    """The watches of all viewers."""
 
     def __init__(self) -> None:
         self._values: dict[Points, Values] = {}
@@ -105,7 +105,7 @@ class Watches:
             del self._values[values.points]
 
     def due(self, now: Nanos) -> Points:
-        """Points that are to be read now."""
+        """The points that are due for reading."""
         if now < self._due or not self._watched:
             return ()
         fastest = min(watched.interval_ns for watched in self._watched)

@@ -14,7 +14,6 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
-from steptwin.subject.events import KINDS
 from steptwin.subject.fields import (
     CHARACTERS,
     FAULT,
@@ -23,6 +22,7 @@ from steptwin.subject.fields import (
     ID,
     LEVELS,
     NAMES,
+    PROGRAM,
     SPEED,
     TEXT,
     TIME,
@@ -33,8 +33,9 @@ from steptwin.subject.fields import (
     read_fields,
     whole,
 )
+from steptwin.subject.payloads import KINDS
 from steptwin.world import script as do
-from steptwin.world.actions import See
+from steptwin.world.actions import Download, See
 from steptwin.world.control import ControlProgram, Enable, Home, Jog, Move, StopAxes
 
 VERSION = 1
@@ -189,6 +190,7 @@ Command: TypeAlias = (
     | do.Expect
     | do.Note
     | See
+    | Download
     | Describe
     | ReadPoints
     | ReadPins
@@ -243,7 +245,7 @@ _ROWS = (
         "describe",
         Describe,
         "What there is.",
-        "version, name, machines with the numbers of their datasheets, axes, buttons, lines, commands",
+        "version, name, machines with the numbers of their datasheets, axes, buttons, elements, lines, commands",
     ),
     CommandRow(
         "read",
@@ -300,7 +302,7 @@ _ROWS = (
     CommandRow(
         "write",
         do.Write,
-        "Registers of a MIC488 take values, as a master writes them.",
+        "Registers take values by name, as a Modbus master writes them.",
         _NOTHING,
         (Field("values", LEVELS, "Registers by MACHINE.REGISTER.", unit=UNITS),),
     ),
@@ -327,14 +329,14 @@ _ROWS = (
     CommandRow(
         "turn",
         do.Turn,
-        "Turn the encoder shaft of an axis of a MIC488.",
+        "Turn the encoder shaft of an axis.",
         _NOTHING,
         (_MACHINE, _AXIS, Field("counts", whole(-(2**31), 2**31 - 1), "By how much.", unit="encoder counts")),
     ),
     CommandRow(
         "couple",
         do.Couple,
-        "What turns the encoder shaft of an axis of a MIC488.",
+        "What turns the encoder shaft of an axis without mechanics.",
         _NOTHING,
         (_MACHINE, _AXIS, Field("to", choice(*do.COUPLINGS), "What turns it.", attribute="coupling")),
     ),
@@ -347,7 +349,7 @@ _ROWS = (
     CommandRow(
         "see",
         See,
-        "A record of a vision system comes to a MIC488.",
+        "A record of a vision system comes to a controller.",
         _NOTHING,
         (_MACHINE, *(Field(name, number(), f"The {name} of the record.") for name in ("number", "x", "y", "angle"))),
     ),
@@ -387,7 +389,7 @@ _ROWS = (
     CommandRow(
         "stop",
         StopAxes,
-        "Stop as fast as the controller does: a MIC488 without ramp, an M1486 with it (Kill).",
+        "Stop as fast as the controller does, with a ramp or without.",
         _NOTHING,
         (_MACHINE, Field("axis", whole(1, 64), "The number of an axis; all without.", None)),
     ),
@@ -397,6 +399,17 @@ _ROWS = (
         "Start, pause or stop the program of a machine.",
         _NOTHING,
         (_MACHINE, Field("action", choice("start", "pause", "stop"), "What to do.")),
+    ),
+    CommandRow(
+        "download",
+        Download,
+        "Put a text into the program memory of a controller: a MIC488 has it at once, to an M1486 it is typed, and runs then.",
+        _NOTHING,
+        (
+            _MACHINE,
+            Field("place", TEXT, "Where, such as program 0, positions 0 (MIC488, by bank), program (M1486)."),
+            Field("text", PROGRAM, "The text. One with errors is refused with what is wrong."),
+        ),
     ),
     CommandRow("pause", Pause, "Time stands.", "as time"),
     CommandRow("resume", Resume, "Time goes on.", "as time", (Field("speed", SPEED, "Virtual seconds in a second.", None),)),

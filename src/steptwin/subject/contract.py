@@ -1,7 +1,7 @@
-"""What a subject is: something with a description, a present, commands that can be done, and events that can be followed.
+"""The interface of a subject: a description, present values, commands, and events.
 
-There are three: a world in this process (`steptwin.subject.world`), a world in another one (`steptwin.live.remote`), and a device
-behind a driver (`steptwin.drivers.subject`). What one of them cannot know has the quality `UNKNOWN`; what it cannot do is a
+There are three: a world in this process (`steptwin.subject.world`), a world in another process (`steptwin.live.remote`), and a
+device behind a driver (`steptwin.drivers.subject`). Unknown values have the quality `UNKNOWN`; an unsupported command is a
 `Refusal`. Commands raise `Misuse`, `Refusal` or `LineFailure`.
 """
 
@@ -21,7 +21,7 @@ GOOD, UNKNOWN = "good", "unknown"
 
 
 class Reading(NamedTuple):
-    """The value of a point at a moment; None where it is not known, or can only be written."""
+    """The value of a point at a moment; None if it is unknown or write-only."""
 
     point: str
     value: float | None
@@ -30,7 +30,7 @@ class Reading(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What a command gave. ``number`` is what causes of events name; ``time`` the moment at which it was done."""
+    """The result of a command. ``number`` identifies it as the cause of events; ``time``: the moment of execution."""
 
     value: Any
     time: Nanos
@@ -47,7 +47,9 @@ class MachinePart:
     unit: int | None = None
     """Slave address, or address of a chip."""
     takes: tuple[ControlDescription, ...] = ()
-    """The commands for controllers that it takes, for each axis, with their arguments."""
+    """Its commands for controllers, for each axis, with their arguments."""
+    is_real: bool = False
+    """Whether it is a device behind a driver: its positions come as samples, and it may move something."""
 
     @property
     def controls(self) -> tuple[str, ...]:
@@ -56,7 +58,7 @@ class MachinePart:
 
     @property
     def points(self) -> tuple[str, ...]:
-        """What can be named: its pins, and its points that are no pins."""
+        """The names of its pins and of its other points."""
         paths = (*(pin.name for pin in self.datasheet.pins), *(point.path for point in self.datasheet.points))
         return tuple(dict.fromkeys(f"{self.name}.{path}" for path in paths))
 
@@ -65,7 +67,7 @@ class MachinePart:
 class SwitchPart:
     """A switch at an axis: on from ``low`` to ``high``, in units of the axis, and again after each ``period``.
 
-    Where ``low`` or ``high`` is None, there is no end on that side.
+    ``low`` or ``high`` is None if it is unbounded on that side.
     """
 
     pin: str
@@ -76,7 +78,7 @@ class SwitchPart:
 
 @dataclass(frozen=True, slots=True)
 class MechanicsPart:
-    """What an axis of a controller moves."""
+    """The mechanics of an axis of a controller."""
 
     name: str
     machine: str
@@ -88,6 +90,31 @@ class MechanicsPart:
     travel: tuple[float, float] | None = None
     """Hard stops, in units of the axis."""
     switches: tuple[SwitchPart, ...] = ()
+    pulses_per_unit: float = 1.0
+    """Of its drive; negative if positive pulses move it in the negative direction."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalPart:
+    """A value of an element that changes, with its unit and range where they are known."""
+
+    name: str
+    unit: str
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ElementPart:
+    """An element around the controllers that is no axis and no button. Its terminals and signals are read as ``NAME.SIGNAL``."""
+
+    name: str
+    kind: str
+    """The name of its table, such as ``cylinder``."""
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    signals: tuple[SignalPart, ...]
+    """Those that are no terminals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,24 +124,25 @@ class LinePart:
     name: str
     kind: str
     baud: int | None
-    """None where it is not known."""
+    """None if unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What there is. It does not change."""
+    """The constant description of a subject."""
 
     name: str
     machines: tuple[MachinePart, ...]
     axes: tuple[MechanicsPart, ...] = ()
     buttons: tuple[str, ...] = ()
+    elements: tuple[ElementPart, ...] = ()
     lines: tuple[LinePart, ...] = ()
     commands: tuple[str, ...] = ()
-    """Names of the commands that can be done here."""
+    """Names of the supported commands."""
     version: int = VERSION
 
     def plain(self) -> dict[str, object]:
-        """As JSON. Data sheets are in a list of their own, because many controllers may have the same."""
+        """As JSON. Data sheets are in a separate list, because controllers may share them."""
         sheets = {id(part.datasheet): part.datasheet for part in self.machines}
         numbers = {key: number for number, key in enumerate(sheets)}
         machines = [
@@ -125,6 +153,7 @@ class Description:
                 "unit": part.unit,
                 "controls": part.controls,
                 "takes": plain(part.takes),
+                "real": part.is_real,
             }
             for part in self.machines
         ]
@@ -132,6 +161,7 @@ class Description:
             **{field.name: getattr(self, field.name) for field in fields(self)},
             "machines": machines,
             "axes": [asdict(part) for part in self.axes],
+            "elements": [asdict(part) for part in self.elements],
             "lines": [asdict(part) for part in self.lines],
             "datasheets": [plain(sheet) for sheet in sheets.values()],
         }
@@ -141,7 +171,14 @@ def read_description(data: Mapping[str, Any]) -> Description:
     """The description in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
     sheets = [read_datasheet(sheet) for sheet in data["datasheets"]]
     machines = tuple(
-        MachinePart(one["name"], sheets[one["datasheet"]], one["line"], one["unit"], tuple(map(_read_control, one["takes"])))
+        MachinePart(
+            one["name"],
+            sheets[one["datasheet"]],
+            one["line"],
+            one["unit"],
+            tuple(map(_read_control, one["takes"])),
+            is_real=one["real"],
+        )
         for one in data["machines"]
     )
     axes = tuple(
@@ -154,13 +191,23 @@ def read_description(data: Mapping[str, Any]) -> Description:
             one["kind"],
             None if one["travel"] is None else (one["travel"][0], one["travel"][1]),
             tuple(SwitchPart(**switch) for switch in one["switches"]),
+            one["pulses_per_unit"],
         )
         for one in data["axes"]
     )
-    lines = tuple(LinePart(**one) for one in data["lines"])
-    return Description(
-        data["name"], machines, axes, tuple(data["buttons"]), lines, tuple(data["commands"]), version=data["version"]
+    elements = tuple(
+        ElementPart(
+            one["name"],
+            one["kind"],
+            tuple(one["inputs"]),
+            tuple(one["outputs"]),
+            tuple(SignalPart(**signal) for signal in one["signals"]),
+        )
+        for one in data["elements"]
     )
+    lines = tuple(LinePart(**one) for one in data["lines"])
+    commands = tuple(data["commands"])
+    return Description(data["name"], machines, axes, tuple(data["buttons"]), elements, lines, commands, version=data["version"])
 
 
 def _read_control(data: Mapping[str, Any]) -> ControlDescription:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.contract import Description, LinePart, MachinePart, MechanicsPart, SwitchPart
+from steptwin.subject.contract import Description, ElementPart, LinePart, MachinePart, MechanicsPart, SignalPart, SwitchPart
 from steptwin.subject.controls import controls_of
-from steptwin.world.elements.axis import MECHANICS
+from steptwin.world.elements.axis import AXIS, MECHANICS
+from steptwin.world.elements.button import BUTTON
 from steptwin.world.elements.switch import SwitchSpec
+from steptwin.world.kind import Terminals
 from steptwin.world.plant import Plant
 
 
@@ -16,14 +20,15 @@ def describe(world: Plant) -> Description:
         world.spec.name,
         tuple(_machine(world, name) for name in world.machines),
         tuple(_mechanics(world, name) for name in world.axes),
-        tuple(world.plan.buttons),
+        tuple(world.parts.buttons),
+        tuple(_elements(world)),
         tuple(LinePart(line.name, line.kind, world.lines[line.name].baud) for line in world.spec.lines),
         tuple(COMMANDS),
     )
 
 
 def _machine(world: Plant, name: str) -> MachinePart:
-    on = world.plan.line_of.get(name)
+    on = world.parts.line_of.get(name)
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
     sheet = kind.datasheet(world.machines[name])
@@ -36,7 +41,25 @@ def _mechanics(world: Plant, name: str) -> MechanicsPart:
     points = tuple(f"{name}.{what}" for what in MECHANICS)
     spec = fitted.spec
     switches = tuple(_switch(one) for one in spec.switches)
-    return MechanicsPart(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches)
+    scale = fitted.mechanism.build.sign * float(fitted.scale.pulses_per_unit)
+    return MechanicsPart(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale)
+
+
+def _elements(world: Plant) -> Iterator[ElementPart]:
+    for kind, built in world.parts.elements.items():
+        if kind in (AXIS.name, BUTTON.name):
+            continue
+        for name in built:
+            terminals = world.parts.terminals.get(name, Terminals())
+            inputs = tuple(pin.lower() for pin in (*terminals.digital_inputs, *terminals.analog_inputs))
+            outputs = tuple(pin.lower() for pin in terminals.outputs)
+            signals = world.parts.element_signals(name) or {}
+            others = tuple(
+                SignalPart(signal, of.unit, *(of.bounds or (None, None)))
+                for signal, of in signals.items()
+                if signal not in (*inputs, *outputs)
+            )
+            yield ElementPart(name, kind, inputs, outputs, others)
 
 
 def _switch(spec: SwitchSpec) -> SwitchPart:

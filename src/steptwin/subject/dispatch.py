@@ -1,10 +1,10 @@
-"""The dispatcher: takes a command, gives a result or a refusal. Messages and the command line come to the same place."""
+"""The dispatcher: executes commands, for messages and the command line alike."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.plaintypes import shown
@@ -12,17 +12,17 @@ from steptwin.subject.commands import COMMANDS, VERSION, Command, read_command, 
 from steptwin.subject.contract import Result
 from steptwin.subject.fields import ID
 
-LONGEST_REQUEST = 65536
-"""Bytes of a message."""
+LONGEST_REQUEST = 1 << 20
+"""Limit of a message, bytes: sufficient for the longest permitted program in any JSON encoding."""
 FORM = 'a request is a line of JSON: {"do": NAME, "id": ANY, FIELD: VALUE, ...}'
 
 Action: TypeAlias = Callable[[Any], object]
-"""Does a command; gives what its answer is, as plain data."""
+"""Executes a command; returns its answer as plain data."""
 Message: TypeAlias = dict[str, object]
 
 
 class Dispatcher:
-    """Commands by class, and what does them. ``number`` counts a command when it is done; ``done`` ends it."""
+    """The actions of commands, by class. ``begin`` returns the number of a command, ``end`` the moment of its execution."""
 
     def __init__(self, actions: Mapping[Any, Action], begin: Callable[[], int], end: Callable[[], int]) -> None:
         self._actions = dict(actions)
@@ -30,7 +30,7 @@ class Dispatcher:
         self._end = end
 
     def add(self, actions: Mapping[Any, Action]) -> None:
-        """Commands that something around the subject does: its time, its files, its end points."""
+        """Add commands that are executed outside the subject: for its time, files and end points."""
         self._actions.update(actions)
 
     @property
@@ -38,10 +38,10 @@ class Dispatcher:
         return tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
 
     def do(self, command: Command) -> Result:
-        """Raises `Misuse`, `Refusal`, `LineFailure`."""
+        """Execute a command. Raises `Misuse`, `Refusal`, `LineFailure`."""
         action = self._actions.get(type(command))
         if action is None:
-            raise Refusal(f"{row_of(command).name} cannot be done here; what can: {', '.join(self.names)}")
+            raise Refusal(f"{row_of(command).name} is not supported here; supported are {', '.join(self.names)}")
         number = self._begin()
         try:
             value = action(command)
@@ -54,7 +54,7 @@ class Dispatcher:
 
 
 def read_message(line: bytes, key: str = "do") -> Message:
-    """An object with a text under ``key``. Raises `Misuse`."""
+    """Read a JSON object with a text under ``key``. Raises `Misuse`."""
     try:
         message = json.loads(line)
     except (ValueError, RecursionError):
@@ -102,29 +102,20 @@ def _code(error: SteptwinError) -> str:
 
 
 def raised(error: Mapping[str, Any]) -> SteptwinError:
-    """The exception that an error as a value stands for."""
+    """The exception for an error as a value."""
     kinds: Mapping[str, type[SteptwinError]] = {"misuse": Misuse, "refusal": Refusal, "failure": LineFailure}
     return kinds.get(error["code"], SteptwinError)(error["message"])
 
 
-T = TypeVar("T")
-
-
-def respond(
-    do: Callable[[T, object], Result],
-    line: bytes,
-    on_internal: Callable[[Exception], object],
-    read: Callable[[Message], T] = command_of,
-) -> Message:
-    """The one answer to a message, whatever it is. ``do`` gets what was read of the message, its command, and the id;
-    ``on_internal`` is called with exceptions that should not be."""
+def respond(do: Callable[[Command, object], Result], line: bytes, on_internal: Callable[[Exception], object]) -> Message:
+    """The answer to any message. ``do`` takes its command and its id; ``on_internal`` is called with unexpected exceptions."""
     found: dict[str, object] = {}
     try:
         message = read_message(line)
         identity = id_of(message)
         found = {} if identity is None else {"id": identity}
-        return {**found, **answer(do(read(message), identity))}
-    except Exception as error:  # noqa: BLE001  whoever waits is never left without an answer
+        return {**found, **answer(do(command_of(message), identity))}
+    except Exception as error:  # noqa: BLE001  every request must be answered
         if not isinstance(error, SteptwinError):
             on_internal(error)
         return {**found, **failure(error)}

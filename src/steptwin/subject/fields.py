@@ -113,6 +113,23 @@ def _text(value: Any) -> str:
 TEXT = ValueType("a text", {"type": "string", "minLength": 1, "maxLength": LONGEST_TEXT}, _text)
 
 
+LONGEST_PROGRAM = 170_000
+"""Characters of a program; the longest that are meant have 4000 lines."""
+
+
+def _program(value: Any) -> str:
+    if not isinstance(value, str):
+        raise wrong(value, PROGRAM.what)
+    if len(value) > LONGEST_PROGRAM:
+        raise Misuse(f"a text of {len(value)} characters: permitted are at most {LONGEST_PROGRAM}")
+    if any("\ud800" <= c <= "\udfff" for c in value):
+        raise Misuse("a text takes no surrogates")
+    return value
+
+
+PROGRAM = ValueType("a text", {"type": "string", "maxLength": LONGEST_PROGRAM}, _program)
+
+
 def _flag(value: Any) -> bool:
     if not isinstance(value, bool):
         raise wrong(value, FLAG.what)
@@ -261,7 +278,7 @@ def _characters(value: Any) -> bytes:
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError as error:
-        raise Misuse(f"{value[error.start]!r} is not a character of a line, which has 8 bits for each") from None
+        raise Misuse(f"{value[error.start]!r} is not an 8-bit character") from None
 
 
 CHARACTERS = ValueType(

@@ -1,4 +1,4 @@
-"""Following events: every follower has a bound, and what it missed is counted."""
+"""Subscriptions to events: each follower has a bounded queue, and dropped events are counted."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from steptwin.subject.events import KINDS, Event
+from steptwin.subject.events import Event
+from steptwin.subject.payloads import KINDS
 
-USUAL = frozenset(KINDS) - {"frame"}
-"""What is followed where no kinds are named: frames are as frequent as requests."""
+USUAL = frozenset(KINDS) - {"frame", "statement"}
+"""What is followed where no kinds are named: frames are as frequent as requests, statements as milliseconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Filter:
-    """Which events. ``machines`` None: all of them; ``axes`` None: all, and what belongs to no axis in any case."""
+    """Selects events. ``machines`` None: all; ``axes`` None: all. Events without an axis always pass."""
 
     kinds: frozenset[str] = USUAL
     machines: frozenset[str] | None = None
@@ -37,22 +38,22 @@ def filter_of(
     )
 
 
-class Taken(NamedTuple):
-    """Events in order. ``missed``: how many before them were dropped since the last time."""
+class EventBatch(NamedTuple):
+    """Events in order. ``missed``: the number of events dropped before them, since the previous batch."""
 
     missed: int
     events: list[Event]
 
 
 class Following:
-    """The events of one follower that were not taken yet, the newest ``bound`` of them."""
+    """The pending events of one follower; if there are more than ``bound``, the oldest are dropped."""
 
     __slots__ = ("_close", "_missed", "_waiting", "filter", "on_event")
 
     def __init__(self, what: Filter, bound: int, close: Callable[[Following], None]) -> None:
         self.filter = what
         self.on_event: Callable[[], None] | None = None
-        """Called when an event has come and none was waiting."""
+        """Called when an event arrives in an empty queue."""
         self._waiting: deque[Event] = deque(maxlen=bound)
         self._missed = 0
         self._close = close
@@ -66,31 +67,31 @@ class Following:
             self.on_event()
 
     def miss(self, count: int) -> None:
-        """Count events that were lost on their way here."""
+        """Count events that were lost before they arrived here."""
         self._missed += count
 
-    def take(self, most: int | None = None) -> Taken:
-        """What has come since the last time, the oldest ``most`` of it."""
+    def take(self, most: int | None = None) -> EventBatch:
+        """Remove and return the pending events, at most the oldest ``most``."""
         missed, self._missed = self._missed, 0
         count = len(self._waiting) if most is None else min(most, len(self._waiting))
-        return Taken(missed, [self._waiting.popleft() for _ in range(count)])
+        return EventBatch(missed, [self._waiting.popleft() for _ in range(count)])
 
     def __len__(self) -> int:
         return len(self._waiting)
 
     def close(self) -> None:
-        """Follow no more. What has come can still be taken."""
+        """End the subscription. Pending events can still be taken."""
         self._close(self)
 
 
 class Followers:
-    """All followers of a subject. ``on_change`` is called when the kinds that are wanted have changed."""
+    """All followers of a subject. ``on_change`` is called when the set of followed kinds has changed."""
 
     def __init__(self, on_change: Callable[[], None] = lambda: None) -> None:
         self._all: list[Following] = []
         self._on_change = on_change
         self.kinds: frozenset[str] = frozenset()
-        """Kinds that at least one follower wants."""
+        """Kinds that at least one follower selects."""
 
     def __bool__(self) -> bool:
         return bool(self._all)

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan, profile_of
 from steptwin.subject.contract import MachinePart
-from steptwin.subject.events import CoordinatePayload, Event, PlanPayload
+from steptwin.subject.events import Event
+from steptwin.subject.payloads import CoordinatePayload, PlanPayload
 
 
 class Motions:

@@ -12,8 +12,8 @@ from steptwin.datasheet import Datasheet
 from steptwin.subject.commands import COMMANDS, VERSION, CommandRow
 from steptwin.subject.contract import Description
 from steptwin.subject.controls import ControlDescription
-from steptwin.subject.events import KINDS
 from steptwin.subject.fields import LONGEST_ID, Field
+from steptwin.subject.payloads import KINDS
 from steptwin.subject.shapes import members, shape
 from steptwin.tables import complete
 
@@ -26,6 +26,7 @@ _TEXT = {"type": "string"}
 _TEXT_OR_NULL = {"type": ["string", "null"]}
 _WHOLE = {"type": "integer"}
 _REAL = {"type": "number"}
+_REAL_OR_NULL = {"type": ["number", "null"]}
 _FLAG = {"type": "boolean"}
 _NUMBERS = {"type": "array", "items": {"type": ["number", "null"]}}
 _ARC = members(
@@ -59,7 +60,7 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
     {
         "plan": {"axis": _TEXT, "plan": _PLAN, "origin": {"type": ["integer", "null"]}},
         "coordinate": {"axis": _TEXT, "origin": _WHOLE},
-        "sample": {"axis": _TEXT, "position": _REAL, "unit": _TEXT},
+        "sample": {"axis": _TEXT, "position": _REAL_OR_NULL, "unit": _TEXT, "velocity": _REAL_OR_NULL},
         "load": {
             "axis": _TEXT,
             "pieces": {"type": "array", "items": members({"time_ns": _MOMENT, "follows": _FLAG, "pulses": _WHOLE})},
@@ -78,7 +79,7 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
         "button": {"button": _TEXT, "pressed": _FLAG},
         "input": {"what": _TEXT, "value": {}},
         "fault": {"fault": _TEXT, "words": _TEXT},
-        "restored": {"snapshot": _TEXT},
+        "restored": {"snapshot": {"anyOf": [_TEXT, {"type": "null"}], "description": "Its name; null without one."}},
         "pace": {"paused": _FLAG, "speed": {"anyOf": [_REAL, {"const": "max"}, {"type": "null"}]}},
     },
 )
@@ -180,6 +181,7 @@ def _description() -> dict[str, object]:
                 "items": shape(ControlDescription),
                 "description": "The same for each axis, and with axis null for the whole controller, with their arguments.",
             },
+            "real": {"type": "boolean", "description": "A device: it gives samples instead of plans, and may move something."},
         }
     )
     own: Mapping[str, object] = {
@@ -188,7 +190,7 @@ def _description() -> dict[str, object]:
     }
     hints = get_type_hints(Description)
     rest = {field.name: shape(hints[field.name]) for field in fields(Description) if field.name not in own}
-    return {**members({**rest, **own}), "description": "What there is. It does not change."}
+    return {**members({**rest, **own}), "description": "What there is; another one when devices come or go."}
 
 
 def _state() -> dict[str, object]:

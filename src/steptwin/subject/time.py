@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject.commands import Advance
-from steptwin.subject.events import SHOWN_KINDS, STEP_KINDS
 from steptwin.subject.following import Filter, Following, filter_of
+from steptwin.subject.payloads import SHOWN_KINDS, STEP_KINDS
 
 if TYPE_CHECKING:
     from steptwin.subject.world import WorldSubject

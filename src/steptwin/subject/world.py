@@ -14,42 +14,45 @@ from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import Action, Dispatcher
-from steptwin.subject.events import Event, FramePayload, Numbering, PacePayload, Payload, PlanPayload, RestoredPayload, payload_of
+from steptwin.subject.events import Event, Numbering, payload_of
 from steptwin.subject.following import Filter, Followers, Following, filter_of
+from steptwin.subject.payloads import FramePayload, PacePayload, Payload, PlanPayload, RestoredPayload
 from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.time import advance
-from steptwin.words.frames import FrameLine
+from steptwin.wire.frameline import FrameLine
 from steptwin.world import script as steps
-from steptwin.world.actions import Outside, See
+from steptwin.world.actions import Download, ExternalInput, See
 from steptwin.world.control import ControllerCommand, Jog
 from steptwin.world.faults.kinds import rows
 from steptwin.world.heldjog import HeldJog
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import LineWords
-from steptwin.world.plant import WORLD, Plant
+from steptwin.world.plant import WORLD, Plant, PlantSnapshot
+from steptwin.world.programs import StatementFollower
 from steptwin.world.trace import TraceRecord
 
 STEPS = (
     steps.Set, steps.Press, steps.Release, steps.Write, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple, steps.ClearFault,
-    steps.Note, See,
+    steps.Note, See, Download,
 )  # fmt: skip
-"""Commands that are done as they are, and whose answer is nothing."""
+"""Commands that are steps themselves, without a result."""
 
 
 class WorldSubject:
-    """The world ``world``; ``outside`` does something from outside to it, at its present moment."""
+    """The world ``world``; ``apply_input`` applies an external input to it at its present moment."""
 
-    def __init__(self, world: Plant, outside: Callable[[Outside], None] | None = None) -> None:
+    def __init__(self, world: Plant, apply_input: Callable[[ExternalInput], None] | None = None) -> None:
         self.world = world
         self.description: Description = describe(world)
-        self._outside = outside or world.outside
-        lines = {name: line.name for name, (line, _) in world.plan.line_of.items()}
-        self._numbering = Numbering(lines)
+        self._apply_input = apply_input or world.apply_input
+        lines = {name: line.name for name, (line, _) in world.parts.line_of.items()}
+        self.numbering = Numbering(lines)
         self.followers = Followers(self._followed)
         self.snapshots = Snapshots()
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self._words: dict[str, LineWords] = {}
         self._is_watching = False
+        self._statements: StatementFollower | None = None
 
     def _actions(self) -> dict[Any, Action]:
         taken: dict[Any, Action] = dict.fromkeys(STEPS, self._step)
@@ -75,7 +78,7 @@ class WorldSubject:
             command.Advance: lambda wanted: advance(self, wanted),
         }
 
-    # ------------------------------------------------------------------ what a subject is
+    # ------------------------------------------------------------------ interface of a subject
 
     def read(self, *points: str) -> tuple[Reading, ...]:
         return tuple(map(self._reading, points))
@@ -96,23 +99,23 @@ class WorldSubject:
     # ------------------------------------------------------------------ commands
 
     def _begin(self) -> int:
-        """Everything due by now happens before, so that it has no cause in the command."""
+        """Process all due events first, so that the command is not their cause."""
         if self.followers:
             self.world.settle_all()
-        return self._numbering.command(self.world.now)
+        return self.numbering.command(self.world.now)
 
     def _end(self) -> Nanos:
-        """What the command leads to at its moment has its cause in it."""
+        """Process its effects at the same moment, so that the command is their cause."""
         if self.followers:
             self.world.settle_all()
-        self._numbering.done()
+        self.numbering.done()
         return self.world.now
 
-    def _step(self, step: Outside) -> None:
-        self._outside(step)
+    def _step(self, step: ExternalInput) -> None:
+        self._apply_input(step)
 
     def _control(self, wanted: ControllerCommand) -> None:
-        """As the master of the controller does it."""
+        """Execute a command for a controller as its master does."""
         world, name = self.world, wanted.machine
         kind, machine = world.kind(name), world.machine(name)
         make = kind.control.get(type(wanted))
@@ -120,17 +123,17 @@ class WorldSubject:
             known = ", ".join(command.name_of(one) for one in kind.control)
             raise Refusal(f"{name!r} is {kind.title}, which cannot do {command.name_of(type(wanted))}; it can do {known}")
         world.touch(name)
-        on = world.plan.line_of.get(name)
-        self._outside(make(machine, None if on is None else on[0].name, wanted))
+        on = world.parts.line_of.get(name)
+        self._apply_input(make(machine, None if on is None else on[0].name, wanted))
 
     def held_jog(self, wanted: Jog) -> HeldJog:
-        """A jog that lasts only while it is extended; nothing has been done yet. Raises `Misuse` and `Refusal`."""
+        """A jog that lasts only while it is extended; it has not started yet. Raises `Misuse` and `Refusal`."""
         world, name = self.world, wanted.machine
         kind, machine = world.kind(name), world.machine(name)
         if kind.held_jog is None:
             raise Refusal(f"{name!r} is {kind.title}, which cannot be jogged")
         world.touch(name)
-        on = world.plan.line_of.get(name)
+        on = world.parts.line_of.get(name)
         return kind.held_jog(machine, None if on is None else on[0].name, wanted)
 
     def _request(self, step: steps.Request) -> object:
@@ -138,19 +141,19 @@ class WorldSubject:
         number = master.asked + 1
         master.wanted |= {number}
         try:
-            self._outside(step)
+            self._apply_input(step)
         finally:
             master.wanted -= {number}
         found = master.answers.pop(number, None)
         return {"pdu": found[1:-2].hex() if found else None}
 
     def _set_fault(self, step: steps.SetFault) -> object:
-        self._outside(step)
-        return {"name": self.world.plan.faults.active[-1].name}
+        self._apply_input(step)
+        return {"name": self.world.parts.faults.active[-1].name}
 
     def _expect(self, step: steps.Expect) -> object:
         before = len(self.world.failures)
-        self._outside(step)
+        self._apply_input(step)
         return {"holds": len(self.world.failures) == before}
 
     def _pins(self, wanted: command.ReadPins) -> object:
@@ -174,24 +177,24 @@ class WorldSubject:
         return encoders.shown(self.world.machine(wanted.machine), self.world.now)
 
     def _restore(self, wanted: command.RestoreSnapshot) -> object:
-        self.restore(wanted)
+        self.go_back(self.snapshots.find(wanted), wanted.name)
         return self.time()
 
-    def restore(self, wanted: command.RestoreSnapshot) -> None:
-        """Go back to a snapshot, and tell followers. Raises `Misuse`."""
-        self.world.restore(self.snapshots.find(wanted))
-        self._numbering.moved(self.world.now)
-        self._publish(self.world.now, WORLD, RestoredPayload(wanted.name))
+    def go_back(self, snapshot: PlantSnapshot, name: str | None) -> None:
+        """Restore a snapshot, with its name if it has one, and notify followers."""
+        self.world.restore(snapshot)
+        self.numbering.moved(self.world.now)
+        self._publish(self.world.now, WORLD, RestoredPayload(name))
         for plan in self.plans(filter_of(["plan"])):
             self._publish(plan.time, plan.machine, plan.payload)
 
     def _faults(self) -> object:
         return [
-            {"name": a.name, "fault": str(a.fault), "seen": a.seen, "happened": a.struck} for a in self.world.plan.faults.active
+            {"name": a.name, "fault": str(a.fault), "seen": a.seen, "happened": a.struck} for a in self.world.parts.faults.active
         ]
 
     def time(self) -> dict[str, object]:
-        """The present moment; a world in virtual time stands unless it is advanced."""
+        """The present moment; a world in virtual time is paused unless it is advanced."""
         now = self.world.now
         return {
             "world": self.world.spec.name,
@@ -205,7 +208,7 @@ class WorldSubject:
     # ------------------------------------------------------------------ events
 
     def plans(self, what: Filter) -> list[Event]:
-        """The present plan of every axis that ``what`` wants, as events of now."""
+        """The present plan of every axis that ``what`` selects, as events of now."""
         world = self.world
         found: list[Event] = []
         for part in self.description.machines:
@@ -217,18 +220,18 @@ class WorldSubject:
         return found
 
     def paced(self, pace: PacePayload) -> None:
-        """Time stands or goes on, from now on."""
+        """Report that time was paused or resumed."""
         self._publish(self.world.now, WORLD, pace)
 
     def _publish(self, time: Nanos, machine: str, payload: Payload) -> None:
         if self.followers:
-            self.followers.publish(self._numbering.event(time, machine, payload))
+            self.followers.publish(self.numbering.event(time, machine, payload))
 
     def _recorded(self, record: TraceRecord) -> None:
-        if record.kind == "frame":  # they come from the lines, whether they are recorded or not
+        if record.kind == "frame":  # lines report frames themselves, recorded or not
             return
         if self._words:
-            line, _ = self.world.plan.line_of.get(record.machine, (None, 0))
+            line, _ = self.world.parts.line_of.get(record.machine, (None, 0))
             if line is not None:
                 self._words[line.name].recorded(record)
         payload = payload_of(record)
@@ -236,12 +239,15 @@ class WorldSubject:
             payload = self._with_origin(record.machine, payload)
         self._publish(record.time, record.machine, payload)
 
+    def _executed(self, record: TraceRecord) -> None:
+        self._publish(record.time, record.machine, payload_of(record))
+
     def _with_origin(self, machine: str, payload: PlanPayload) -> PlanPayload:
         drive = self.world.machines[machine].axes[int(payload.axis) - 1]
         return PlanPayload(payload.axis, payload.plan, drive.offset_p)
 
     def _followed(self) -> None:
-        """Subscribe to the world only while it is followed, and to frames only while they are wanted."""
+        """Subscribe to the world only while it is followed, to frames and statements only while they are wanted."""
         watchers = self.world.trace.watchers
         if bool(self.followers) is not self._is_watching:
             self._is_watching = not self._is_watching
@@ -249,6 +255,12 @@ class WorldSubject:
                 watchers.append(self._recorded)
             else:
                 watchers.remove(self._recorded)
+        if ("statement" in self.followers.kinds) is not (self._statements is not None):
+            if self._statements is None:
+                self._statements = StatementFollower(self.world, self._executed)
+            else:
+                self._statements.close()
+                self._statements = None
         wanted = "frame" in self.followers.kinds
         if wanted is bool(self._words):
             return

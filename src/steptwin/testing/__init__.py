@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from steptwin.testing.m1486 import M1486Rig
 from steptwin.testing.mic488 import Mic488Rig, TwinAxis
-from steptwin.testing.rig import FaultSeen, Happened
+from steptwin.testing.rig import FaultSeen, TwinEvent
 from steptwin.testing.world import WorldAxis, WorldRig
 
-__all__ = ["FaultSeen", "Happened", "M1486Rig", "Mic488Rig", "TwinAxis", "WorldAxis", "WorldRig"]
+__all__ = ["FaultSeen", "M1486Rig", "Mic488Rig", "TwinAxis", "TwinEvent", "WorldAxis", "WorldRig"]

@@ -18,13 +18,15 @@ from steptwin.files.beginning import set_faults
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.world import LiveWorld
-from steptwin.m1486.chip import OPEN_ADDRESS, M1486Chip
+from steptwin.m1486.chip import M1486Chip
+from steptwin.m1486.pins import OPEN_ADDRESS
 from steptwin.m1486.variants import DEFAULT
 from steptwin.machine import Nanos, Port
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip
-from steptwin.world.small import Whole, chip_name, m1486_world
+from steptwin.world.kinds.m1486.small import chip_name, m1486_world
+from steptwin.world.small import Whole
 
 T = TypeVar("T")
 

@@ -30,7 +30,8 @@ from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
 from steptwin.world import script as do
-from steptwin.world.small import Whole, mic488_world
+from steptwin.world.kinds.mic488.small import mic488_world
+from steptwin.world.small import Whole
 
 T = TypeVar("T")
 
@@ -133,7 +134,7 @@ class Mic488Rig(LineRig):
             if file is not None:
                 files[str(base / file)] = read_bytes(base / file)
         key, _ = LINKS[options.link]
-        # That the line is open tells which faults can happen on it.
+        # The faults that are possible on a line depend on its external links.
         line = {key: "127.0.0.1:0", "baud": options.baud, "timing": "real" if options.line_timing else None}
         values = {
             "firmware": firmware,

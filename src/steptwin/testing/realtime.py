@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from steptwin.errors import Misuse, SteptwinError
-from steptwin.live.cell import Advancing, Cell
+from steptwin.live.cell import Advanceable, Cell
 from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.links import Link
@@ -38,7 +38,7 @@ class RealTime:
     ``place`` names the twin in messages. Raises `Misuse` for a speed outside 0.001 to 1000.
     """
 
-    def __init__(self, machines: Advancing, speed: float, place: str) -> None:
+    def __init__(self, machines: Advanceable, speed: float, place: str) -> None:
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
             raise Misuse(f"{place}: speed = {speed:g}: permitted are {SPEEDS[0]:g} to {SPEEDS[1]:g}")
         self.machines = machines
@@ -59,7 +59,7 @@ class RealTime:
             # The standard library's loop: a test knows what it gets.
             with asyncio.Runner(loop_factory=asyncio.SelectorEventLoop) as runner:
                 runner.run(self._serve())
-        except BaseException as error:  # noqa: BLE001 - a thread has nobody to raise to but `close`
+        except BaseException as error:  # noqa: BLE001 - the exception is raised by `close`
             self._troubles.append(error)
         finally:
             self._ready.set()

@@ -21,8 +21,8 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, row_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.virtualtime import VirtualTime
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.words.frames import FrameLine
 from steptwin.world import script as do
 from steptwin.world.faults import read as read_fault
 from steptwin.world.records import describe
@@ -50,7 +50,7 @@ class FaultSeen(NamedTuple):
     happened: int
 
 
-class Happened(NamedTuple):
+class TwinEvent(NamedTuple):
     """Something that happened in a twin: ``code`` is stable, ``text`` describes it."""
 
     time_s: float
@@ -97,7 +97,7 @@ class Rig:
             self.twin_only("later()")
         self._time.later(seconds, act)
 
-    def story(self) -> str:
+    def log(self) -> str:
         """The last frames and events, one in a line."""
         return "\n".join(map(str, self._shown))
 
@@ -131,32 +131,32 @@ class LineRig(Rig):
         self._live = live
         self._machine = machine
         self._is_twin_only = twin_only
-        self._events: list[Happened] = []
+        self._events: list[TwinEvent] = []
         self._places = count(1)
         if live is not None:
             for record in live.world.trace.events(machine):  # what power-on had to say
                 self._happened(record)
             live.world.stop_recording()
-            follow_frames(live, self._heard)
+            follow_frames(live, self._log_frame)
             live.world.trace.watchers.append(self._happened)
 
     def _happened(self, record: TraceRecord) -> None:
         if record.kind == "event" and record.machine == self._machine:
-            happened = Happened(record.time / SECOND, record.subject, str(record.value))
+            happened = TwinEvent(record.time / SECOND, record.subject, str(record.value))
             self._events.append(happened)
             self._shown.append(happened)
         elif record.kind == "fault":
             self._shown.append(describe(record))
 
-    def _heard(self, frame: FrameLine) -> None:
-        told = self._shown
-        told.append(frame)
-        last = [one.meaning if isinstance(one, FrameLine) else None for one in list(told)[-4:]]
+    def _log_frame(self, frame: FrameLine) -> None:
+        shown = self._shown
+        shown.append(frame)
+        last = [one.meaning if isinstance(one, FrameLine) else None for one in list(shown)[-4:]]
         if len(last) == 4 and None not in last and last[:2] == last[2:]:
-            del told[-4], told[-3]  # the same was asked and answered before: a poll
+            del shown[-4], shown[-3]  # the same request and answer as before: a poll
 
-    def story(self) -> str:
-        return "\n".join(_shortened(told) for told in self._shown)
+    def log(self) -> str:
+        return "\n".join(_shortened(item) for item in self._shown)
 
     def begin(self) -> None:
         if self._live is None and self._is_twin_only:
@@ -211,7 +211,7 @@ class LineRig(Rig):
         self._do(f"set_pin({pin!r})", do.Set(((self._machine, pin, level),)))
 
     @property
-    def events(self) -> list[Happened]:
+    def events(self) -> list[TwinEvent]:
         """What happened in it so far. The twin's."""
         __tracebackhide__ = True
         return self._on("events", lambda _: list(self._events))
@@ -245,11 +245,11 @@ class LineRig(Rig):
         return [FaultSeen(one["name"], one["fault"], one["happened"]) for one in self._do("faults", command.ListFaults())]
 
 
-def _shortened(told: object) -> str:
-    if not isinstance(told, FrameLine):
-        return str(told)
-    arrow = "→" if told.direction is FrameDirection.IN else "←"
-    return f"{told.time / SECOND:12.6f} s  {arrow} {textwrap.shorten(told.meaning, WIDTH, placeholder=' …')}"
+def _shortened(item: object) -> str:
+    if not isinstance(item, FrameLine):
+        return str(item)
+    arrow = "→" if item.direction is FrameDirection.IN else "←"
+    return f"{item.time / SECOND:12.6f} s  {arrow} {textwrap.shorten(item.meaning, WIDTH, placeholder=' …')}"
 
 
 def options_of(marker: str, kind: type[T], arguments: tuple[Any, ...], given: dict[str, Any]) -> T:

@@ -14,7 +14,7 @@ from steptwin.drivers.m1486.lines import BAUD, TALK, talking
 from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
 from steptwin.drivers.place import Channel, LineAddress
 from steptwin.drivers.threads import ThreadLine
-from steptwin.live.cell import Advancing
+from steptwin.live.cell import Advanceable
 from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
 from steptwin.mic488.config import ControllerConfig
 
@@ -25,9 +25,9 @@ LOOK_NS: Nanos = 10 * MILLISECOND
 
 
 class VirtualTime:
-    """Machines that are advanced by whoever waits. Nothing else ever happens, so a test gives the same result each time."""
+    """Machines that are advanced only while the test waits, so that it gives the same result each time."""
 
-    def __init__(self, machines: Advancing) -> None:
+    def __init__(self, machines: Advanceable) -> None:
         self.machines = machines
         self._planned: list[tuple[Nanos, int, Callable[[], object]]] = []
         self._count = count()

@@ -59,7 +59,7 @@ class BlockMatcher:
     def finish(self) -> Blocks:
         while self._stack:
             self._abandon()
-        # With an ELSE IF nobody knows how many ENDIFs were meant; it has been reported itself.
+        # With an ELSE IF the intended number of ENDIFs is unknown; the ELSE IF was reported.
         self._reported += [d for d in self._diagnostics if not (self._uncertain and d.code in _OF_IF)]
         return self.blocks
 

@@ -27,6 +27,8 @@ class CheckedProgram:
     executable: Executable | None
     lines: int
     diagnostics: list[Diagnostic]
+    positions: PositionTable | None = None
+    """The table in which names after @ were found."""
 
     @property
     def errors(self) -> list[Diagnostic]:
@@ -77,5 +79,5 @@ def check_program(
             diagnostics += usage.too_fast(executable, setup)
     wrong_somewhere = any(d.severity is Severity.ERROR for d in diagnostics)
     runs = resolution.complete and not wrong_somewhere
-    checked = CheckedProgram(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics))
+    checked = CheckedProgram(text, program, executable if runs else None, len(executable.steps), in_order(diagnostics), positions)
     return checked, resolution.scope

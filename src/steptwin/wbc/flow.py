@@ -33,6 +33,11 @@ def flow_of(executable: s.Executable) -> ControlFlow:
     return ControlFlow(steps, after, _returns(steps, after))
 
 
+def returning(steps: tuple[s.Step, ...]) -> list[bool]:
+    """Whether each step, and last the end, can come to a RETURN that takes back the JUMP which led to it."""
+    return _returns(steps, [_after(number, step) for number, step in enumerate(steps)])
+
+
 def _after(number: int, step: s.Step) -> tuple[int, ...]:
     """Where a step goes on. For JUMP: the next line, which it reaches only when its target can return."""
     return _AFTER[type(step)](number, step)
@@ -146,12 +151,12 @@ def unreached(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
                 continue
         work += flow.after[number]
     found: list[Diagnostic] = []
-    told = False
+    reported = False
     for number, step in enumerate(steps):
         if seen[number]:
-            told = False
-        elif not told and not isinstance(step, s.ElseStep | s.EndIfStep | s.EndWhileStep | s.ReturnStep | s.EndStep):
-            told = True
+            reported = False
+        elif not reported and not isinstance(step, s.ElseStep | s.EndIfStep | s.EndWhileStep | s.ReturnStep | s.EndStep):
+            reported = True
             found.append(f.NEVER_REACHED.at(step, "this line is never reached", "no label or interrupt leads here"))
     return found
 

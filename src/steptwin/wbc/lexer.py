@@ -28,8 +28,8 @@ class Lexeme(NamedTuple):
 
 
 # The order decides: a whole number before a part of one, long operators before short ones. A comma or point followed by a
-# digit is a decimal sign. A word takes in what nobody could have meant as something else (`a.b`, `a?`), so that the message
-# can speak of the name.
+# digit is a decimal sign. A word includes characters that cannot start anything else (`a.b`, `a?`), so that the message
+# names the whole word.
 _TOKEN = re.compile(
     r"""
       ( [0-9]+ (?: [.,][0-9]+ )? (?! [\w.] ) )

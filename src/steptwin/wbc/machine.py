@@ -20,7 +20,8 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.state import Stateful
-from steptwin.wbc.code import Code
+from steptwin.statements import StatementHook, StatementHooks, joined, without
+from steptwin.wbc.code import Cells, Code, Execution, StepCode
 from steptwin.wbc.controller import ProgramController
 from steptwin.wbc.looks import first_change
 
@@ -72,6 +73,9 @@ class Interpreter(Stateful):
 
     __slots__ = (
         "_base",
+        "_hooked",
+        "_hooks",
+        "_is_repeated",
         "_loop",
         "_mark",
         "_marks",
@@ -93,12 +97,13 @@ class Interpreter(Stateful):
         "pc",
         "pending",
         "rests",
+        "rests_in_loops",
         "running",
         "stack",
         "statement_time",
         "waiting",
     )
-    FIXED = frozenset({"controller", "rests", "statement_time"})
+    FIXED = frozenset({"_hooked", "_hooks", "_is_repeated", "controller", "rests", "rests_in_loops", "statement_time"})
 
     def __init__(self, controller: ProgramController, statement_time: Nanos = STATEMENT_TIME) -> None:
         if statement_time and not SHORTEST_STATEMENT_TIME <= statement_time <= LONGEST_STATEMENT_TIME:
@@ -107,6 +112,13 @@ class Interpreter(Stateful):
         self.controller = controller
         self.rests = True
         """Off, every look is taken: what tests compare with."""
+        self.rests_in_loops = True
+        """Off, every statement of a loop is executed; WAIT alone rests."""
+        self._hooks: StatementHooks = ()
+        self._hooked: tuple[Code, tuple[StepCode, ...]] | None = None
+        """Code, and its steps with hooks."""
+        self._is_repeated = False
+        """The next statement is in progress already: it looks again, and no hook is called."""
         self.statement_time = statement_time
         self.cells = array("f")
         self.now: Nanos = 0
@@ -281,11 +293,44 @@ class Interpreter(Stateful):
             elif not self._record(code, self._trail, until):
                 return
 
+    # ------------------------------------------------------------------ hooks
+
+    def hook(self, hook: StatementHook) -> None:
+        """Call ``hook`` before each statement from now on."""
+        self._hooks = (*self._hooks, hook)
+        self._hooked = None
+
+    def unhook(self, hook: StatementHook) -> None:
+        self._hooks = without(self._hooks, hook)
+        self._hooked = None
+
+    def _steps(self, code: Code) -> tuple[StepCode, ...]:
+        """What is executed for each step."""
+        if not self._hooks:
+            return code.steps
+        self._is_repeated = self.waiting
+        if self._hooked is None or self._hooked[0] is not code:
+            call = joined(self._hooks)
+            self._hooked = code, tuple(self._with_hook(call, number, step) for number, step in enumerate(code.steps))
+        return self._hooked[1]
+
+    def _with_hook(self, hook: StatementHook, number: int, code: StepCode) -> StepCode:
+        def step(machine: Execution, cells: Cells) -> int:
+            if self._is_repeated:
+                self._is_repeated = False
+            else:
+                hook(machine.now, number)
+            return code(machine, cells)
+
+        return step
+
+    # ------------------------------------------------------------------ the statements
+
     def _dash(self, code: Code, until: Nanos) -> bool:
         """Execute until something has to be looked at. True: go on, now recording."""
-        steps, cells, pause = code.steps, self.cells, self.statement_time
+        steps, cells, pause = self._steps(code), self.cells, self.statement_time
         pc, now, unmarked = self.pc, self.now, self._unmarked
-        marks = self.rests
+        marks = self.rests and self.rests_in_loops
         self.waiting = False
         self.not_before = 0
         try:
@@ -315,7 +360,7 @@ class Interpreter(Stateful):
 
     def _dash_at_once(self, code: Code) -> None:
         """`_dash` without time: up to `STATEMENTS_AT_ONCE` statements at this moment, then a breath."""
-        steps, cells = code.steps, self.cells
+        steps, cells = self._steps(code), self.cells
         pc, executed, acted = self.pc, self._spent, 0
         self.waiting = False
         self.not_before = 0
@@ -376,7 +421,7 @@ class Interpreter(Stateful):
 
     def _record(self, code: Code, trail: list[Visit], until: Nanos) -> bool:
         """As `_dash`, noting every visit, until the loop is closed or turns out to be none. True: go on, not recording."""
-        steps, cells, pause = code.steps, self.cells, self.statement_time
+        steps, cells, pause = self._steps(code), self.cells, self.statement_time
         while len(trail) < LONGEST_LOOP:
             now = self.now
             visit = self._visit(now - self._mark)
@@ -475,4 +520,4 @@ class Interpreter(Stateful):
             return visit.step - 1 if visit.held else visit.step
         if self.paused_at is not None:
             now = self.paused_at
-        return self.pc - 1 if self.not_before > now else self.pc
+        return self.pc - 1 if self.not_before > self.after(now) else self.pc

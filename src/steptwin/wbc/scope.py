@@ -129,7 +129,7 @@ class Scope:
     def value(self, node: Value, other: Value | None = None, *, is_row: bool = False) -> Source | None:
         """The value of a number or name; None after reporting an error.
 
-        ``other`` is what it is compared with or given to: that tells which names were possible. ``is_row``: a row of the
+        ``other`` is what it is compared with or assigned to, which determines the possible names. ``is_row``: a row of the
         position table is wanted.
         """
         if isinstance(node, DecimalNumber):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 
 from steptwin.diagnostics import Span
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.wbc.events import BY_LABEL
 from steptwin.wbc.lexer import WORD, is_name, tokens
 from steptwin.wbc.registers import PREDEFINED, parts
@@ -51,10 +51,10 @@ def kind_of(key: str, scope: Scope) -> SymbolKind | None:
 def of_statement(statement: Statement, scope: Scope) -> Iterator[Use]:
     match statement:
         case ConstantDefinition(name=name, value=value):
-            yield _use(name, SymbolKind.CONSTANT, Role.DEFINE)
+            yield _use(name, SymbolKind.CONSTANT, SymbolRole.DEFINE)
             yield from _value(value, scope)
         case Label(name=name):
-            yield _use(name, SymbolKind.LABEL, Role.DEFINE)
+            yield _use(name, SymbolKind.LABEL, SymbolRole.DEFINE)
         case Assign(target=target, value=value):
             yield from _target(target, scope)
             yield from _value(value, scope)
@@ -70,7 +70,7 @@ def of_statement(statement: Statement, scope: Scope) -> Iterator[Use]:
             return
 
 
-def _use(name: Identifier, kind: SymbolKind, role: Role = Role.READ) -> Use:
+def _use(name: Identifier, kind: SymbolKind, role: SymbolRole = SymbolRole.READ) -> Use:
     return Use(Symbol(kind, name.key, name.text), Span(name.start, name.end), role)
 
 
@@ -78,7 +78,7 @@ def _target(name: Identifier, scope: Scope) -> Iterator[Use]:
     kind = kind_of(name.key, scope)
     if kind is not None:
         first = kind is SymbolKind.VARIABLE and scope.variables[name.key].start == name.start
-        yield _use(name, kind, Role.DEFINE if first else Role.WRITE)
+        yield _use(name, kind, SymbolRole.DEFINE if first else SymbolRole.WRITE)
 
 
 def _value(node: Expression | Operand, scope: Scope) -> Iterator[Use]:
@@ -121,7 +121,7 @@ def _word(name: Identifier, before: str, after: str, scope: Scope, statement: Br
     elif before == "JUMP":
         yield _use(name, SymbolKind.LABEL)
     elif label is not None and name.start == label.start:
-        yield _use(name, SymbolKind.LABEL, Role.DEFINE)
+        yield _use(name, SymbolKind.LABEL, SymbolRole.DEFINE)
     elif after == "(" and name.key in FUNCTIONS:
         yield _use(name, SymbolKind.FUNCTION)
     elif target is not None and name.start == target.start:

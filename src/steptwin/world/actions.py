@@ -1,4 +1,4 @@
-"""What steps and programs outside do to a world, each at the present moment."""
+"""The actions of steps and of external programs on a world, at the present moment."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args
 
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 from steptwin.world import script as do
 from steptwin.world.kernel import Kernel, PinName
+from steptwin.world.kind import lacks
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.master import ANSWER_NS
+from steptwin.world.programtexts import Destination, name_of_text
 from steptwin.world.trace import TraceRecord
 
 if TYPE_CHECKING:
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Bytes(NamedTuple):
-    """Bytes of a program outside at its place on a line."""
+    """Bytes that an external program sends at its place on a line."""
 
     line: str
     place: str
@@ -29,7 +32,7 @@ class Bytes(NamedTuple):
 
 
 class See(NamedTuple):
-    """A record of a vision system comes to a MIC488."""
+    """A record of a vision system arrives at a controller."""
 
     machine: str
     number: float
@@ -38,26 +41,50 @@ class See(NamedTuple):
     angle: float
 
 
+class Download(NamedTuple):
+    """A text goes into the program memory of a controller."""
+
+    machine: str
+    place: str
+    """One of the places of `steptwin.world.programtexts.program_texts`."""
+    text: str
+
+
+class SetVariable(NamedTuple):
+    """A debugger sets a variable of a controller's program."""
+
+    machine: str
+    name: str
+    value: float
+
+
 class Leave(NamedTuple):
-    """A program outside has gone."""
+    """An external program has disconnected."""
 
     line: str
     place: str
 
 
-Outside: TypeAlias = do.Step | Bytes | See | Leave
-"""What comes from outside a world. Recorded with its moment, it can be replayed."""
+ExternalInput: TypeAlias = do.Step | Bytes | See | SetVariable | Download | Leave
+"""An input from outside a world. Recorded with its moment, it can be replayed."""
+
+
+def size_of(what: ExternalInput) -> int:
+    """Bytes of a program outside in it, which have no bound of their own."""
+    if isinstance(what, Download):
+        return len(what.text)
+    return len(what.data) if isinstance(what, Bytes) else 0
 
 
 FOR_SCRIPTS = frozenset({do.Wait, do.At, do.Until, do.Stop, do.Read, do.Call, do.Repeat})
-"""Steps that only scripts can take; every other one has its action here."""
+"""Steps that only scripts can execute; all others have their action here."""
 
 
-def act(plant: Plant, what: Outside) -> None:
-    """Raises `Misuse` for what is not there, and for steps that only scripts can take."""
+def act(plant: Plant, what: ExternalInput) -> None:
+    """Execute an external input. Raises `Misuse` for unknown names, and for steps that only scripts can execute."""
     action = ACTIONS.get(type(what))
     if action is None:
-        raise Misuse(f"{what}: this is for scripts")
+        raise Misuse(f"{what}: only scripts can execute this step")
     action(plant, what)
 
 
@@ -67,7 +94,7 @@ def _record(plant: Plant, machine: str, what: str, value: object) -> None:
 
 @contextmanager
 def _now(plant: Plant, name: str) -> Generator[Kernel]:
-    """The kernel of a machine or line at this moment; what an action leads to happens when it is done."""
+    """The kernel of a machine or line, advanced to the present; it settles after the action."""
     kernel = plant.touch(name)
     yield kernel
     kernel.settle()
@@ -77,13 +104,13 @@ def _set(plant: Plant, step: do.Set) -> None:
     for name, pin, value in step.levels:
         known = plant.input_pin(name, pin, value)
         with _now(plant, name) as kernel:
-            kernel.give(PinName(name, known), value)
+            kernel.set_input(PinName(name, known), value)
 
 
 def _press(plant: Plant, step: do.Press) -> None:
     _move_button(plant, step.button, pressed=True)
     if step.duration is not None:
-        plant.do_later(_releasing(step.button), (do.Wait(step.duration), do.Release(step.button)))
+        plant.schedule(_releasing(step.button), (do.Wait(step.duration), do.Release(step.button)))
 
 
 def _release(plant: Plant, step: do.Release) -> None:
@@ -91,30 +118,32 @@ def _release(plant: Plant, step: do.Release) -> None:
 
 
 def _releasing(button: str) -> str:
-    """The script that releases a button after a time; no script of a description has a blank in its name."""
+    """The name of the script that releases a button after a time. Scripts of a description have no blank in their names."""
     return f"release {button}"
 
 
 def _move_button(plant: Plant, name: str, *, pressed: bool) -> None:
     button, _ = plant.button(name)
-    plant.call_off(_releasing(name))
-    with _now(plant, button.target.machine):
-        _record(plant, button.target.machine, name, "pressed" if pressed else "released")
+    plant.unschedule(_releasing(name))
+    with _now(plant, button.machine):
+        _record(plant, button.machine, name, "pressed" if pressed else "released")
         button.press(pressed, plant.now)
 
 
 def _write(plant: Plant, step: do.Write) -> None:
+    parts, now = plant.parts, plant.now
     for name, values in plant.by_machine(step):
-        registers = plant.registers(name)
-        with _now(plant, name):
-            on = plant.plan.line_of.get(name)
-            for pdu in plant.requests(name, values):
-                if on is not None:
-                    line, unit = on
-                    line.master.ask(encode_frame(unit, pdu), ANSWER_NS, plant.now)
-                else:
-                    _record(plant, name, "request", pdu)
-                    registers.execute(plant.machine(name), pdu, plant.now)
+        execute = plant.registers(name).execute
+        kernel = plant.touch(name)  # as `_now` does: every write of every script comes here
+        machine, on = parts.machines[name], parts.line_of.get(name)
+        for pdu in plant.requests(name, values):
+            if on is not None:
+                line, unit = on
+                line.master.ask(encode_frame(unit, pdu), ANSWER_NS, now)
+            else:
+                _record(plant, name, "request", pdu)
+                execute(machine, pdu, now)
+        kernel.settle()
 
 
 def _request(plant: Plant, step: do.Request) -> None:
@@ -141,6 +170,27 @@ def _see(plant: Plant, given: See) -> None:
     with _now(plant, given.machine):
         _record(plant, given.machine, "vision", given[1:])
         vision.see(plant.machine(given.machine), given[1:], plant.now)
+
+
+def _download(plant: Plant, given: Download) -> None:
+    kind = plant.kind(given.machine)
+    if kind.download is None:
+        raise lacks(given.machine, kind, "program memory")
+    with _now(plant, given.machine):
+        on = plant.parts.line_of.get(given.machine)
+        source = SourceText(name_of_text(plant, given.machine, given.place), given.text)
+        to = Destination(given.machine, None if on is None else on[0].name, given.place)
+        found = kind.download(plant.machine(given.machine), to, source)
+        found.put(plant.now)
+        _record(plant, given.machine, "download", given.place)
+        plant.downloaded[given.machine, given.place] = source
+    if found.typed:
+        plant.schedule(f"download {given.machine}", found.typed)
+
+
+def _set_variable(plant: Plant, given: SetVariable) -> None:
+    with _now(plant, given.machine):
+        plant.programs_of(given.machine).set_variable(given.name, given.value, plant.now)
 
 
 def _leave(plant: Plant, given: Leave) -> None:
@@ -175,8 +225,8 @@ def _set_fault(plant: Plant, step: do.SetFault) -> None:
 
 
 def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
-    faults = plant.plan.faults
-    if step.name in (active.name for active in faults.active):  # else it has been cleared already, or is not set yet
+    faults = plant.parts.faults
+    if step.name in (active.name for active in faults.active):  # otherwise it was cleared already or is not set yet
         plant.settle_all()
         faults.remove(step.name, plant.now)
 
@@ -187,13 +237,14 @@ def _expect(plant: Plant, step: do.Expect) -> None:
 
 def _note(plant: Plant, step: do.Note) -> None:
     if plant.trace.watchers:
-        plant.settle_all()  # what happened before is shown before
+        plant.settle_all()  # earlier events are shown first
+
     plant.trace.add(TraceRecord(plant.now, "world", "event", "note", step.text))
 
 
 ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
     "step",
-    [kind for kind in get_args(Outside) if kind not in FOR_SCRIPTS],
+    [kind for kind in get_args(ExternalInput) if kind not in FOR_SCRIPTS],
     "action",
     {
         do.Set: _set,
@@ -211,6 +262,8 @@ ACTIONS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.Note: _note,
         Bytes: _bytes,
         See: _see,
+        Download: _download,
+        SetVariable: _set_variable,
         Leave: _leave,
     },
 )

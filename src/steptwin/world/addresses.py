@@ -29,8 +29,8 @@ def parse_address(text: str, *, listen_any: bool) -> Address:
         raise Misuse(f"{text!r} is not an address: expected HOST:PORT with a port from 0 to 65535, such as 127.0.0.1:5020")
     if not listen_any and not is_loopback(host):
         raise Misuse(
-            f"{host} is not a loopback address: the protocols served here have no authentication, whoever reaches the port "
-            "moves the axes; --listen-any permits it"
+            f"{host} is not a loopback address: the protocols served here have no authentication, every program that reaches the "
+            "port can move the axes; --listen-any permits it"
         )
     return Address(host, int(number))
 

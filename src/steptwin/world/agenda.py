@@ -1,7 +1,7 @@
-"""When waiting scripts are evaluated: at fixed moments, and when a kernel has changed on which their condition depends.
+"""Scheduling of waiting scripts: at fixed moments, and when a kernel changes on which their condition depends.
 
-A watching script is evaluated when its due moment has come or one of its kernels has changed, never because of other scripts. So
-the cost of a world grows with the number of its events only.
+A script with a condition is evaluated only at its due moment or when one of its kernels has changed. The cost of a world
+therefore grows with the number of its events, not with the number of its scripts.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from steptwin.world.kernel import Kernel
 from steptwin.world.running import Script
 
 _FEW = 64
-"""Outdated entries of a queue that are not worth removing."""
+"""Number of outdated entries that a queue tolerates before it removes them."""
 
 
 class _Queue:
-    """Scripts by the moments at which they are due, those of one moment in their order.
+    """A priority queue of scripts by due moment; scripts due at the same moment keep their order.
 
-    A script has one entry in all queues that share ``count``, which gives each entry a number: the last one made for it.
+    Only the last entry of a script is valid. Entries are numbered by ``count``, which several queues share.
     """
 
     __slots__ = ("_count", "_entries", "_room")
@@ -32,7 +32,7 @@ class _Queue:
         self._room = _FEW
 
     def put(self, script: Script, due: Nanos) -> None:
-        """A script is due at ``due``, and at no other moment."""
+        """Make a script due at ``due``, instead of at an earlier entry."""
         script.entry = next(self._count)
         heappush(self._entries, (due, script.number, script.entry, script))
         if len(self._entries) > self._room:
@@ -41,14 +41,14 @@ class _Queue:
             self._room = 2 * len(self._entries) + _FEW
 
     def first(self) -> Nanos | None:
-        """The first moment at which one is due."""
+        """The earliest due moment; None if the queue is empty."""
         entries = self._entries
         while entries and entries[0][3].entry != entries[0][2]:
             heappop(entries)
         return entries[0][0] if entries else None
 
     def take(self, now: Nanos) -> Script | None:
-        """One that is due by ``now``, which is then due no more."""
+        """Remove and return a script that is due by ``now``; None if there is none."""
         first = self.first()
         if first is None or first > now:
             return None
@@ -58,7 +58,7 @@ class _Queue:
 
 
 class Agenda:
-    """The scripts that wait, each in one of two ways."""
+    """The waiting scripts: those that wait for a moment, and those that wait for a condition or an answer."""
 
     __slots__ = ("_timed", "_watching")
 
@@ -68,30 +68,30 @@ class Agenda:
         self._watching = _Queue(numbers)
 
     def wait(self, script: Script, until: Nanos) -> None:
-        """A script waits for a moment."""
+        """Let a script wait for a moment."""
         self._timed.put(script, until)
 
     def watch(self, script: Script, due: Nanos | None) -> None:
-        """A watching script is evaluated at ``due``; None: only when a kernel has changed."""
+        """Let a script be evaluated at ``due``; None: only when a kernel has changed."""
         script.entry = 0
         if due is not None:
             self._watching.put(script, due)
 
     def remove(self, script: Script) -> None:
-        """A script waits no longer: its entry is outdated."""
+        """Remove a script: its entry becomes outdated."""
         script.entry = 0
 
     def first(self) -> Nanos | None:
-        """The first moment at which a script is due."""
+        """The earliest moment at which a script is due."""
         timed, watching = self._timed.first(), self._watching.first()
         return watching if timed is None else timed if watching is None else min(timed, watching)
 
     def take_timed(self, now: Nanos) -> Script | None:
-        """One whose moment has come, which then waits no longer."""
+        """Remove and return a script whose moment has come; None if there is none."""
         return self._timed.take(now)
 
     def take_watching(self, now: Nanos) -> list[Script]:
-        """Those that watch and are due."""
+        """Remove and return the scripts that are due for evaluation."""
         taken = []
         while (script := self._watching.take(now)) is not None:
             taken.append(script)
@@ -105,13 +105,13 @@ class Watchers:
 
     def __init__(self) -> None:
         self._watch: Callable[[Kernel], None] | None = None
-        """Called with every kernel that has changed, also those on which no script depends."""
+        """Called with every changed kernel, including those on which no script depends."""
         self._scripts: dict[Kernel, dict[int, Script]] = {}
         self._changed: dict[Kernel, None] = {}
         self._again: dict[int, Script] = {}
 
     def set(self, script: Script, kernels: tuple[Kernel, ...]) -> None:
-        """A script depends on these kernels, and on no others any more."""
+        """Replace the kernels on which a script depends."""
         if kernels == script.kernels:
             return
         for kernel in script.kernels:
@@ -126,7 +126,7 @@ class Watchers:
             kernel.on_change = self.change
 
     def change(self, kernel: Kernel) -> None:
-        """Scripts that depend on ``kernel`` have to be evaluated."""
+        """Register a change of ``kernel``: the scripts that depend on it have to be evaluated."""
         self._changed[kernel] = None
         if self._watch is not None:
             self._watch(kernel)
@@ -139,11 +139,11 @@ class Watchers:
                 kernel.on_change = watch
 
     def again(self, script: Script) -> None:
-        """A script was evaluated and has to wait on."""
+        """Evaluate a script again with the next `take`."""
         self._again[script.number] = script
 
     def take(self) -> list[Script]:
-        """The scripts for which something has changed, in their order."""
+        """The scripts that have to be evaluated, in their order."""
         if not self._changed and not self._again:
             return []
         found, self._again = self._again, {}

@@ -1,4 +1,4 @@
-"""From a description to machines in kernels: one kernel for all that is joined by wires, lines and mechanics."""
+"""Builds machines and kernels from a description: one kernel for all that is connected by wires, lines and mechanics."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from functools import partial
 from typing import Any
 
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, SourceErrors
 from steptwin.machine import MachineEvent, Nanos
-from steptwin.world.element import AnyElement, ElementSpec, Reference
+from steptwin.world.board import Board
+from steptwin.world.element import AnyElement, ElementSpec, NamedSpec, Reference
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.faults import Faults
 from steptwin.world.faults.element import FaultyElement
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import Member
+from steptwin.world.kind import Member, Terminals
 from steptwin.world.kinds import line_kinds
 from steptwin.world.parts import WorldParts
 from steptwin.world.site import Site
@@ -24,12 +25,19 @@ from steptwin.world.trace import Recorder, TraceRecord
 Files = Mapping[str, bytes]
 """Contents of the files a description names, and of non-volatile memories (`memory_file`)."""
 Keep = Callable[[str, bytes, Nanos], None]
-"""Keeps the new non-volatile memory of a controller that is named, at a moment, and returns when it is safe. Raises `OSError`."""
+"""Stores the non-volatile memory of a controller (name, contents, moment); returns when it is on disk. Raises `OSError`."""
 
 
 def memory_file(name: str) -> str:
-    """The name among the files of a world of what a controller has in its non-volatile memory at first."""
+    """The name, among the files of a world, of the initial non-volatile memory of a controller."""
     return f"state:{name}"
+
+
+def beside(description: str, name: str) -> str:
+    """The path of a file that a description names, for a user: seen from where the path of the description is seen from."""
+    is_absolute = name.startswith(("/", "\\")) or name[1:2] == ":"
+    folder = "" if is_absolute else description[: max(map(description.rfind, "/\\")) + 1]
+    return folder + name
 
 
 def build(spec: WorldSpec, files: Files, record: Recorder, keep: Keep | None = None) -> WorldParts:
@@ -76,17 +84,22 @@ class _Builder:
             raise Misuse(f"the content of the file {name!r} is not given with the description")
         return found
 
-    def warn(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
-        """As `BuildContext.warn`."""
-        shown = [finding for finding in findings if finding.severity is Severity.WARNING]
-        if shown and (text := render(source, shown)) not in self.parts.warnings:
+    def accept(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
+        """As `BuildContext.accept`."""
+        shown = SourceText(beside(self.spec.text.source.name, source.name), source.text)
+        found = tuple(findings)
+        if errors := [one for one in found if one.severity is Severity.ERROR]:
+            raise SourceErrors(render(shown, errors))
+        warnings = [one for one in found if one.severity is Severity.WARNING]
+        if warnings and (text := render(shown, warnings)) not in self.parts.warnings:
             self.parts.warnings.append(text)
 
     # ------------------------------------------------------------------ kernels
 
     def _make_kernels(self) -> None:
-        """Machines that share a line, a wire or mechanics share a kernel; kernels go by their first machine."""
-        joined = {name: name for name in [*self.parts.machines, *(line.name for line in self.spec.lines)]}
+        """Machines connected by a line, a wire or mechanics share a kernel; kernels are ordered by their first machine."""
+        boards = {spec.name: (spec, terminals) for spec, terminals in self._boards()}
+        joined = {name: name for name in [*self.parts.machines, *(line.name for line in self.spec.lines), *boards]}
 
         def root(name: str) -> str:
             while joined[name] != name:
@@ -115,6 +128,21 @@ class _Builder:
             self.parts.kernel_of[root(name)] = self.parts.kernel_of[name] = kernel
             if name in self.parts.machines:
                 kernel.add(name, self.parts.machines[name])
+            elif name in boards:
+                spec, terminals = boards[name]
+                self._add_board(spec, terminals, kernel)
+
+    def _boards(self) -> Iterator[tuple[NamedSpec, Terminals]]:
+        for element in ELEMENTS.values():
+            if element.terminals is not None:
+                for spec in element.named(self.spec.elements[element.name]):
+                    yield spec, element.terminals(spec)
+
+    def _add_board(self, spec: NamedSpec, terminals: Terminals, kernel: Kernel) -> None:
+        if not kernel.machines and not self.spec.text.findings:
+            self.spec.text.wrong(spec.path, "D009", f"nothing joins {spec.name!r} to a controller")
+        self.parts.terminals[spec.name] = terminals
+        kernel.add_board(Board(kernel, spec.name, (*terminals.digital_inputs, *terminals.analog_inputs), terminals.outputs))
 
     def _joints(self) -> Iterator[Reference]:
         spec = self.spec
@@ -166,7 +194,7 @@ class _Builder:
             self.site.close_circuits()
 
     def _element(self, element: AnyElement, spec: ElementSpec) -> Any:
-        """What was built of it; None where something is wrong with it."""
+        """The built element; None if it has errors."""
         found: list[Any] = []
         self.site.unless_wrong(spec.path, lambda: found.append(element.build(spec, self.site)))
         if not found:
@@ -174,7 +202,7 @@ class _Builder:
         for named in element.named((spec,)):
             self.parts.elements.setdefault(element.name, {})[named.name] = found[0]
             if element.faults:
-                kernel = self.site.kernel(next(iter(element.refers(spec, self.spec))).one)
+                kernel = self.site.kernel_of(element, named)
                 failing = FaultyElement(kernel, named.name, self.parts.faults, element.faults, found[0])
                 self.parts.faults.elements[named.name] = failing
                 kernel.add_part(failing)

@@ -1,8 +1,6 @@
-"""Contacts that drive inputs, alone or several in parallel or in series.
+"""Contacts that drive inputs, alone or several in parallel or in series: switches actuated by an axis, and push-buttons.
 
-They are switches that an axis runs over, and buttons that a person presses. All may bounce.
-
-Positions in pulses of whatever carries the switch.
+All contacts may bounce. Positions in pulses of the axis.
 """
 
 from __future__ import annotations
@@ -22,20 +20,20 @@ from steptwin.world.kernel import Kernel, PinName
 
 
 class Carriage(Protocol):
-    """What runs over switches."""
+    """The moving part that actuates switches."""
 
     def version(self) -> object:
-        """Another value whenever predictions no longer hold."""
+        """A value that changes whenever predictions become invalid."""
         ...
 
     def place(self, now: Nanos) -> int: ...
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
-        """First moment > ``after`` at which it has come to ``position`` going in ``direction``, or beyond; None if never."""
+        """First moment > ``after`` at which it reaches or passes ``position`` in ``direction``; None if never."""
         ...
 
 
 class CountedPosition:
-    """A carriage that is where its drive has counted to, in pulses since power-on."""
+    """A carriage at the counted position of its drive, in pulses since power-on."""
 
     __slots__ = ("_drive",)
 
@@ -133,6 +131,11 @@ class Circuit:
         self.in_series = in_series
         self.contacts: list[Contact] = []
 
+    @property
+    def machine(self) -> str:
+        """Under which its contacts are recorded."""
+        return self._kernel.owner(self.target.machine)
+
     def close(self) -> None:
         """The input takes what its contacts give it now."""
         levels = [contact.level for contact in self.contacts]
@@ -144,7 +147,7 @@ class Circuit:
 
     def report(self, lane: str, level: float) -> None:
         """The level of one of the contacts, whatever the input has of it."""
-        self._kernel.report(self.target.machine, "edge", lane, level)
+        self._kernel.report(self.machine, "edge", lane, level)
 
 
 class Contact(Stateful):
@@ -185,11 +188,16 @@ class Contact(Stateful):
 
     @property
     def target(self) -> PinName:
-        """The input it drives."""
+        """The input that it drives."""
         return self._circuit.target
 
+    @property
+    def machine(self) -> str:
+        """Under which it is recorded."""
+        return self._circuit.machine
+
     def rest_at(self, closed: bool) -> None:
-        """Its state before anything has happened, which its input takes with `Circuit.close`."""
+        """Set its initial state; the input takes it with `Circuit.close`."""
         self.closed = self.level = closed
         self._report()
 
@@ -222,7 +230,7 @@ class Contact(Stateful):
 
 
 class Button(Contact):
-    """A button, pressed and released from outside."""
+    """A push-button, operated by external inputs."""
 
     __slots__ = ()
 
@@ -235,7 +243,7 @@ class Button(Contact):
     def pressed(self) -> bool:
         return self.closed is not self.normally_closed
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         self.bounce(now)
 
     def deadline(self) -> Nanos | None:
@@ -243,7 +251,7 @@ class Button(Contact):
 
 
 class Switch(Contact):
-    """A switch that is on while a carriage stands in its zone."""
+    """A switch that is on while a carriage is in its zone."""
 
     __slots__ = ("_carriage", "_version", "on", "zone")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_carriage", "_version", "zone"}) | Contact.FIXED
@@ -270,7 +278,7 @@ class Switch(Contact):
         self.rest_at(self.on is not normally_closed)
         self._predict(carriage.place(now), now)
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         if self._bouncing:
             self.bounce(now)
         version = self._carriage.version()
@@ -295,7 +303,7 @@ class Switch(Contact):
 
 @dataclass(frozen=True, slots=True)
 class PositionSwitch:
-    """A switch that is on while an axis stands from ``low`` to ``high`` (counted pulses since power-on; None is open).
+    """A switch that is on while an axis is between ``low`` and ``high`` (counted pulses since power-on; None is unbounded).
 
     ``axis`` counts from 1. ``normally_closed`` gives 0 while the switch is on.
     """
@@ -315,7 +323,7 @@ class PositionSwitch:
 
 
 def place(kernel: Kernel, switch: PositionSwitch) -> None:
-    """Add a switch; its input takes its present state at once."""
+    """Add a switch and drive its input to the present state."""
     kernel.check(switch.target)
     try:
         drive = kernel.drive_of(switch.machine, switch.axis)

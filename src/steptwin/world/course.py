@@ -1,15 +1,16 @@
-"""Where an axis really is while its drive follows one plan: in closed form, from the state it began with.
+"""The true position of an axis while its drive follows one plan, in closed form from its initial state.
 
-All positions are whole pulses in the frame of the mechanics, which has its zero where the description of the axis says. The
-*field* is where the pulses given so far would have the rotor. The *rotor* follows the field, less what was lost, and stands
-where a stop or a lack of torque holds it. The *load* is moved by the rotor through backlash of ``play`` pulses: it is at the
-rotor after a way up, and ``play`` above it after a way down.
+All positions are whole pulses in the frame of the mechanics, whose zero is given by the description of the axis. The *field* is
+the commanded position. The *rotor* follows the field, less the lost pulses, and stops where a hard stop or insufficient torque
+holds it. The *load* follows the rotor through backlash of ``play`` pulses: it is at the rotor after upward motion, and ``play``
+above it after downward motion.
 
-A rotor that was held is drawn to the nearest place with the electrical angle of the field as soon as that stands or turns: what
-is lost is a whole number of electrical periods (four full steps). That place may be up to two full steps before a stop, and the
-rotor springs back there; or as far beyond it, and the rotor leaves the stop when the field has come back so far.
+A rotor that was held synchronises at the nearest position with the electrical angle of the field as soon as the field stops or
+reverses: the loss is a whole number of electrical periods (four full steps). If that position is up to two full steps before a
+stop, the rotor springs back to it; if it is beyond the stop, the rotor leaves the stop when the field has returned that far.
 
-Between two turns of the field both are what they were, or the field and a constant: a course is a list of such pieces.
+Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a course is a list of
+such pieces.
 """
 
 from __future__ import annotations
@@ -28,35 +29,35 @@ from steptwin.world.motor import StepperMotor
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """How an axis is built, in pulses of the mechanics."""
+    """Construction data of an axis, in pulses of the mechanics."""
 
     sign: int = 1
     """Direction for positive pulses."""
     zero: int = 0
-    """Where the axis stands when its drive has given no pulse."""
+    """Position of the axis at count 0 of its drive."""
     low: int | None = None
     high: int | None = None
     """Hard stops of the load."""
     play: int = 0
     period_p: int = 1
-    """An electrical period of the motor, four full steps: a rotor that was held is caught at a multiple of it."""
+    """Electrical period of the motor (four full steps): pulses are lost in multiples of it."""
     motor: StepperMotor | None = None
 
     @property
     def ideal(self) -> bool:
-        """Whether the load cannot but be where the field is."""
+        """Whether the load is always at the position of the field."""
         return self.low is None and self.high is None and self.play == 0 and self.motor is None
 
 
-class Standing(NamedTuple):
+class MechanicalState(NamedTuple):
     """State of an axis at a moment."""
 
     rotor: int
     load: int
     stalled: bool = False
-    """The rotor has lost the field."""
+    """Whether the motor has stalled."""
     behind: int = 0
-    """How far behind the field the place is to which it draws the rotor. The rotor is there, unless something holds it."""
+    """Distance of the rotor's equilibrium position behind the field. The rotor is there unless something holds it."""
 
 
 class CoursePiece(NamedTuple):
@@ -72,7 +73,7 @@ class CoursePiece(NamedTuple):
     behind: int
 
 
-class Carried(NamedTuple):
+class LoadPiece(NamedTuple):
     """From ``begin`` on the load is ``pulses`` from where the drive has counted to (``follows``), or stands at ``pulses``.
 
     In pulses of the drive, whose direction and zero it has.
@@ -86,10 +87,10 @@ class Carried(NamedTuple):
 class Course:
     """The way of an axis from ``begin`` on while ``plan`` is in force; immutable. ``blocked``: nothing moves the rotor."""
 
-    __slots__ = ("_laid", "_now", "_standing", "begin", "blocked", "build", "plan")
+    __slots__ = ("_laid", "_now", "_state", "begin", "blocked", "build", "plan")
 
     def __init__(
-        self, build: Build, plan: Plan, begin: Nanos, standing: Standing, *, blocked: bool = False, jump: float = 0.0
+        self, build: Build, plan: Plan, begin: Nanos, state: MechanicalState, *, blocked: bool = False, jump: float = 0.0
     ) -> None:
         """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``."""
         self.build = build
@@ -99,8 +100,8 @@ class Course:
         self._laid: list[CoursePiece] = []
         motor = build.motor
         if motor is not None and not motor.follows(jump) and profile_of(plan).moving(begin):
-            standing = standing._replace(stalled=True)
-        self._standing = self._now = standing
+            state = state._replace(stalled=True)
+        self._state = self._now = state
 
     # ------------------------------------------------------------------ questions
 
@@ -114,7 +115,7 @@ class Course:
     @property
     def is_exact(self) -> bool:
         """Whether not a pulse is lost, before or on this course."""
-        begin = self._standing
+        begin = self._state
         if self.blocked or begin.rotor != self.field(self.begin):
             return False
         build, profile = self.build, profile_of(self.plan)
@@ -127,13 +128,13 @@ class Course:
     def field(self, now: Nanos) -> int:
         return self.build.sign * self.plan.count(now) + self.build.zero
 
-    def at(self, now: Nanos) -> Standing:
+    def at(self, now: Nanos) -> MechanicalState:
         """Where everything is at ``now``, not before ``begin``."""
         piece = self._piece(now)
         field = self.field(now) if piece.rotor_follows or piece.load_follows else 0
         rotor = piece.rotor + field if piece.rotor_follows else piece.rotor
         load = piece.load + field if piece.load_follows else piece.load
-        return Standing(rotor, load, piece.stalled, piece.behind)
+        return MechanicalState(rotor, load, piece.stalled, piece.behind)
 
     def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
         """First moment > ``after`` at which the load (or the rotor) has come to ``position`` in ``direction``, or beyond."""
@@ -157,17 +158,17 @@ class Course:
         stalled = self._piece(after).stalled
         return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
 
-    def carried(self) -> tuple[Carried, ...]:
+    def load_pieces(self) -> tuple[LoadPiece, ...]:
         """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""
         build, end = self.build, profile_of(self.plan).end
-        found: list[Carried] = []
+        found: list[LoadPiece] = []
         for piece in self.pieces:
             if piece.load_follows:
-                now = Carried(piece.begin, True, piece.load * build.sign)
+                now = LoadPiece(piece.begin, True, piece.load * build.sign)
             elif end is not None and piece.begin >= end:
-                now = Carried(piece.begin, True, (piece.load - self.field(piece.begin)) * build.sign)
+                now = LoadPiece(piece.begin, True, (piece.load - self.field(piece.begin)) * build.sign)
             else:
-                now = Carried(piece.begin, False, (piece.load - build.zero) * build.sign)
+                now = LoadPiece(piece.begin, False, (piece.load - build.zero) * build.sign)
             if found and found[-1].begin == now.begin:
                 found.pop()
             if not found or found[-1][1:] != now[1:]:
@@ -273,7 +274,7 @@ class Course:
             if stop is not None and (rotor - stop) * direction > 0:
                 rotor = stop
             carried = rotor + slack
-            self._now = Standing(rotor, carried if (carried - load) * direction > 0 else load, False, behind)
+            self._now = MechanicalState(rotor, carried if (carried - load) * direction > 0 else load, False, behind)
 
     def _is_pushed(self, now: Nanos, direction: int) -> bool:
         """Whether the field goes on against the stop at which the rotor stands."""
@@ -300,4 +301,4 @@ class Course:
             if build.high is not None:
                 rotor = min(rotor, build.high)
             load = min(max(load, rotor), rotor + build.play)
-        self._now = Standing(rotor, load, False, behind)
+        self._now = MechanicalState(rotor, load, False, behind)

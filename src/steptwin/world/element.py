@@ -1,7 +1,7 @@
-"""What a world wants of an element that its description may have: one value (`Element`), in a file of its own.
+"""The interface of an element of a world's description: one value (`Element`) for each kind, in a file of its own.
 
-An element is what is around the controllers: mechanics, wires, buttons, sources. It becomes part of descriptions, conditions,
-traces and faults by being registered (`steptwin.world.elements`); nothing else asks which one it is.
+Elements surround the controllers: mechanics, wires, buttons, sources. Registering one (`steptwin.world.elements`) makes it
+available in descriptions, conditions, traces and faults; no other code distinguishes kinds of elements.
 """
 
 from __future__ import annotations
@@ -17,26 +17,27 @@ from steptwin.world.sense import TableRows
 from steptwin.world.tomlplaces import Path
 
 if TYPE_CHECKING:
+    from steptwin.world.kind import Terminals
     from steptwin.world.signals import SignalOf
     from steptwin.world.site import Site
     from steptwin.world.spec import WorldSpec
 
 Row: TypeAlias = Mapping[str, Any]
-"""Values of a table by attribute, read and checked one by one, with its ``path``."""
+"""The values of a table by attribute, each read and checked, with the ``path`` of the table."""
 Table: TypeAlias = Mapping[str, Any]
-"""The table as it was written."""
+"""The table as written in the text."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ElementSpec:
-    """An element as its table describes it. ``path`` is where the table is in the text."""
+    """An element as its table describes it. ``path``: the place of the table in the text."""
 
     path: Path = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamedSpec(ElementSpec):
-    """One that others refer to."""
+    """The specification of an element with a name."""
 
     name: str
 
@@ -46,7 +47,8 @@ B = TypeVar("B")
 
 
 class Reference(NamedTuple):
-    """Two machines or lines that an element joins, or one twice; they are in one kernel. ``path`` is the key that names them."""
+    """Two machines, lines or elements with terminals that an element connects, so that they share a kernel; both are the same if
+    it concerns only one. ``path``: the key that names them."""
 
     one: str
     other: str
@@ -55,34 +57,36 @@ class Reference(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Element(Generic[S, B]):
-    """An element: ``S`` is its table as a value, ``B`` what is built of it. `IncompleteTable` where something is missing."""
+    """A kind of element. ``S`` is its table as a value, ``B`` the built object. Raises `IncompleteTable` for missing entries."""
 
     name: str
-    """Of its table: ``[[NAME]]``."""
+    """The name of its table: ``[[NAME]]``."""
     spec: type[S]
     rows: TableRows
-    """Its keys, with meanings, units and ranges."""
+    """The keys of its table, with meanings, units and ranges."""
     inner: Mapping[str, TableRows] = field(default_factory=dict)
-    """Tables in it, by their keys; ``spec`` has an attribute for each."""
+    """Nested tables by key; ``spec`` has an attribute for each."""
     inner_attributes: Mapping[str, str] = field(default_factory=dict)
-    """The attributes of inner tables, where these are not their keys."""
+    """Attributes of nested tables whose names differ from their keys."""
     read: Callable[[TomlText, Row, Table], S]
-    """Reports what is wrong with keys taken together, and with inner tables."""
+    """Makes ``S``. Reports inconsistent combinations of keys, and errors in nested tables."""
     refers: Callable[[S, WorldSpec], Iterable[Reference]]
-    """Every machine and line that it names. What is not there is reported at the path."""
+    """All machines, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
     build: Callable[[S, Site], B]
-    """Puts it into its kernel. Raises `Misuse` where it does not fit."""
+    """Adds it to its kernel. Raises `Misuse` if it does not fit."""
     connect: Callable[[S, B, Site], None] | None = None
-    """What is done when all elements of this kind are built: they may refer to each other."""
+    """Called after all elements of this kind were built, because they may refer to each other."""
+    terminals: Callable[[S], Terminals] | None = None
+    """Its own inputs and outputs, as pins of a machine: others join ``NAME.TERMINAL``. `Site.board` has their levels."""
     signals: Callable[[B], Mapping[str, SignalOf]] | None = None
-    """What conditions may speak of, by name. An element with a ``name`` has signals; none but those have."""
+    """Signals for conditions, by name. Exactly the elements with a ``name`` have signals."""
     lanes: Callable[[S], tuple[str, ...]]
-    """Subjects under which it records edges of its own in traces."""
+    """Subjects of the edges that it records in traces."""
     faults: tuple[FaultKind, ...] = ()
-    """What can fail of it (`Layer.ELEMENT`); they are given what was built."""
+    """Its faults (`Layer.ELEMENT`), which act on the built object."""
 
     def named(self, specs: Sequence[ElementSpec]) -> Sequence[NamedSpec]:
-        """The same with their names; none where the kind has none."""
+        """``specs`` as named ones; empty for a kind without names."""
         return cast("Sequence[NamedSpec]", specs) if self.is_named else ()
 
     @property
@@ -101,6 +105,8 @@ class Element(Generic[S, B]):
             raise IncompleteTable(f"{where} has a name and lacks its signals")
         if not self.is_named and self.signals is not None:
             raise IncompleteTable(f"{where} has signals and lacks a name that they could be asked for by")
+        if not self.is_named and self.terminals is not None:
+            raise IncompleteTable(f"{where} has terminals and lacks a name that they could be joined by")
         for fault in self.faults:
             if fault.layer is not Layer.ELEMENT or not self.is_named:
                 raise IncompleteTable(f"{where}: fault {fault.name} is of the layer {Layer.ELEMENT}, and its element has a name")

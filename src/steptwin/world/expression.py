@@ -6,8 +6,8 @@
     comparison  = operand [ ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) operand ]
     operand     = number | signal
 
-A signal alone is true where it is not 0. Names of signals are for `Signals` to know: ``table.M1.position``, ``table.hr:10020``,
-``table.USER_REGISTER[12]:real``.
+A signal alone is true if it is not 0. Names of signals, such as ``table.M1.position``, ``table.hr:10020`` and
+``table.USER_REGISTER[12]:real``, are resolved by `Signals`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from steptwin.machine import Nanos
 from steptwin.points import FARTHEST_NS
 
 MOST_NESTED = 64
-"""Deepest nesting that is read: reading is recursive."""
+"""Limit of nesting, because the parser is recursive."""
 
 _COMPARE: dict[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
 _TOKEN = re.compile(
@@ -32,21 +32,21 @@ _TOKEN = re.compile(
 
 
 class Signal(Protocol):
-    """A quantity of a world. ``continuous`` ones change between events too."""
+    """A quantity of a world. ``continuous``: it also changes between events."""
 
     @property
     def continuous(self) -> bool: ...
     def bring(self, now: Nanos) -> tuple[Any, ...]:
-        """Have the value of ``now`` ready. Until something changes in one of what this gives, the value goes on as it goes."""
+        """Prepare the value at ``now``. Returns what it depends on: until one of these changes, it follows its course."""
         ...
 
     def value(self, now: Nanos) -> float: ...
     def turns(self, now: Nanos) -> Iterator[Nanos]:
-        """Moments after ``now``, in order, between which (and after the last of which) the value goes one way only."""
+        """Moments after ``now``, in order, between which (and after the last of which) the value is monotonic."""
         ...
 
     def version(self) -> object:
-        """What its values to come depend on: another one when they may have changed. None: that is not known."""
+        """A value that changes whenever the future course may have changed; None if that is unknown."""
         ...
 
 
@@ -77,20 +77,20 @@ class Not:
 
 
 @dataclass(frozen=True, slots=True)
-class Both:
+class And:
     parts: tuple[Node, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Either:
+class Or:
     parts: tuple[Node, ...]
 
 
-Node: TypeAlias = SignalComparison | Not | Both | Either
+Node: TypeAlias = SignalComparison | Not | And | Or
 
 
 def parse(text: str) -> Node:
-    """Raises `Misuse` with the place, what was found and what was expected."""
+    """Parse a condition. Raises `Misuse` with the column, the found and the expected token."""
     return _Parser(text).whole()
 
 
@@ -137,13 +137,13 @@ class _Parser:
         parts = [self._conjunction()]
         while self._accept("or"):
             parts.append(self._conjunction())
-        return parts[0] if len(parts) == 1 else Either(tuple(parts))
+        return parts[0] if len(parts) == 1 else Or(tuple(parts))
 
     def _conjunction(self) -> Node:
         parts = [self._negation()]
         while self._accept("and"):
             parts.append(self._negation())
-        return parts[0] if len(parts) == 1 else Both(tuple(parts))
+        return parts[0] if len(parts) == 1 else And(tuple(parts))
 
     def _negation(self) -> Node:
         if self._peek().lower() in ("not", "("):
@@ -185,7 +185,7 @@ class _Parser:
 
 
 class _Crossing(NamedTuple):
-    """When a signal crosses a level; found again at ``until``."""
+    """The moment at which a signal crosses a level; computed again at ``until``."""
 
     version: object
     level: float
@@ -199,16 +199,16 @@ class SignalCondition:
     __slots__ = ("_comparisons", "_crossings", "_node", "_signals", "text")
 
     def __init__(self, text: str, signals: Signals) -> None:
-        """Raises `Misuse` for text that is not a condition, and where two signals are compared that change between events."""
+        """Raises `Misuse` for invalid text, and for a comparison of two continuous signals."""
         self.text = text
         self._node = parse(text)
         self._signals = {name: signals(name) for name in names(self._node)}
         self._comparisons = list(self._moving(self._node))
         self._crossings: list[_Crossing | None] = [None] * len(self._comparisons)
-        """As found last."""
+        """The crossings computed last."""
 
     def bring(self, now: Nanos) -> tuple[Any, ...]:
-        """As `Signal.bring`, for all its signals; before anything else is asked."""
+        """As `Signal.bring`, for all its signals. Must be called before `holds` and `due`."""
         found: dict[Any, None] = {}
         for signal in self._signals.values():
             found.update(dict.fromkeys(signal.bring(now)))
@@ -222,7 +222,7 @@ class SignalCondition:
             return _COMPARE[node.sign](self._value(node.left, now), self._value(node.right, now))
         if isinstance(node, Not):
             return not self._holds(node.inner, now)
-        if isinstance(node, Both):
+        if isinstance(node, And):
             return all(self._holds(part, now) for part in node.parts)
         return any(self._holds(part, now) for part in node.parts)
 
@@ -230,7 +230,7 @@ class SignalCondition:
         return side.value if isinstance(side, NumberLiteral) else self._signals[side.text].value(now)
 
     def _moving(self, node: Node) -> Iterator[tuple[Signal, NumberLiteral | SignalName]]:
-        """Comparisons that may change between events: the signal, and what it is compared with."""
+        """The comparisons with a continuous signal: that signal, and the other operand."""
         if isinstance(node, Not):
             yield from self._moving(node.inner)
         elif not isinstance(node, SignalComparison):
@@ -246,14 +246,14 @@ class SignalCondition:
                 yield self._signals[moving[0].text], node.right if moving[0] is node.left else node.left
 
     def due(self, now: Nanos) -> Nanos | None:
-        """When the condition may come true while no event happens: ``now`` where it does; None: not without one."""
+        """The next moment at which the condition may become true without an event; ``now`` if it is true; None if never."""
         if self.holds(now):
             return now
         dues = [due for n in range(len(self._comparisons)) if (due := self._crossing(n, now)) is not None]
         return min(dues, default=None)
 
     def _crossing(self, n: int, now: Nanos) -> Nanos | None:
-        """When a comparison changes, which need not be looked for anew while its signal goes on as it did."""
+        """The moment at which a comparison changes; cached while the course of its signal is unchanged."""
         signal, side = self._comparisons[n]
         version, level, known = signal.version(), self._value(side, now), self._crossings[n]
         if known is not None and version is not None and known[:2] == (version, level) and now < known.until:

@@ -1,8 +1,8 @@
-"""A jog that lasts only while it is extended, as a dead man's switch: what the kinds of controllers make of it.
+"""A jog that lasts only while it is extended, like a dead man's switch; each kind of controller implements it.
 
-The controller is never given a motion without end. It gets bounded ones, again and again, each of which ends by itself; and what
-is still in motion `STOP_NS` after the jog was extended last is stopped. So an axis stands at most `STANDS_NS` of virtual time
-after that, whatever has become of whoever held it.
+The controller never gets an endless motion, but repeated bounded ones, each of which ends by itself. An axis that still moves
+`STOP_NS` after the last extension is stopped. It is therefore at rest at most `STANDS_NS` of virtual time after that extension,
+even if the operator's program has failed.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ class HeldJog(Protocol):
 
     @property
     def over(self) -> str | None:
-        """Why it has ended, in words; None while it has not."""
+        """The reason for its end as text; None while it is active."""
         ...
 
     def extend(self, now: Nanos) -> Given:
-        """It goes on. The first call begins it. Nothing where it is over, which `over` tells then."""
+        """Start the jog (first call) or extend it. Returns no steps if it has ended; `over` then has the reason."""
         ...
 
     def release(self, now: Nanos) -> Given:
-        """It ends, with the ramp of the axis."""
+        """End it with the ramp of the axis."""
         ...
 
     def drop(self, now: Nanos) -> Given:
-        """Whoever held it has gone: as `release`, and what still moves `STOP_NS` after it was extended is stopped."""
+        """The operator's connection is lost: as `release`; an axis still moving `STOP_NS` after the last extension is stopped."""
         ...
 
     def cut(self) -> None:
-        """The axis was stopped otherwise; nothing more is given to it but settings that are put back."""
+        """The axis was stopped by another command; only its settings are restored."""
         ...
 
     def deadline(self) -> Nanos | None:

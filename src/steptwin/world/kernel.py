@@ -1,7 +1,7 @@
-"""The event kernel: machines, wires between their pins, and what stands between them.
+"""The event-driven kernel: machines, the wires between their pins, and the parts (mechanics, switches, lines) between them.
 
-A kernel is itself a machine in virtual time. Machines that share no wire belong into kernels of their own, so that each is
-advanced only when something happens to it.
+A kernel is itself a machine in virtual time. Machines without a common wire are put into separate kernels, so that each one is
+advanced only when an event concerns it.
 """
 
 from __future__ import annotations
@@ -15,21 +15,22 @@ from steptwin.machine import Drive, Fact, MotionController, Nanos, PinEdge
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain
+from steptwin.world.board import Board
 from steptwin.world.trace import Recorder, TraceRecord
 
 MAX_ROUNDS_PER_INSTANT = 1000
-"""Signals propagate in zero time; more rounds than this at one moment are a loop of wires."""
+"""Signals propagate in zero time; more rounds than this at one moment mean a feedback loop of wires."""
 
 
 class KernelPart(Protocol):
-    """What stands between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
+    """A part between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
 
     def deadline(self) -> Nanos | None:
-        """When something happens by itself; as for a machine."""
+        """The time of its next event of its own, as for a machine."""
         ...
 
-    def look(self, now: Nanos) -> None:
-        """Do what is due by ``now`` and react to what machines did; called until nothing changes. Levels go to `Kernel.drive`."""
+    def update(self, now: Nanos) -> None:
+        """Process events due by ``now`` and changes of machines; called until nothing changes. Levels go to `Kernel.drive`."""
         ...
 
     def copy_state(self) -> Plain: ...
@@ -37,6 +38,8 @@ class KernelPart(Protocol):
 
 
 class PinName(NamedTuple):
+    """A pin of a machine, or a terminal of an element."""
+
     machine: str
     pin: str
 
@@ -46,7 +49,7 @@ class PinName(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """From an output to an input; ``inverted`` turns the level round, which arrives ``delay`` later."""
+    """A wire from an output to an input. ``inverted``: the level is inverted; ``delay``: propagation delay, ns."""
 
     source: PinName
     target: PinName
@@ -57,13 +60,13 @@ class Wire:
         if self.delay < 0:
             raise Misuse(f"wire to {self.target}: a delay of {self.delay} ns is negative")
 
-    def carried(self, level: float) -> float:
-        """What arrives for a level of the source."""
+    def transmitted(self, level: float) -> float:
+        """The level at the target for a level of the source."""
         return (0.0 if level else 1.0) if self.inverted else level
 
 
-class Flight(NamedTuple):
-    """A level on its way along a wire."""
+class DelayedLevel(NamedTuple):
+    """A level that reaches the end of a wire with delay at ``arrival``."""
 
     arrival: Nanos
     target: PinName
@@ -71,20 +74,20 @@ class Flight(NamedTuple):
 
 
 class KernelState(NamedTuple):
-    """State of a kernel and of everything in it."""
+    """State of a kernel, its machines and its parts."""
 
     now: Nanos
     machines: tuple[Any, ...]
     parts: tuple[Plain, ...]
     levels: Mapping[PinName, float]
-    flights: tuple[Flight, ...]
+    flights: tuple[DelayedLevel, ...]
 
 
 class Kernel:
     """Runs machines together. Ties in time are broken by the order in which machines and parts were added.
 
-    Whoever commands a machine directly (a request, a pin) at a moment first advances the kernel to that moment, so that
-    nothing on a wire is late; what the command leads to settles with the next `advance`, `deadline` or `settle`.
+    Before a machine is changed directly (by a request or a pin), the kernel must be advanced to that moment, so that delayed
+    levels arrive in order; the effects propagate with the next `advance`, `deadline` or `settle`.
 
     ``record`` gets the first level of each driven input, every edge of an output and of an input, and every new plan of an axis.
     """
@@ -92,30 +95,32 @@ class Kernel:
     def __init__(self, now: Nanos = 0, record: Recorder | None = None) -> None:
         self.now = now
         self.machines: dict[str, MotionController] = {}
+        self.boards: dict[str, Board] = {}
+        """Terminals of elements."""
         self.parts: list[KernelPart] = []
         self.observers: list[Callable[[str, PinEdge], None]] = []
         """Called with machine name and edge, in order, for every output edge."""
         self.stale = False
-        """Something changed since signals last settled."""
+        """Whether something changed since the signals last settled."""
         self.is_attentive = False
-        """Whether a condition is on what a request may change without an event: then every request is one."""
+        """Whether a condition depends on values that a request may change without an event; then every request counts as one."""
         self.on_change: Callable[[Kernel], None] | None = None
-        """Called with the kernel whenever something has happened in it, or something has changed from outside."""
+        """Called with the kernel after each of its events and after each change from outside."""
         self._record = record
         self._wires: dict[PinName, list[Wire]] = {}
         self._levels: dict[PinName, float] = {}
-        """What was driven to each input last."""
-        self._given: dict[PinName, tuple[Nanos, float]] = {}
-        """The last edge recorded of each input that was driven."""
-        self._flights: list[Flight] = []
+        """The level last driven to each input."""
+        self._recorded: dict[PinName, tuple[Nanos, float]] = {}
+        """The last recorded edge of each driven input."""
+        self._flights: list[DelayedLevel] = []
         self._plans: list[_Plans] = []
-        """Of each machine, as recorded last."""
+        """The plans of each machine that were recorded last."""
         self._due: Nanos | None = None
 
     # ------------------------------------------------------------------ what is in it
 
     def add(self, name: str, machine: MotionController) -> None:
-        """Add a machine that is not ahead of the kernel's time (`TimeReversal`); its ``changed`` hook is taken."""
+        """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the kernel's."""
         if name in self.machines:
             raise Misuse(f"there is a machine {name!r} already")
         machine.advance(self.now)
@@ -125,36 +130,44 @@ class Kernel:
         self.mark()
 
     def replace(self, name: str, machine: MotionController) -> None:
-        """Replace the machine ``name`` by another one: one around it, with the same pins and axes."""
+        """Replace the machine ``name`` by a wrapper with the same pins and axes."""
         if name not in self.machines:
             raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
         self.machines[name] = machine
         machine.changed = self.mark
         self.mark()
 
+    def add_board(self, board: Board) -> None:
+        """Add the terminals of an element, whose part has their state."""
+        self.boards[board.name] = board
+
     def add_part(self, part: KernelPart) -> None:
-        """Add something between machines; it looks at them when signals settle next."""
+        """Add a part; it is first updated when the signals settle next."""
         self.parts.append(part)
         self.mark()
 
     def connect(self, wire: Wire) -> None:
-        """Add a wire, along which the present level of the source has come to the target long ago."""
+        """Add a wire. The target takes the present level of the source at once, without the delay."""
         self.check(wire.source)
         self.check(wire.target)
-        self.drive(wire.target, wire.carried(self.machines[wire.source.machine].pins()[wire.source.pin]))
+        self.drive(wire.target, wire.transmitted(self._pins_of(wire.source.machine)[wire.source.pin]))
         self._wires.setdefault(wire.source, []).append(wire)
         self.mark()
 
     def check(self, name: PinName) -> None:
-        """`Misuse` unless there is such a machine with such a pin."""
-        machine = self.machines.get(name.machine)
-        if machine is None:
+        """Raises `Misuse` if the machine or its pin does not exist."""
+        if name.machine not in self.machines and name.machine not in self.boards:
             raise Misuse(f"no machine {name.machine!r}: there are {', '.join(self.machines) or 'none'}")
-        if name.pin not in machine.pins():
-            raise Misuse(f"{name.machine!r} has no pin {name.pin!r}: pins are {', '.join(machine.pins())}")
+        pins = self._pins_of(name.machine)
+        if name.pin not in pins:
+            raise Misuse(f"{name.machine!r} has no pin {name.pin!r}: pins are {', '.join(pins)}")
+
+    def _pins_of(self, name: str) -> Mapping[str, float]:
+        board = self.boards.get(name)
+        return self.machines[name].pins() if board is None else board.pins()
 
     def drive_of(self, machine: str, axis: int) -> Drive:
-        """The drive of ``axis`` (from 1). `Misuse` where there is none."""
+        """The drive of ``axis`` (from 1). Raises `Misuse` if it does not exist."""
         found = self.machines.get(machine)
         axes = () if found is None else found.axes
         if not 1 <= axis <= len(axes):
@@ -162,7 +175,7 @@ class Kernel:
         return axes[axis - 1]
 
     def mark(self) -> None:
-        """Something changed: signals have to settle."""
+        """Register a change: the signals have to settle."""
         self.stale = True
         if self.on_change is not None:
             self.on_change(self)
@@ -170,43 +183,59 @@ class Kernel:
     # ------------------------------------------------------------------ levels
 
     def drive(self, target: PinName, level: float) -> None:
-        """Give an input a level now; only a change is passed on."""
+        """Drive an input to a level now; an unchanged level has no effect."""
         before = self._levels.get(target)
         if before == level:
             return
         self._levels[target] = level
-        self.give(target, level, is_first=before is None)
+        self.set_input(target, level, is_first=before is None)
 
-    def give(self, target: PinName, level: float, *, is_first: bool = False) -> None:
+    def set_input(self, target: PinName, level: float, *, is_first: bool = False) -> None:
         """Drive an input now. Its resulting level, which a fault may hold, is recorded where it changes or ``is_first``.
 
         The machine's own report of the same edge is not recorded again.
         """
+        board = self.boards.get(target.machine)
+        if board is not None:
+            board.set_pin(target.pin, level, self.now)
+            self.mark()
+            return
         machine, (_, pin) = self.machines[target.machine], target
         if self._record is None:
             machine.set_pin(pin, level, self.now)
             return
-        known = self._given.get(target)
+        known = self._recorded.get(target)
         before = machine.pins()[pin] if known is None else known[1]
         machine.set_pin(pin, level, self.now)
         after = machine.pins()[pin]
         if is_first or after != before:
-            self.take_as_recorded(target, self.now, after)
+            self.mark_recorded(target, self.now, after)
             self._record(TraceRecord(self.now, target.machine, "edge", pin, after))
 
-    def take_as_recorded(self, target: PinName, now: Nanos, level: float) -> None:
+    def mark_recorded(self, target: PinName, now: Nanos, level: float) -> None:
         """Mark an edge of an input as recorded, in case its machine reports it too."""
-        self._given[target] = now, level
+        self._recorded[target] = now, level
+
+    def owner(self, name: str) -> str:
+        """The machine under which ``name`` is recorded: itself, or the first one for an element with terminals."""
+        return next(iter(self.machines), name) if name in self.boards else name
+
+    def put(self, element: str, output: str, level: float) -> None:
+        """An output of an element has another level now, or its first one."""
+        self.report(self.owner(element), "edge", f"{element}.{output.lower()}", level)
+        for wire in self._wires.get(PinName(element, output), ()):
+            self._send(wire, level)
+        self.mark()
 
     def _send(self, wire: Wire, value: float) -> None:
-        level = wire.carried(value)
+        level = wire.transmitted(value)
         if wire.delay:
-            self._flights.append(Flight(self.now + wire.delay, wire.target, level))
+            self._flights.append(DelayedLevel(self.now + wire.delay, wire.target, level))
         else:
             self.drive(wire.target, level)
 
     def report(self, machine: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
-        """Something worth recording happens to a machine now."""
+        """Record an event of a machine at the present moment."""
         if self._record is not None:
             self._record(TraceRecord(self.now, machine, kind, subject, value, facts))
 
@@ -223,7 +252,7 @@ class Kernel:
         self.now = now
 
     def _run(self, now: Nanos) -> None:
-        """Everything that is due by ``now``, in order."""
+        """Process all events due by ``now``, in order."""
         if len(self.machines) == 1 and not self.parts and not self._wires:
             self._advance_alone(now)
         while self._due is not None and self._due <= now:
@@ -237,7 +266,7 @@ class Kernel:
             self.settle()
 
     def _advance_alone(self, now: Nanos) -> None:
-        """What `advance` and `settle` do where there is one machine and nothing that could act on it."""
+        """As `advance` and `settle`, for a single machine without parts and wires."""
         ((name, machine),) = self.machines.items()
         (plans,) = self._plans
         due = self._due
@@ -257,17 +286,17 @@ class Kernel:
             self.on_change(self)
 
     def deadline(self) -> Nanos | None:
-        """The next moment at which something happens by itself."""
+        """The time of the next event; None if there is none."""
         if self.stale:
             self.settle()
         return self._due
 
     def settle(self) -> None:
-        """Carry edges along wires and let parts look until nothing changes; find the next deadline."""
+        """Propagate edges along wires and update parts until nothing changes; then find the next deadline."""
         for _ in range(MAX_ROUNDS_PER_INSTANT):
             self.stale = False
             for part in self.parts:
-                part.look(self.now)
+                part.update(self.now)
             for name, machine in self.machines.items():
                 for edge in machine.take_edges():
                     self._edge(name, edge)
@@ -289,17 +318,17 @@ class Kernel:
 
     def _edge(self, name: str, edge: PinEdge) -> None:
         pin = PinName(name, edge.pin)
-        if self._record is not None and self._given.get(pin) != (edge.time, edge.value):
+        if self._record is not None and self._recorded.get(pin) != (edge.time, edge.value):
             self._record(TraceRecord(edge.time, name, "edge", edge.pin, edge.value))
-            if pin in self._given:
-                self._given[pin] = edge.time, edge.value
+            if pin in self._recorded:
+                self._recorded[pin] = edge.time, edge.value
         for observer in self.observers:
             observer(name, edge)
         for wire in self._wires.get(pin, ()):
             self._send(wire, edge.value)
 
     def _arrive(self) -> None:
-        """Levels that have come to the end of their wires."""
+        """Drive the targets of delayed levels that are due."""
         arrived = [flight for flight in self._flights if flight.arrival <= self.now]
         self._flights = [flight for flight in self._flights if flight.arrival > self.now]
         for flight in arrived:
@@ -320,22 +349,22 @@ class Kernel:
         )
 
     def restore(self, state: KernelState) -> None:
-        """Take the state of a kernel with the same machines and parts."""
+        """Restore the state of a kernel with the same machines and parts."""
         self.now = state.now
         for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
             machine.restore(its_state)
         for part, its_state in zip(self.parts, state.parts, strict=True):
             part.set_state(its_state)
         self._levels = dict(state.levels)
-        self._given.clear()
+        self._recorded.clear()
         self._flights = list(state.flights)
         for plans in self._plans:
-            plans.take_as_reported()
+            plans.mark_reported()
         self.settle()
 
 
 class _Plans:
-    """The plans and coordinates of a machine's axes, as recorded last."""
+    """The plans and coordinate offsets of a machine's axes that were recorded last."""
 
     __slots__ = ("_drives", "_name", "_origins", "_profiles", "_revisions")
 
@@ -347,7 +376,7 @@ class _Plans:
         self._origins = [0] * len(self._drives)
 
     def report(self, record: Recorder, now: Nanos) -> None:
-        """Record new plans, and changes of coordinates. An axis at rest where its plan ended has no new plan."""
+        """Record new plans and changes of coordinates. A plan that only continues the rest at the same position is not new."""
         for i, number, drive in self._drives:
             origin = drive.offset_p
             if origin != self._origins[i]:
@@ -361,14 +390,14 @@ class _Plans:
             if before is None or not _only_rests(before, profile):
                 record(TraceRecord(now, self._name, "plan", number, plan))
 
-    def take_as_reported(self) -> None:
+    def mark_reported(self) -> None:
         for i, _, drive in self._drives:
             self._revisions[i], self._profiles[i] = drive.revision, profile_of(drive.plan)
             self._origins[i] = drive.offset_p
 
 
 def _only_rests(before: Profile, after: Profile) -> bool:
-    """Whether ``after`` is only the rest at the position where ``before`` has ended."""
+    """Whether ``after`` is rest at the end position of ``before``."""
     if after.segments or before.end is None or before.end > after.start:
         return False
     return before.base + before.counts[-1] == after.base

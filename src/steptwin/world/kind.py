@@ -19,13 +19,14 @@ from steptwin.world.mechanics import EncoderReader
 from steptwin.world.reader import Key, TomlText
 from steptwin.world.scale import DriveScale
 from steptwin.world.spec import ControllerSpec, LineSpec, WorldSpec
+from steptwin.world.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT
 
 if TYPE_CHECKING:
     from steptwin.controllerstate import ControllerState
     from steptwin.datasheet import Datasheet
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
-    from steptwin.words.frames import FrameLine
+    from steptwin.wire.frameline import FrameLine
     from steptwin.world.control import ControllerCommand, Jog
     from steptwin.world.elements.axis import AxisSpec
     from steptwin.world.faults import AxisLoad, Body, Faults
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
     from steptwin.world.lanes import AxisLane
     from steptwin.world.lines import Line, LineWords
     from steptwin.world.plant import Plant
-    from steptwin.world.programtexts import ProgramText
+    from steptwin.world.programs import Programs
+    from steptwin.world.programtexts import Destination, Downloading, ProgramText
     from steptwin.world.script import Step
     from steptwin.world.trace import Recorder
 
@@ -47,8 +49,6 @@ Row: TypeAlias = dict[str, Any]
 Values: TypeAlias = tuple[tuple[str, float], ...]
 """Registers by name, and what they are to take."""
 
-DIGITAL_INPUT, ANALOG_INPUT, OUTPUT = "digital input", "analog input", "output"
-
 
 class BuildContext(Protocol):
     """What the description of a controller refers to, while it is built."""
@@ -59,8 +59,16 @@ class BuildContext(Protocol):
         """The content of a file the description names. Raises `Misuse` where it is not given."""
         ...
 
-    def warn(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
-        """Report the warnings among what was found in a file."""
+    def accept(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
+        """Report the warnings among what was found in a file. Raises `SourceErrors` with the errors, if there are any."""
+        ...
+
+
+class TextContext(BuildContext, Protocol):
+    """What is known of the texts of programs besides."""
+
+    def downloaded(self, machine: str, place: str) -> SourceText | None:
+        """The text that has been put there since the beginning; None where there is none."""
         ...
 
 
@@ -73,9 +81,9 @@ def text_of(context: BuildContext, name: str) -> str:
 class Terminals:
     """Names of pins that wires, switches, buttons and sources may be joined to; a pin may be both input and output."""
 
-    digital_inputs: Sequence[str]
-    analog_inputs: Sequence[str]
-    outputs: Sequence[str]
+    digital_inputs: Sequence[str] = ()
+    analog_inputs: Sequence[str] = ()
+    outputs: Sequence[str] = ()
 
     def check(self, name: PinName, kind: str) -> None:
         """Raises `Misuse` unless a pin is of a kind: `DIGITAL_INPUT`, `ANALOG_INPUT` or `OUTPUT`."""
@@ -99,7 +107,7 @@ class Selection:
     """Whether a driver may hold the line without selecting one of its controllers."""
 
 
-class Service(NamedTuple):
+class LineUnit(NamedTuple):
     """Where a controller is served."""
 
     unit: int = 1
@@ -109,7 +117,7 @@ class Service(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Encoders(Generic[M]):
+class EncoderInputs(Generic[M]):
     """The encoder inputs of a controller. Axes count from 1."""
 
     reader: Callable[[M], EncoderReader]
@@ -214,17 +222,24 @@ class ControllerKind(Generic[S, M, V]):
     """What Python programs see of it in a running world."""
     lanes: Callable[[M], Mapping[str, AxisLane]]
     """How its axes are shown in a trace, by the subject of their plans."""
-    body: Callable[[M, Service, Mapping[int, AxisLoad]], Body]
+    body: Callable[[M, LineUnit, Mapping[int, AxisLoad]], Body]
     """What can fail of it; shafts are those of the mechanics of its axes, by number."""
     keeps_memory: Callable[[M], bool]
     """Whether it has non-volatile memory."""
     watch_program: Callable[[M, Kernel, str], ProgramReport | None] = lambda machine, kernel, name: None
     """Watch the programs of the machine, which has that name in its kernel; None without any."""
-    texts: Callable[[S, M, BuildContext], Sequence[ProgramText]] = lambda spec, machine, context: ()
-    """The texts of programs that its description gives it, with what the checkers find in them; the machine is at the present."""
+    texts: Callable[[S, M, TextContext], Sequence[ProgramText]] = lambda spec, machine, context: ()
+    """What is in its program memory, one text for each place there; the machine is at the present."""
+    programs: Callable[[S, M, TextContext], Programs | None] = lambda spec, machine, context: None
+    """Its programs while they are executed; None for a kind without any."""
+    download: Callable[[M, Destination, SourceText], Downloading] | None = None
+    """How a text comes to one of the places of ``texts``. Changes nothing yet. Raises `SourceErrors` for a text with errors, and
+    `Refusal` for what cannot be done now."""
+    configuration: Callable[[S, M, BuildContext], SourceText | None] = lambda spec, machine, context: None
+    """Its configuration file: as it was given, else made of its settings; None for a kind that has none."""
     remarks: Callable[[str, M], Sequence[str]] = lambda name, machine: ()
     """What a person who starts it, under a name, should know."""
-    encoders: Encoders[M] | None = None
+    encoders: EncoderInputs[M] | None = None
     registers: NamedRegisters[M] | None = None
     vision: Vision[S, M] | None = None
 

@@ -1,6 +1,6 @@
-"""How the axes of a trace are shown: unit, and the terminals that carry their pulses or currents.
+"""Display data of the axes of a trace: their unit, and the terminals with their pulses or currents.
 
-A trace knows pulses only. A view is static: it is read from a machine once and then goes with the trace.
+A trace has pulses only. The display data are static: they are read from a machine once and stored with the trace.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ class StepOutputs(NamedTuple):
 
     step: str = "STEP"
     dir: str | None = "DIR"
-    """None: the machine has this pin itself, so that its edges are in the trace."""
+    """None if the machine has this pin itself, so that its edges are in the trace."""
     active_low: bool = False
     width_ns: Nanos = 5 * MICROSECOND
-    """How long a pulse is drawn; shorter where the next one comes within twice this time."""
+    """Drawn width of a pulse; less if the next one follows within twice this time."""
 
 
 class PhaseOutputs(NamedTuple):
@@ -27,12 +27,12 @@ class PhaseOutputs(NamedTuple):
 
     phases: tuple[str, str] = ("PHASE1", "PHASE2")
     characteristic: int = 1
-    """Until the trace says otherwise: an edge of ``characteristic_pin``."""
+    """The initial characteristic; edges of ``characteristic_pin`` in the trace change it."""
     characteristic_pin: str = "N"
 
 
 class Mechanics(NamedTuple):
-    """What an axis moves, which has a name, a unit and a zero of its own.
+    """The mechanics of an axis, which have a name, a unit and a zero of their own.
 
     Its true position is (pulses of the load + ``zero_p``) / ``pulses_per_unit``; negative where positive pulses go down.
     """
@@ -42,7 +42,7 @@ class Mechanics(NamedTuple):
     pulses_per_unit: float
     zero_p: int = 0
     is_ideal: bool = True
-    """Whether the load is where the pulses have it, unless a trace says otherwise."""
+    """Whether the load is at the commanded position, unless a ``load`` of the trace states otherwise."""
 
     @property
     def position_name(self) -> str:

@@ -1,6 +1,6 @@
-"""Lines of a world: controllers on a serial line or a network, and whoever talks to them.
+"""Lines of a world: controllers on a serial line or a network, and the programs connected to them.
 
-Each talker has a place on the line of its own. What comes back is fetched by the line as it comes, so that it has its moment.
+Each program has its own place on the line. Responses are collected at the moment they arrive, so that each has its time.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos, Port, TalkingPort
+from steptwin.machine import Nanos, Port, SendingPort
 from steptwin.state import Plain, Stateful
 from steptwin.wire.slave import Device, FrameDirection, FrameObserver, SlavePort
-from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort
+from steptwin.world.faults import Faults, FaultyPort, FaultySendingPort
 from steptwin.world.faults import LineProtocol as FaultLine
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
@@ -23,31 +23,31 @@ SCRIPTS = "script"
 """The place of the world's own scripts on every line."""
 
 MOST_RECEIVED = 1 << 16
-"""More pieces than these are not kept for a program that does not fetch them: the oldest go."""
+"""Limit of received pieces kept for a program that does not fetch them; the oldest are dropped."""
 
 
 class FrameFollower(Protocol):
-    """Takes what goes over a line."""
+    """Observes the traffic of a line."""
 
     def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
-        """A frame, or characters; ``place`` is ``"chips"`` for what M1486 chips send."""
+        """Take a frame, or characters; ``place`` is ``"chips"`` for characters that M1486 chips send."""
         ...
 
     def rubbish(self, now: Nanos, place: str, count: int) -> None:
-        """Bytes came that belong to no frame."""
+        """Take the number of bytes that belong to no frame."""
         ...
 
 
 class LineWords(FrameFollower, Protocol):
-    """Puts what goes over a line into words."""
+    """Decodes the traffic of a line into text."""
 
     def recorded(self, record: TraceRecord) -> None:
-        """A record of a controller on the line was made."""
+        """Take a trace record of a controller on the line."""
         ...
 
 
 class LineEndPoint(Stateful):
-    """Where one program is connected. ``received`` is what has come and was not fetched, with its moments."""
+    """The connection of one program. ``received``: pieces not fetched yet, with their moments."""
 
     __slots__ = ("at_once", "framed", "inner", "is_connected", "kind", "on_output", "port", "received", "rubbish", "talks")
     FIXED: ClassVar[frozenset[str]] = frozenset(
@@ -58,22 +58,22 @@ class LineEndPoint(Stateful):
         self.kind = kind
         self.port = port
         self.inner = inner
-        """The port behind the faults of the line."""
+        """The port without the faults of the line."""
         self.framed = framed
-        """What reports Modbus frames in it."""
+        """The port that reports Modbus frames."""
         self.rubbish = 0
-        """Bytes that belonged to no frame, as far as that was reported."""
+        """Number of reported bytes that belonged to no frame."""
         self.at_once = False
-        """Whether the port has sent all answers when it has taken a request, and nothing later."""
+        """Whether the port answers every request immediately and sends nothing else."""
         self.is_connected = True
-        """Until the program has gone."""
+        """False after the program has disconnected."""
         self.talks = talks
-        """Whether the port may send without having been asked."""
+        """Whether the port may send without a request."""
         self.received: deque[tuple[Nanos, bytes]] = deque(maxlen=MOST_RECEIVED)
         self.on_output: Callable[[], None] | None = None
 
     def take(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
-        """What has come by ``now``."""
+        """Remove and return the pieces received by ``now``."""
         taken = []
         while self.received and self.received[0][0] <= now:
             taken.append(self.received.popleft())
@@ -81,7 +81,7 @@ class LineEndPoint(Stateful):
 
 
 class Line(Stateful):
-    """Base of the lines; a part of its kernel."""
+    """Base class of lines; a part of its kernel."""
 
     __slots__ = ("_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_busy", "_faults", "_followers", "_kernel", "_record", "name", "places"})
@@ -100,29 +100,29 @@ class Line(Stateful):
         self.places: dict[str, LineEndPoint] = {}
         self._followers: list[FrameFollower] = []
         self._busy: dict[str, LineEndPoint] = {}
-        """Places at which something may come without being asked for, or is due later."""
+        """Places that may send without a request, or later."""
 
-    # ------------------------------------------------------------------ what kinds of lines have of their own
+    # ------------------------------------------------------------------ implemented by kinds of lines
 
     def _port(self, place: str, kind: str) -> Port:
-        """A port for one more program. Its state is copied by `_port_state`."""
+        """A new port for a program. Its state is copied by `_port_state`."""
         raise NotImplementedError
 
     def _answers_at_once(self, kind: str) -> bool:
-        """Whether ports of a kind have sent all answers when they have taken a request."""
+        """Whether ports of a kind answer every request immediately."""
         return False
 
     def _framed(self, port: Any) -> SlavePort | None:
-        """What reports Modbus frames in a port of `_port`."""
+        """The port that reports Modbus frames, for a port made by `_port`."""
         return None
 
     @property
     def master(self) -> Master:
-        """Sends the Modbus requests of scripts. `Misuse` for a line without one."""
+        """Sends the Modbus requests of scripts. Raises `Misuse` for a line without Modbus."""
         raise Misuse(f"line {self.name!r} carries no Modbus: requests need a line of kind modbus")
 
     def serve_by(self, served: Callable[[Mapping[int, Device]], Mapping[int, Device]]) -> None:
-        """Have Modbus requests from outside executed by what a function makes of the controllers, by unit."""
+        """Replace the devices that execute external Modbus requests: ``served`` maps those by unit to their wrappers."""
 
     @property
     def units(self) -> tuple[int, ...]:
@@ -135,13 +135,13 @@ class Line(Stateful):
 
     @property
     def is_timed(self) -> bool:
-        """Whether characters take the time of a wire."""
+        """Whether characters take transmission time."""
         raise NotImplementedError
 
     # ------------------------------------------------------------------ places
 
     def connect(self, place: str, kind: str | None = None) -> LineEndPoint:
-        """A place for a program; the same one again for the same name. `Misuse` for a kind the line does not have."""
+        """The place of a program, made on first use. Raises `Misuse` for a kind the line does not have."""
         found = self.places.get(place)
         if found is not None:
             return found
@@ -150,8 +150,8 @@ class Line(Stateful):
             raise Misuse(f"line {self.name!r} takes no connection of kind {kind!r}: permitted are {', '.join(self.kinds)}")
         port = self._port(place, kind)
         framed = self._framed(port)
-        if isinstance(port, TalkingPort):
-            faulty: FaultyPort = FaultyTalkingPort(
+        if isinstance(port, SendingPort):
+            faulty: FaultyPort = FaultySendingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
             port.on_output = self._kernel.mark
@@ -174,7 +174,7 @@ class Line(Stateful):
         return found
 
     def leave(self, place: str) -> None:
-        """The program has gone."""
+        """Remove the place of a program that has disconnected."""
         found = self.places.pop(place, None)
         self._busy.pop(place, None)
         if found is not None:
@@ -192,8 +192,8 @@ class Line(Stateful):
         place.rubbish = rubbish
 
     def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        """Give bytes of the program at ``place``, which is connected as ``found``; the kernel is at ``now``. Returns what is
-        answered at once; what is answered later is in `LineEndPoint.received` then."""
+        """Take bytes of the program at ``place``, connected as ``found``; the kernel is at ``now``. Returns the immediate answer;
+        later answers go to `LineEndPoint.received`."""
         answer = found.port.exchange(data, now)
         if place in self._busy or found.port.deadline() is not None:
             self._busy[place] = found
@@ -205,7 +205,7 @@ class Line(Stateful):
         return answer
 
     def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
-        """Whether bytes of a program are a read that changes nothing. It need not be recorded: a replay misses nothing."""
+        """Whether bytes of a program are a read without side effects, which need not be recorded for a replay."""
         return False
 
     def exchange_unrecorded(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
@@ -217,7 +217,7 @@ class Line(Stateful):
             self._record = record
 
     def receive(self, place: str, data: bytes, now: Nanos) -> None:
-        """Bytes of the program at ``place``, with all answers in `LineEndPoint.received`; the kernel is at ``now``."""
+        """Take bytes of the program at ``place``; all answers go to `LineEndPoint.received`. The kernel is at ``now``."""
         found = self.connect(place)
         answer = self.exchange(place, found, data, now)
         if answer:
@@ -231,7 +231,7 @@ class Line(Stateful):
 
     # ------------------------------------------------------------------ time
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         for name, place in tuple(self._busy.items()):
             pieces = place.port.to_send(now)
             if pieces:
@@ -261,7 +261,7 @@ class Line(Stateful):
         self._watch_ports()
 
     def unfollow_frames(self, follower: FrameFollower) -> None:
-        """Call it no more."""
+        """Stop calling ``follower``."""
         self._followers.remove(follower)
         self._watch_ports()
 
@@ -270,7 +270,8 @@ class Line(Stateful):
             place.port.watch(self._observer(name))
 
     def _observer(self, place: str) -> FrameObserver | None:
-        """What a port at ``place`` is to call with its frames; None where nothing wants them, or the line has no frames."""
+        """The observer of frames for the port at ``place``; None if frames are not observed, or the line has none."""
+
         return None
 
     @property

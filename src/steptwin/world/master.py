@@ -1,4 +1,4 @@
-"""The master of a Modbus line that scripts share: one request at a time, the next one after the answer to the one before."""
+"""The Modbus master of a line, shared by all scripts: one request at a time, each after the answer to the previous one."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.state import Stateful
 
 ANSWER_NS: Nanos = SECOND
-"""How long a write waits for its answer, which is what masters are commonly set to."""
+"""Response time-out of writes; a common setting of masters."""
 
 MOST_WAITING = 10_000
-"""Requests that wait for those before them."""
+"""Limit of queued requests."""
 
 
 class Master(Stateful):
     """Sends requests in the order of the calls. They are numbered from 1.
 
-    ``send`` puts a request on the line; its answer may come at once or later (`answered`). ``pause`` passes between an answer and
-    the next request. A request without an answer in its time is given up.
+    ``send`` puts a request on the line; its answer may arrive at once or later (`answered`). ``pause``: time between an answer
+    and the next request, ns. A request is given up at its time-out.
     """
 
     __slots__ = ("_free", "_pause", "_pending", "_queue", "_send", "answers", "asked", "finished", "unanswered", "wanted")
@@ -32,36 +32,36 @@ class Master(Stateful):
         self._pause = pause
         self._queue: deque[tuple[bytes, Nanos]] = deque()
         self._pending: Nanos | None = None
-        """Until when the request on the line has time to be answered."""
+        """Time-out of the request on the line; None if there is none."""
         self._free: Nanos = 0
-        """From when on the next one may go."""
+        """Earliest moment of the next request."""
         self.asked = 0
-        """How many requests there were so far."""
+        """Number of the last request that was queued."""
         self.finished = 0
-        """The last one that was answered or given up."""
+        """Number of the last request that was answered or given up."""
         self.unanswered = 0
-        """The last one that was given up."""
+        """Number of the last request that was given up."""
         self.wanted: frozenset[int] = frozenset()
-        """Numbers of requests, also to come, whose answers are to be kept until they are taken from `answers`."""
+        """Numbers of requests whose answers are kept in `answers` until they are taken; may be set in advance."""
         self.answers: dict[int, bytes] = {}
 
     def ask(self, frame: bytes, within: Nanos, now: Nanos) -> None:
-        """Send a request when those before it are finished; it has ``within`` from then on to be answered.
+        """Queue a request. ``within``: its response time-out, from the moment at which it is sent.
 
-        `Misuse` when `MOST_WAITING` requests wait already.
+        Raises `Misuse` if `MOST_WAITING` requests are queued.
         """
         if len(self._queue) >= MOST_WAITING:
-            raise Misuse(f"{MOST_WAITING} requests of scripts wait for this line already: it answers more slowly than they come")
+            raise Misuse(f"{MOST_WAITING} requests of scripts are queued for this line: it answers too slowly")
         self.asked += 1
         self._queue.append((frame, within))
         self._go_on(now)
 
     def answered(self, data: bytes, moment: Nanos) -> None:
-        """Data has arrived from the line. Without a pending request it is dropped."""
+        """Take data from the line; it is dropped if no request is pending."""
         if self._pending is not None:
             self._finish(data, moment + self._pause)
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         if self._pending is not None and self._pending <= now:
             self.unanswered = self.finished + 1
             self._finish(b"", now)

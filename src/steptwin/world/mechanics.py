@@ -1,7 +1,7 @@
-"""What an axis moves: rotor and load with their stops, play and motor, and the encoder that sees them.
+"""The mechanics of an axis: rotor and load with hard stops, backlash and motor, and the encoders on them.
 
-A `Mechanism` follows the plans of one drive. While nothing can come between pulses and load it costs nothing; else each plan
-gives a `Course` in closed form. Positions in pulses of the mechanics.
+A `Mechanism` follows the plans of one drive. An ideal one, whose load always is at the commanded position, costs no computing
+time; otherwise each plan gives a `Course` in closed form. Positions in pulses of the mechanics.
 """
 
 from __future__ import annotations
@@ -15,40 +15,40 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Drive, Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain, Stateful
-from steptwin.world.course import Build, Carried, Course, Standing
+from steptwin.world.course import Build, Course, LoadPiece, MechanicalState
 from steptwin.world.kernel import Kernel
 
 _OUTDATED = -1
-"""No drive has this revision."""
+"""A revision that no drive has."""
 FOLLOW_NS: Nanos = 10 * MILLISECOND
-"""A controller that follows an encoder looks at it this often while it turns, so it is notified."""
+"""Interval at which a controller that follows an encoder is notified while the encoder turns."""
 
 
 class Shaft(NamedTuple):
-    """What turns an encoder: a course, in the frame of a drive's counted position. Never changed."""
+    """The motion of an encoder shaft: a course, in the frame of the drive's counted position. Immutable."""
 
     course: Course
     on_load: bool
 
     def count(self, now: Nanos) -> int:
-        standing = self.course.at(now)
+        state = self.course.at(now)
         build = self.course.build
-        return ((standing.load if self.on_load else standing.rotor) - build.zero) * build.sign
+        return ((state.load if self.on_load else state.rotor) - build.zero) * build.sign
 
 
 class EncoderReader(Protocol):
     """A controller that reads encoders. Axes count from 1."""
 
     def gear_encoder(self, axis: int, counts: int, pulses: int, now: Nanos, /) -> None:
-        """The encoder gives ``counts`` per ``pulses`` of what turns it."""
+        """Set the resolution: ``counts`` of the encoder per ``pulses`` of its shaft."""
         ...
 
     def follow_shaft(self, axis: int, shaft: Shaft, now: Nanos, /) -> None:
-        """The encoder turns with ``shaft`` from now on."""
+        """Couple the encoder to ``shaft`` from now on."""
         ...
 
     def turn_encoder(self, axis: int, counts: int, now: Nanos, /) -> None:
-        """The encoder turns by ``counts`` at once."""
+        """Turn the encoder by ``counts`` at once."""
         ...
 
 
@@ -68,7 +68,7 @@ class EncoderBuild:
 
 
 class Mechanism(Stateful):
-    """The mechanics of axis ``number`` (from 1) of a machine in ``kernel``. It is a part of the kernel, and carries switches."""
+    """The mechanics of axis ``number`` (from 1) of a machine in ``kernel``: a part of the kernel, and a carriage for switches."""
 
     __slots__ = (
         "_blocked",
@@ -100,46 +100,46 @@ class Mechanism(Stateful):
         self.build = build
         self._encoders: list[EncoderBuild] = []
         self._coupled = False
-        """Whether encoders have been notified that the drive does not turn them directly."""
+        """Whether the encoders were coupled to a course instead of the drive."""
         self._due: Nanos | None = None
-        """When controllers that follow are next notified that their encoder turns."""
+        """The next notification of controllers that follow an encoder."""
         self._stalled = False
         self._stall_due: Nanos | None = None
-        """When the motor loses the field next, or is caught."""
+        """The next moment at which the motor stalls or synchronises again."""
         self._lost = 0
         self._blocked = False
         self._changes = 0
-        self._reported: tuple[Carried, ...] = (Carried(kernel.now, True, 0),)
-        """Where the load is, as reported last."""
+        self._reported: tuple[LoadPiece, ...] = (LoadPiece(kernel.now, True, 0),)
+        """The position of the load as reported last."""
         self._reported_course: Course | None = None
         """The course that was reported."""
         self._simple = build.ideal
-        """Nothing has come between pulses and load yet, and nothing can."""
+        """Whether the load always was, and always will be, at the commanded position."""
         drive = self._drive
         here = build.sign * drive.plan.count(kernel.now) + build.zero
         if (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
             raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
         self._revision = drive.revision
-        self._course = Course(build, drive.plan, kernel.now, Standing(here, here))
+        self._course = Course(build, drive.plan, kernel.now, MechanicalState(here, here))
 
     @property
     def _drive(self) -> Drive:
         return self._kernel.drive_of(self.machine, self.number)
 
-    # ------------------------------------------------------------------ where it is
+    # ------------------------------------------------------------------ position
 
     def course(self, now: Nanos) -> Course:
-        """The course in force at ``now``, the kernel's moment or later."""
+        """The course at ``now``, which is the kernel's moment or later."""
         drive = self._drive
         if drive.revision != self._revision:
             self._renew(drive, now)
         return self._course
 
-    def at(self, now: Nanos) -> Standing:
+    def at(self, now: Nanos) -> MechanicalState:
         return self.course(now).at(now)
 
     def lost(self, now: Nanos) -> int:
-        """Pulses by which the rotor is behind the field."""
+        """The number of pulses by which the rotor is behind the field."""
         course = self.course(now)
         return course.field(now) - course.at(now).rotor
 
@@ -154,7 +154,7 @@ class Mechanism(Stateful):
 
     # ------------------------------------------------------------------ time
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         if not self._simple:
             drive = self._drive
             if drive.revision != self._revision:
@@ -166,24 +166,24 @@ class Mechanism(Stateful):
             self._report_load(now)
 
     def _report_load(self, now: Nanos) -> None:
-        """Report where the load is, unless that follows from earlier reports: a load that goes with its drive needs none."""
+        """Report the position of the load, unless it follows from earlier reports or from the plan of the drive."""
         course = self._course
         if course is self._reported_course:
             return
         self._reported_course = course
-        carried = _from(course.carried(), now)
-        if carried != _from(self._reported, now):
-            self._reported = carried
-            self._kernel.report(self.machine, "load", str(self.number), carried)
+        pieces = _from(course.load_pieces(), now)
+        if pieces != _from(self._reported, now):
+            self._reported = pieces
+            self._kernel.report(self.machine, "load", str(self.number), pieces)
 
     def deadline(self) -> Nanos | None:
-        """Courses are computed ahead: only followers of the axis need to be notified."""
+        """Courses are computed in advance: only followers of the axis have to be notified."""
         if self._due is None or self._stall_due is None:
             return self._stall_due if self._due is None else self._due
         return min(self._due, self._stall_due)
 
     def _watch_motor(self, now: Nanos) -> None:
-        """Report where the motor has lost the field, and where it has regained it."""
+        """Report that the motor has stalled or has synchronised again."""
         stalled = self._course.at(now).stalled
         if stalled is not self._stalled:
             self._stalled = stalled
@@ -192,21 +192,21 @@ class Mechanism(Stateful):
             self._kernel.report(self.machine, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
 
-    def _renew(self, drive: Drive, now: Nanos, standing: Standing | None = None) -> None:
-        """The drive follows another plan, or something has changed in the mechanics."""
+    def _renew(self, drive: Drive, now: Nanos, state: MechanicalState | None = None) -> None:
+        """Compute a new course after a change of the drive's plan or of the mechanics."""
         before, plan = self._course, drive.plan
-        if standing is None:
+        if state is None:
             if self._simple:
                 here = self.build.sign * plan.count(now) + self.build.zero - self._lost
-                standing = Standing(here, here, behind=self._lost)
+                state = MechanicalState(here, here, behind=self._lost)
             else:
-                standing = before.at(now)
-                # A controller that is switched off counts from 0 again.
+                state = before.at(now)
+                # After power-off a controller counts from 0 again.
                 counted_anew = self.build.sign * (plan.count(now) - before.plan.count(now))
-                standing = standing._replace(behind=standing.behind + counted_anew)
+                state = state._replace(behind=state.behind + counted_anew)
         jump = profile_of(plan).velocity(now) - profile_of(before.plan).velocity(now)
         self._revision = drive.revision
-        self._course = Course(self.build, plan, now, standing, blocked=self._blocked, jump=jump)
+        self._course = Course(self.build, plan, now, state, blocked=self._blocked, jump=jump)
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
@@ -216,7 +216,7 @@ class Mechanism(Stateful):
     # ------------------------------------------------------------------ encoders
 
     def fit(self, encoder: EncoderBuild, now: Nanos) -> None:
-        """Put an encoder on the rotor or the load."""
+        """Mount an encoder on the rotor or the load."""
         self._encoders.append(encoder)
         if encoder.counts is not None:
             encoder.device.gear_encoder(encoder.axis, encoder.counts, encoder.pulses, now)
@@ -237,22 +237,22 @@ class Mechanism(Stateful):
                 self._due = now + FOLLOW_NS
 
     def _is_own(self, encoder: EncoderBuild) -> bool:
-        """Whether the axis turns an encoder of its own controller's axis."""
+        """Whether an encoder belongs to the same axis of the same controller."""
         return (encoder.machine, encoder.axis) == (self.machine, self.number)
 
-    # ------------------------------------------------------------------ what can go wrong
+    # ------------------------------------------------------------------ faults
 
     def block(self, blocked: bool, now: Nanos) -> None:
-        """Hold the rotor: pulses are lost; let it go again."""
-        standing = self.at(now)
+        """Block the rotor, so that pulses are lost, or release it."""
+        state = self.at(now)
         self._simple = False
         self._blocked = blocked
-        stalled = standing.stalled or (not blocked and self.build.motor is not None)
-        self._renew(self._drive, now, standing._replace(stalled=stalled))
+        stalled = state.stalled or (not blocked and self.build.motor is not None)
+        self._renew(self._drive, now, state._replace(stalled=stalled))
         self._kernel.mark()
 
     def lose(self, pulses: int, now: Nanos) -> None:
-        """The rotor falls ``pulses`` behind the field (negative: ahead), as far as stops permit."""
+        """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
         build, (rotor, load, stalled, _) = self.build, self.at(now)
         rotor -= pulses
         if build.low is not None:
@@ -262,35 +262,35 @@ class Mechanism(Stateful):
         self._lost += pulses
         self._simple = False
         behind = self.course(now).field(now) - rotor
-        self._renew(self._drive, now, Standing(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
+        self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
         self._kernel.mark()
 
     def slip(self, counts: int, now: Nanos) -> None:
-        """The encoders turn by ``counts`` on their shaft."""
+        """Let the encoders slip by ``counts`` on their shaft."""
         for encoder in self._encoders:
             encoder.device.turn_encoder(encoder.axis, counts, now)
         self._kernel.mark()
 
-    # A drive counts its revisions on, whatever is restored: what is kept is whether the course is that of its plan.
+    # Revisions of a drive are not restored, so the state only holds whether the course belongs to the drive's present plan.
 
     def copy_state(self) -> Plain:
         return super().copy_state(), self._revision == self._drive.revision
 
     def set_state(self, plain: Plain) -> None:
-        """As ever; the drive has its state already."""
+        """As `Stateful.set_state`; the drive must have been restored before."""
         own, is_current = plain
         super().set_state(own)
         self._revision = self._drive.revision if is_current else _OUTDATED
 
 
-def _from(reported: tuple[Carried, ...], now: Nanos) -> tuple[Carried, ...]:
-    """What was reported for ``now`` and later."""
+def _from(reported: tuple[LoadPiece, ...], now: Nanos) -> tuple[LoadPiece, ...]:
+    """The part of a report that concerns ``now`` and later."""
     past = max(bisect_right(reported, now, key=attrgetter("begin")) - 1, 0)
     return (reported[past]._replace(begin=now), *reported[past + 1 :])
 
 
 class RotorMark:
-    """The rotor of a mechanism as a carriage: the index of an encoder is on it."""
+    """The rotor of a mechanism as a carriage, for the index of an encoder."""
 
     __slots__ = ("_mechanism",)
 

@@ -1,13 +1,13 @@
-"""A stepper motor with a pull-out torque curve and a load: when it loses the field, and when it finds it again.
+"""A stepper motor with a pull-out torque curve and a load: when it stalls, and when it synchronises with the field again.
 
 Torques in N·m, speeds in pulses/s. While the torque that a motion needs,
 
     inertia · acceleration + friction · direction + load,
 
-is not above what the curve gives at its speed, the rotor follows the field. Where it is above, the rotor stands still at once and
-pulses are lost until the field is slow enough for the rotor to be caught, and there is the torque that the motion needs at that
-moment. Velocity within a segment is a polynomial, so both moments come in closed form. What a rotor does beyond its stop in a
-jump of the field is not modelled.
+does not exceed the curve at its speed, the rotor follows the field. Where it exceeds the curve, the rotor stops at once, and
+pulses are lost until the field is slow enough and the torque is sufficient; then the rotor synchronises. Velocity within a
+segment is a polynomial, so both moments are computed in closed form. The transient of a rotor that stops because of a jump of the
+field's speed is not modelled.
 """
 
 from __future__ import annotations
@@ -22,28 +22,29 @@ from steptwin.errors import Misuse
 from steptwin.motion import Segment
 
 LOOK_S = 0.001
-"""Motions along arcs have no such polynomial: they are looked at this often."""
+"""Motions along arcs are no polynomials: they are sampled at this interval, s."""
 _NEAR_S = 1e-5
 Quadratic: TypeAlias = tuple[float, float, float]
 """q0 + q1·u + q2·u²."""
 _SLACK = 1e-12
-"""Relative: what is needed and what is there may be the same number but for rounding."""
+"""Relative tolerance for rounding when required and available torque are equal."""
 
 
 @dataclass(frozen=True, slots=True)
 class StepperMotor:
-    """``curve``: (speed in pulses/s, pull-out torque) from speed 0 on, straight between; above the last speed there is none."""
+    """``curve``: points (speed in pulses/s, pull-out torque) from speed 0 on, interpolated linearly; no torque above the last."""
 
     curve: tuple[tuple[float, float], ...]
     inertia: float
-    """N·m per pulse/s²: of rotor and load together."""
+    """Inertia of rotor and load together, N·m per pulse/s²."""
     friction: float
-    """Against the direction of motion."""
+    """Friction torque, against the direction of motion."""
     load: float
-    """Constant; positive where it pulls the axis towards lower positions."""
+    """Constant load torque; positive if it pulls the axis towards lower positions."""
     start_p: float | None
-    """Highest speed (pulses/s) that the field may take at once, and at which a standing rotor is caught. None: it may take any,
-    and the rotor is caught where the field stands or turns."""
+    """Highest start-stop speed, pulses/s: the largest jump of the field's speed that the rotor follows, and the highest speed at
+    which a stopped rotor synchronises. None: every jump is followed, and the rotor synchronises where the field stops or
+    reverses."""
 
     def __post_init__(self) -> None:
         speeds = [speed for speed, _ in self.curve]
@@ -57,16 +58,16 @@ class StepperMotor:
         return 0.0 if self.start_p is None else self.start_p
 
     def follows(self, jump: float) -> bool:
-        """Whether the rotor follows when the speed of the field changes at once by ``jump`` (pulses/s)."""
+        """Whether the rotor follows a jump of the field's speed (pulses/s)."""
         return self.start_p is None or abs(jump) <= self.start_p * (1.0 + 1e-9)
 
     def torque(self, speed: float) -> float:
-        """What the motor gives at ``speed`` (pulses/s, not negative); below 0 above the end of the curve."""
+        """Pull-out torque at ``speed`` (pulses/s, not negative); negative above the end of the curve."""
         constant, slope = self._line(speed)
         return constant + slope * speed
 
     def _line(self, speed: float) -> tuple[float, float]:
-        """The straight piece of the curve in which ``speed`` lies: torque at speed 0, and its slope."""
+        """The linear piece of the curve at ``speed``: its torque extrapolated to speed 0, and its slope."""
         for (s0, t0), (s1, t1) in pairwise(self.curve):
             if speed <= s1:
                 slope = (t1 - t0) / (s1 - s0)
@@ -75,15 +76,15 @@ class StepperMotor:
         return (torque, 0.0) if speed <= last else (-1.0, 0.0)
 
     def holds(self) -> bool:
-        """Whether a standing rotor is not turned by the load."""
+        """Whether the motor holds the load at rest."""
         return abs(self.load) <= self.curve[0][1] + self.friction
 
     def needs(self, acceleration: float, direction: int) -> float:
-        """Torque for an acceleration (pulses/s²) while moving in ``direction``."""
+        """Torque required for an acceleration (pulses/s²) while moving in ``direction``."""
         return self.inertia * acceleration + self.friction * direction + self.load
 
     def loses(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
-        """First moment from ``begin_s`` on and before ``end_s`` at which more is needed than there is; seconds of segment ``s``.
+        """First moment from ``begin_s`` on and before ``end_s`` at which the torque is insufficient; seconds of segment ``s``.
 
         ``sign`` is the direction of the mechanics for positive pulses.
         """
@@ -102,9 +103,9 @@ class StepperMotor:
         return None
 
     def _spares(self, s: Segment, t0: float, t1: float, sign: int) -> tuple[list[Quadratic], float]:
-        """What torque is left for what is needed in each direction, from ``t0`` to ``t1``, and what of it is rounding.
+        """The torque reserve for each direction from ``t0`` to ``t1``, as polynomials, and its tolerance for rounding.
 
-        By seconds since the segment's anchor; between the two moments the speed passes no corner of the curve.
+        Time is in seconds since the segment's anchor; between the two moments the speed passes no corner of the curve.
         """
         d = s.direction
         speed = (d * s.c1, d * 2.0 * s.c2, d * 3.0 * s.c3)
@@ -140,9 +141,9 @@ class StepperMotor:
             yield t, abs(s.velocity(t)), self.needs(sign * acceleration, sign * s.direction)
 
     def catches(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
-        """First moment from ``begin_s`` on and before ``end_s`` at which a standing rotor follows the field again.
+        """First moment from ``begin_s`` on and before ``end_s`` at which a stopped rotor synchronises with the field.
 
-        The field is no faster than ``start_p`` then, and there is torque for what the motion needs.
+        The speed of the field is then not above ``start_p``, and the torque is sufficient.
         """
         if not isinstance(s, Segment):
             return self._catches_looking(s, begin_s, end_s, sign)
@@ -177,7 +178,7 @@ def _first_below_0(q: Quadratic, begin: float, end: float, slack: float) -> floa
     if at_begin < -slack:
         return begin
     if at_begin <= slack and _slope(q, begin) < 0.0:
-        # The root is where it begins, give or take its rounding: only how far it falls from there tells.
+        # The root is at the beginning, apart from rounding: only the depth of the fall after it decides.
         lowest = end if q[2] <= 0.0 else min(end, -q[1] / (2.0 * q[2]))
         if _at(q, lowest) < -slack:
             return begin
@@ -186,7 +187,7 @@ def _first_below_0(q: Quadratic, begin: float, end: float, slack: float) -> floa
             return u if at_end < -slack or u < end else None
     if at_end >= -slack:
         return None
-    # A parabola that touches 0 where it begins has no root to fall through; else the root is the end, give or take its rounding.
+    # A parabola that touches 0 at the beginning has no falling root; otherwise the root is the end, apart from rounding.
     return begin if at_begin <= slack else end
 
 

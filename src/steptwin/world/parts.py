@@ -1,4 +1,4 @@
-"""Everything a world is made of, by name."""
+"""The built parts of a world, by name."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from steptwin.machine import MotionController
 from steptwin.world.contacts import Button
 from steptwin.world.element import B, Element, S
 from steptwin.world.elements import ELEMENTS
-from steptwin.world.elements.axis import AXIS, Fitted
+from steptwin.world.elements.axis import AXIS, BuiltAxis
 from steptwin.world.elements.button import BUTTON
 from steptwin.world.faults import Faults
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import AnyKind
+from steptwin.world.kind import AnyKind, Terminals
 from steptwin.world.lines import Line
 from steptwin.world.signals import SignalOf
 from steptwin.world.spec import WorldSpec
@@ -23,27 +23,29 @@ from steptwin.world.trace import Recorder
 
 @dataclass(slots=True)
 class WorldParts:
-    """What was built of a description."""
+    """The objects built from a description."""
 
     spec: WorldSpec
     faults: Faults
     record: Recorder
     kernels: list[Kernel] = field(default_factory=list)
     kernel_of: dict[str, Kernel] = field(default_factory=dict)
-    """Of machines and lines."""
+    """Of machines, lines and elements with terminals."""
     machines: dict[str, MotionController] = field(default_factory=dict)
     kind_of: dict[str, AnyKind] = field(default_factory=dict)
     """Of machines."""
     lines: dict[str, Line] = field(default_factory=dict)
     line_of: dict[str, tuple[Line, int]] = field(default_factory=dict)
-    """Line and unit (or address) of a machine."""
+    """Line and unit (or address) of each machine."""
+    terminals: dict[str, Terminals] = field(default_factory=dict)
+    """Of elements that have some."""
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """What was built of named elements: by the name of the kind, then by their own."""
+    """Built elements with names: by the name of the kind, then by their own."""
     warnings: list[str] = field(default_factory=list)
     """Warnings about the files that the description names."""
 
     def built(self, element: Element[S, B]) -> Mapping[str, B]:
-        """What was built of a kind of element with names, by name."""
+        """The built elements of a kind, by name."""
         return cast("Mapping[str, B]", self.elements.get(element.name, {}))
 
     @property
@@ -51,7 +53,7 @@ class WorldParts:
         return [name for built in self.elements.values() for name in built]
 
     def element_signals(self, name: str) -> Mapping[str, SignalOf] | None:
-        """What conditions may speak of; None where no element has the name."""
+        """The signals of an element; None if no element has the name."""
         for kind, built in self.elements.items():
             signals = ELEMENTS[kind].signals
             if name in built and signals is not None:
@@ -59,7 +61,7 @@ class WorldParts:
         return None
 
     @property
-    def axes(self) -> Mapping[str, Fitted]:
+    def axes(self) -> Mapping[str, BuiltAxis]:
         return self.built(AXIS)
 
     @property

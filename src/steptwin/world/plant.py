@@ -1,35 +1,38 @@
-"""A world that runs: its kernels, each advanced on demand, and the scripts that act on them.
+"""A running world: its kernels, each advanced on demand, and its scripts.
 
-Machines that share nothing are in kernels of their own. A kernel is advanced to the present when something reads it or does
-something to it; conditions keep the kernels they speak of up to date, event by event. So the order in which kernels are
-advanced never matters.
+Machines without a connection are in separate kernels. A kernel is advanced to the present before it is read or changed; the
+kernels that a condition depends on are advanced event by event. The result therefore does not depend on the order in which
+kernels are advanced.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, NamedTuple
 
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import MotionController, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.world import script as do
-from steptwin.world.actions import Outside, act
+from steptwin.world.actions import ExternalInput, act
 from steptwin.world.build import Files, Keep, build
 from steptwin.world.contacts import Button
-from steptwin.world.elements.axis import Fitted
+from steptwin.world.elements.axis import BuiltAxis
 from steptwin.world.expression import SignalCondition
 from steptwin.world.faults import Fault
 from steptwin.world.kernel import Kernel, KernelState
-from steptwin.world.kind import AnyKind, Encoders, NamedRegisters, Values, Vision, lacks
+from steptwin.world.kind import AnyKind, EncoderInputs, NamedRegisters, Values, Vision, lacks
 from steptwin.world.lines import Line
 from steptwin.world.names import Unknown
 from steptwin.world.overrides import Overrides
 from steptwin.world.parts import WorldParts
+from steptwin.world.programs import Programs
+from steptwin.world.programtexts import GivenFiles
 from steptwin.world.references import check_faults, check_scripts, check_step
 from steptwin.world.reports import Reports, ReportsState
 from steptwin.world.rigging import Rigging
@@ -40,42 +43,43 @@ from steptwin.world.spec import ScriptSpec, WorldSpec
 from steptwin.world.trace import Mark, Trace, TraceRecord
 
 WORLD = "world"
-"""What happens to no machine happens to the world."""
+"""The machine name in records that belong to no machine."""
 
 MOST_REMEMBERED = 10_000
-"""Requests, signals and conditions are remembered, for scripts use the same again and again; not more of each than these."""
+"""Size limit of each cache of requests, signals and conditions, which scripts use repeatedly."""
 
 
-class Given(NamedTuple):
-    """Something from outside, and when it came. ``settled``: the scripts of the description had done what they had to do then."""
+class RecordedInput(NamedTuple):
+    """An external input and its moment. ``settled``: the scripts of the description had already run at that moment."""
 
     time: Nanos
-    what: Outside
+    what: ExternalInput
     settled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class PlantSnapshot:
-    """All state of a world at a moment."""
+    """The complete state of a world at a moment."""
 
     description: tuple[str, int, Overrides, Files]
     now: Nanos
     kernels: tuple[KernelState, ...]
     faults: tuple[tuple[Fault, str, Nanos], ...]
-    """Those that were set, with their names and moments."""
+    """The faults that were set, with their names and moments."""
     faults_state: Any
     scripts: ScriptsState
-    inputs: tuple[Given, ...]
+    inputs: tuple[RecordedInput, ...]
     is_settled: bool
     failures: ReportsState
     overdue: ReportsState
     trace: Mark
-    later: frozenset[str]
-    """Names of what is done later, and may be called off."""
+    scheduled: frozenset[str]
+    """Names of the scheduled steps that can still be cancelled."""
+    downloaded: tuple[tuple[tuple[str, str], SourceText], ...]
 
 
 class Plant:
-    """A world without files and clocks."""
+    """A world, independent of files and clocks."""
 
     def __init__(
         self,
@@ -90,27 +94,31 @@ class Plant:
         self.spec = spec
         self.files = files
         self.trace = Trace(names, keep=keep_trace)
-        self.plan: WorldParts = build(spec, files, self.trace.add, keep_memory)
+        self.parts: WorldParts = build(spec, files, self.trace.add, keep_memory)
         self.now: Nanos = 0
         self.stopped: str | None = None
-        """Why the run ended, where a script gave a reason."""
+        """The reason a script gave for ending the run; None if none did."""
         self.failures = Reports()
         """Expectations that did not hold."""
         self.overdue = Reports()
-        """What scripts of the description waited for in vain."""
+        """Conditions that scripts of the description waited for until their time-out."""
         self.keeps_inputs = keep_inputs
-        """Whether everything from outside is kept, as a session needs it; a world that runs for weeks has no room for that."""
-        self.inputs: list[Given] = []
-        """Everything from outside so far, where it is kept."""
+        """Whether external inputs are kept, as a session needs; off for worlds that run for weeks, where memory would fill up."""
+        self.inputs: list[RecordedInput] = []
+        """All external inputs so far, if they are kept."""
+        self.input_watchers: list[Callable[[RecordedInput], None]] = []
+        """Called with everything from outside as it comes."""
         self.is_settled = False
-        """Whether the scripts of the description have done what they had to do since the last of that."""
+        """Whether the scripts of the description have run since the last external input."""
         self._encoded: dict[object, tuple[bytes, ...]] = {}
         self._signals: dict[str, SignalOf | Idle] = {}
         self._conditions: dict[str, SignalCondition] = {}
         self._scripts = Scripts(self)
-        self._later: dict[str, Script] = {}
-        """What is done later, and may be called off, by name."""
-        self.rigging = Rigging(self.plan)
+        self.downloaded: dict[tuple[str, str], SourceText] = {}
+        """What has been put into controllers since the beginning, by machine and place, as it was written."""
+        self._scheduled: dict[str, Script] = {}
+        """Scheduled steps that can be cancelled, by name."""
+        self.rigging = Rigging(self.parts)
         check_faults(self, spec.faults)
         check_scripts(self, spec.scripts)
         spec.text.check()
@@ -121,30 +129,30 @@ class Plant:
 
     @property
     def machines(self) -> Mapping[str, MotionController]:
-        return self.plan.machines
+        return self.parts.machines
 
     @property
     def lines(self) -> Mapping[str, Line]:
-        return self.plan.lines
+        return self.parts.lines
 
     @property
-    def axes(self) -> Mapping[str, Fitted]:
-        return self.plan.axes
+    def axes(self) -> Mapping[str, BuiltAxis]:
+        return self.parts.axes
 
     @property
     def kernels(self) -> list[Kernel]:
-        return self.plan.kernels
+        return self.parts.kernels
 
     @property
     def scripts(self) -> list[Script]:
-        """Scripts that have not ended, in their order: those of the description, then those started later."""
+        """The scripts that have not ended: those of the description, then those started later, in order."""
         return list(self._scripts)
 
     def touch(self, name: str) -> Kernel:
-        """The kernel of a machine or line, brought to the present. `Misuse` with the names there are."""
-        kernel = self.plan.kernel_of.get(name)
+        """The kernel of a machine or line, advanced to the present. Raises `Misuse` with the existing names."""
+        kernel = self.parts.kernel_of.get(name)
         if kernel is None:
-            raise self.unknown("machine or line", name, self.plan.kernel_of)
+            raise self.unknown("machine or line", name, self.parts.kernel_of)
         kernel.advance(self.now)
         return kernel
 
@@ -154,7 +162,7 @@ class Plant:
         return Unknown(name, f"no {what} is called {name!r}{hint}; there are {', '.join(known) or 'none'}")
 
     def condition(self, text: str) -> SignalCondition:
-        """Raises `Misuse` for what is not a condition, and for unknown signals."""
+        """The condition with this text. Raises `Misuse` for invalid text and for unknown signals."""
         found = self._conditions.get(text)
         if found is None:
             if len(self._conditions) >= MOST_REMEMBERED:
@@ -168,19 +176,26 @@ class Plant:
         return found
 
     def signal(self, name: str) -> SignalOf | Idle:
-        """The signal called ``name``. Raises `Misuse` with what there is."""
+        """The signal called ``name``. Raises `Misuse` with the existing names."""
         found = self._signals.get(name)
         if found is None:
             if len(self._signals) >= MOST_REMEMBERED:
                 self._signals.clear()
-            found = self._signals[name] = find_signal(self.plan, name)
+            found = self._signals[name] = find_signal(self.parts, name)
         return found
 
     def read(self, name: str) -> float:
-        """The present value of a signal. Raises `Misuse` for one that can only be written."""
+        """The present value of a signal. Raises `Misuse` for a write-only one."""
         found = self.signal(name)
         found.bring(self.now)
         return float(found.value(self.now))
+
+    @cached_property
+    def programs(self) -> Mapping[str, Programs]:
+        """The programs of controllers that have any, by name of the controller."""
+        given = GivenFiles(self)
+        found = {one.name: one.kind.programs(one, self.machines[one.name], given) for one in self.spec.controllers}
+        return {name: programs for name, programs in found.items() if programs is not None}
 
     # ------------------------------------------------------------------ scripts
 
@@ -195,9 +210,9 @@ class Plant:
             steps = (do.At(spec.at or 0), *spec.steps)
             self.start(spec.name, partial(do.run_through, steps, spec.repeat))
 
-    def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool = False) -> Script:
-        """Let a script run from now on. ``make`` makes its steps, again whenever a snapshot is restored."""
-        return self._scripts.start(name, make, is_outside=is_outside)
+    def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool = False) -> Script:
+        """Start a script now. ``make`` creates its steps; it is called again when a snapshot is restored."""
+        return self._scripts.start(name, make, is_external=is_external)
 
     def expect(self, text: str) -> None:
         """Report a condition that does not hold."""
@@ -210,7 +225,7 @@ class Plant:
         return condition.holds(self.now)
 
     def report_overdue(self, text: str) -> None:
-        """A script of the description has waited for something in vain."""
+        """Report that a wait of a script of the description timed out."""
         self._report(self.overdue, "overdue", text)
 
     def _report(self, reports: Reports, code: str, text: str) -> None:
@@ -218,59 +233,70 @@ class Plant:
         reports.add(record)
         self.trace.add(record)
 
-    # ------------------------------------------------------------------ what comes from outside
+    # ------------------------------------------------------------------ external inputs
 
-    def outside(self, what: Outside) -> None:
-        """Do something from outside at the present moment, and keep it for a replay. A `Misuse` changes nothing."""
+    def apply_input(self, what: ExternalInput) -> None:
+        """Apply an external input at the present moment and record it for replay. If it raises `Misuse`, nothing has changed."""
         check_step(self, what)
         self.perform(what)
         self.note(what)
 
-    def note(self, what: Outside) -> None:
-        """Keep what was done from outside at the present moment, where inputs are kept."""
-        if self.keeps_inputs:
-            self.inputs.append(Given(self.now, what, self.is_settled))
+    @property
+    def notes_inputs(self) -> bool:
+        """Whether anything wants to know of what comes from outside."""
+        return self.keeps_inputs or bool(self.input_watchers)
+
+    def note(self, what: ExternalInput) -> None:
+        """Keep what was done from outside at the present moment, where inputs are kept, and tell watchers."""
+        if self.notes_inputs:
+            given = RecordedInput(self.now, what, self.is_settled)
+            if self.keeps_inputs:
+                self.inputs.append(given)
+            for watcher in self.input_watchers:
+                watcher(given)
         self.is_settled = False
 
-    def perform(self, what: Outside) -> None:
-        """Do something at the present moment. Raises `Misuse` for what is not there."""
+    def perform(self, what: ExternalInput) -> None:
+        """Execute an action at the present moment. Raises `Misuse` for names that do not exist."""
         act(self, what)
 
     def machine(self, name: str) -> MotionController:
-        """Raises `Misuse` with the machines there are."""
+        """The machine called ``name``. Raises `Misuse` with the existing ones."""
         machine = self.machines.get(name)
         if machine is None:
             raise self.unknown("machine", name, self.machines)
         return machine
 
     def kind(self, name: str) -> AnyKind:
-        """The kind of a machine. Raises `Misuse` with the machines there are."""
-        self.machine(name)
-        return self.plan.kind_of[name]
+        """The kind of a machine. Raises `Misuse` with the existing machines."""
+        kind = self.parts.kind_of.get(name)
+        if kind is None:
+            raise self.unknown("machine", name, self.machines)
+        return kind
 
     def input_pin(self, name: str, pin: str, level: float) -> str:
-        """The input of a machine that ``pin`` means. Raises `Misuse` with those there are, and for a level it does not take."""
+        """The name of the input that ``pin`` means. Raises `Misuse` with the existing inputs, and for a level out of range."""
         kind = self.kind(name)
         found = kind.input_pin(pin, level)
         kind.refuse_taken(self.machine(name), found)
         return found
 
     def registers(self, name: str) -> NamedRegisters[Any]:
-        """Raises `Misuse` for a machine without."""
+        """The registers of a machine. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.registers is None:
             raise lacks(name, kind, "registers")
         return kind.registers
 
-    def encoders(self, name: str) -> Encoders[Any]:
-        """Raises `Misuse` for a machine without."""
+    def encoders(self, name: str) -> EncoderInputs[Any]:
+        """The encoder inputs of a machine. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.encoders is None:
             raise lacks(name, kind, "encoder")
         return kind.encoders
 
     def vision(self, name: str) -> Vision[Any, Any]:
-        """Raises `Misuse` for a machine without."""
+        """The vision registers of a machine. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.vision is None:
             raise lacks(name, kind, "vision registers")
@@ -278,14 +304,14 @@ class Plant:
 
     @staticmethod
     def by_machine(step: do.Write) -> Iterator[tuple[str, Values]]:
-        """What a step writes to one machine after the other."""
+        """The values that a step writes, grouped by machine."""
         for name, group in groupby(step.values, key=itemgetter(0)):
             yield name, tuple((register, value) for _, register, value in group)
 
     def requests(self, name: str, values: Values) -> tuple[bytes, ...]:
-        """The PDUs that write ``values`` to a machine. Raises `Misuse` for what a register does not take."""
-        registers, machine = self.registers(name), self.machine(name)
-        key = (self.kind(name).name, registers.dialect(machine), values)
+        """The PDUs that write ``values`` to a machine. Raises `Misuse` for values that a register does not accept."""
+        registers, machine = self.registers(name), self.parts.machines[name]
+        key = (self.parts.kind_of[name].name, registers.dialect(machine), values)
         found = self._encoded.get(key)
         if found is None:
             if len(self._encoded) >= MOST_REMEMBERED:
@@ -293,35 +319,42 @@ class Plant:
             found = self._encoded[key] = registers.requests(machine, values)
         return found
 
+    def programs_of(self, name: str) -> Programs:
+        """The programs of a machine. Raises `Misuse` for a machine without."""
+        kind = self.kind(name)
+        if name not in self.programs:
+            raise lacks(name, kind, "program whose text is known")
+        return self.programs[name]
+
     def button(self, name: str) -> tuple[Button, Kernel]:
-        """Raises `Misuse` with the buttons there are."""
-        found = self.plan.buttons.get(name)
+        """The button called ``name`` and its kernel. Raises `Misuse` with the existing buttons."""
+        found = self.parts.buttons.get(name)
         if found is None:
-            raise self.unknown("button", name, self.plan.buttons)
+            raise self.unknown("button", name, self.parts.buttons)
         return found
 
     def line_called(self, name: str) -> Line:
-        """Raises `Misuse` with the lines there are."""
+        """The line called ``name``. Raises `Misuse` with the existing lines."""
         line = self.lines.get(name)
         if line is None:
             raise self.unknown("line", name, self.lines)
         return line
 
     def put_fault(self, fault: Fault) -> None:
-        """Set a fault now. Raises `Misuse` for one that cannot happen here."""
+        """Set a fault now. Raises `Misuse` for one that cannot occur in this world."""
         self.settle_all()
         self.rigging.put(fault, self.now)
 
     # ------------------------------------------------------------------ time
 
     def next(self) -> Nanos | None:
-        """When something happens to a script."""
+        """The time of the next event of a script; None if there is none."""
         return _first(*self._scripts.first())
 
     def advance(self, now: Nanos) -> None:
-        """Bring the scripts, and the kernels they need, to ``now``, or to the end of the moment at which a script stops the run.
+        """Advance the scripts, and the kernels they depend on, to ``now``, or to the moment at which a script stops the run.
 
-        What ends at a moment has seen all of it, so that its length determines what happened.
+        All events of that moment are processed, so that the result depends on the duration of a run only.
         """
         if now < self.now:
             raise TimeReversal(self.now, now)
@@ -334,18 +367,18 @@ class Plant:
             self.now = max(due, self.now)
             rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
             if rounds > MOST_STEPS_PER_INSTANT:
-                raise Runaway(f"scripts go round for ever at {self.now} ns")
+                raise Runaway(f"scripts loop without end at {self.now} ns")
             if own is not None and own <= self.now:
-                self._scripts.run_own()
+                self._scripts.run_described()
             else:
                 self.is_settled = True
-                self._scripts.run_guests()
+                self._scripts.run_external()
         self.is_settled = True
         if self.stopped is None:
             self.now = now
 
     def watch_kernels(self, watch: Callable[[Kernel], None]) -> None:
-        """Call ``watch`` from now on with every kernel in which something has happened, as `Kernel.on_change`."""
+        """Call ``watch`` from now on with every kernel that has changed, as `Kernel.on_change`."""
         self._scripts.watch_kernels(self.kernels, watch)
 
     def stop_recording(self) -> None:
@@ -357,12 +390,12 @@ class Plant:
             line.stop_recording()
 
     def settle_all(self) -> None:
-        """Bring every kernel to the present."""
+        """Advance every kernel to the present."""
         for kernel in self.kernels:
             kernel.advance(self.now)
 
     def run_to(self, end: Nanos, until: str | None = None) -> str | None:
-        """Run to the moment ``end``, or until a condition is true; gives why it ended before ``end``, else None."""
+        """Run to the moment ``end``, or until a condition is true. Returns the reason for ending before ``end``, or None."""
         self.go_on()
         watch = None
         if until is not None:
@@ -374,46 +407,48 @@ class Plant:
         self.settle_all()
         return self.stopped
 
-    def do_later(self, name: str, steps: tuple[do.Step, ...]) -> None:
-        """Steps that are taken as those of the description, instead of others begun under the same name."""
-        self.call_off(name)
-        self._later[name] = self.start(name, partial(do.run_through, steps))
+    def schedule(self, name: str, steps: tuple[do.Step, ...]) -> None:
+        """Start steps as a script of the description; they replace steps scheduled under the same name."""
+        self.unschedule(name)
+        self._scheduled[name] = self.start(name, partial(do.run_through, steps))
 
-    def call_off(self, name: str) -> None:
-        """What was to be done later under a name is not done."""
-        script = self._later.pop(name, None)
+    def unschedule(self, name: str) -> None:
+        """Cancel the steps scheduled under a name, if any."""
+        script = self._scheduled.pop(name, None)
         if script is not None:
             self._scripts.end(script)
 
     def go_on(self) -> None:
-        """A world that was stopped may go on."""
+        """Let a stopped world continue."""
         self.stopped = None
 
     # ------------------------------------------------------------------ snapshots
 
-    def snapshot(self) -> PlantSnapshot:
-        """Everything at the present moment."""
+    def snapshot(self, *, with_inputs: bool = True) -> PlantSnapshot:
+        """Everything at the present moment, ``with_inputs`` also what came from outside before, where it is kept."""
         self.settle_all()
         return PlantSnapshot(
             self._description(),
             self.now,
             tuple(kernel.snapshot() for kernel in self.kernels),
-            tuple((active.fault, active.name, active.since) for active in self.plan.faults.active),
-            self.plan.faults.copy_state(),
+            tuple((active.fault, active.name, active.since) for active in self.parts.faults.active),
+            self.parts.faults.copy_state(),
             self._scripts.state(),
-            tuple(self.inputs),
+            tuple(self.inputs) if with_inputs else (),
             self.is_settled,
             self.failures.state(),
             self.overdue.state(),
             self.trace.mark(),
-            frozenset(self._later),
+            frozenset(self._scheduled),
+            tuple(self.downloaded.items()),
         )
 
     def _description(self) -> tuple[str, int, Overrides, Files]:
         return self.spec.text.source.text, self.spec.seed, self.spec.overrides, self.files
 
     def restore(self, snapshot: PlantSnapshot) -> None:
-        """Go on where a snapshot of this world, or of one with the same description, was taken.
+        """Continue from a snapshot of this world, or of one with the same description.
+
 
         Raises `Misuse` for a snapshot of another world.
         """
@@ -427,9 +462,12 @@ class Plant:
             kernel.restore(state)
         self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled
         self.failures, self.overdue = Reports(snapshot.failures), Reports(snapshot.overdue)
+        self.downloaded = dict(snapshot.downloaded)
         self._conditions.clear()
         self._scripts.restore(snapshot.scripts)
-        self._later = {script.name: script for script in self._scripts if script.name in snapshot.later and not script.is_outside}
+        self._scheduled = {
+            script.name: script for script in self._scripts if script.name in snapshot.scheduled and not script.is_external
+        }
 
 
 def _first(one: Nanos | None, other: Nanos | None) -> Nanos | None:

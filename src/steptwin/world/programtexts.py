@@ -1,13 +1,17 @@
-"""The texts of programs that the description of a world gives its controllers, as they were read with it."""
+"""The texts in the program memories of controllers: what a description gives them, and what is put there later."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import json
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from steptwin.diagnostics import Diagnostic, SourceText, to_json
 from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.world.script import Step
 
 if TYPE_CHECKING:
     from steptwin.world.plant import Plant
@@ -15,39 +19,79 @@ if TYPE_CHECKING:
 
 WBC, CHIP, CSV = "wbc", "m1486", "csv"
 LANGUAGES = (WBC, CHIP, CSV)
+
 FINDING = ("line", "column", "end_line", "end_column", "severity", "code", "message", "hint")
 """Of a diagnostic as plain values (`steptwin.diagnostics.to_json`)."""
 
 
+_SUFFIXES = {WBC: ".prg", CHIP: ".m1486", CSV: ".csv"}
+_TYPE_KEYS = ("name", "firmware", "variant", "interface")
+"""What editors need to know of a controller besides its texts."""
+
+
+def bank_text(bank: int) -> str:
+    """The place of the program in a bank."""
+    return f"program {bank}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramText:
-    """A text that a controller was given."""
+    """A place in the program memory of a controller, and the text there."""
 
     place: str
-    """Where it is in the controller, unlike all others of it: ``program 0``, ``positions 0``, ``program``."""
+    """Unlike all others of the controller: ``program 0``, ``positions 0``, ``program``."""
     language: str
     """One of `LANGUAGES`."""
     source: SourceText
-    diagnostics: Sequence[Diagnostic] = ()
-    """As the checker of its language gives them, in the order of the text."""
+    check: Callable[[], Sequence[Diagnostic]]
+    """What the checker of its language finds, in the order of the text."""
+    is_empty: bool = False
+    """Whether nothing is there; the text is empty then."""
     is_running: bool = False
     line: int | None = None
     """Of the present statement, from 1, while it runs or is paused; None where that is not known."""
 
 
-class _Given:
-    """The files of a world that was built. Its warnings were reported then."""
+class Destination(NamedTuple):
+    """Where a text goes."""
+
+    machine: str
+    line: str | None
+    """The name of its line; None where it is on none."""
+    place: str
+
+
+class Downloading(NamedTuple):
+    """How a text that was checked comes to its place."""
+
+    put: Callable[[Nanos], None] = lambda now: None
+    """What happens at once."""
+    typed: tuple[Step, ...] = ()
+    """What a host types after that."""
+
+
+class GivenFiles:
+    """The files of a world that was built, whose warnings were reported then, and what was put into controllers since."""
 
     def __init__(self, plant: Plant) -> None:
         self.spec: WorldSpec = plant.spec
-        self._files = plant.files
+        self._plant = plant
 
     def data(self, name: str) -> bytes:
         """As `steptwin.world.kind.BuildContext.data`."""
-        return self._files[name]
+        return self._plant.files[name]
 
-    def warn(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
-        """As `steptwin.world.kind.BuildContext.warn`."""
+    def accept(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
+        """As `steptwin.world.kind.BuildContext.accept`."""
+
+    def downloaded(self, machine: str, place: str) -> SourceText | None:
+        """As `steptwin.world.kind.TextContext.downloaded`."""
+        return self._plant.downloaded.get((machine, place))
+
+
+def address_of(machine: str, place: str, language: str) -> str:
+    """The address under which editors know a text."""
+    return f"steptwin:///{machine}/{place.replace(' ', '-')}{_SUFFIXES[language]}"
 
 
 def program_texts(plant: Plant, machine: str) -> Sequence[ProgramText]:
@@ -56,7 +100,28 @@ def program_texts(plant: Plant, machine: str) -> Sequence[ProgramText]:
         raise Misuse(f"there is no controller {machine!r}: there are {', '.join(plant.machines)}")
     plant.touch(machine)
     spec = next(one for one in plant.spec.controllers if one.name == machine)
-    return spec.kind.texts(spec, plant.machines[machine], _Given(plant))
+    return spec.kind.texts(spec, plant.machines[machine], GivenFiles(plant))
+
+
+def text_at(plant: Plant, machine: str, place: str) -> ProgramText:
+    """Raises `Misuse` with the places there are."""
+    there = {text.place: text for text in program_texts(plant, machine)}
+    if place not in there:
+        raise Misuse(f"{machine} has no place {place!r} for a program: places are {', '.join(there) or 'none'}")
+    return there[place]
+
+
+def name_of_text(plant: Plant, machine: str, place: str) -> str:
+    """Of the text at a place, or of the place where nothing is there yet. Raises `Misuse`."""
+    return text_at(plant, machine, place).source.name
+
+
+def configuration_text(plant: Plant, machine: str) -> SourceText | None:
+    """The configuration file of a controller by name; None for a kind that has none. Raises `Misuse` for another name."""
+    if machine not in plant.machines:
+        raise Misuse(f"there is no controller {machine!r}: there are {', '.join(plant.machines)}")
+    spec = next(one for one in plant.spec.controllers if one.name == machine)
+    return spec.kind.configuration(spec, plant.machines[machine], GivenFiles(plant))
 
 
 class WorldPrograms:
@@ -71,12 +136,51 @@ class WorldPrograms:
 
     def text(self, machine: str, place: str) -> Mapping[str, object]:
         """One of them, with what its checker finds. Raises `Misuse`."""
-        there = {text.place: text for text in program_texts(self._plant, machine)}
-        if place not in there:
-            raise Misuse(f"{machine} was given no text {place!r}: texts are {', '.join(there) or 'none'}")
-        text = there[place]
-        findings = [{key: row[key] for key in FINDING} for row in to_json(text.source, text.diagnostics)]
+        text = text_at(self._plant, machine, place)
+        findings = [{key: row[key] for key in FINDING} for row in to_json(text.source, text.check())]
         return {**_plain(machine, text), "text": text.source.text, "diagnostics": findings}
+
+    def files(self) -> Mapping[str, bytes]:
+        """What an editor server needs by address: texts, configurations, and a description that says what belongs together."""
+        plant = self._plant
+        data: Any = tomllib.loads(plant.spec.text.source.text)
+        found: dict[str, bytes] = {}
+        tables: list[str] = []
+        for spec in plant.spec.controllers:
+            kind, index = spec.path
+            table = data[kind][index]
+            lines = [f"[[{kind}]]", *(f"{key} = {json.dumps(table[key])}" for key in _TYPE_KEYS if key in table)]
+            for name, key in spec.kind.files(spec):
+                if key == "config":
+                    found[f"steptwin:///{spec.name}/config.cfg"] = plant.files[name]
+                    lines.append(f'config = "{spec.name}/config.cfg"')
+            texts = program_texts(plant, spec.name)
+            for text in texts:
+                if not text.is_empty:
+                    found[address_of(spec.name, text.place, text.language)] = text.source.text.encode()
+            tables += [*lines, *_keys(spec.name, texts)]
+        found["steptwin:///world.toml"] = "\n".join(tables).encode()
+        return found
+
+
+def _keys(machine: str, texts: Sequence[ProgramText]) -> Iterator[str]:
+    """The keys of a table that name the places of its program memory. The only table of positions is that of all banks, so others
+    are left out while they are empty."""
+    for key, language in (("programs", WBC), ("positions", CSV)):
+        of_key = [text for text in texts if text.language == language]
+        if language == CSV:
+            of_key = [text for text in of_key if not text.is_empty] or of_key[:1]
+        banks = (f'{text.place.rpartition(" ")[2]} = "{_name(machine, text)}"' for text in of_key)
+        if of_key:
+            yield f"{key} = {{ {', '.join(banks)} }}"
+    for text in texts:
+        if text.language == CHIP:
+            yield f'program = "{_name(machine, text)}"'
+
+
+def _name(machine: str, text: ProgramText) -> str:
+    """Of a text, seen from the description."""
+    return address_of(machine, text.place, text.language).removeprefix("steptwin:///")
 
 
 def _plain(machine: str, text: ProgramText) -> Mapping[str, object]:
@@ -85,6 +189,8 @@ def _plain(machine: str, text: ProgramText) -> Mapping[str, object]:
         "place": text.place,
         "name": text.source.name,
         "language": text.language,
+        "address": address_of(machine, text.place, text.language),
+        "empty": text.is_empty,
         "running": text.is_running,
         "line": text.line,
     }

@@ -12,7 +12,7 @@ from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in
 from steptwin.errors import Misuse, SourceErrors
 from steptwin.nearmiss import NearMiss
 from steptwin.world.names import Unknown
-from steptwin.world.tomlplaces import Path, TooMuch, find_places
+from steptwin.world.tomlplaces import Path, UnsupportedToml, find_places
 from steptwin.world.values import Word
 
 _MISSING: Any = object()
@@ -57,7 +57,7 @@ class TomlText:
         try:
             self._spans = find_places(text)
             self.data: dict[str, Any] = tomllib.loads(text)
-        except TooMuch as error:
+        except UnsupportedToml as error:
             self.wrong_at(error.span, "D001", str(error))
             raise self.error() from None
         except tomllib.TOMLDecodeError as error:

@@ -1,4 +1,4 @@
-"""What steps speak of is there, and takes what they give it: checked before anything runs, or anything is done."""
+"""Checks of names and values in steps, before a world runs or a step is executed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from steptwin.errors import Misuse
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import Bytes, Leave, Outside, See
+from steptwin.world.actions import Bytes, Download, ExternalInput, Leave, See, SetVariable
 from steptwin.world.faults import Fault
 from steptwin.world.script import STEPS
 from steptwin.world.spec import ScriptSpec
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
-    """Report every step that cannot be taken, in the description's text."""
+    """Report every invalid step in the text of the description."""
     text = plant.spec.text
     set_somewhere = [step.fault for script in scripts for step in _all(script.steps) if isinstance(step, do.SetFault)]
     for script in scripts:
@@ -33,7 +33,7 @@ def check_scripts(plant: Plant, scripts: Sequence[ScriptSpec]) -> None:
 
 
 def check_faults(plant: Plant, faults: Sequence[Fault | None]) -> None:
-    """Set the faults of the description; report those that cannot happen."""
+    """Set the faults of the description; report impossible ones."""
     for n, fault in enumerate(faults):
         if fault is not None and not _is_on_something_broken(plant, fault):
             try:
@@ -43,7 +43,7 @@ def check_faults(plant: Plant, faults: Sequence[Fault | None]) -> None:
 
 
 def _is_on_something_broken(plant: Plant, fault: Fault) -> bool:
-    """Whether a fault is, or may be, on a machine or line with something wrong in its own table."""
+    """Whether a fault concerns, or may concern, a machine or line whose own table has errors."""
     text = plant.spec.text
     named = [str(name) for key in ("machine", "line", "element") if (name := fault.get(key)) is not None]
     return any(map(text.may_be_broken, named)) if named else text.is_any_wrong(*text.controllers, "line", "axis")
@@ -77,7 +77,7 @@ def _check(plant: Plant, steps: Iterable[do.Step], path: Path, set_somewhere: Se
 
 
 def _parts(step: do.Step) -> Sequence[do.Step]:
-    """A step in parts that can each be wrong."""
+    """A step split into parts that are checked separately."""
     if isinstance(step, do.Set):
         return [replace(step, levels=(level,)) for level in step.levels]
     if isinstance(step, do.Write):
@@ -86,13 +86,13 @@ def _parts(step: do.Step) -> Sequence[do.Step]:
 
 
 def _may_be_called(fault: Fault, name: str) -> bool:
-    """Whether a fault can get this name: its own, or its kind and a number where it has none."""
+    """Whether a fault may have this name: its own, or its kind with a number if it has none."""
     kind, _, number = name.rpartition("-")
     return name == fault.name or (not fault.name and fault.kind.name in (name, kind if number.isdecimal() else name))
 
 
 def check_step(plant: Plant, step: object) -> None:
-    """Raises `Misuse` for a step that cannot be taken, or not as a whole."""
+    """Raises `Misuse` for a step with unknown names or invalid values."""
     check = _CHECKS.get(type(step))
     if check is not None:
         check(plant, step)
@@ -137,11 +137,15 @@ def _couple(plant: Plant, step: do.Couple) -> None:
     drive = step.machine, f"M{step.axis}"
     for axis in plant.axes.values():
         if axis.spec.drive == drive:
-            raise Misuse(f"{'.'.join(drive)}: the description of axis {axis.spec.name!r} says what turns its encoder")
+            raise Misuse(f"{'.'.join(drive)}: its encoder is part of the mechanics of axis {axis.spec.name!r}")
 
 
 def _see(plant: Plant, step: See) -> None:
     plant.vision(step.machine)
+
+
+def _set_variable(plant: Plant, step: SetVariable) -> None:
+    plant.programs_of(step.machine)
 
 
 def _fault(plant: Plant, step: do.SetFault) -> None:
@@ -149,16 +153,16 @@ def _fault(plant: Plant, step: do.SetFault) -> None:
 
 
 def _clear_fault(plant: Plant, step: do.ClearFault) -> None:
-    plant.plan.faults.called(step.name)
+    plant.parts.faults.called(step.name)
 
 
 def _nothing(plant: Plant, step: object) -> None:
-    """It names nothing that could be missing, or is checked when it is taken."""
+    """No check: the step has no names, or is checked when it is executed."""
 
 
 _CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
     "step",
-    get_args(Outside),
+    get_args(ExternalInput),
     "check",
     {
         do.Until: _condition,
@@ -173,8 +177,9 @@ _CHECKS: Mapping[type, Callable[[Plant, Any], None]] = complete(
         do.Turn: _turn,
         do.Couple: _couple,
         See: _see,
+        SetVariable: _set_variable,
         do.SetFault: _fault,
         do.ClearFault: _clear_fault,
-        **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat, Bytes, Leave), _nothing),
+        **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat, Bytes, Download, Leave), _nothing),
     },
 )

@@ -1,4 +1,4 @@
-"""The faults of a world: whether they can happen where they are placed, and the machines that are prepared for them."""
+"""The faults of a world: checks of their places, and preparation of machines for them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from steptwin.machine import Nanos
-from steptwin.world.faults import Active, Fault, RequestRoute, check_place, rig
-from steptwin.world.faults.table import Layer, OfRequest
-from steptwin.world.kind import Service
+from steptwin.world.faults import ActiveFault, Fault, RequestRoute, check_place, rig
+from steptwin.world.faults.table import Layer, RequestEffect
+from steptwin.world.kind import LineUnit
 from steptwin.world.kinds import line_kinds
 from steptwin.world.lines import SCRIPTS
 from steptwin.world.parts import WorldParts
@@ -21,7 +21,7 @@ class Rigging:
         self._plan = plan
 
     def check(self, fault: Fault) -> None:
-        """Raises `Misuse` for a fault of something that is not there, or that cannot happen there."""
+        """Raises `Misuse` for a fault at a place that does not exist, or where it is impossible."""
         check_place(fault, [*_wires(self._plan)])
         self._prepare(fault)
         self._plan.faults.check(fault)
@@ -32,33 +32,33 @@ class Rigging:
         self._plan.faults.add(fault, now)
 
     def put_back(self, faults: Iterable[tuple[Fault, str, Nanos]], state: Any) -> None:
-        """The faults that were set then, by name and moment; machines stay prepared for those that were set since."""
+        """Restore the faults of a snapshot, with name and moment; machines remain prepared for later ones."""
         kept, there = list(faults), self._plan.faults
         for fault, _, _ in kept:
             self._prepare(fault)
-        there.active = tuple(Active(fault, name, there.seed, since) for fault, name, since in kept)
+        there.active = tuple(ActiveFault(fault, name, there.seed, since) for fault, name, since in kept)
         there.set_state(state)
 
     def _prepare(self, fault: Fault) -> None:
-        if fault.kind.layer is Layer.PHYSICS or isinstance(fault.kind.effect, OfRequest):
+        if fault.kind.layer is Layer.PHYSICS or isinstance(fault.kind.effect, RequestEffect):
             for name in self._plan.machines:
                 self._rig(name)
 
     def _rig(self, name: str) -> None:
-        """Let a machine have faults; mechanics of its axes have them instead of the bare shafts."""
+        """Prepare a machine for faults; if an axis has mechanics, its faults act on these instead of on the encoder."""
         plan = self._plan
         machine = plan.machines[name]
         if name in plan.faults.machines:
             return
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.axes.values() if axis.spec.drive[0] == name}
         on = plan.line_of.get(name)
-        service = Service() if on is None else Service(on[1], on[0].name)
+        service = LineUnit() if on is None else LineUnit(on[1], on[0].name)
         body = plan.kind_of[name].body(machine, service, mechanisms)
         rig(plan.kernel_of[name], name, plan.faults, body)
 
 
 def _wires(plan: WorldParts) -> Iterator[RequestRoute]:
-    """What requests come along: links of lines to the outside, described or there now; their scripts; without a line nothing."""
+    """The routes of requests: external links of lines, described or present; scripts; None for a machine without a line."""
     for spec in plan.spec.lines:
         line = plan.lines.get(spec.name)
         if line is None:
@@ -75,4 +75,4 @@ def _wires(plan: WorldParts) -> Iterator[RequestRoute]:
         yield RequestRoute(name, line.fault_kinds[line.kinds[0]], SCRIPTS, line.units, is_usual=not outside, on=spec.name)
     for name, kind in plan.kind_of.items():
         if kind.registers is not None and name not in plan.line_of:
-            yield RequestRoute(f"{name!r} is on no line", None, units=(Service().unit,))
+            yield RequestRoute(f"{name!r} is on no line", None, units=(LineUnit().unit,))

@@ -1,4 +1,4 @@
-"""Scripts that run: where each is in its steps, and what it waits for."""
+"""Running scripts: their progress and what they wait for."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from steptwin.machine import Nanos
 from steptwin.world import script as do
 
 
-class Asked(NamedTuple):
-    """Requests on a line, up to the one numbered ``last``, to which a script waits for the answers."""
+class PendingRequests(NamedTuple):
+    """The requests ``first`` to ``last`` on a line, for whose answers a script waits."""
 
     line: str
     first: int
@@ -20,24 +20,24 @@ class Asked(NamedTuple):
 
 
 class ScriptWait(NamedTuple):
-    """What a script waits for: a moment, or something that comes before it."""
+    """What a script waits for: a moment, or a condition or answers before that moment."""
 
     until: Nanos | None
     condition: str | None = None
-    asked: tuple[Asked, ...] = ()
+    asked: tuple[PendingRequests, ...] = ()
     answer: bytes | None = None
-    """What a `Request` was answered at once."""
+    """The answer of a `Request` that was answered at once."""
     is_request: bool = False
-    """Whether the script is sent the answer."""
+    """Whether the answer is sent to the script's generator."""
 
     @property
     def is_timed(self) -> bool:
-        """Whether nothing but a moment ends it."""
+        """Whether only the passing of time ends the wait."""
         return self.condition is None and not self.asked
 
 
 class SentValues:
-    """All values sent to a generator so far, stored compactly: scripts may run for months."""
+    """All values sent to a generator so far, stored compactly because scripts may run for months."""
 
     __slots__ = ("_bytes", "_kinds", "_lengths", "_numbers")
 
@@ -54,7 +54,7 @@ class SentValues:
         return len(self._kinds)
 
     def add(self, value: object) -> None:
-        """None, a truth value, a number or bytes: what steps give."""
+        """Add the result of a step: None, a truth value, a number or bytes."""
         if value is None or value is False or value is True:
             self._kinds.append(self._PLAIN.index(value))
         elif isinstance(value, float):
@@ -65,10 +65,10 @@ class SentValues:
             self._lengths.append(len(value))
             self._bytes += value
         else:
-            raise Misuse(f"{value!r}: a step gives nothing, a truth value, a number or bytes")
+            raise Misuse(f"{value!r}: the result of a step is None, a truth value, a number or bytes")
 
     def values(self) -> Any:
-        """All of it, in order."""
+        """All values in order."""
         numbers, lengths, at = iter(self._numbers), iter(self._lengths), 0
         for kind in self._kinds:
             if kind == self._NUMBER:
@@ -88,38 +88,38 @@ class SentValues:
 
 
 Place: TypeAlias = "tuple[tuple[int, int], ...] | SentValues"
-"""Where a script is: its place in a `Walk`, or what its generator was sent."""
+"""The progress of a script: its place in a `Walk`, or the values sent to its generator."""
 
 
 class ScriptState(NamedTuple):
-    """A script that has not ended, where it is and what it waits for."""
+    """The state of a script that has not ended."""
 
     number: int
     name: str
     make: Callable[[], do.Steps | do.Walk]
-    is_outside: bool
+    is_external: bool
     place: Place
     waiting: ScriptWait | None
 
 
 class Script:
-    """Steps in progress. Scripts are numbered in the order in which they began."""
+    """A script in progress. Scripts are numbered in the order of their start."""
 
-    __slots__ = ("_sent", "_steps", "ended", "entry", "is_outside", "kernels", "make", "name", "number", "waiting")
+    __slots__ = ("_sent", "_steps", "ended", "entry", "is_external", "kernels", "make", "name", "number", "waiting")
 
-    def __init__(self, number: int, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool) -> None:
+    def __init__(self, number: int, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool) -> None:
         self.number = number
         self.name = name
         self.make = make
-        self.is_outside = is_outside
-        """Whether it is not part of the description: what it does comes from outside."""
+        self.is_external = is_external
+        """Whether it is not part of the description, so that its actions are external inputs."""
         self._sent = SentValues()
         self._steps = make()
         self.waiting: ScriptWait | None = None
         self.entry = 0
-        """Its present entry in an agenda."""
+        """The number of its valid entry in an agenda."""
         self.kernels: tuple[Any, ...] = ()
-        """Those on which it depends what it waits for."""
+        """The kernels on which its wait depends."""
         self.ended = False
 
     def send(self, value: Any) -> do.Step | None:
@@ -136,7 +136,7 @@ class Script:
             return None
 
     def end(self) -> None:
-        """It takes no further step."""
+        """End it: no further step is executed."""
         self.ended = True
         self._steps.close()
         self._sent = SentValues()
@@ -144,12 +144,12 @@ class Script:
     def state(self) -> ScriptState:
         steps = self._steps
         place: Place = steps.place if isinstance(steps, do.Walk) else self._sent.copy()
-        return ScriptState(self.number, self.name, self.make, self.is_outside, place, self.waiting)
+        return ScriptState(self.number, self.name, self.make, self.is_external, place, self.waiting)
 
     @classmethod
     def at(cls, state: ScriptState) -> Script:
-        """A script in a state: a walk at its place, or a fresh generator that was sent the same again."""
-        script = cls(state.number, state.name, state.make, is_outside=state.is_outside)
+        """A script in a given state: a walk at its place, or a new generator that was sent the same values again."""
+        script = cls(state.number, state.name, state.make, is_external=state.is_external)
         if isinstance(state.place, SentValues):
             script._sent = state.place.copy()
             for value in state.place.values():

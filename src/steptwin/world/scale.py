@@ -1,4 +1,4 @@
-"""How far an axis goes with a pulse: from its description, else from the configuration of its controller."""
+"""The scale of an axis: from its description, otherwise from the configuration of its controller."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from steptwin.world.elements.motor import MotorSpec
 
 FULL_STEPS = 200
-"""Of a motor that is not described."""
+"""Default full steps per revolution of a motor."""
 PULSES = "imp"
-"""The unit of an axis that is not described."""
+"""Default unit of an axis."""
 LENGTHS: Mapping[str, Fraction] = {"mm": Fraction(1, 1000), "cm": Fraction(1, 100), "m": Fraction(1)}
 """In metres."""
 TURNS: Mapping[str, Fraction] = {"rev": Fraction(1), "degree": Fraction(1, 360)}
@@ -28,7 +28,7 @@ TURNS: Mapping[str, Fraction] = {"rev": Fraction(1), "degree": Fraction(1, 360)}
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Pulses of the drive in a unit of the axis, and in a revolution of its motor."""
+    """Pulses of the drive per unit of the axis, and per revolution of its motor."""
 
     unit: str
     pulses_per_unit: Fraction
@@ -49,7 +49,7 @@ class Scale:
 
     @property
     def turn(self) -> Fraction | None:
-        """Pulses in a turn of the axis itself, where its unit defines that."""
+        """Pulses per revolution of the axis itself; None if its unit is not an angle."""
         revs = TURNS.get(self.unit)
         return None if revs is None else self.pulses_per_unit / revs
 
@@ -59,19 +59,19 @@ class DriveScale:
     """How a controller counts the position of an axis."""
 
     pulses_per_rev: int
-    """Of the motor: what the description says, else what the controller is configured for."""
+    """Of the motor: from the description, otherwise from the configuration of the controller."""
     full_steps: int
     """Of the motor, per revolution."""
     unit: str | None = None
-    """That the controller is configured for; None where it knows pulses only."""
+    """The unit in the configuration of the controller; None if it has pulses only."""
     pulses_per_unit: Fraction = Fraction(1)
     text: str
-    """What it counts, for messages: ``counts minimum microsteps``."""
+    """The counted quantity, for messages: ``counts minimum microsteps``."""
 
 
 def scale_of(spec: AxisSpec, drive: DriveScale) -> Scale:
-    """The scale of an axis. What the description says goes before what the controller is configured for. Raises `Misuse` where a
-    unit has none."""
+    """The scale of an axis; the description takes precedence over the configuration of the controller. Raises `Misuse` for a unit
+    without a scale."""
     unit, per_unit = _per_unit(spec, drive)
     return Scale(unit, per_unit, drive.pulses_per_rev, drive.full_steps)
 

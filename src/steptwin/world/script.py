@@ -1,9 +1,9 @@
-"""What operators do: steps, one after another. A script is a generator of steps, which are plain values. Their times are whole
-nanoseconds: ``Wait(SECOND // 2)``, or ``Wait(duration("500 ms"))`` with `steptwin.durations`.
+"""Scripts: sequences of steps that an operator takes. A script is a generator of steps, which are plain values. Their times are
+whole nanoseconds: ``Wait(SECOND // 2)``, or ``Wait(duration("500 ms"))`` with `steptwin.durations`.
 
-A generator is sent what a step gives: for `Read` a number, for `Request` the answer (bytes), for `Until` whether the condition
-came true in time. It touches nothing by itself, so that it can be restored by sending it the same again. Steps that are known
-beforehand are a `Walk`, whose state is its place among them.
+The result of a step is sent to the generator: for `Read` a number, for `Request` the answer (bytes), for `Until` whether the
+condition became true in time. A generator must have no side effects, so that it can be restored by sending it the same results
+again. A fixed sequence of steps is a `Walk`, whose state is its place in the sequence.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from steptwin.world.reader import Key, Path, TomlText, read_table
 from steptwin.world.values import name_value, number, pin_name, text_value, time_value, whole
 
 COUPLINGS = ("drive", "free", "blocked")
-"""What can turn the encoder shaft of an axis."""
+"""Couplings of an axis's encoder shaft: turned by the drive, free, or blocked together with the drive."""
 
 
 def _check_ns(value: object) -> None:
-    """`Misuse` unless a time of a step is whole nanoseconds; the rest of the interface takes seconds."""
+    """Raises `Misuse` unless a time is in whole nanoseconds; the rest of the interface takes seconds."""
     if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
         raise Misuse(f"{value!r}: steps take whole nanoseconds, such as SECOND // 2, or duration('500 ms')")
 
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Nothing for so long."""
+    """Wait for a duration, ns."""
 
     duration: Nanos
 
@@ -42,7 +42,7 @@ class Wait:
 
 @dataclass(frozen=True, slots=True)
 class At:
-    """Nothing until that moment; nothing at all when it has passed."""
+    """Wait until a moment, ns of the world's time; no wait if it has passed."""
 
     time: Nanos
 
@@ -52,7 +52,7 @@ class At:
 
 @dataclass(frozen=True, slots=True)
 class Until:
-    """Nothing until a condition is true, at most for ``within``. Gives whether it is."""
+    """Wait until a condition is true, at most for ``within``. Result: whether it is true."""
 
     condition: str
     within: Nanos | None = None
@@ -63,14 +63,14 @@ class Until:
 
 @dataclass(frozen=True, slots=True)
 class Set:
-    """Inputs take levels: 0, 1, volts."""
+    """Set inputs (machine, pin, level): 0, 1 or volts."""
 
     levels: tuple[tuple[str, str, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """Press a button, for ``duration`` or until it is released; who presses or releases it meanwhile goes before that."""
+    """Press a button for ``duration``, or until it is released. A later press or release of it cancels the timed release."""
 
     button: str
     duration: Nanos | None = None
@@ -86,14 +86,14 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Registers of a MIC488 by name take values, in configured units, as a master writes them."""
+    """Write registers by name (machine, register, value in configured units), as a Modbus master does."""
 
     values: tuple[tuple[str, str, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Bytes go to a line."""
+    """Send bytes to a line."""
 
     line: str
     data: bytes
@@ -101,7 +101,7 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A Modbus request on a line. Gives the PDU of the answer; nothing (b"") when none comes in time."""
+    """Send a Modbus request on a line. Result: the PDU of the answer; b"" if none arrives in time."""
 
     line: str
     unit: int
@@ -119,7 +119,7 @@ class PowerCycle:
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Turn the encoder shaft of an axis of a MIC488 by counts."""
+    """Turn the encoder shaft of an axis by counts."""
 
     machine: str
     axis: int
@@ -128,7 +128,7 @@ class Turn:
 
 @dataclass(frozen=True, slots=True)
 class Couple:
-    """What turns the encoder shaft of an axis of a MIC488 without mechanics: the drive, nothing, or a blocked drive."""
+    """Choose what turns the encoder shaft of an axis without mechanics: one of `COUPLINGS`."""
 
     machine: str
     axis: int
@@ -151,35 +151,35 @@ class ClearFault:
 
 @dataclass(frozen=True, slots=True)
 class Expect:
-    """Report a condition that does not hold; the run has failed then."""
+    """Check a condition; if it is false, it is reported and the run fails."""
 
     condition: str
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A text for the trace."""
+    """Write a text into the trace."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """The run ends when all scripts have done what they do at this moment. The next step is due a nanosecond later."""
+    """End the run after all steps of this moment. If the world continues, the next step is due a nanosecond later."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """Gives the value of a signal."""
+    """Read a signal. Result: its value."""
 
     signal: str
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Call Python code, which may do anything with the world."""
+    """Call Python code, which may read and change the world."""
 
     function: Callable[[], object]
 
@@ -213,19 +213,19 @@ Step: TypeAlias = (
     | Repeat
 )
 Steps: TypeAlias = Generator[Step, Any, None]
-"""What an operator in Python is: steps as they come, which may depend on what steps before have given."""
+"""A script in Python: its steps may depend on the results of earlier steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Turn:
-    """The first step of a `Walk` whose turns begin ``period`` after each other."""
+    """The first step of a periodic `Walk`: waits for the begin of the next period."""
 
     begin: Nanos
     period: Nanos
 
 
 class Walk:
-    """Steps in order, ``times`` times; None: without end. It is used like a generator, and `place` is all of its state."""
+    """Steps in order, repeated ``times`` times; None: without end. It is used like a generator; `place` is its complete state."""
 
     __slots__ = ("_levels", "_steps", "_times")
 
@@ -233,11 +233,11 @@ class Walk:
         self._steps = _without_empty(steps)
         self._times = times
         self._levels = [(self._steps, 0, 0)] if self._steps and times != 0 else []
-        """Of the whole and each `Repeat` that has begun, outermost first: steps, the next of them, how many turns are done."""
+        """For the walk and each active `Repeat`, outermost first: steps, index of the next one, number of completed passes."""
 
     @property
     def place(self) -> tuple[tuple[int, int], ...]:
-        """For the whole and each `Repeat` that has begun, outermost first: which step is next, and how many turns are done."""
+        """For the walk and each active `Repeat`, outermost first: index of the next step, number of completed passes."""
         return tuple((index, done) for _, index, done in self._levels)
 
     @place.setter
@@ -248,7 +248,7 @@ class Walk:
             self._levels.append((steps, index, done))
 
     def _repeat(self) -> Repeat:
-        """The `Repeat` that the innermost level has begun."""
+        """The innermost active `Repeat`."""
         steps, index, _ = self._levels[-1]
         return cast(Repeat, steps[index - 1])
 
@@ -259,7 +259,7 @@ class Walk:
         return self.send(None)
 
     def send(self, value: object) -> Step:
-        """The next step; what the step before has given is ignored. Raises `StopIteration` after the last."""
+        """The next step; the result of the previous one is ignored. Raises `StopIteration` after the last."""
         while self._levels:
             steps, index, done = self._levels.pop()
             if index == len(steps):
@@ -282,7 +282,7 @@ class Walk:
 
 
 def _without_empty(steps: Iterable[Step | _Turn]) -> tuple[Step | _Turn, ...]:
-    """Steps without repetitions of nothing, through which one could go for ever."""
+    """Steps without empty repetitions, which could loop without end."""
     kept: list[Step | _Turn] = []
     for step in steps:
         if not isinstance(step, Repeat):
@@ -293,7 +293,7 @@ def _without_empty(steps: Iterable[Step | _Turn]) -> tuple[Step | _Turn, ...]:
 
 
 def run_through(steps: Iterable[Step], times: int = 1) -> Walk:
-    """The steps in order, ``times`` times."""
+    """The steps in order, repeated ``times`` times."""
     return Walk(steps, times)
 
 
@@ -303,7 +303,7 @@ def run_every(steps: tuple[Step, ...], period: Nanos, begin: Nanos) -> Walk:
 
 
 def run_when(steps: tuple[Step, ...], condition: str, *, once: bool) -> Walk:
-    """The steps whenever the condition comes true."""
+    """The steps each time the condition becomes true; ``once``: only the first time."""
     if once:
         return Walk((Until(condition), *steps))
     return Walk((Until(condition), *steps, Until(f"not ({condition})")), None)
@@ -342,7 +342,7 @@ def _characters(value: Any) -> bytes:
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError as error:
-        raise Misuse(f"{value!r}: {value[error.start]!r} is not a character of a line, which has 8 bits for each") from None
+        raise Misuse(f"{value!r}: {value[error.start]!r} is not an 8-bit character") from None
 
 
 def _turn(axis: tuple[str, int], counts: int) -> Turn:
@@ -355,7 +355,7 @@ def _couple(axis: tuple[str, int], coupling: str) -> Couple:
 
 @dataclass(frozen=True, slots=True)
 class StepKind:
-    """A kind of step: its first key selects it; ``make`` takes the values of all keys in their order."""
+    """A kind of step: its first key selects it; ``make`` takes the values of all keys in order."""
 
     main: Key
     others: tuple[Key, ...]
@@ -382,7 +382,7 @@ ACTIONS: Mapping[str, StepKind] = dict(
         _action(Key("release", name_value, "a button"), Release),
         _action(Key("write", _levels, "{ 'MACHINE.REGISTER' = VALUE }"), Write),
         _action(
-            Key("send", name_value, "a line of M1486 chips"),
+            Key("send", name_value, "a line that carries characters"),
             Send,
             Key("text", _characters, "characters; \\r ends a command line", attribute="data"),
         ),
@@ -404,7 +404,7 @@ ACTIONS: Mapping[str, StepKind] = dict(
         _action(Key("stop", text_value, "why the run ends"), Stop),
     )
 )
-"""What steps can be, by their first key. ``repeat`` has steps of its own and stands beside it."""
+"""The kinds of steps by their first key, except ``repeat``, which contains steps."""
 
 REPEAT = Key("repeat", whole(1, 10**9), "how often")
 
@@ -414,11 +414,11 @@ def _list(value: Any) -> Any:
 
 
 STEPS = Key("steps", _list, "a list of steps, such as [{ press = 'start' }, { wait = '1 s' }]")
-"""Of events, scripts and ``repeat``; `read_steps` reads it."""
+"""The key ``steps`` of events, scripts and ``repeat``; `read_steps` reads its value."""
 
 
 _UNREAD = Note("")
-"""In the place of a step that is wrong, so that those after it keep theirs; such a script never runs."""
+"""Placeholder for a step with an error, so that later steps keep their numbers; such a script never runs."""
 
 
 def read_steps(text: TomlText, path: Path, value: object) -> tuple[Step, ...]:

@@ -1,4 +1,4 @@
-"""The scripts of a world: which step each takes next, and when."""
+"""Execution of the scripts of a world."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ from steptwin.errors import Runaway
 from steptwin.machine import Nanos
 from steptwin.tables import complete
 from steptwin.world import script as do
-from steptwin.world.actions import FOR_SCRIPTS, Outside
+from steptwin.world.actions import FOR_SCRIPTS, ExternalInput
 from steptwin.world.agenda import Agenda, Watchers
 from steptwin.world.kernel import Kernel
 from steptwin.world.master import Master
-from steptwin.world.running import Asked, Script, ScriptState, ScriptWait
+from steptwin.world.running import PendingRequests, Script, ScriptState, ScriptWait
 
 if TYPE_CHECKING:
     from steptwin.world.plant import Plant
 
 MOST_STEPS_PER_INSTANT = 10_000
-"""More steps of scripts at one moment are a runaway."""
+"""Limit of steps of scripts at one moment; more are reported as `Runaway`."""
 
 
-Taken: TypeAlias = tuple[ScriptWait | None, Any]
-"""What a step waits for, or else what it gives."""
+StepResult: TypeAlias = tuple[ScriptWait | None, Any]
+"""What a step waits for; if it does not wait, its result."""
 
 
 class ScriptsState(NamedTuple):
-    """All scripts that have not ended, and how many there were."""
+    """All scripts that have not ended, and the number of scripts started so far."""
 
     begun: int
     scripts: tuple[ScriptState, ...]
 
 
 class Scripts:
-    """Runs scripts step by step. Those of the description come first at a moment; those from outside when they are done."""
+    """Runs scripts step by step. At one moment, scripts of the description run before external ones."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self._begun = 0
         self._scripts: dict[int, Script] = {}
-        self._own, self._guests = Agenda(), Agenda()
+        self._described, self._external = Agenda(), Agenda()
         self._watchers = Watchers()
 
     def watch_kernels(self, kernels: Iterable[Kernel], watch: Callable[[Kernel], None]) -> None:
@@ -49,19 +49,19 @@ class Scripts:
         self._watchers.watch_all(kernels, watch)
 
     def __iter__(self) -> Iterator[Script]:
-        """Those that have not ended, in their order."""
+        """The scripts that have not ended, in order of their start."""
         return iter(self._scripts.values())
 
-    # ------------------------------------------------------------------ beginning and ending
+    # ------------------------------------------------------------------ start and end
 
-    def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_outside: bool) -> Script:
-        script = self._scripts[self._begun] = Script(self._begun, name, make, is_outside=is_outside)
+    def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool) -> Script:
+        script = self._scripts[self._begun] = Script(self._begun, name, make, is_external=is_external)
         self._begun += 1
         self._wait(script, ScriptWait(self._plant.now))
         return script
 
     def end(self, script: Script) -> None:
-        """It takes no further step."""
+        """End a script: no further step is executed."""
         if self._scripts.get(script.number) is script:
             script.end()
             self._remove(script)
@@ -74,14 +74,14 @@ class Scripts:
             del self._scripts[script.number]
 
     def _agenda_of(self, script: Script) -> Agenda:
-        return self._guests if script.is_outside else self._own
+        return self._external if script.is_external else self._described
 
-    # ------------------------------------------------------------------ when they are due
+    # ------------------------------------------------------------------ scheduling
 
     def first(self) -> tuple[Nanos | None, Nanos | None]:
-        """When the first script of the description is due, and when the first one from outside."""
+        """The earliest due moments of the scripts of the description and of the external ones."""
         self._renew()
-        return self._own.first(), self._guests.first()
+        return self._described.first(), self._external.first()
 
     def _renew(self) -> None:
         """Update the due moments of scripts whose kernels have changed."""
@@ -98,7 +98,7 @@ class Scripts:
             self._plan(script)
 
     def _plan(self, script: Script) -> None:
-        """Find when a script that watches is due, unless one of its kernels changes before."""
+        """Schedule the evaluation of a script that waits for a condition or answers."""
         waiting, plant = script.waiting, self._plant
         if waiting is None:
             return
@@ -120,20 +120,20 @@ class Scripts:
     def _master(self, line: str) -> Master:
         return self._plant.line_called(line).master
 
-    # ------------------------------------------------------------------ what they do
+    # ------------------------------------------------------------------ execution
 
-    def run_own(self) -> None:
-        """Let the scripts of the description do what is due now."""
-        self._run(self._own)
+    def run_described(self) -> None:
+        """Run the scripts of the description that are due now."""
+        self._run(self._described)
 
-    def run_guests(self) -> None:
-        """Let those from outside do what is due now."""
-        self._run(self._guests)
+    def run_external(self) -> None:
+        """Run the external scripts that are due now."""
+        self._run(self._external)
 
     def _run(self, agenda: Agenda) -> None:
-        """First those whose moment has come, then those that watch, in their order. Each is looked at once; what comes to be due
-        behind the one that acts is left for the next time."""
-        plant = self._plant  # whose moment changes where a step restores a snapshot
+        """Run scripts whose moment has come, then those with conditions, each once and in order. A script that becomes due after
+        its turn runs with the next call."""
+        plant = self._plant  # its moment changes if a step restores a snapshot
         while (timed := agenda.take_timed(plant.now)) is not None:
             self._resume(timed, None)
         ready: dict[int, Script] = {}
@@ -184,7 +184,7 @@ class Scripts:
 
     def _report_overdue(self, script: Script, waiting: ScriptWait, *, has_come: bool) -> None:
         """Steps of a description go on whether or not what they wait for comes; code from outside is sent that, and decides."""
-        if script.is_outside or waiting.is_request:
+        if script.is_external or waiting.is_request:
             return
         if waiting.condition is not None:
             if not has_come:
@@ -209,55 +209,55 @@ class Scripts:
                 return
         raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self._plant.now} ns")
 
-    def _take(self, step: do.Step, script: Script) -> Taken:
-        """Take a step: what it waits for, or else what it gives."""
+    def _take(self, step: do.Step, script: Script) -> StepResult:
+        """Execute a step; returns what it waits for, or its result."""
         return _TAKING.get(type(step), Scripts._act)(self, step, script)
 
-    def _act(self, step: do.Step, script: Script) -> Taken:
+    def _act(self, step: do.Step, script: Script) -> StepResult:
         self._do(script, step)
         return None, None
 
-    def _pause(self, step: do.Wait, script: Script) -> Taken:
+    def _pause(self, step: do.Wait, script: Script) -> StepResult:
         return (ScriptWait(self._plant.now + step.duration) if step.duration > 0 else None), None
 
-    def _wait_for_moment(self, step: do.At, script: Script) -> Taken:
+    def _wait_for_moment(self, step: do.At, script: Script) -> StepResult:
         return (ScriptWait(step.time) if step.time > self._plant.now else None), None
 
-    def _wait_for_condition(self, step: do.Until, script: Script) -> Taken:
+    def _wait_for_condition(self, step: do.Until, script: Script) -> StepResult:
         return ScriptWait(None if step.within is None else self._plant.now + step.within, step.condition), None
 
-    def _stop(self, step: do.Stop, script: Script) -> Taken:
+    def _stop(self, step: do.Stop, script: Script) -> StepResult:
         plant = self._plant
         plant.stopped = step.reason if plant.stopped is None else plant.stopped
         return ScriptWait(plant.now + 1), None
 
-    def _read(self, step: do.Read, script: Script) -> Taken:
+    def _read(self, step: do.Read, script: Script) -> StepResult:
         return None, self._plant.read(step.signal)
 
-    def _call(self, step: do.Call, script: Script) -> Taken:
+    def _call(self, step: do.Call, script: Script) -> StepResult:
         step.function()
         return None, None
 
-    def _request(self, step: do.Request, script: Script) -> Taken:
+    def _request(self, step: do.Request, script: Script) -> StepResult:
         master = self._master(step.line)
         number = master.asked + 1
         master.wanted |= {number}
         self._do(script, step)
-        return ScriptWait(None, asked=(Asked(step.line, number, number),), is_request=True), None
+        return ScriptWait(None, asked=(PendingRequests(step.line, number, number),), is_request=True), None
 
-    def _write(self, step: do.Write, script: Script) -> Taken:
-        """Write as a master does: wait for the answers before the next step."""
+    def _write(self, step: do.Write, script: Script) -> StepResult:
+        """Write as a Modbus master: wait for the answers before the next step."""
         plant = self._plant
-        lines = dict.fromkeys(plant.plan.line_of[name][0].name for name, *_ in step.values if name in plant.plan.line_of)
+        lines = dict.fromkeys(plant.parts.line_of[name][0].name for name, *_ in step.values if name in plant.parts.line_of)
         before = {name: self._master(name).asked for name in lines}
         self._do(script, step)
-        asked = tuple(Asked(name, before[name] + 1, self._master(name).asked) for name in lines)
+        asked = tuple(PendingRequests(name, before[name] + 1, self._master(name).asked) for name in lines)
         waiting = ScriptWait(None, asked=tuple(one for one in asked if self._master(one.line).finished < one.last))
         return (waiting if waiting.asked else None), None
 
-    def _do(self, script: Script, what: Outside) -> None:
-        if script.is_outside:
-            self._plant.outside(what)
+    def _do(self, script: Script, what: ExternalInput) -> None:
+        if script.is_external:
+            self._plant.apply_input(what)
         else:
             self._plant.perform(what)
 
@@ -267,7 +267,7 @@ class Scripts:
         return ScriptsState(self._begun, tuple(script.state() for script in self._scripts.values()))
 
     def restore(self, state: ScriptsState) -> None:
-        """Take a state; kernels have theirs already."""
+        """Restore a state; the kernels must have been restored before."""
         for script in list(self._scripts.values()):
             self.end(script)
         self._begun = state.begun
@@ -277,7 +277,7 @@ class Scripts:
                 self._wait(script, one.waiting)
 
 
-_TAKING: Mapping[type, Callable[[Scripts, Any, Script], Taken]] = complete(
+_TAKING: Mapping[type, Callable[[Scripts, Any, Script], StepResult]] = complete(
     "step of scripts",
     [*(FOR_SCRIPTS - {do.Repeat}), do.Request, do.Write],
     "execution",
@@ -292,4 +292,4 @@ _TAKING: Mapping[type, Callable[[Scripts, Any, Script], Taken]] = complete(
         do.Write: Scripts._write,
     },
 )
-"""How scripts take the steps that wait or give something (`steptwin.world.script.Walk` resolves `Repeat`)."""
+"""The execution of steps that wait or have a result (`steptwin.world.script.Walk` resolves `Repeat`)."""

@@ -1,5 +1,5 @@
-"""Signals: what conditions may speak of, and scripts and programs outside may read, by name. Points of controllers are those of
-their data sheets."""
+"""Signals: named quantities that conditions use, and that scripts and external programs read. The signals of a controller are the
+points of its data sheet."""
 
 from __future__ import annotations
 
@@ -22,23 +22,25 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 MOST_NAMED = 8
-"""Points in a message."""
+"""Number of points listed in a message."""
 
 
 @dataclass(frozen=True, slots=True)
 class SignalOf:
-    """A signal, and the kernels that have to be at the moment asked for."""
+    """A signal, and the kernels that must be advanced before it is read."""
 
     kernels: tuple[Kernel, ...]
     read: Callable[[Nanos], float] | None
-    """None where it can only be written."""
+    """None if it is write-only."""
     turning: Callable[[Nanos], Iterable[Nanos]] | None = None
     versions: Callable[[], object] | None = None
     unit: str = ""
+    bounds: tuple[float, float] | None = None
+    """The lowest and highest value, where that is known."""
     is_kept: bool = False
-    """Whether it may change by a request that is not an event of its kernel."""
+    """Whether a request may change it without an event of its kernel."""
     check: Callable[[], None] = lambda: None
-    """Raises `Misuse` where no condition can be on it: it changes between events at moments that are not known."""
+    """Raises `Misuse` if conditions cannot use it, because it changes between events at unknown moments."""
 
     @property
     def is_readable(self) -> bool:
@@ -49,20 +51,20 @@ class SignalOf:
         return self.turning is not None
 
     def bring(self, now: Nanos) -> tuple[Kernel, ...]:
-        """Bring the kernels on which the value at ``now`` depends to that moment; gives them. Until one of them changes, the
-        value stays as it is or goes on as it goes."""
+        """Advance the kernels on which the value depends to ``now`` and return them. Until one of them changes, the value is
+        constant or follows its course."""
         for kernel in self.kernels:
             kernel.advance(now)
         return self.kernels
 
     def value(self, now: Nanos) -> float:
-        """After `bring`. Raises `Misuse` for what can only be written."""
+        """The value, after `bring`. Raises `Misuse` for a write-only signal."""
         if self.read is None:
             raise Misuse("it can only be written")
         return self.read(now)
 
     def watch(self, name: str) -> None:
-        """A condition is on it from now on. Raises `Misuse` where it cannot be."""
+        """Prepare for use in a condition. Raises `Misuse` if that is impossible."""
         if self.read is None:
             raise Misuse(f"{name} can only be written")
         self.check()
@@ -78,7 +80,7 @@ class SignalOf:
 
 
 class Idle:
-    """Whether all machines are idle, and nothing is on its way on a line. While one of them is busy the others do not matter."""
+    """The signal ``idle``: all machines are idle and no transmission is pending. It is tested on one busy machine at a time."""
 
     continuous = False
     is_readable = True
@@ -91,10 +93,10 @@ class Idle:
             *((plan.kernel_of[name], partial(_is_quiet, line)) for name, line in plan.lines.items()),
         ]
         self._busy: int | None = None
-        """The thing that was found busy last."""
+        """Index of the machine or line that was busy last."""
 
     def bring(self, now: Nanos) -> tuple[Kernel, ...]:
-        """As `SignalOf.bring`: the kernel of what is busy, all of them when nothing is."""
+        """As `SignalOf.bring`: the kernel of a busy machine or line, or all kernels if none is busy."""
         for n in (*(() if self._busy is None else (self._busy,)), *range(len(self._things))):
             kernel, is_at_rest = self._things[n]
             kernel.advance(now)
@@ -105,10 +107,10 @@ class Idle:
         return self._kernels
 
     def watch(self, name: str) -> None:
-        """A condition may be on it."""
+        """Conditions can always use it."""
 
     def value(self, now: Nanos) -> float:
-        """After `bring`."""
+        """1 if idle, otherwise 0; after `bring`."""
         return float(self._busy is None)
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
@@ -119,7 +121,7 @@ class Idle:
 
 
 def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
-    """The signal called ``name``. `Misuse` with what there is."""
+    """The signal called ``name``. Raises `Misuse` with the existing names."""
     if name == "time":
         return SignalOf((), lambda now: now / SECOND, lambda now: (), lambda: name, unit="s")
     if name == "idle":
@@ -137,7 +139,7 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
 
 
 def _of_machine(kind: AnyKind, machine: MotionController, kernel: Kernel, rest: str, name: str) -> SignalOf:
-    """A pin, or else a point of the data sheet."""
+    """The signal of a pin, otherwise of a point of the data sheet."""
     pin = rest.upper()
     if pin in machine.pins():
         found = next(found for found in kind.datasheet(machine).pins if found.name == pin)
@@ -151,7 +153,7 @@ def _of_machine(kind: AnyKind, machine: MotionController, kernel: Kernel, rest: 
 
 
 def _is_quiet(line: Line, now: Nanos) -> bool:
-    """Whether nothing is on its way on a line."""
+    """Whether no transmission is pending on a line."""
     return line.deadline() is None
 
 
@@ -163,7 +165,7 @@ def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
 
 
 def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Misuse:
-    """Names of the same axis, where it is of one."""
+    """The error for an unknown name, with the names of the same axis if it names one."""
     axis, dot, _ = rest.rpartition(".")
     of_axis = [path for path in known if dot and path.upper().startswith(f"{axis.upper()}.")]
     shown = of_axis or known[:MOST_NAMED]

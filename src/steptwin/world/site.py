@@ -1,4 +1,4 @@
-"""Where elements are built: machines and kernels by name, inputs that one thing alone drives, contacts that share one."""
+"""The context in which elements are built: machines and kernels by name, inputs and their drivers, shared contacts."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from steptwin.errors import Misuse, SourceErrors
 from steptwin.machine import MotionController
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit
-from steptwin.world.kernel import Kernel, PinName
-from steptwin.world.kind import DIGITAL_INPUT, AnyKind
+from steptwin.world.kernel import Kernel, PinName, Wire
+from steptwin.world.kind import AnyKind
 from steptwin.world.names import Unknown
 from steptwin.world.spec import WorldSpec
 from steptwin.world.tomlplaces import Path
+from steptwin.world.values import DIGITAL_INPUT, OUTPUT
 
 if TYPE_CHECKING:
+    from steptwin.world.board import Board
+    from steptwin.world.element import AnyElement, ElementSpec
     from steptwin.world.parts import WorldParts
 
 Terminal = tuple[str, str]
@@ -23,18 +26,18 @@ Terminal = tuple[str, str]
 
 
 class Site:
-    """What an element is given to build itself with. Every method raises `Misuse` for what is not there, or does not fit."""
+    """The context for building an element. Every method raises `Misuse` for a name that does not exist or does not fit."""
 
     def __init__(self, spec: WorldSpec, parts: WorldParts) -> None:
         self.spec = spec
         self.parts = parts
         self._driven: dict[PinName, Path] = {}
-        """What drives each input."""
+        """The description's path of what drives each input."""
         self._circuits: dict[PinName, tuple[Circuit, str | None]] = {}
-        """The contacts of inputs, and their ``join``."""
+        """The contact circuit of each input, and its ``join``."""
 
     def unless_wrong(self, path: Path, action: Callable[[], None]) -> None:
-        """Do something for the table at ``path``, unless it has an error already; errors are collected there."""
+        """Execute ``action`` for the table at ``path``, unless that has an error already; errors are reported at the path."""
         if self.spec.text.is_wrong(path):
             return
         try:
@@ -44,45 +47,63 @@ class Site:
         except Misuse as error:
             self.spec.text.wrong_reference(path, error)
 
-    # ------------------------------------------------------------------ what is there
+    # ------------------------------------------------------------------ machines and kernels
 
     @property
     def machines(self) -> Mapping[str, MotionController]:
         return self.parts.machines
 
     def machine(self, name: str) -> MotionController:
-        """What has pins and axes: no line."""
+        """The machine called ``name``, which is not a line."""
         found = self.parts.machines.get(name)
         if found is None and name not in self.parts.kernel_of:
             raise Unknown(name, f"nothing is called {name!r}")
         if found is None:
-            raise Misuse(f"{name!r} is a line; machines are {', '.join(self.parts.machines)}")
+            what = "an element" if name in self.parts.terminals else "a line"
+            raise Misuse(f"{name!r} is {what}; machines are {', '.join(self.parts.machines)}")
         return found
 
     def kind(self, name: str) -> AnyKind:
-        """Of a machine."""
+        """The kind of a machine."""
         self.machine(name)
         return self.parts.kind_of[name]
 
     def kernel(self, name: str) -> Kernel:
-        """Of a machine or a line."""
+        """The kernel of a machine, a line or an element with terminals."""
         found = self.parts.kernel_of.get(name)
         if found is None:
             raise Unknown(name, f"nothing is called {name!r}")
         return found
 
+    def kernel_of(self, element: AnyElement, spec: ElementSpec) -> Kernel:
+        """The kernel that an element is in: that of the first thing it refers to."""
+        return self.kernel(next(iter(element.refers(spec, self.spec))).one)
+
     # ------------------------------------------------------------------ terminals
 
+    def board(self, name: str) -> Board:
+        """The terminals of the element ``name``."""
+        return self.kernel(name).boards[name]
+
+    def join(self, source: Terminal, target: Terminal, path: Path) -> None:
+        """Join an output to an input that nothing else drives, without delay. ``path`` is the key that names the source."""
+        pin = self.terminal(source, OUTPUT)
+        self.kernel(source[0]).connect(Wire(pin, self.input(target, path)))
+
     def terminal(self, name: Terminal, kind: str) -> PinName:
-        """A terminal of a machine, of one of the kinds of `steptwin.world.kind`."""
+        """A terminal of a machine or an element; ``kind`` is one of those of `steptwin.world.values`."""
         pin = PinName(*name)
+        of_element = self.parts.terminals.get(pin.machine)
+        if of_element is not None:
+            of_element.check(pin, kind)
+            return pin
         machine, its = self.machine(pin.machine), self.kind(pin.machine)
         its.terminals.check(pin, kind)
         its.refuse_taken(machine, pin.pin)
         return pin
 
     def input(self, name: Terminal, path: Path, kind: str = DIGITAL_INPUT) -> PinName:
-        """An input that nothing else drives."""
+        """An input, reserved for one driver."""
         target = PinName(*name)
         if target in self._driven:
             raise Misuse(f"{target} is driven already, from line {self.spec.text.line(self._driven[target])}")
@@ -91,7 +112,7 @@ class Site:
         return target
 
     def circuit(self, kernel: Kernel, name: Terminal, path: Path, join: str | None) -> Circuit:
-        """What a contact is part of: an input of its own, or one that it shares with contacts that are joined in the same way."""
+        """The circuit of a contact: an input of its own, or one shared with contacts that have the same ``join``."""
         target = PinName(*name)
         there, their_join = self._circuits.get(target, (None, None))
         if there is None:
@@ -107,11 +128,11 @@ class Site:
         return there
 
     def bounce_of(self, circuit: Circuit) -> Chance:
-        """The chance of the contact that is put into a circuit next."""
+        """The random stream for the bounce of the next contact in a circuit."""
         number = f" {len(circuit.contacts) + 1}" if circuit.contacts else ""
         return Chance(self.spec.seed, f"bounce {circuit.target}{number}")
 
     def close_circuits(self) -> None:
-        """Inputs take what their contacts give them at first."""
+        """Drive all inputs with contacts to their initial levels."""
         for circuit, _ in self._circuits.values():
             circuit.close()

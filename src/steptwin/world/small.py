@@ -1,4 +1,7 @@
-"""Descriptions of small worlds: controllers on one line, as a text that a person can go on with."""
+"""Descriptions of small worlds: controllers on one line, as a text that a person can go on with.
+
+What the controllers of a kind are given is made beside the kind: `steptwin.world.kinds.mic488.small`.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +18,6 @@ from steptwin.world.tables import all_keys, written
 
 LINE = "bus"
 """What the line is called."""
-HOST = "host"
-"""The script that sends lines to chips."""
-AXES = "xyzu"
-"""What the spindles of `demo` are called."""
-GEAR = 100.0
-"""Pulses per mm of `demo`."""
-KL_MM, KR_MM = -10.0, 250.0
-"""Where the switches of `demo` are, seen from the position at power-on."""
 _COMMENT = 44
 """The column of comments."""
 MOST_IN_A_ROW = 8
@@ -63,67 +58,12 @@ class InputChange(NamedTuple):
     note: str
 
 
-class AxisSwitches(NamedTuple):
-    """Where switches of an axis are (number from 1), seen from the place at power-on in configured units; None: there is none."""
-
-    axis: int
-    low: float | None
-    high: float | None
-    low_pin: str
-    high_pin: str
-    contacts: tuple[str, str] = ("NO", "NO")
-
-
-def mic488_world(
-    whole: Whole,
-    units: Sequence[int | None],
-    values: Mapping[str, object],
-    *,
-    demo: bool = False,
-    switches: Iterable[AxisSwitches] = (),
-    changes: Iterable[InputChange] = (),
+def small_world(
+    whole: Whole, line_kind: str, tables: Iterable[TomlTable], changes: Iterable[InputChange] = (), example: str = ""
 ) -> str:
-    """MIC488 controllers by their units (None: that of the configuration), all with the same ``values`` of ``[[mic488]]``.
-
-    ``demo``: each moves four spindles in mm with a switch at each end, so that homing and limits work from the first day.
-    ``switches`` are those of axes of the first controller.
-    """
-    names = ["mic488" if len(units) == 1 else f"mic488-{unit}" for unit in units]
-    tables = [_world(whole), _line(whole, "modbus")]
-    for name, unit in zip(names, units, strict=True):
-        tables.append(TomlTable("mic488", {"name": name, "line": LINE, "unit": unit, **values}))
-        tables += _demo_axes() if demo else ()
-    if demo:
-        for name, unit in zip(names, units, strict=True):
-            tables += _spindles(name, "" if len(names) == 1 else f"-{unit}")
-    axes = [table for one in switches for table in _switches(names[0], one)]
-    tables += [*axes, *_changes(changes), *_faults(whole.faults)]
-    return _text(tables) + ("" if demo or axes else _EXAMPLE.format(controller=names[0]))
-
-
-def m1486_world(
-    whole: Whole,
-    addresses: Sequence[int],
-    values: Mapping[str, object],
-    wires: Iterable[tuple[str, str]] = (),
-    *,
-    typed: Iterable[str] = (),
-    changes: Iterable[InputChange] = (),
-) -> str:
-    """M1486 chips by their addresses, all with the same ``values`` of ``[[m1486]]``; wires between ``CHIP.PIN``.
-
-    ``typed``: lines that a host sends as soon as all chips have room for them.
-    """
-    tables = [_world(whole), _line(whole, "m1486")]
-    tables += [TomlTable("m1486", {"name": chip_name(one), "line": LINE, "address": one, **values}) for one in addresses]
-    tables += [TomlTable("wire", {"from": source, "to": target}) for source, target in wires]
-    tables += [*_host([chip_name(one) for one in addresses], typed), *_changes(changes)]
-    return _text([*tables, *_faults(whole.faults)]) + _CHIP_EXAMPLE.format(controller=chip_name(addresses[0]))
-
-
-def chip_name(address: int) -> str:
-    """What a chip is called: ``chip7``, ``chipF``."""
-    return f"chip{address:X}"
+    """The description: the world, a line of a kind, what is on it and around it (``tables``), and at the end an example of what
+    may follow."""
+    return _text([_world(whole), _line(whole, line_kind), *tables, *_changes(changes), *_faults(whole.faults)]) + example
 
 
 def _world(whole: Whole) -> TomlTable:
@@ -135,43 +75,10 @@ def _line(whole: Whole, kind: str) -> TomlTable:
     return TomlTable("line", {"name": LINE, "kind": kind, **whole.line})
 
 
-def _demo_axes() -> Iterator[TomlTable]:
-    """Millimetres; KL on IN1–IN4, KR on IN5–IN8; homing backs off the switch (HOME1)."""
-    for n in range(1, len(AXES) + 1):
-        values = {"unit": "mm", "gear": GEAR, "acc": 50.0, "dec": 50.0, "vel": 25.0, "home_mode": "HOME1"}
-        switches = {"limit_mode": "KL+KR", "in_kl": f"IN{n}", "in_kr": f"IN{n + 4}"}
-        yield TomlTable("", {**values, **switches}, header=f"[mic488.M{n}]")
-
-
-def _spindles(machine: str, suffix: str) -> Iterator[TomlTable]:
-    for n, name in enumerate(AXES, start=1):
-        remark = "Spindles with a switch at each end; travel, play, motors and encoders may follow." if n == 1 else ""
-        yield TomlTable("axis", {"name": f"{name}{suffix}", "drive": f"{machine}.M{n}"}, remark=remark)
-        yield TomlTable("switch", {"below": KL_MM, "to": f"{machine}.IN{n}"})
-        yield TomlTable("switch", {"above": KR_MM, "to": f"{machine}.IN{n + 4}"})
-
-
-def _switches(machine: str, axis: AxisSwitches) -> Iterator[TomlTable]:
-    yield TomlTable("axis", {"name": f"m{axis.axis}", "drive": f"{machine}.M{axis.axis}"})
-    for key, edge, pin, contact in (
-        ("below", axis.low, axis.low_pin, axis.contacts[0]),
-        ("above", axis.high, axis.high_pin, axis.contacts[1]),
-    ):
-        if edge is not None:
-            yield TomlTable("switch", {key: edge, "to": f"{machine}.{pin}", "contact": None if contact == "NO" else contact})
-
-
 def _changes(changes: Iterable[InputChange]) -> Iterator[TomlTable]:
     for change in changes:
         steps = [{"note": change.note}, {"set": {change.pin: change.level}}]
         yield TomlTable("event", {"at": duration_text(change.time), "steps": steps})
-
-
-def _host(chips: Sequence[str], lines: Iterable[str]) -> Iterator[TomlTable]:
-    room = " and ".join(f"{chip}.room" for chip in chips)
-    steps = [step for line in lines for step in ({"until": room}, {"send": LINE, "text": f"{line}\r"})]
-    if steps:
-        yield TomlTable("script", {"name": HOST, "steps": steps}, remark="A host that sends lines as chips have room for them.")
 
 
 def _faults(faults: Iterable[Fault]) -> Iterator[TomlTable]:
@@ -179,35 +86,6 @@ def _faults(faults: Iterable[Fault]) -> Iterator[TomlTable]:
         given = {key: value_text(value) if isinstance(value, tuple) else value for key, value in fault.given.items()}
         values = {"kind": fault.kind.name, "name": fault.name or None, **given}
         yield TomlTable("fault", values, header="[[fault]]")
-
-
-_EXAMPLE = """
-# An axis with a home switch:
-#
-# [[axis]]
-# name = "x"
-# drive = "{controller}.M1"
-# unit = "mm"
-# pitch = 5.0
-#
-# [[axis.switch]]
-# below = 0.0
-# to = "{controller}.IN1"
-"""
-_CHIP_EXAMPLE = """
-# An axis with a switch that the program waits for:
-#
-# [[axis]]
-# name = "x"
-# drive = "{controller}.M1"
-# unit = "mm"
-# pitch = 5.0
-#
-# [[axis.switch]]
-# below = 0.0
-# to = "{controller}.LIMIT"
-# contact = "NC"
-"""
 
 
 # ---------------------------------------------------------------------- text

@@ -1,4 +1,4 @@
-"""What lies on analog inputs: constant, ramp, sine, table. Volts over seconds of the world's time."""
+"""Sources of analog inputs: constant, ramp, sine, table. Volts over seconds of the world's time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steptwin.world.kernel import Kernel, PinName
 
 LOWEST_V, HIGHEST_V = 0.0, 10.0
 RESOLUTION_V = 0.001
-"""Smaller changes are none."""
+"""Resolution of the voltage."""
 
 
 class Waveform(Protocol):
@@ -25,7 +25,7 @@ class Waveform(Protocol):
 
     def volts(self, t_s: float) -> float: ...
     def rests(self, t_s: float) -> bool:
-        """Whether nothing changes from ``t_s`` on."""
+        """Whether the voltage is constant from ``t_s`` on."""
         ...
 
 
@@ -46,9 +46,9 @@ class ConstantWaveform:
 
 @dataclass(frozen=True, slots=True)
 class TableWaveform:
-    """Points (seconds, volts) with straight lines between; before the first and after the last their values.
+    """Points (seconds, volts), interpolated linearly; constant before the first and after the last.
 
-    With ``repeat_s`` it begins anew after so many seconds.
+    ``repeat_s``: the period, if it repeats.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -100,7 +100,7 @@ class SineWaveform:
 
 
 class AnalogSource(Stateful):
-    """Gives an analog input the voltage of a waveform once in a ``period``."""
+    """Drives an analog input with the voltage of a waveform, updated every ``period``."""
 
     __slots__ = ("_due", "_kernel", "_waveform", "period", "target")
     FIXED: ClassVar[frozenset[str]] = frozenset({"_kernel", "_waveform", "period", "target"})
@@ -119,11 +119,11 @@ class AnalogSource(Stateful):
         self.period = period
         self._due: Nanos | None = kernel.now
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         if self._due is None or self._due > now:
             return
         t_s = now / SECOND
-        # Its bounds are permitted: only rounding can go beyond.
+        # The bounds were checked: only rounding can exceed them.
         volts = min(max(self._waveform.volts(t_s), LOWEST_V), HIGHEST_V)
         self._kernel.drive(self.target, int(volts / RESOLUTION_V + 0.5) * RESOLUTION_V)
         self._due = None if self._waveform.rests(t_s) else now + self.period

@@ -27,18 +27,18 @@ class LineSpec:
     timing: str
     gap: Nanos | None
     links: Mapping[str, str]
-    """What opens it for programs outside, by key."""
+    """Addresses of its external links, by key."""
     path: Path = ()
 
     @property
     def is_open(self) -> bool:
-        """Whether programs outside can talk on it."""
+        """Whether it has external links."""
         return bool(self.links)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerSpec:
-    """What the table of any controller has; each kind has more."""
+    """The common part of all controllers' tables; each kind adds its own."""
 
     kind: AnyKind
     name: str
@@ -48,7 +48,7 @@ class ControllerSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScriptSpec:
-    """An event or a script: when it begins, what it does."""
+    """An event or a script: its start and its steps."""
 
     name: str
     at: Nanos | None
@@ -69,14 +69,14 @@ class WorldSpec:
     state: str | None
     """Directory of the non-volatile memories."""
     trace: str | None
-    """How much is kept of what happens in real time: a file, ``ring N``, ``off``."""
+    """Trace of a live run: a file, ``ring N``, ``off``."""
     lines: tuple[LineSpec, ...]
     controllers: tuple[ControllerSpec, ...]
     elements: Mapping[str, tuple[ElementSpec, ...]]
-    """What is around the controllers, by the names of their tables."""
+    """The elements by the names of their tables."""
     scripts: tuple[ScriptSpec, ...]
     faults: tuple[Fault | None, ...]
-    """None for one with errors, which ``text`` has."""
+    """None for one with errors, which are in ``text``."""
     text: TomlText
     overrides: Overrides
     """Values that replace those of the text."""
@@ -86,7 +86,7 @@ class WorldSpec:
         return cast("tuple[S, ...]", self.elements[element.name])
 
     def vision_addresses(self) -> Iterator[tuple[str, str]]:
-        """Controllers that take records of a vision system, and where."""
+        """Controllers with an input for records of a vision system, and its address."""
         for spec in self.controllers:
             address = None if spec.kind.vision is None else spec.kind.vision.address(spec)
             if address is not None:

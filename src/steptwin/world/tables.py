@@ -7,6 +7,7 @@ The reader, the messages and the reference page take them from here.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from steptwin.durations import duration
@@ -55,7 +56,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
     ),
     "line": (
         Key("name", name_value, "how controllers and scripts name it"),
-        optional(_line_kind, "kind", "modbus (MIC488) or m1486", "modbus"),
+        optional(_line_kind, "kind", "", "modbus"),
         optional(
             whole(300, 1_000_000),
             "baud",
@@ -98,13 +99,19 @@ def tables() -> dict[str, TableRows]:
     """Every table, in the order of a description: its name and seed, lines, controllers, what is around them, scripts."""
     found = {
         "world": TableRows(written="[world]", keys=KEYS["world"]),
-        "line": TableRows(written="[[line]]", keys=KEYS["line"], only=of_lines()),
+        "line": TableRows(written="[[line]]", keys=_line_keys(), only=of_lines()),
     }
     for kind in KINDS.values():
         found[kind.name] = TableRows(written=f"[[{kind.name}]]", keys=kind.keys, exclude=kind.exclusive)
     for element in ELEMENTS.values():
         found |= {element.name: element.rows, **element.inner}
     return found | {"event": EVENT, "script": SCRIPT}
+
+
+def _line_keys() -> tuple[Key, ...]:
+    """What kinds of lines there are is known when all are registered."""
+    meaning = " or ".join(kind.meaning for kind in line_kinds().values())
+    return tuple(replace(key, meaning=meaning) if key.name == "kind" else key for key in KEYS["line"])
 
 
 def all_keys() -> dict[str, tuple[Key, ...]]:

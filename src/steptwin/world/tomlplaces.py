@@ -36,7 +36,7 @@ _STRING = re.compile(
 _SCALAR = re.compile(r"[^\s,\]}#]+(?: [0-9][^\s,\]}#]*)?")
 
 
-class TooMuch(Misuse):
+class UnsupportedToml(Misuse):
     """A text that is not supported; ``span`` is where."""
 
     def __init__(self, span: Span, message: str) -> None:
@@ -47,15 +47,15 @@ class TooMuch(Misuse):
 def find_places(text: str) -> dict[Path, Span]:
     """Span by path: of a table its header, of a key the key with its value, of an item of an array the item.
 
-    Raises `TooMuch` for what is nested too deeply and for numbers that are too long.
+    Raises `UnsupportedToml` for what is nested too deeply and for numbers that are too long.
     """
     finder = _Finder(text)
-    with suppress(_Lost):
+    with suppress(_NotToml):
         finder.document()
     return finder.spans
 
 
-class _Lost(Exception):
+class _NotToml(Exception):
     """What comes next is not TOML."""
 
 
@@ -112,10 +112,10 @@ class _Finder:
             self._skip(_BLANKS)
             found = _KEY_PART.match(self.text, self.at)
             if found is None:
-                raise _Lost
+                raise _NotToml
             parts.append(_plain(found[0]))
             if len(parts) > MOST_NESTED:
-                raise TooMuch(Span(found.start(), found.end()), f"a key of more than {MOST_NESTED} parts")
+                raise UnsupportedToml(Span(found.start(), found.end()), f"a key of more than {MOST_NESTED} parts")
             self.at = found.end()
             self._skip(_BLANKS)
             if not self.text.startswith(".", self.at):
@@ -124,7 +124,7 @@ class _Finder:
 
     def _value(self, path: Path, depth: int = 0) -> None:
         if depth > MOST_NESTED:
-            raise TooMuch(Span(self.at, self.at + 1), f"values are nested more than {MOST_NESTED} deep")
+            raise UnsupportedToml(Span(self.at, self.at + 1), f"values are nested more than {MOST_NESTED} deep")
         found = _STRING.match(self.text, self.at)
         if found is not None:
             self.at = found.end()
@@ -135,10 +135,10 @@ class _Finder:
         else:
             found = _SCALAR.match(self.text, self.at)
             if found is None:
-                raise _Lost
+                raise _NotToml
             if len(found[0]) > LONGEST_SCALAR:
                 message = f"a value of {len(found[0])} characters that is not text: permitted are {LONGEST_SCALAR}"
-                raise TooMuch(Span(found.start(), found.start() + LONGEST_SCALAR), message)
+                raise UnsupportedToml(Span(found.start(), found.start() + LONGEST_SCALAR), message)
             self.at = found.end()
 
     def _array(self, path: Path, depth: int) -> None:
@@ -176,12 +176,12 @@ class _Finder:
         if self.text.startswith(",", self.at):
             self.at += 1
         elif not self.text.startswith(bracket, self.at):
-            raise _Lost
+            raise _NotToml
 
     def _expect(self, what: str) -> None:
         self._skip(_BLANKS)
         if not self.text.startswith(what, self.at):
-            raise _Lost
+            raise _NotToml
         self.at += len(what)
 
 
@@ -194,4 +194,4 @@ def _plain(part: str) -> str:
     try:
         return tomllib.loads(f"x = {part}")["x"] if "\\" in part else part[1:-1]
     except tomllib.TOMLDecodeError:
-        raise _Lost from None
+        raise _NotToml from None

@@ -121,9 +121,45 @@ def points(value: Any) -> tuple[tuple[float, float], ...]:
     return found
 
 
+DIGITAL_INPUT, ANALOG_INPUT, OUTPUT = "digital input", "analog input", "output"
+"""Kinds of terminals."""
+
+
 def pin_name(value: Any) -> tuple[str, str]:
     """``MACHINE.PIN``."""
     machine, dot, pin = value.partition(".") if isinstance(value, str) else ("", "", "")
     if not dot or not machine or not pin:
         raise Misuse(f"{value!r}: expected MACHINE.PIN, such as 'table.IN3'")
     return machine, pin.upper()
+
+
+@dataclass(frozen=True, slots=True)
+class PinOf:
+    """``MACHINE.PIN`` or ``ELEMENT.TERMINAL``, a terminal of a kind; a list of them where there may be several."""
+
+    kind: str
+    most: int = 1
+
+    def __call__(self, value: Any) -> Any:
+        """One name, or a tuple of names with ``most`` > 1."""
+        if self.most == 1:
+            return pin_name(value)
+        names = value if isinstance(value, list) else [value]
+        if not 1 <= len(names) <= self.most:
+            raise Misuse(f"{len(names)} terminals: permitted are 1 to {self.most}")
+        return tuple(pin_name(name) for name in names)
+
+
+@dataclass(frozen=True, slots=True)
+class NameOf:
+    """The name of an element of a kind."""
+
+    element: str
+
+    def __call__(self, value: Any) -> str:
+        return name_value(value)
+
+
+INPUT_PIN = PinOf(DIGITAL_INPUT)
+OUTPUT_PIN = PinOf(OUTPUT)
+"""What drives an input."""

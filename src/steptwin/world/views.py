@@ -1,4 +1,4 @@
-"""What a person sees of a running world: its controllers, their axes, and the mechanics. Everything is as of the present moment.
+"""Views of a running world for Python programs: its controllers, their axes, and the mechanics, at the present moment.
 
 Positions in the units of the axis, times in seconds, torques in N·m.
 """
@@ -13,14 +13,14 @@ from steptwin.world.actions import Bytes
 
 if TYPE_CHECKING:
     from steptwin.controllerstate import ControllerState
-    from steptwin.world.elements.axis import Fitted
+    from steptwin.world.elements.axis import BuiltAxis
     from steptwin.world.plant import Plant
 
 View = TypeVar("View")
 
 
 class Views(Mapping[str, View], Generic[View]):
-    """Views by name. A name that is not there raises `Misuse` with those that are."""
+    """Views by name. An unknown name raises `Misuse` with the existing ones."""
 
     def __init__(self, plant: Plant, what: str, views: Mapping[str, View]) -> None:
         self._plant = plant
@@ -46,7 +46,7 @@ class Views(Mapping[str, View], Generic[View]):
 
 
 class MachineView:
-    """What all controllers have."""
+    """The common part of all controllers' views."""
 
     def __init__(self, plant: Plant, name: str) -> None:
         self._plant = plant
@@ -69,17 +69,17 @@ class MachineView:
 
     def set_pin(self, pin: str, value: float) -> None:
         """Set an input from outside: 0, 1, volts. Raises `Misuse`."""
-        self._plant.outside(do.Set(((self.name, pin.upper(), float(value)),)))
+        self._plant.apply_input(do.Set(((self.name, pin.upper(), float(value)),)))
 
     def power_cycle(self) -> None:
         """Switch it off and on again."""
-        self._plant.outside(do.PowerCycle(self.name))
+        self._plant.apply_input(do.PowerCycle(self.name))
 
 
 class MechanicsView:
-    """The mechanics of an axis: where it really is, in its units."""
+    """The mechanics of an axis: its true position, in its units."""
 
-    def __init__(self, plant: Plant, fitted: Fitted) -> None:
+    def __init__(self, plant: Plant, fitted: BuiltAxis) -> None:
         self._plant = plant
         self._fitted = fitted
 
@@ -99,22 +99,22 @@ class MechanicsView:
 
     @property
     def rotor(self) -> float:
-        """Where the motor is, play not counted."""
+        """Position of the motor, without backlash."""
         return self._fitted.units(self._fitted.mechanism.at(self._now).rotor)
 
     @property
     def lost(self) -> int:
-        """Pulses by which the motor is behind the pulses given; negative where it is above, after losses on the way down."""
+        """Lost pulses: commanded minus true position of the motor; negative after losses in the negative direction."""
         return self._fitted.mechanism.lost(self._now)
 
     @property
     def stalled(self) -> bool:
-        """Whether the motor has lost the field at this moment."""
+        """Whether the motor is stalled at this moment."""
         return self._fitted.mechanism.at(self._now).stalled
 
 
 class LineView:
-    """A line, for programs that speak on it from Python."""
+    """A line, for Python programs that send and receive on it."""
 
     def __init__(self, plant: Plant, name: str) -> None:
         self._plant = plant
@@ -123,10 +123,10 @@ class LineView:
     def send(self, data: bytes, place: str = "python") -> None:
         """Put bytes on the line at the present moment."""
         line = self._plant.lines[self.name]
-        self._plant.outside(Bytes(self.name, place, line.kinds[0], data))
+        self._plant.apply_input(Bytes(self.name, place, line.kinds[0], data))
 
     def received(self, place: str = "python") -> bytes:
-        """What has come for ``place`` and was not fetched yet."""
+        """Remove and return the bytes received for ``place``."""
         self._plant.touch(self.name)
         line = self._plant.lines[self.name]
         return b"".join(data for _, data in line.connect(place).take(self._plant.now))

@@ -8,16 +8,27 @@ export const isOnControl = (target: EventTarget | null): boolean =>
 export const isInText = (target: EventTarget | null): boolean =>
   target instanceof Element && target.closest(TEXTS) !== null;
 
+/** Where a key was pressed, inside of editors too. */
+const originOf = (event: KeyboardEvent): EventTarget | null => event.composedPath()[0] ?? event.target;
+
 /** What a key means outside of controls: null for nothing. Escape is heard everywhere. */
-export type Meaning = "stop" | "resume" | "pause" | "step" | "find" | "help" | { panel: number };
+export type Meaning = "stop" | "live" | "pause" | "back" | "on" | "find" | "help" | { panel: number };
 
 export function meaningOf(event: KeyboardEvent): Meaning | null {
   if (event.key === "Escape") return "stop";
   if (event.ctrlKey || event.altKey || event.metaKey) return null;
-  if (event.key === " ") return isOnControl(event.target) ? null : "stop";
-  if (isInText(event.target)) return null;
-  const meanings: Record<string, Meaning> = { ".": "resume", ",": "pause", ";": "step", "/": "find", "?": "help" };
-  if (event.target instanceof Element && event.target.closest('[role="application"]')) return null;
+  const target = originOf(event);
+  if (event.key === " ") return isOnControl(target) ? null : "stop";
+  if (isInText(target)) return null;
+  const meanings: Record<string, Meaning> = {
+    ".": "live",
+    p: "pause",
+    ",": "back",
+    ";": "on",
+    "/": "find",
+    "?": "help",
+  };
+  if (target instanceof Element && target.closest('[role="application"]')) return null;
   if (/^[1-9]$/.test(event.key)) return { panel: Number(event.key) - 1 };
   return meanings[event.key] ?? null;
 }

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 from chip_rig import ChipWire, Fault, chip_driver, chip_line
 
-from steptwin.drivers import Unconfirmed
+from steptwin.drivers import SentLate, Unconfirmed
 from steptwin.drivers.m1486 import (
     M1486,
     Busy,
@@ -643,6 +643,17 @@ def test_after_a_restart_a_busy_chip_is_not_held_by_an_earlier_kill() -> None:
         chip.variable()
 
 
+def test_after_a_restart_the_motion_before_it_is_over() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.run(1)
+    wire.sleep(1.0)
+    wire.chip.power_cycle(wire.now)
+    with pytest.raises(Restarted):
+        chip.flags()
+    assert chip.wait().reason is ChipReason.REST
+
+
 def test_a_chip_that_is_switched_off_between_the_distance_and_the_run_does_not_move() -> None:
     wire = ChipWire("B", (7,))
     chip = chip_driver(wire, 7)
@@ -688,6 +699,27 @@ def test_a_line_that_is_cut_when_a_move_begins_leaves_it_in_doubt() -> None:
     wire.before_each, wire.severed = None, False
     wire.sleep(2.0)
     assert chip.counter() == wire.true() == 0
+
+
+def test_a_move_that_was_sent_too_late_is_stopped_and_said_to_be_so() -> None:
+    """The process is suspended while it writes the CR of the command that moves."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(**KNOWN)
+    begin = wire.true()
+
+    def suspend(data: bytes) -> None:
+        if data == b"\r" and wire.sent[-1][1] == b"r":
+            wire.before_each = None
+            wire.sleep(70.0)
+
+    wire.before_each = suspend
+    with pytest.raises(SentLate, match="was sent more than"):
+        chip.move_by(500.0)
+    wire.sleep(2.0)
+    assert not wire.moving()
+    assert 0 <= wire.true() - begin < 64 * 30
+    assert chip.wait(check=False).reason is ChipReason.STOPPED
 
 
 def test_a_chip_that_cannot_be_told_to_stop_is_told_with_the_first_cause() -> None:

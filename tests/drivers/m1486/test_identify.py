@@ -13,7 +13,7 @@ from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486.identify import (
     CHIP_BAUDS,
     FoundChip,
-    Question,
+    SearchRequest,
     answer_in,
     let_all_listen,
     scan_chips,
@@ -27,7 +27,7 @@ from steptwin.machine import SECOND
 from steptwin.wire import pdu, rtu
 
 
-def search_line(wire: Any) -> ThreadLine[Question, bytes]:
+def search_line(wire: Any) -> ThreadLine[SearchRequest, bytes]:
     endpoint: Any = MemoryEndpoint(wire)
     return ThreadLine(endpoint, searching(endpoint, BAUD), clock=wire.clock, sleeping=wire.sleep)
 
@@ -52,6 +52,16 @@ def test_chips_that_echo_and_report_are_found_too() -> None:
     wire.send(f"t{RETURN}\rt{REPORT}\r".encode())
     wire.sleep(1.0)
     assert finish(scan_chips(search_line(wire))) == [FoundChip(2, "A"), FoundChip(9, "A")]
+
+
+def test_x0_is_said_while_an_address_is_selected_that_no_e_type_has() -> None:
+    """Fourteen chips of an E type leave one address, the lowest, for it: X0 is wrong data to those that listen."""
+    wire = ChipWire("E1", tuple(range(2, 16)))
+    asked: list[int] = []
+    assert finish(scan_chips(search_line(wire), progress=asked.append)) == [FoundChip(a, "E1") for a in range(2, 16)]
+    assert asked == [*range(1, 16), 0]
+    assert b"x1\rx0\ru20\r" in b"".join(data for _, data in wire.sent)
+    assert set(wire.codes()) == {"upload"}
 
 
 def test_nobody_is_not_waited_for_long() -> None:

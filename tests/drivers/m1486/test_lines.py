@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
 from collections.abc import Callable
 
@@ -11,7 +12,7 @@ from chip_rig import ChipWire, Fault, chip_line, chip_task_line
 from line_rig import run_virtual
 
 from steptwin.drivers import Overtaken
-from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, NoEcho, PositionUnknown, Restarted
+from steptwin.drivers.m1486 import M1486, AsyncM1486, ChipReason, M1486Line, NoEcho, PositionUnknown, Restarted
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.machine import MILLISECOND, SECOND
 
@@ -55,6 +56,17 @@ def test_threads_share_a_line_with_two_chips() -> None:
 
     assert in_threads(lambda: use(0), lambda: use(7)) == []
     assert (wire.true(0), wire.true(7)) == (64 * 30, 64 * 51)
+
+
+def test_a_line_is_open_as_long_as_its_block() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with M1486Line(address) as line:
+            assert line.place == address
+            device, _ = server.accept()
+            device.settimeout(60)
+        with device:
+            assert device.recv(1) == b"", "the connection was closed"
 
 
 def test_tasks_move_two_chips_at_the_same_time() -> None:

@@ -127,6 +127,16 @@ def test_what_is_said_blind_selects_nobody_and_waits_for_nothing() -> None:
 # ---------------------------------------------------------------------- what goes wrong
 
 
+def test_an_answer_that_is_no_longer_waited_for_leaves_nothing_in_front_of_the_next_command() -> None:
+    """The question has been taken: it is not there to be spoilt."""
+    line = Line()
+    line.typed(7, "u1", answers=True, acts=False)
+    free_ns = line.talk.free_ns
+    assert line.talk.abandon(line.now) == b""
+    assert (line.talk.dirty, line.talk.selected, line.talk.free_ns) == (False, 7, free_ns)
+    assert line.typed(7, "r") == [b"r", b"\r"]
+
+
 def test_what_does_not_come_back_right_is_spoilt_before_the_next_command() -> None:
     line = Line()
     line.say(None, "f640")

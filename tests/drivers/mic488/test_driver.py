@@ -260,7 +260,7 @@ def test_registers_by_name() -> None:
     names = ("M2_ACC", "OUT5", "USER_REGISTER[10]:real", "USER_REGISTER[12]", "m_status")
     wire.sent.clear()
     assert mic.get(*names) == dict(zip(names, (12.5, True, 1.5, 7, 0), strict=True))
-    # Control registers; axes; user registers; outputs.
+    # ControlRegisters registers; axes; user registers; outputs.
     assert len(wire.sent) <= 5
     assert mic.get_shown("M2_ACC", "OUT5") == {"M2_ACC": (12.5, "mm/s²"), "OUT5": (True, "")}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.drivers.mic488.frames import FrameWords, Heard
+from steptwin.drivers.mic488.frames import FrameWords, ObservedFrame
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.machine import MILLISECOND
 from steptwin.mic488.registermap import DataType
@@ -16,14 +16,14 @@ READ, ANSWER = bytes.fromhex("01 03 27 24 00 02 8E B4"), bytes.fromhex("01 03 04
 WRITE = bytes.fromhex("01 05 17 71 00 00 98 65")
 
 
-def listener() -> tuple[RtuListener, list[Heard]]:
+def listener() -> tuple[RtuListener, list[ObservedFrame]]:
     words = FrameWords()
-    heard: list[Heard] = []
+    heard: list[ObservedFrame] = []
     words.sinks.append(heard.append)
     return RtuListener(words), heard
 
 
-def meanings(heard: list[Heard]) -> list[str]:
+def meanings(heard: list[ObservedFrame]) -> list[str]:
     return [f"{'?' if h.direction is None else '→' if h.direction is FrameDirection.IN else '←'} {h.meaning}" for h in heard]
 
 
@@ -32,7 +32,7 @@ def test_questions_and_answers_of_one_wire(size: int) -> None:
     ear, heard = listener()
     stream = READ + ANSWER + WRITE + WRITE
     for at in range(0, len(stream), size):
-        ear.heard(stream[at : at + size], at * MILLISECOND)
+        ear.feed(stream[at : at + size], at * MILLISECOND)
     assert meanings(heard) == [
         "→ unit 1: read M1_POS_ACT",
         "← unit 1: read M1_POS_ACT = 12.5 u",
@@ -43,7 +43,7 @@ def test_questions_and_answers_of_one_wire(size: int) -> None:
 
 def test_rubbish_is_counted() -> None:
     ear, heard = listener()
-    ear.heard(b"\xff\xfe\xfd" + READ, 0)
+    ear.feed(b"\xff\xfe\xfd" + READ, 0)
     assert meanings(heard)[0] == "→ unit 1: read M1_POS_ACT"
     assert "? no frame: 3 bytes" in meanings(heard)
     assert str(heard[-1]) == "    0.000000 s  ? no frame: 3 bytes"
@@ -51,30 +51,31 @@ def test_rubbish_is_counted() -> None:
 
 def test_the_beginning_of_a_frame_that_never_ends_is_told_with_the_next() -> None:
     ear, heard = listener()
-    ear.heard(READ[:5], 0)
+    ear.feed(READ[:5], 0)
     assert ear.deadline() == BURSTY_GAP_NS
     while (due := ear.deadline()) is not None:
         ear.expire(due)
-    ear.heard(READ, 500 * MILLISECOND)
+    ear.feed(READ, 500 * MILLISECOND)
     assert meanings(heard) == ["→ unit 1: read M1_POS_ACT", "? no frame: 5 bytes"]
 
 
 def test_both_directions_of_modbus_tcp() -> None:
     words = FrameWords(tcp=True)
-    heard: list[Heard] = []
+    heard: list[ObservedFrame] = []
     words.sinks.append(heard.append)
     ear = TcpListener(words)
     for byte in mbap.encode_frame(7, 1, READ[1:-2]):
-        ear.heard(bytes((byte,)), 1, FrameDirection.IN)
-    ear.heard(mbap.encode_frame(7, 1, ANSWER[1:-2]), 2, FrameDirection.OUT)
-    ear.heard(b"GET / HTTP/1.0\r\n\r\n", 3, FrameDirection.IN)
-    ear.heard(mbap.encode_frame(8, 1, READ[1:-2]), 4, FrameDirection.IN)
+        ear.feed(bytes((byte,)), 1, FrameDirection.IN)
+    ear.feed(mbap.encode_frame(7, 1, ANSWER[1:-2]), 2, FrameDirection.OUT)
+    ear.feed(b"GET / HTTP/1.0\r\n\r\n", 3, FrameDirection.IN)
+    ear.feed(mbap.encode_frame(8, 1, READ[1:-2]), 4, FrameDirection.IN)
     assert meanings(heard) == [
         "→ unit 1: read M1_POS_ACT",
         "← unit 1: read M1_POS_ACT = 12.5 u",
         "? no frame",
         "→ unit 1: read M1_POS_ACT",
     ]
+    assert [(h.time, h.raw[:3]) for h in heard[2:]] == [(3, b"GET"), (4, bytes.fromhex("00 08 00"))]
 
 
 def test_what_is_too_short_for_a_frame_is_none() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import assert_type
 
 import pytest
 from host_rig import Wire, driver
 
+from steptwin.drivers import Mic488, NoAnswer
 from steptwin.errors import Misuse
 
 
@@ -53,6 +55,23 @@ def test_what_no_register_holds() -> None:
         mic.user.dints.read(1)
     with pytest.raises(Misuse, match="user register 1 as WORD × 100000 is outside"):
         mic.user.words.read_many(1, 100_000)
+
+
+def test_the_non_volatile_memory_is_given_three_seconds() -> None:
+    """As long as a driver with this time-out waits for any coil."""
+
+    def waited(action: Callable[[Mic488], object], timeout_s: float = 0.3) -> int:
+        wire = Wire()
+        mic = driver(wire, timeout_s=timeout_s)
+        wire.severed = True
+        begin = wire.now
+        with pytest.raises(NoAnswer):
+            action(mic)
+        return wire.now - begin
+
+    for action in (lambda mic: mic.user.save(), lambda mic: mic.user.load(), lambda mic: mic.user.zero()):
+        assert waited(action) == waited(lambda mic: mic.axis(1).enable(), timeout_s=3.0)
+        assert waited(action, timeout_s=4.0) == waited(lambda mic: mic.axis(1).enable(), timeout_s=4.0)
 
 
 def test_the_non_volatile_copy() -> None:

@@ -11,7 +11,7 @@ import pytest
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.line import LONGEST_WAIT_S
 from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd, Reason
-from steptwin.drivers.mic488.unit import Control
+from steptwin.drivers.mic488.unit import ControlRegisters
 from steptwin.drivers.mic488.waiting import AxisWait, dynamics, wait_for
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND
@@ -62,18 +62,18 @@ class Unit:
     def gear(self, axis: int) -> float | None:
         return self.scale
 
-    async def control(self, after: int | None = None) -> Control:
+    async def control(self, after: int | None = None) -> ControlRegisters:
         self.asked.append(after)
         status = self.statuses.pop(0)
         if isinstance(status, LineFailure):
             raise status
         axes = status if isinstance(status, tuple) else (status, status, 0, 0)
-        return Control(self.moment, DataType.REAL, 0, False, 0, axes)  # type: ignore[arg-type]
+        return ControlRegisters(self.moment, DataType.REAL, 0, False, 0, axes)  # type: ignore[arg-type]
 
 
 def judged(unit: Any, watch: AxisWait, status: int, at: int | None = None) -> MoveEnd | None:
     moment = unit.moment if at is None else at
-    return finish(watch.judge(Control(moment, DataType.REAL, 0, False, 0, (0, status, 0, 0))))
+    return finish(watch.judge(ControlRegisters(moment, DataType.REAL, 0, False, 0, (0, status, 0, 0))))
 
 
 def limit_s(unit: Any, motion: MotionCommand | None, status: int, timeout_s: float | None = None) -> float:

@@ -4,8 +4,8 @@ import io
 import json
 import random
 import re
-import shutil
 import subprocess
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -153,11 +153,8 @@ def test_every_record_that_is_no_track_is_a_mark(mic488: Run) -> None:
     assert frame[4].endswith("00 … 100 bytes")
 
 
-def shown(page: Path) -> str:
-    """The page as a browser has it after its scripts have run. The test is skipped where there is no browser."""
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("no browser is installed (chromium)")
+def shown(browser: str, page: Path) -> str:
+    """The page as a browser has it after its scripts have run."""
     options = ["--headless", "--disable-gpu", "--no-sandbox", "--virtual-time-budget=3000", "--window-size=1300,1000"]
     profile = f"--user-data-dir={page.parent / 'browser'}"
     ran = subprocess.run(
@@ -166,13 +163,13 @@ def shown(page: Path) -> str:
     return ran.stdout
 
 
-def test_lanes_in_a_browser(tmp_path: Path) -> None:
+def test_lanes_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) -> None:
     """Axes that never move share a row; commanded and true position share a lane; an axis that has homed shows its count too."""
     world = World.load(WORLDS / "feeder.toml")
     world.run(for_=8)
     page = tmp_path / "t.html"
     write_trace(world.trace, page, views=axis_views(world))
-    lanes = re.findall(r'class="name"[^>]*>([^<]*)<', shown(page))
+    lanes = re.findall(r'class="name"[^>]*>([^<]*)<', shown(require_peer("chromium"), page))
     assert lanes[:3] == ["table", "M1 position, x true", "M1 since power-on"]
     assert lanes[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
     assert not [name for name in lanes if name.startswith("M2 ")]

@@ -13,13 +13,13 @@ from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactT
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import SECOND, MachineEvent, Nanos
 from steptwin.points import LivePoint, turns_of
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection as Way
-from steptwin.words.frames import FrameLine
 from steptwin.world import script as do
 from steptwin.world.control import Move, StopAxes
 from steptwin.world.faults import AxisLoad, Faults
 from steptwin.world.kernel import Kernel
-from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LinkKind, Member, Row, Service, Terminals
+from steptwin.world.kind import BuildContext, ControllerKind, LineKind, LineUnit, LinkKind, Member, Row, Terminals
 from steptwin.world.kinds import KINDS, register
 from steptwin.world.lanes import AxisLane, plain_view
 from steptwin.world.reader import Key, TomlText, optional
@@ -102,7 +102,7 @@ def _scale(spec: AxisSpec, toy: Toy, number: int) -> DriveScale:
     return DriveScale(pulses_per_rev=spec.pulses_per_rev or 200, full_steps=FULL_STEPS, text="counts pulses")
 
 
-def _body(toy: Toy, service: Service, shafts: Mapping[int, AxisLoad]) -> ToyBody:
+def _body(toy: Toy, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> ToyBody:
     return ToyBody(shafts.values())
 
 

@@ -11,16 +11,15 @@ from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
 from steptwin.world.elements import forget, register
-from steptwin.world.faults import Active, FaultKind, Layer, Occasion
-from steptwin.world.faults.table import OfElement
+from steptwin.world.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.world.faults.table import ElementEffect
 from steptwin.world.kernel import Kernel, PinName
-from steptwin.world.kind import OUTPUT
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import flag, name_value, pin_name, time_value
+from steptwin.world.values import OUTPUT, flag, name_value, pin_name, time_value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +44,7 @@ class Lamp(Stateful):
         self.burnt = False
         self.lit = False
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         level = self.kernel.machines[self.source.machine].pins()[self.source.pin]
         is_on = bool(level) is not self._spec.inverted
         if is_on is not self._is_on:
@@ -82,7 +81,7 @@ def _signals(lamp: Lamp) -> Mapping[str, SignalOf]:
     return {"lit": SignalOf((lamp.kernel,), lambda now: float(lamp.lit))}
 
 
-def _burn(active: Active, lamp: Lamp, begins: bool, now: Nanos) -> str:
+def _burn(active: ActiveFault, lamp: Lamp, begins: bool, now: Nanos) -> str:
     lamp.burnt = begins
     lamp.kernel.mark()
     return "it is burnt out" if begins else "it has been replaced"
@@ -105,7 +104,7 @@ LAMP: Element[LampSpec, Lamp] = Element(
     build=_build,
     signals=_signals,
     lanes=lambda spec: (spec.name,),
-    faults=(FaultKind("burnt-out", Layer.ELEMENT, Occasion.ALWAYS, "A lamp stays dark.", effect=OfElement(_burn)),),
+    faults=(FaultKind("burnt-out", Layer.ELEMENT, Occasion.ALWAYS, "A lamp stays dark.", effect=ElementEffect(_burn)),),
 )
 
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.tables import IncompleteTable
-from steptwin.world.faults import KINDS, Active, Fault, FaultKind, Layer, Occasion, Parameter, parse, read, schema
+from steptwin.world.faults import KINDS, ActiveFault, Fault, FaultKind, Layer, Occasion, Parameter, parse, read, schema
 from steptwin.world.faults.active import addresses
 from steptwin.world.faults.stream import Run, spoil
-from steptwin.world.faults.table import LARGEST_WHOLE, FaultReporter, OfByte, ParameterForm, check, checked
+from steptwin.world.faults.table import LARGEST_WHOLE, ByteEffect, FaultReporter, ParameterForm, check, checked
 
 
 @pytest.mark.parametrize(
@@ -153,17 +153,17 @@ _CRC, _STALL = KINDS["crc"], KINDS["stall"]
         *(
             (replace(kind, effect=None), f"fault {kind.name} lacks its effect: {effect}")
             for kind, effect in (
-                (KINDS["flip"], "OfByte"),
-                (KINDS["split"], "BeforeDelivery or InPieces"),
-                (_CRC, "OfAnswer"),
-                (KINDS["busy"], "OfRequest"),
-                (_STALL, "OfMoment"),
-                (KINDS["stuck"], "OfWindow"),
-                (KINDS["bounce"], "OfChange"),
-                (KINDS["wear"], "OfSave"),
+                (KINDS["flip"], "ByteEffect"),
+                (KINDS["split"], "InsertEffect or PiecesEffect"),
+                (_CRC, "AnswerEffect"),
+                (KINDS["busy"], "RequestEffect"),
+                (_STALL, "MomentEffect"),
+                (KINDS["stuck"], "WindowEffect"),
+                (KINDS["bounce"], "ChangeEffect"),
+                (KINDS["wear"], "SaveEffect"),
             )
         ),
-        (replace(_CRC, effect=_STALL.effect), "fault crc needs the effect OfAnswer, not OfMoment"),
+        (replace(_CRC, effect=_STALL.effect), "fault crc needs the effect AnswerEffect, not MomentEffect"),
         (replace(_CRC, occasion=Occasion.BYTE), "fault crc: nothing of layer frames waits for the occasion byte"),
         (replace(KINDS["no-answer"], effect=KINDS["busy"].effect), "fault no-answer lacks what it does to answers"),
     ],
@@ -175,12 +175,12 @@ def test_a_kind_without_the_effect_of_its_occasion_is_refused(kind: FaultKind, m
 
 
 def test_a_new_kind_is_one_row() -> None:
-    def invert(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
+    def invert(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
         report(active, "inverted")
         return byte ^ 0xFF
 
-    kind = replace(KINDS["flip"], name="invert", own=(), effect=OfByte(invert))
-    active = Active(Fault(checked((kind,))["invert"], {"nth": 2}), "", 0, 0)
+    kind = replace(KINDS["flip"], name="invert", own=(), effect=ByteEffect(invert))
+    active = ActiveFault(Fault(checked((kind,))["invert"], {"nth": 2}), "", 0, 0)
     said: list[str] = []
     assert spoil(b"\x01\x02\x03", [active], 0, lambda _, text: said.append(text)) == [(0, b"\x01\xfd\x03")]
     assert said == ["byte 2 of 3: inverted"]

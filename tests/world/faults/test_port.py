@@ -12,7 +12,7 @@ from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND
 from steptwin.wire.slave import FrameDirection, RtuSlavePort
-from steptwin.world.faults import Faults, FaultyPort, FaultyTalkingPort, LineProtocol, read
+from steptwin.world.faults import Faults, FaultyPort, FaultySendingPort, LineProtocol, read
 from steptwin.world.trace import Trace
 
 WRITE = bytes.fromhex("06 00 64 00 07")
@@ -132,12 +132,12 @@ def test_after_any_faults_of_bytes_the_line_is_in_step_again(seed: int, kinds: l
     assert rig.ask() == ANSWER
 
 
-def characters(*faults: str) -> tuple[FaultyTalkingPort, Faults]:
+def characters(*faults: str) -> tuple[FaultySendingPort, Faults]:
     chain = SerialChain([M1486Chip(variant("B"))])
     held = Faults()
     for fault in faults:
         held.add(read(fault))
-    return FaultyTalkingPort(chain.port(), "pty", held, LineProtocol.CHARACTERS), held
+    return FaultySendingPort(chain.port(), "pty", held, LineProtocol.CHARACTERS), held
 
 
 def test_bytes_of_an_m1486_go_wrong_too() -> None:

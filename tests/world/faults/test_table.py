@@ -10,9 +10,11 @@ from pathlib import Path
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.world.faults.kinds import KINDS, rows, shared
+from steptwin.world.elements import fault_kinds
+from steptwin.world.faults.kinds import rows, shared
 from steptwin.world.faults.table import LARGEST_WHOLE, FaultKind, Layer, Parameter, ParameterForm, check
 
+KINDS = fault_kinds()
 GOLDEN = Path(__file__).parent / "golden" / "kinds.txt"
 
 
@@ -51,7 +53,8 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
         ("machine", "physics"),
     ]
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
-        "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error"
+        "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
+        "stuck-output, welded-contact, open-coil, no-air, jam, belt-stop, leak"
     )
     assert len({parameter for parameter, _ in found}) == len(found)
     for parameter, of in found:

@@ -261,7 +261,7 @@ class AsyncChip:
             await unit.rest()
             for name, number in numbers.items():
                 unit.notes.settings = unit.notes.settings.with_(**{name: None})
-                await unit.say(f"{COMMANDS[name]}{number}")
+                await unit.send(f"{COMMANDS[name]}{number}")
                 unit.notes.settings = unit.notes.settings.with_(**{name: number})
 
     async def set_position(self, position: float) -> None:
@@ -270,7 +270,7 @@ class AsyncChip:
         async with self._unit.turn():
             await self._unit.rest()
             self._unit.notes.is_position_valid = False
-            await self._unit.say(f"={counter}" if counter else "c100")
+            await self._unit.send(f"={counter}" if counter else "c100")
             self._unit.notes.is_position_valid = True
 
     async def set_output(self, line: int, on: bool) -> None:
@@ -304,20 +304,20 @@ class AsyncChip:
     async def _switch(self, number: int, on: bool) -> None:
         async with self._unit.turn():
             await self._unit.rest()
-            await self._unit.say(f"{'t' if on else 'c'}{number}", acts=True)
+            await self._unit.send(f"{'t' if on else 'c'}{number}", acts=True)
 
     async def set_variable(self, number: int) -> None:
         """Set the internal variable, 0 to 2^24 − 1."""
         checked_number(":", number, self.variant, "the internal variable")
         async with self._unit.turn():
             await self._unit.rest()
-            await self._unit.say(f":{number}")
+            await self._unit.send(f":{number}")
 
     async def inputs(self, first: int = 1, count: int = 4) -> tuple[bool, ...]:
         """Levels of up to nine lines from ``first`` on. This overwrites the internal variable."""
         checked_number("?", 10 * first + count, self.variant, f"{count} lines from B{first} on")
         async with self._unit.turn():
             await self._unit.rest()
-            await self._unit.say(f"?{10 * first + count}")
+            await self._unit.send(f"?{10 * first + count}")
             bits = await self._unit.read_number(4, rests=True)
         return tuple(bool(bits >> bit & 1) for bit in range(count))

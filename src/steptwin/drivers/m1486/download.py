@@ -14,7 +14,7 @@ from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.m1486.syntax import Command, JumpCondition, ProgramText
+from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
 
@@ -30,7 +30,7 @@ _MOVES = frozenset("r)(jk'[ie")
 """Commands that move, or jump to commands sent before."""
 
 
-def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> ProgramText:
+def checked_program(text: str, variant: Variant, interface: Interface, name: str = "program") -> ParsedProgram:
     """The parsed program. Raises `Misuse` with its errors."""
     from steptwin.m1486.check import check
 
@@ -42,7 +42,7 @@ def checked_program(text: str, variant: Variant, interface: Interface, name: str
     return checked.program
 
 
-def parts(program: ProgramText) -> list[tuple[int | None, list[Command]]]:
+def parts(program: ParsedProgram) -> list[tuple[int | None, list[Command]]]:
     """The commands in order, split where ``X`` selects another chip; None before the first X."""
     found: list[tuple[int | None, list[Command]]] = [(None, [])]
     for command in program.commands:
@@ -103,12 +103,12 @@ async def send_program(
     done = 0
     uploaded = b""
 
-    def tell(count: int) -> None:
+    def report(count: int) -> None:
         if progress is not None:
             progress(done + count, total)
 
     for address, commands in found:
-        uploaded += await _Typist(units[address], tell).type(commands)
+        uploaded += await _Typist(units[address], report).type(commands)
         done += len(commands)
     return uploaded
 
@@ -116,9 +116,9 @@ async def send_program(
 class _Typist:
     """Sends commands to one chip."""
 
-    def __init__(self, unit: ChipUnit, tell: Callable[[int], object]) -> None:
+    def __init__(self, unit: ChipUnit, report: Callable[[int], object]) -> None:
         self._unit = unit
-        self._tell = tell
+        self._report = report
         self._permission = unit.permission()
         self._capacity = unit.variant.input_bits // 8
         self._typed = 0  # characters that may lie in the input buffer
@@ -143,7 +143,7 @@ class _Typist:
                     uploaded += await self._command(commands[index])
                     index += 1
                 self._permission.extend()
-                self._tell(index)
+                self._report(index)
         return uploaded
 
     async def _file(self, commands: Sequence[Command], done: int) -> None:
@@ -152,7 +152,7 @@ class _Typist:
         if unit.variant.store is Store.EEPROM:
             await reset(unit)
         await type_file(
-            unit, [str(command).lower() for command in commands], self._permission, lambda count: self._tell(done + count)
+            unit, [str(command).lower() for command in commands], self._permission, lambda count: self._report(done + count)
         )
         self._typed = self._capacity
 
@@ -174,8 +174,8 @@ class _Typist:
             unit.notes.settings = ChipSettings()
             if command.key == "U":
                 await self._empty()
-                return await unit.say(text, answers=True)
-            await unit.say(text, acts=True)
+                return await unit.send(text, answers=True)
+            await unit.send(text, acts=True)
         self._typed += len(text) + 1
         if unit.talk.nearly_full:
             await self._empty()
@@ -195,7 +195,7 @@ class _Typist:
         self._typed = 0
 
 
-async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission, tell: Callable[[int], object]) -> None:
+async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission, report: Callable[[int], object]) -> None:
     """Send a file from ``[`` to ``]``, which starts it.
 
     On an earlier error the chip is reset, which discards the file (manual chapter II, Memory), and `FileGivenUp` is raised.
@@ -203,11 +203,11 @@ async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission
     """
     try:
         for count, line in enumerate(lines[:-1], start=1):
-            await unit.say(line, once=True, retype=count == 1)
+            await unit.send(line, once=True, retype=count == 1)
             if unit.talk.nearly_full:
                 await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             permission.extend()
-            tell(count)
+            report(count)
         await begin(unit, lines[-1], ChipMotion.BLOCK, permission, retype=False)
     except (DoubtfulMove, SentLate):
         raise
@@ -223,7 +223,7 @@ async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission
             f"{unit.place}: the file for {unit.name} was not typed to its end ({failure}); the chip was reset: nothing of it "
             "runs, position and settings are those of power-up"
         ) from failure
-    tell(len(lines))
+    report(len(lines))
 
 
 async def begin(
@@ -238,33 +238,34 @@ async def begin(
 ) -> None:
     """Send a command that begins a motion, once."""
     notes = unit.notes
+    stops = notes.stops  # what is sent too late is stopped before it is noted
 
-    def told(target_u: int | None, duration_s: float | None) -> None:
+    def register_motion(target_u: int | None, duration_s: float | None) -> None:
         if kind is ChipMotion.BLOCK:
             notes.settings = ChipSettings()
             unit.talk.uploads = notes.uploads = bytearray()
-        # What an E type is told it does when it has written it.
+        # An E type executes a command after it has written it to its EEPROM.
         notes.motion = ChipMotionCommand(
-            kind, unit.line.now() + unit.write_ns, notes.stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0)
+            kind, unit.line.now() + unit.write_ns, stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0)
         )
 
     notes.motion = None
     try:
         await unit.act(text, permission, once=True, retype=retype, program=kind is ChipMotion.BLOCK)
     except SentLate:
-        told(None, None)
+        register_motion(None, None)
         raise
     except LineFailure as failure:
         if not getattr(failure, "uncertain", False):
             raise
-        told(None, None)
+        register_motion(None, None)
         raise DoubtfulMove(unit.name, kind.value, failure) from failure
-    told(target_u, duration_s)
+    register_motion(target_u, duration_s)
 
 
 async def reset(unit: ChipUnit) -> None:
     """``\\``, and the time an E type takes for it."""
-    await unit.say("\\", stored=False)
+    await unit.send("\\", stored=False)
     notes = unit.notes
     unit.talk.forget(unit.address)
     notes.forget()

@@ -72,7 +72,7 @@ class AsyncM1486(AsyncChip):
             notes = self._unit.notes
             notes.motion = ChipMotionCommand(ChipMotion.MOVE, self.line.now(), notes.stops, target_u, 0.0)
             return
-        await self._unit.say(specification)
+        await self._unit.send(specification)
         duration = self.settings.travel_s(distance_u, self.variant)
         await begin(self._unit, "r", ChipMotion.MOVE, permission, target_u=target_u, duration_s=duration)
 
@@ -85,7 +85,7 @@ class AsyncM1486(AsyncChip):
             await self.configure(velocity=velocity)
         async with self._unit.turn(permission):
             await self._unit.rest()
-            await self._unit.say("g+" if direction > 0 else "g-")
+            await self._unit.send("g+" if direction > 0 else "g-")
             await begin(self._unit, "r", ChipMotion.ENDLESS, permission)
 
     async def seek(self, direction: int, line: int) -> None:
@@ -99,7 +99,7 @@ class AsyncM1486(AsyncChip):
         permission = self._unit.permission()
         async with self._unit.turn(permission):
             await self._unit.rest()
-            await self._unit.say(f":{line}")
+            await self._unit.send(f":{line}")
             await begin(self._unit, ")" if direction > 0 else "(", ChipMotion.SEEK, permission)
 
     async def start_program(self, label: int) -> None:
@@ -108,7 +108,7 @@ class AsyncM1486(AsyncChip):
         permission = self._unit.permission()
         async with self._unit.turn(permission):
             await self._unit.rest()
-            await self._unit.say(f":{label}")
+            await self._unit.send(f":{label}")
             await begin(self._unit, "j", ChipMotion.BLOCK, permission)
 
     async def stop(self) -> None:

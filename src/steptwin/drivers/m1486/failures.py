@@ -46,11 +46,11 @@ class Garbled(LineFailure):
     ``uncertain``: the chip may have executed it, or another command that it received instead.
     """
 
-    def __init__(self, place: str, request: object, sent: bytes, heard: bytes, *, uncertain: bool) -> None:
+    def __init__(self, place: str, request: object, sent: bytes, received: bytes, *, uncertain: bool) -> None:
         self.uncertain = uncertain
         doubt = "; it is unknown whether the chip has executed it" if uncertain else "; it was not executed"
         super().__init__(
-            f"{place}: '{request}' did not come back as it was sent: {_shown(heard)} instead of {_shown(sent)}{doubt}"
+            f"{place}: '{request}' did not come back as it was sent: {_shown(received)} instead of {_shown(sent)}{doubt}"
         )
 
 

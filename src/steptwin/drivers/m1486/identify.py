@@ -53,7 +53,7 @@ class FoundChip(NamedTuple):
         return self.variant is not None and 0 in variant(self.variant).addresses
 
 
-class Question(NamedTuple):
+class SearchRequest(NamedTuple):
     """Characters to send, and whether the next type letter is their answer."""
 
     text: str
@@ -65,7 +65,7 @@ class Question(NamedTuple):
         return self.text.strip().replace("\r", " ")
 
 
-class Asking:
+class SearchDiscipline:
     """The protocol of a search. See `steptwin.drivers.exchange.Discipline`."""
 
     free_ns: Nanos = 0
@@ -76,36 +76,36 @@ class Asking:
         self.reset()
 
     def reset(self) -> None:
-        self._question = Question("", has_one_answer=False)
-        self._heard = b""
+        self._request = SearchRequest("", has_one_answer=False)
+        self._received = b""
 
-    def start(self, request: Question, now: Nanos, *, urgent: bool) -> bytes:
-        self._question = request
-        self._heard = b""
+    def start(self, request: SearchRequest, now: Nanos, *, urgent: bool) -> bytes:
+        self._request = request
+        self._received = b""
         return request.text.encode("ascii")
 
     def receive(self, data: bytes, now: Nanos) -> bytes | None:
-        self._heard += data
-        question = self._question
-        if question.has_one_answer and letter_in(answer_in(question.text, self._heard)) is not None:
-            return self._heard
+        self._received += data
+        request = self._request
+        if request.has_one_answer and letter_in(answer_in(request.text, self._received)) is not None:
+            return self._received
         return None
 
-    def allowance_ns(self, request: Question) -> Nanos:
+    def allowance_ns(self, request: SearchRequest) -> Nanos:
         return self._serial.duration(len(request.text) + 2)
 
     def abandon(self, now: Nanos) -> bytes:
-        return self._heard
+        return self._received
 
     def stray(self, data: bytes, now: Nanos) -> None:
         """Discard bytes from before the query."""
 
 
-def searching(endpoint: Endpoint, baud: int) -> Exchanger[Question, bytes]:
-    return Exchanger(Asking(SerialLine(baud)), str(endpoint))
+def searching(endpoint: Endpoint, baud: int) -> Exchanger[SearchRequest, bytes]:
+    return Exchanger(SearchDiscipline(SerialLine(baud)), str(endpoint))
 
 
-class SearchLine(ThreadLine[Question, bytes]):
+class SearchLine(ThreadLine[SearchRequest, bytes]):
     """A line to search for chips, at an address as of `steptwin.drivers.m1486.M1486`."""
 
     def __init__(self, address: str, *, baud: int) -> None:
@@ -113,10 +113,10 @@ class SearchLine(ThreadLine[Question, bytes]):
         super().__init__(endpoint, searching(endpoint, baud))
 
 
-def answer_in(said: str, heard: bytes) -> bytes:
+def answer_in(sent: str, received: bytes) -> bytes:
     """The received bytes without the echo (function 41), of which a chip sends the part from its selection on, and without the
     reports of function 57. No answer looks like an echo: the characters sent are lower-case letters and digits."""
-    return heard.translate(None, said.encode("ascii") + bytes((EMPTY, THREE_FREE)))
+    return received.translate(None, sent.encode("ascii") + bytes((EMPTY, THREE_FREE)))
 
 
 def letter_in(answer: bytes) -> int | None:
@@ -132,7 +132,7 @@ def type_of(letter: int, baud: int | None) -> str:
 
 
 async def scan_chips(
-    line: DriverLine[Question, bytes],
+    line: DriverLine[SearchRequest, bytes],
     *,
     baud: int | None = None,
     timeout_ns: Nanos = SCAN_NS,
@@ -143,11 +143,11 @@ async def scan_chips(
     If chips were found, all listen afterwards, as after power-up. Otherwise chips that may be present stay deselected until
     `let_all_listen`.
     """
-    everybody = f"xg\rxg\r{WHO}\r"  # twice: the first may meet the rest of another line
-    heard = answer_in(everybody, await _say(line, everybody, timeout_ns + _WRITE_NS))
+    query = f"xg\rxg\r{WHO}\r"  # twice: the first may meet the rest of another line
+    received = answer_in(query, await _send(line, query, timeout_ns + _WRITE_NS))
     found: dict[int, FoundChip] = {}
-    if heard:
-        patience_ns = timeout_ns if _LETTERS_RAM.issuperset(heard) else timeout_ns + _WRITE_NS
+    if received:
+        patience_ns = timeout_ns if _LETTERS_RAM.issuperset(received) else timeout_ns + _WRITE_NS
         for address in (*range(1, 16), 0):
             if progress is not None:
                 progress(address)
@@ -161,25 +161,25 @@ async def scan_chips(
             chip = await _asked(line, before, address, baud, patience_ns)
             if chip is not None:
                 found[address] = chip
-    await _say(line, "xg\r" if found else f"x{_PARKED:x}\r", 0)
+    await _send(line, "xg\r" if found else f"x{_PARKED:x}\r", 0)
     return sorted(found.values())
 
 
-async def let_all_listen(line: DriverLine[Question, bytes]) -> None:
+async def let_all_listen(line: DriverLine[SearchRequest, bytes]) -> None:
     """End foreign bytes on the line and select all chips again."""
-    await _say(line, "\rxg\r", 0)
+    await _send(line, "\rxg\r", 0)
 
 
-async def end_line(line: DriverLine[Question, bytes]) -> None:
+async def end_line(line: DriverLine[SearchRequest, bytes]) -> None:
     """End foreign bytes on the line, so that chips drop them. No chip is selected by it."""
-    await _say(line, "\r", 0)
+    await _send(line, "\r", 0)
 
 
 async def _asked(
-    line: DriverLine[Question, bytes], before: str, address: int, baud: int | None, patience_ns: Nanos
+    line: DriverLine[SearchRequest, bytes], before: str, address: int, baud: int | None, patience_ns: Nanos
 ) -> FoundChip | None:
     text = f"{before}x{address:x}\r{WHO}\r"
-    answer = answer_in(text, await _say(line, text, patience_ns, has_one_answer=True))
+    answer = answer_in(text, await _send(line, text, patience_ns, has_one_answer=True))
     letter = letter_in(answer)
     if letter is not None:
         return FoundChip(address, type_of(letter, baud))
@@ -187,9 +187,9 @@ async def _asked(
     return FoundChip(address, None) if answer and full.issuperset(answer) else None
 
 
-async def _say(line: DriverLine[Question, bytes], text: str, patience_ns: Nanos, *, has_one_answer: bool = False) -> bytes:
+async def _send(line: DriverLine[SearchRequest, bytes], text: str, patience_ns: Nanos, *, has_one_answer: bool = False) -> bytes:
     """Send characters; returns the bytes received meanwhile."""
     try:
-        return await line.exchange(Job(Question(text, has_one_answer), patience_ns))
-    except NoAnswer as silence:
-        return silence.heard
+        return await line.exchange(Job(SearchRequest(text, has_one_answer), patience_ns))
+    except NoAnswer as error:
+        return error.received

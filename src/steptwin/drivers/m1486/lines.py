@@ -27,11 +27,11 @@ def talking(
 ) -> tuple[Exchanger[ChipRequest, bytes], CharacterTalk]:
     """The exchanger and the protocol of a line of chips."""
 
-    def heard(now: Nanos, direction: FrameDirection, data: bytes) -> None:
+    def log_bytes(now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if log is not None:
             log(f"{now / SECOND:12.6f} s  {'→' if direction is FrameDirection.IN else '←'} {data.hex(' '):<24}  {in_words(data)}")
 
-    talk = CharacterTalk(SerialLine(baud), str(endpoint), on_bytes=heard if log is not None else None)
+    talk = CharacterTalk(SerialLine(baud), str(endpoint), on_bytes=log_bytes if log is not None else None)
     return Exchanger(talk, str(endpoint)), talk
 
 

@@ -5,14 +5,18 @@ A chip responds only at rest (M-28); while it moves, its values are unknown.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 
+from steptwin.controllerstate import ControllerState, DetailValue, ProgramActivity, StateAxis, StateProgram, StateStatus
 from steptwin.datasheet import Datasheet
 from steptwin.drivers.line import DriverLine
+from steptwin.drivers.m1486.chip import ChipStatus
 from steptwin.drivers.m1486.driver import AsyncM1486
-from steptwin.drivers.m1486.failures import Busy
+from steptwin.drivers.m1486.failures import Busy, PositionUnknown
+from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.subject import Action, Value
 from steptwin.errors import Misuse, Refusal
@@ -20,10 +24,11 @@ from steptwin.m1486.datasheet import axis, datasheet_of
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.registers import UPLOADS
 from steptwin.subject import commands as command
-from steptwin.subject.events import Payload, SamplePayload, StatusPayload
+from steptwin.subject.payloads import Payload, SamplePayload, StatusPayload
 from steptwin.world import script as steps
 
 AXIS = 1
+FORMAT = "steptwin M1486 settings 1"
 BUSY = StatusPayload("busy", "moves, waits or runs its program")
 AT_REST = StatusPayload("at-rest", "is at rest")
 
@@ -42,7 +47,7 @@ class M1486Part:
         self._readers: dict[str, Callable[[], Awaitable[float]]] = {"COUNTER": chip.counter, "VARIABLE": chip.variable}
         self._readers |= {f"U{number}": partial(chip.byte, number) for number in UPLOADS}
         self._was_busy: bool | None = None
-        self._counter: int | None = None
+        self._shown: SamplePayload | None = None
 
     @property
     def line(self) -> DriverLine[ChipRequest, bytes]:
@@ -52,19 +57,31 @@ class M1486Part:
     def address(self) -> int | None:
         return self._chip.address
 
+    answers_in_motion = False
+
+    async def reconnect(self) -> None:
+        await self._chip.is_busy()
+
     # ------------------------------------------------------------------ points
 
     async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
         """Counter, variable and uploads are known at rest. Levels of lines are unknown, because reading them would overwrite
         the internal variable, which a program may need."""
-        for point in points:
-            if point.upper() not in self._units:
-                raise Misuse(f"{point!r} is not a point of an M1486: there are {', '.join(self._paths)}")
-        return {point: (await self._value(point.upper()), self._units[point.upper()]) for point in points}
+        units = {point: self.unit_of(point) for point in points}
+        if await self._chip.is_busy():  # asked once: it does not answer any of them
+            return {point: (None, unit) for point, unit in units.items()}
+        return {point: (await self._value(point.upper()), unit) for point, unit in units.items()}
+
+    def unit_of(self, point: str) -> str:
+        unit = self._units.get(point.upper())
+        if unit is None:
+            raise Misuse(f"{point!r} is not a point of an M1486: there are {', '.join(self._paths)}")
+        return unit
 
     async def _value(self, path: str) -> float | None:
+        """At rest."""
         if path in ("MOVING", "VELOCITY"):
-            return None if await self._chip.is_busy() else 0.0
+            return 0.0
         reader = self._readers.get(path)
         if reader is None:
             return None
@@ -72,6 +89,37 @@ class M1486Part:
             return float(await reader())
         except Busy:
             return None
+
+    async def state(self) -> ControllerState:
+        """While it moves, waits or runs its program, only that is known."""
+        sheet = self.datasheet
+        try:
+            status = await self._chip.status()
+        except Busy:
+            status = None
+        words = AT_REST.words if status is not None else BUSY.words
+        (described,) = sheet.axes
+        present = StateAxis(
+            number=described.number,
+            name=described.name,
+            unit=described.unit,
+            position=None if status is None else status.position,
+            velocity=None if status is None else 0.0,
+            moving=None if status is None else False,
+            enabled=None,
+            encoder=None,
+            status=StateStatus(text=words),
+        )
+        return ControllerState(
+            kind=sheet.kind,
+            variant=sheet.variant,
+            time_s=None,
+            status=StateStatus(text=words),
+            program=StateProgram(state=None if status is None else ProgramActivity.STOPPED, text=words, variables={}),
+            axes=(present,),
+            pins={pin.name: None for pin in sheet.pins},
+            details=dict.fromkeys((detail.name for detail in sheet.details), None) | _details(status),
+        )
 
     # ------------------------------------------------------------------ commands
 
@@ -124,18 +172,55 @@ class M1486Part:
     # ------------------------------------------------------------------ polling
 
     async def look(self, kinds: frozenset[str]) -> list[Payload]:
+        """While a chip is busy, its position is not known; nor is it after a motion that was stopped."""
         busy = await self._chip.is_busy()
         found: list[Payload] = []
         if busy is not self._was_busy and self._was_busy is not None and "status" in kinds:
             found.append(BUSY if busy else AT_REST)
         self._was_busy = busy
-        if busy or "sample" not in kinds:
-            return found
-        try:
-            counter = await self._chip.counter()
-        except Busy:  # it has begun to move meanwhile
-            return found
-        if counter != self._counter:
-            self._counter = counter
-            found.append(SamplePayload(str(AXIS), (counter - self._chip.origin_u) / self._chip.scale_u, self._chip.unit))
+        if "sample" in kinds:
+            sample = await self._sample(busy=busy)
+            if sample != self._shown:
+                self._shown = sample
+                found.append(sample)
         return found
+
+    async def _sample(self, *, busy: bool) -> SamplePayload:
+        if busy:
+            return self.unknown()[0]
+        try:
+            return SamplePayload(str(AXIS), await self._chip.position(), self._chip.unit, 0.0)
+        except PositionUnknown:
+            return SamplePayload(str(AXIS), None, self._chip.unit, 0.0)
+        except Busy:  # it has begun to move meanwhile
+            return self.unknown()[0]
+
+    def unknown(self) -> list[SamplePayload]:
+        return [SamplePayload(str(AXIS), None, self._chip.unit)]
+
+    def forget(self) -> None:
+        self._was_busy = self._shown = None
+
+    # ------------------------------------------------------------------ what faces need besides
+
+    def held_jog(self, wanted: command.Jog) -> AsyncM1486Jog:
+        self._check_axis(wanted.axis)
+        return AsyncM1486Jog(self._chip, wanted.velocity)
+
+    async def settings_text(self) -> str:
+        """What can be read of the chip: S, A, V and other settings cannot, so only those are known that this driver has made."""
+        status = asdict(await self._chip.status())
+        return json.dumps({"format": FORMAT, **status, "settings": asdict(self._chip.settings)}, indent=2)
+
+
+def _details(status: ChipStatus | None) -> dict[str, DetailValue]:
+    """What the uploads show."""
+    if status is None:
+        return {}
+    return {
+        "counter": status.counter_u,
+        "counter_valid": status.is_position_valid,
+        "variable": status.variable,
+        "flags_on": tuple(number for number, on in status.flags.items() if on),
+        "functions_on": tuple(number for number, on in status.functions.items() if on),
+    }

@@ -90,14 +90,14 @@ class ChipRequest:
         return f"{chip_name(self.address)}: {self.text.strip() or 'select'}"
 
 
-Heard = Callable[[Nanos, FrameDirection, bytes], object]
+ByteObserver = Callable[[Nanos, FrameDirection, bytes], object]
 """Called with all bytes sent and received."""
 
 
 class CharacterTalk:
     """The protocol of all exchanges of a line. ``echoing``: chips known to echo; ``owed``: pending type letters of each chip."""
 
-    def __init__(self, serial: SerialLine, place: str, *, on_bytes: Heard | None = None) -> None:
+    def __init__(self, serial: SerialLine, place: str, *, on_bytes: ByteObserver | None = None) -> None:
         self._serial = serial
         self._place = place
         self._on_bytes = on_bytes
@@ -128,7 +128,7 @@ class CharacterTalk:
         self._request: ChipRequest | None = None
         self._lines: list[bytes] = []  # still to be said, the one being said first
         self._sent = b""
-        self._heard = b""
+        self._echoed = b""
         self._answer: int | None = None
 
     wary = True
@@ -205,12 +205,12 @@ class CharacterTalk:
 
     def _put(self, data: bytes, now: Nanos) -> bytes:
         self._sent = data
-        self._heard = b""
+        self._echoed = b""
         if data and self._on_bytes is not None:
             self._on_bytes(now, FrameDirection.IN, data)
         return data
 
-    # ------------------------------------------------------------------ hearing
+    # ------------------------------------------------------------------ receiving
 
     def receive(self, data: bytes, now: Nanos) -> bytes | SendNext | None:
         if self._on_bytes is not None:
@@ -234,7 +234,7 @@ class CharacterTalk:
             for one in (byte, *rest):
                 self._uploaded(one)
             return self._done(bytes((byte,)))
-        if self._sent.startswith(self._heard) and len(self._heard) < len(self._sent):
+        if self._sent.startswith(self._echoed) and len(self._echoed) < len(self._sent):
             return self._echo(request, byte, rest, now)
         # All has come back, and an answer is waited for.
         return self._done(bytes((byte,)))
@@ -248,17 +248,17 @@ class CharacterTalk:
         return self._done(bytes((byte,)))
 
     def _echo(self, request: ChipRequest, byte: int, rest: bytes, now: Nanos) -> bytes | SendNext | None:
-        expected = self._sent[len(self._heard)]
+        expected = self._sent[len(self._echoed)]
         if byte == expected:
-            self._heard += bytes((byte,))
-            if len(self._heard) == len(self._sent):
+            self._echoed += bytes((byte,))
+            if len(self._echoed) == len(self._sent):
                 return self._came_back(request, rest, now)
             return None
-        if self._heard and byte == ~self._heard[-1] & 0xFF:
+        if self._echoed and byte == ~self._echoed[-1] & 0xFF:
             self.nearly_full = True
             return None
         if byte == NO_ROOM:
-            if expected == SPOILER[0] or (request.sort is ChipRequestKind.KILL and self._heard.endswith(SPOILER)):
+            if expected == SPOILER[0] or (request.sort is ChipRequestKind.KILL and self._echoed.endswith(SPOILER)):
                 self._is_stuck = True
                 return self._echo(request, expected, rest, now)
             self._give_up(now)
@@ -266,14 +266,14 @@ class CharacterTalk:
         # What a program uploads comes in between. A wrong echo looks the same, and is missed then: nothing is taken without it.
         if self._uploaded(byte) or byte in (EMPTY, THREE_FREE):
             return None
-        raise self._garbled(request, self._heard + bytes((byte,)) + rest, now)
+        raise self._garbled(request, self._echoed + bytes((byte,)) + rest, now)
 
-    def _garbled(self, request: ChipRequest, heard: bytes, now: Nanos) -> Garbled:
+    def _garbled(self, request: ChipRequest, received: bytes, now: Nanos) -> Garbled:
         typed = request.sort is ChipRequestKind.LINE and len(self._lines) == 1 and self._sent == self._lines[0]
-        request.commented = typed and b";" in heard
+        request.commented = typed and b";" in received
         sent = self._sent
         self._give_up(now)
-        return Garbled(self._place, request, sent, heard, uncertain=request.changes)
+        return Garbled(self._place, request, sent, received, uncertain=request.changes)
 
     def _absorb(self, letter: int) -> bool:
         """Take a type letter that is not the expected answer; returns whether one was pending."""
@@ -296,8 +296,8 @@ class CharacterTalk:
             self.selected = request.address
             return self._done(b"")
         if self._sent != _END:
-            if not all(byte == ~self._heard[-1] & 0xFF or self._uploaded(byte) for byte in rest):
-                raise self._garbled(request, self._heard + rest, now)
+            if not all(byte == ~self._echoed[-1] & 0xFF or self._uploaded(byte) for byte in rest):
+                raise self._garbled(request, self._echoed + rest, now)
             self.nearly_full |= bool(rest)
             request.committed |= len(self._lines) == 1 and request.sort is ChipRequestKind.LINE
             return SendNext(self._put(_END, now), may_wait=False)
@@ -317,14 +317,14 @@ class CharacterTalk:
             self.owed[request.address] = self.owes(request.address) + 1
         if not request.answers:
             for byte in rest:
-                if byte != ~self._heard[-1] & 0xFF:
+                if byte != ~self._echoed[-1] & 0xFF:
                     self._uploaded(byte)
             return self._done(b"")
         for byte in rest:
             answer = self._take(request, byte, b"", now)
             if answer is not None:
                 return answer
-        self._sent = self._heard = b""
+        self._sent = self._echoed = b""
         return None
 
     def _done(self, answer: bytes) -> bytes:
@@ -358,7 +358,7 @@ class CharacterTalk:
         self._busy_until = now + NOISE_NS + self._serial.duration(8)
 
     def abandon(self, now: Nanos) -> bytes:
-        heard, request = self._heard, self._request
+        received, request = self._echoed, self._request
         if request is None:
             return b""
         awaits_answer = request.committed and request.answers and not self._sent and not self._lines
@@ -366,7 +366,7 @@ class CharacterTalk:
             self._done(b"")
             return b""
         self._give_up(now)
-        return heard
+        return received
 
     def stray(self, data: bytes, now: Nanos) -> None:
         if self._on_bytes is not None and data:

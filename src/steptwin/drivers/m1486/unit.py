@@ -137,14 +137,14 @@ class ChipUnit:
 
     async def _exchange(
         self,
-        say: ChipRequest,
+        request: ChipRequest,
         *,
         timeout_ns: Nanos | None = None,
         urgent: bool = False,
         permission: Permission | None = None,
     ) -> bytes:
         job: Job[ChipRequest, bytes] = Job(
-            say, self.timeout_ns if timeout_ns is None else timeout_ns, urgent=urgent, permission=permission
+            request, self.timeout_ns if timeout_ns is None else timeout_ns, urgent=urgent, permission=permission
         )
         return await self.line.exchange(job)
 
@@ -159,7 +159,7 @@ class ChipUnit:
         for pause in PAUSES_NS:
             try:
                 if self.address is not None:
-                    # Everybody is to echo, so that the selection is verified by whoever hears it.
+                    # All chips have to echo, so that the echo verifies the selection.
                     await self._blind(f"{rest}{EVERYBODY}t{RETURN}\r", pause)
                     rest = ""
                     await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.SELECT))
@@ -227,7 +227,7 @@ class ChipUnit:
         if self.notes.variant is not None:
             self.notes.ready_at = self.line.now() + self.notes.variant.write_ns
 
-    async def say(
+    async def send(
         self,
         text: str,
         *,
@@ -245,14 +245,14 @@ class ChipUnit:
         tries = 0
         while True:
             await self._ready()
-            say = ChipRequest(self.address, text, answers=answers, acts=once or acts)
+            request = ChipRequest(self.address, text, answers=answers, acts=once or acts)
             try:
-                answer = await self._exchange(say, permission=permission, timeout_ns=self._patience(answers))
+                answer = await self._exchange(request, permission=permission, timeout_ns=self._patience(answers))
             except (Garbled, NoAnswer) as error:
                 tries += 1
-                if isinstance(error, NoAnswer) and not say.committed:
+                if isinstance(error, NoAnswer) and not request.committed:
                     self.talk.forget(self.address)
-                if tries == TRIES or (say.committed and once) or (say.commented and say.acts) or not retype:
+                if tries == TRIES or (request.committed and once) or (request.commented and request.acts) or not retype:
                     raise
                 continue
             if stored:
@@ -269,13 +269,13 @@ class ChipUnit:
         stored: bool = True,
         program: bool = False,
     ) -> None:
-        """Send a command that may move the motor, as `say`; ``program``: it starts a program. If the permission has ended, the
+        """Send a command that may move the motor, as `send`; ``program``: it starts a program. If the permission has ended, the
         chip drops it.
 
         Raises `Overtaken`, `TooLate`; `SentLate` when it was sent too late, and then the motor was stopped.
         """
         try:
-            await self.say(text, once=once, acts=True, permission=permission, retype=retype, stored=stored)
+            await self.send(text, once=once, acts=True, permission=permission, retype=retype, stored=stored)
         except (Overtaken, TooLate):
             await self.drop_line()
             raise
@@ -337,7 +337,7 @@ class ChipUnit:
     async def ask(self) -> None:
         """Request the type letter, which the chip sends when it has executed all commands."""
         self.talk.came.pop(self.address, None)
-        await self.say(WHO)
+        await self.send(WHO)
 
     async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
         """Wait for a pending letter, in slices that stops can interrupt."""
@@ -398,7 +398,7 @@ class ChipUnit:
             await self.rest()
         before: tuple[int, ...] | None = None
         for _ in range(READINGS):
-            found = tuple([(await self.say(f"u{number}", answers=True))[0] for number in numbers])
+            found = tuple([(await self.send(f"u{number}", answers=True))[0] for number in numbers])
             if found == before:
                 return found
             before = found
@@ -414,7 +414,7 @@ class ChipUnit:
         await self.rest()
         code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
         if letter not in _NAMES:
-            await self.say(f"c{REPORT}")  # function 57 reports an empty input buffer before each answer
+            await self.send(f"c{REPORT}")  # function 57 reports an empty input buffer before each answer
             code, *functions, letter = await self.read(*_LOOKED_AT, rests=True)
         if letter not in _NAMES:
             raise WrongType(f"{self.place}: {self.name} reports the type letter {letter:02X}H, which no M1486 has")

@@ -145,7 +145,7 @@ class _Watch:
         try:
             await self._ask(mover)
         except (LineFailure, Refusal) as failure:
-            # Who uses that chip is told; others are not troubled with it.
+            # Only the driver of that chip gets the error.
             if unit is own:
                 raise
             if isinstance(failure, Restarted):

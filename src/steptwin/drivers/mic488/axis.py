@@ -7,7 +7,7 @@ from math import isfinite
 from steptwin.drivers.mic488.failures import unconfirmed
 from steptwin.drivers.mic488.jog import HOLD_S, AsyncMic488Jog
 from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd
-from steptwin.drivers.mic488.unit import URGENT_TRIES, Control, Unit, check_axis
+from steptwin.drivers.mic488.unit import URGENT_TRIES, ControlRegisters, Unit, check_axis
 from steptwin.drivers.mic488.waiting import AxisWait, wait_for
 from steptwin.errors import LineFailure, Misuse
 from steptwin.mic488.axis_motion import MAX_SPEED_P
@@ -133,9 +133,9 @@ class AsyncMic488Axis:
             control = await unit.ready(self.number)
             self._motion = None
             await unit.set_axis(_KEYS[kind], self.number, value_u, control.data_type, permission=permission)
-            self.told(kind, value_u, control)
+            self.register_command(kind, value_u, control)
 
-    def told(self, kind: MotionKind, value_u: float, control: Control | None) -> None:
+    def register_command(self, kind: MotionKind, value_u: float, control: ControlRegisters | None) -> None:
         """Register a motion command; ``control`` is the state before it."""
         before = -1 if control is None else control.axes[self.number - 1]
         self._motion = MotionCommand(kind, value_u, self._unit.line.now(), before)
@@ -183,7 +183,7 @@ class AsyncMic488Axis:
         self.check(MotionKind.VELOCITY, velocity_u)
         if velocity_u == 0.0:
             raise Misuse(f"a jog of M{self.number} at 0 {self.unit}/s does not move")
-        return AsyncMic488Jog(self._unit, self.number, velocity_u, hold_s, self.told)
+        return AsyncMic488Jog(self._unit, self.number, velocity_u, hold_s, self.register_command)
 
     async def jog_bit(self, direction: int, on: bool) -> None:
         """Write the coil JOG_PLUS (direction +1) or JOG_MINUS (−1): the axis runs at JOG_SPEED **until the coil is written OFF**.

@@ -13,7 +13,7 @@ from steptwin.wire import pdu as modbus
 from steptwin.wire.slave import FrameDirection
 
 
-class Heard(NamedTuple):
+class ObservedFrame(NamedTuple):
     """One frame: towards the device or back, or bytes that are no frame (direction None)."""
 
     time: Nanos
@@ -35,11 +35,11 @@ class FrameWords:
     """
 
     def __init__(self, registers: RegisterMap | None = None, *, tcp: bool = False) -> None:
-        self.sinks: list[Callable[[Heard], object]] = []
+        self.sinks: list[Callable[[ObservedFrame], object]] = []
         self._tcp = tcp
         self._registers = registers or register_map()
         self._wordings: dict[int, Wording] = {}
-        self._asked: dict[int, bytes] = {}
+        self._requests: dict[int, bytes] = {}
 
     def know(self, unit: int, wording: Wording) -> None:
         """Set the known properties of a unit."""
@@ -47,35 +47,35 @@ class FrameWords:
 
     def observe(self, now: Nanos, direction: FrameDirection, raw: bytes) -> None:
         """Take a frame that a master sent or received: a `steptwin.wire.slave.FrameObserver`."""
-        self._tell(self.frame(now, direction, raw))
+        self._emit(self.frame(now, direction, raw))
 
     def rubbish(self, now: Nanos, raw: bytes) -> None:
-        self._tell(Heard(now, None, None, raw, "no frame"))
+        self._emit(ObservedFrame(now, None, None, raw, "no frame"))
 
     def lost(self, now: Nanos, count: int) -> None:
         """Take bytes that belong to no frame."""
-        self._tell(Heard(now, None, None, b"", f"no frame: {count} byte{'' if count == 1 else 's'}"))
+        self._emit(ObservedFrame(now, None, None, b"", f"no frame: {count} byte{'' if count == 1 else 's'}"))
 
-    def _tell(self, heard: Heard) -> None:
+    def _emit(self, frame: ObservedFrame) -> None:
         for sink in self.sinks:
-            sink(heard)
+            sink(frame)
 
-    def frame(self, now: Nanos, direction: FrameDirection, raw: bytes) -> Heard:
+    def frame(self, now: Nanos, direction: FrameDirection, raw: bytes) -> ObservedFrame:
         least = 8 if self._tcp else 4
         if len(raw) < least:
-            return Heard(now, None, None, raw, "no frame")
+            return ObservedFrame(now, None, None, raw, "no frame")
         unit, pdu = (raw[6], raw[7:]) if self._tcp else (raw[0], raw[1:-2])
         wording = self._wordings.get(unit)
         if wording is None:
             wording = self._wordings[unit] = Wording(self._registers)
         if direction is FrameDirection.IN:
-            self._asked[unit] = pdu
+            self._requests[unit] = pdu
             text = wording.request(pdu)
         else:
-            asked = self._asked.pop(unit, None)
+            asked = self._requests.pop(unit, None)
             self._learn(wording, asked, pdu)
             text = wording.response(pdu, asked)
-        return Heard(now, direction, unit, raw, f"{'broadcast' if unit == 0 else f'unit {unit}'}: {text}")
+        return ObservedFrame(now, direction, unit, raw, f"{'broadcast' if unit == 0 else f'unit {unit}'}: {text}")
 
     def _learn(self, wording: Wording, asked: bytes | None, answered: bytes) -> None:
         """Learn DATA_TYPE from a frame that reads or writes it."""

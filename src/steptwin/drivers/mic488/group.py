@@ -45,7 +45,7 @@ async def trigger(unit: Unit, axes: Mapping[int, AsyncMic488Axis], kind: MotionK
                 await unit.write(mode, DIRECT)
             raise
         for axis in chosen:
-            axes[axis].told(kind, values[axis], control)
+            axes[axis].register_command(kind, values[axis], control)
         try:
             await unit.write(mode, DIRECT)
         except LineFailure as failure:

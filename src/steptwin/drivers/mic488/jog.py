@@ -20,7 +20,7 @@ from typing import Self
 from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
 from steptwin.drivers.mic488.failures import NotReady, Unconfirmed
 from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text
-from steptwin.drivers.mic488.unit import Control, Unit
+from steptwin.drivers.mic488.unit import ControlRegisters, Unit
 from steptwin.drivers.mic488.waiting import dynamics
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, SteptwinError
@@ -51,7 +51,7 @@ class AsyncMic488Jog:
         axis: int,
         velocity_u: float,
         hold_s: float,
-        told: Callable[[MotionKind, float, Control | None], None],
+        on_command: Callable[[MotionKind, float, ControlRegisters | None], None],
     ) -> None:
         least, most = HOLD_RANGE_S
         if not least <= hold_s <= most:
@@ -60,7 +60,7 @@ class AsyncMic488Jog:
         self._axis = axis
         self._velocity_u = velocity_u
         self._hold_s = hold_s
-        self._told = told
+        self._on_command = on_command
         self._renew_ns: Nanos = round(hold_s / RENEWALS * SECOND)
         # A jog begins at once or not at all: preparing it takes four exchanges, of which two may be repeated.
         self._begin_ns: Nanos = round(hold_s * SECOND) + 2 * unit.timeout_ns
@@ -81,7 +81,7 @@ class AsyncMic488Jog:
         begin = unit.permission(axis, patience_ns=self._begin_ns)
         async with unit.lock():
             control = await unit.ready(axis)
-            self._told(MotionKind.DISTANCE, self._velocity_u, control)
+            self._on_command(MotionKind.DISTANCE, self._velocity_u, control)
             _, _, _, dec, vmax = await dynamics(unit, axis)
             speed = abs(self._velocity_u)
             if speed > vmax * (1.0 + SINGLE):
@@ -105,7 +105,7 @@ class AsyncMic488Jog:
             with contextlib.suppress(SteptwinError):
                 await self._put_back()
             if isinstance(error, LineFailure) and not isinstance(error, SentLate):
-                raise self._untold("may have begun to jog", error) from error
+                raise self._unconfirmed("may have begun to jog", error) from error
             raise
         return self
 
@@ -133,13 +133,13 @@ class AsyncMic488Jog:
             except LineFailure as failure:
                 if not permission.has_expired():
                     continue
-                raise self._untold("cannot be held any more", failure) from failure
+                raise self._unconfirmed("cannot be held any more", failure) from failure
             return self.end is None
         # Whoever held the button was away: the axis must not go on by itself afterwards.
         self._not_held()
         return False
 
-    async def _look(self) -> Control:
+    async def _look(self) -> ControlRegisters:
         control = await self._unit.control(timeout_ns=self._exchange_ns())
         if control.triggered:
             raise NotReady(
@@ -151,7 +151,7 @@ class AsyncMic488Jog:
         """Time-out of an exchange, ns: short enough to repeat it within the hold time."""
         return min(self._unit.timeout_ns, self._renew_ns)
 
-    async def _move(self, control: Control, permission: Permission) -> None:
+    async def _move(self, control: ControlRegisters, permission: Permission) -> None:
         """Send the move for the hold time from now on."""
         unit, axis = self._unit, self._axis
         distance = self._reach_u if self._velocity_u > 0.0 else -self._reach_u
@@ -199,10 +199,10 @@ class AsyncMic488Jog:
             except (TooLate, SentLate):
                 self._not_held()
             except LineFailure as failure:
-                raise self._untold("cannot be stopped", failure) from failure
+                raise self._unconfirmed("cannot be stopped", failure) from failure
             else:
                 self._stopped(Reason.RELEASED, "")
-                self._told(MotionKind.VELOCITY, 0.0, None)
+                self._on_command(MotionKind.VELOCITY, 0.0, None)
         await self._put_back()
 
     def _not_held(self) -> None:
@@ -214,7 +214,7 @@ class AsyncMic488Jog:
         if vmax is not None and vmax != abs(self._velocity_u):
             await self._unit.set_axis("VMAX", self._axis, vmax, self._unit.wording.data_type)
 
-    def _untold(self, what: str, failure: LineFailure) -> Unconfirmed:
+    def _unconfirmed(self, what: str, failure: LineFailure) -> Unconfirmed:
         unit = self._unit
         name = unit.unit_name(self._axis)
         since = (unit.line.now() - (self._held_ns or unit.line.now())) / SECOND

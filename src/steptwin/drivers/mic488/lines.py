@@ -30,7 +30,7 @@ def modbus_exchanger(
     observer = None
     if log is not None:
         frames = FrameWords(tcp=place.framed)
-        frames.sinks.append(lambda heard: log(str(heard)))
+        frames.sinks.append(lambda frame: log(str(frame)))
         notes["frames"] = frames
         observer = frames.observe
     where = str(place.endpoint)

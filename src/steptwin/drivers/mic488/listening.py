@@ -17,7 +17,7 @@ class RtuListener:
         self._framer = RtuFramer(gap_ns=gap_ns)
         self._rubbish = 0
 
-    def heard(self, data: bytes, now: Nanos) -> None:
+    def feed(self, data: bytes, now: Nanos) -> None:
         self._take(self._framer.feed(data, now), now)
 
     def deadline(self) -> Nanos | None:
@@ -49,7 +49,7 @@ class TcpListener:
         self._words = words
         self._framers = {FrameDirection.IN: mbap.TcpFramer(), FrameDirection.OUT: mbap.TcpFramer()}
 
-    def heard(self, data: bytes, now: Nanos, direction: FrameDirection) -> None:
+    def feed(self, data: bytes, now: Nanos, direction: FrameDirection) -> None:
         framer = self._framers[direction]
         for frame in framer.feed(data):
             self._words.observe(now, direction, frame.raw)

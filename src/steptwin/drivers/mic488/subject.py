@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from steptwin.datasheet import Datasheet
+from steptwin.controllerstate import ControllerState, DetailValue, StateAxis, StateProgram, StateStatus
+from steptwin.datasheet import AxisDescription, Datasheet
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.driver import ALL_AXES, AsyncMic488, Mic488Status
-from steptwin.drivers.mic488.failures import ModbusRefusal
+from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady
+from steptwin.drivers.mic488.jog import AsyncMic488Jog
 from steptwin.drivers.mic488.motion import status_text
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.drivers.modbus import Query
@@ -15,12 +17,14 @@ from steptwin.drivers.subject import Action, Value
 from steptwin.errors import Misuse
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.mic488.points import item_of
-from steptwin.mic488.registermap import Space
+from steptwin.mic488.present import ACTIVITIES, axis_status, controller_status
+from steptwin.mic488.registermap import DataType, Register, Space, Type
 from steptwin.mic488.registers import CONTROLLER_STATUS_TEXTS, register_map
+from steptwin.mic488.status import AxisStatus
 from steptwin.mic488.values import named
 from steptwin.nearmiss import NearMiss
 from steptwin.subject import commands as command
-from steptwin.subject.events import EdgePayload, Payload, SamplePayload, StatusPayload
+from steptwin.subject.payloads import EdgePayload, Payload, SamplePayload, StatusPayload
 from steptwin.wire import pdu
 from steptwin.world import script as steps
 
@@ -51,6 +55,14 @@ class Mic488Part:
     def address(self) -> int:
         return self._mic.unit
 
+    answers_in_motion = True
+
+    async def reconnect(self) -> None:
+        before = self._mic.firmware
+        await self._mic.find_firmware()
+        if self._mic.firmware != before:
+            raise NotReady(f"{self.line.place}: another controller is there: firmware {self._mic.firmware} instead of {before}")
+
     # ------------------------------------------------------------------ points
 
     async def values(self, points: Sequence[str]) -> Mapping[str, Value]:
@@ -78,9 +90,44 @@ class Mic488Part:
             raise Misuse(f"no point {path!r}{NearMiss().hint(path, (*known, *self._pins))}; there are {listed}")
         return None
 
+    def unit_of(self, point: str) -> str:
+        register = self._register(point)
+        item = None if register is None else named(self._registers, register)
+        return self._unit(point) if item is None else item.register.unit(DataType.REAL, self._unit_name(item.register))
+
+    def _unit_name(self, register: Register) -> str:
+        axis = register.axis or (register.index if register.type is Type.VALUE else None)
+        return self._mic.axis(axis).unit if axis else "u"
+
     def _unit(self, path: str) -> str:
         found = self._points.get(path.upper()) or self._pins.get(path.upper())
         return "" if found is None else found.unit
+
+    async def state(self) -> ControllerState:
+        """Whether an axis moves, and the statement and variables of a program, are unknown."""
+        status, sheet = await self._mic.status(), self.datasheet
+        pins = [pin.name for pin in sheet.pins]
+        details = [name for name in _DETAILS.values() if item_of(self._registers, name) is not None]
+        shown = await self.values((*pins, *(f"{axis.name}.encoder" for axis in sheet.axes), *details))
+        known = {point: value for point, (value, _) in shown.items()}
+        activity = ACTIVITIES.get(status.program)
+        return ControllerState(
+            kind=sheet.kind,
+            variant=sheet.variant,
+            time_s=None,
+            status=StateStatus(text="unknown") if status.controller is None else controller_status(status.controller),
+            program=StateProgram(
+                state=activity, text=f"unknown state {status.program}" if activity is None else activity.value, variables={}
+            ),
+            axes=tuple(_axis(axis, status, known[f"{axis.name}.encoder"]) for axis in sheet.axes),
+            pins={pin: known[pin] for pin in pins},
+            details={detail.name: self._detail(known, _DETAILS.get(detail.name, "")) for detail in sheet.details},
+        )
+
+    def _detail(self, known: Mapping[str, float | None], name: str) -> DetailValue:
+        """The value of a register as the state has it: a word where its values have words."""
+        value = known.get(name)
+        return None if value is None else self._registers.of(name).values.get(int(value), int(value))
 
     # ------------------------------------------------------------------ commands
 
@@ -152,11 +199,52 @@ class Mic488Part:
         found: list[Payload] = []
         if "sample" in kinds:
             for axis, position in zip(ALL_AXES, status.positions, strict=True):
-                if before is None or position != before.positions[axis - 1]:
-                    found.append(SamplePayload(str(axis), position, status.units[axis - 1]))
+                velocity = status.velocities[axis - 1]
+                if before is None or (position, velocity) != (before.positions[axis - 1], before.velocities[axis - 1]):
+                    found.append(SamplePayload(str(axis), position, status.units[axis - 1], velocity))
         if before is None:
             return found
         return found + [payload for payload in (*_edges(before, status), *_changes(before, status)) if payload.kind in kinds]
+
+    def unknown(self) -> list[SamplePayload]:
+        return [SamplePayload(str(axis), None, self._mic.axis(axis).unit) for axis in ALL_AXES]
+
+    def forget(self) -> None:
+        self._last = None
+
+    # ------------------------------------------------------------------ what faces need besides
+
+    def held_jog(self, wanted: command.Jog) -> AsyncMic488Jog:
+        return self._mic.axis(wanted.axis).jog(wanted.velocity)
+
+    async def settings_text(self) -> str:
+        """A snapshot, which `AsyncMic488.restore_snapshot` writes back."""
+        return (await self._mic.take_snapshot()).to_json()
+
+
+_DETAILS = {
+    "data_type": "DATA_TYPE",
+    "axis_control_mode": "AXIS_CTR_MODE",
+    "program_bank": "PROG_BANK_SEL",
+    "position_bank": "POS_BANK_SEL",
+}
+"""Registers that show what is in ``details`` of a state; user registers are too many."""
+
+
+def _axis(axis: AxisDescription, status: Mic488Status, encoder: float | None) -> StateAxis:
+    index = axis.number - 1
+    code = status.axes[index]
+    return StateAxis(
+        number=axis.number,
+        name=axis.name,
+        unit=status.units[index],
+        position=status.positions[index],
+        velocity=status.velocities[index],
+        moving=None,
+        enabled=code != AxisStatus.OFF,
+        encoder=None if encoder is None else round(encoder),
+        status=axis_status(code),
+    )
 
 
 def _edges(before: Mic488Status, status: Mic488Status) -> list[Payload]:

@@ -32,7 +32,7 @@ PATIENCE_NS: Nanos = 5 * SECOND
 """A request that changes something is sent at most this long after the call, ns."""
 
 
-class Control(NamedTuple):
+class ControlRegisters(NamedTuple):
     """The control registers, which show the state of the controller; ``at``: a moment (ns) before they were read."""
 
     at: Nanos
@@ -53,7 +53,7 @@ class UnitNotes:
     def __init__(self) -> None:
         self.stops = [0] * (AXES + 1)
         """Number of stops of each axis (from 1): a motion requested before a stop must not begin after it."""
-        self.control: Control | None = None
+        self.control: ControlRegisters | None = None
 
 
 class Unit:
@@ -254,7 +254,7 @@ class Unit:
 
     # ------------------------------------------------------------------ what it is doing
 
-    async def control(self, after: Nanos | None = None, timeout_ns: Nanos | None = None) -> Control:
+    async def control(self, after: Nanos | None = None, timeout_ns: Nanos | None = None) -> ControlRegisters:
         """The control registers, read now, or by another driver since ``after``."""
         known = self.notes.control
         if after is not None and known is not None and known.at >= after:
@@ -266,12 +266,12 @@ class Unit:
         if found[0] not in (DataType.REAL, DataType.DINT):
             raise NotReady(f"{self.place}: unit {self.number} reads DATA_TYPE = {found[0]}, which is not a value of a MIC488")
         status = found[3] if self._has_status else None
-        control = Control(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
+        control = ControlRegisters(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
         self.wording.data_type = control.data_type
         self.notes.control = control
         return control
 
-    async def ready(self, *axes: int) -> Control:
+    async def ready(self, *axes: int) -> ControlRegisters:
         """The control registers. Raises `NotReady` if the controller would not execute a motion now."""
         control = await self.control()
         if control.triggered:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.mic488.failures import MoveFailed
 from steptwin.drivers.mic488.motion import MOVING, MotionCommand, MotionKind, MoveEnd, Reason, reason_of, status_text, travel_s
-from steptwin.drivers.mic488.unit import Control, Unit
+from steptwin.drivers.mic488.unit import ControlRegisters, Unit
 from steptwin.errors import LineFailure, Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.status import AxisStatus
@@ -43,7 +43,7 @@ class AxisWait:
         """The time (ns) from which statuses are valid."""
         return self._begin if self._motion is None else self._motion.at
 
-    async def judge(self, control: Control) -> MoveEnd | None:
+    async def judge(self, control: ControlRegisters) -> MoveEnd | None:
         """The end of the motion; None while it lasts."""
         status = control.axes[self._axis - 1]
         motion = self._motion
@@ -53,7 +53,7 @@ class AxisWait:
             if self._limit is None or (self._is_computed and corrects is not self._corrects):
                 self._limit = now + round(await self._time_out_s(status) * SECOND)
                 self._corrects = corrects
-            if control.at < self._limit:  # only a status read after the limit tells that it is exceeded
+            if control.at < self._limit:  # only a status read after the limit shows that it is exceeded
                 return None
             return await self._end(Reason.OVERDUE, f"{status_text(status)} for {(now - self._begin) / SECOND:.1f} s")
         if motion is not None and status == motion.before and control.at < motion.at + SETTLE_NS:

@@ -18,6 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+from steptwin.calc import Calculation
 from steptwin.errors import Misuse
 from steptwin.files.export.axes import axis_views, controller_views
 from steptwin.files.export.progress import Progress, Watch, bar, unwatched
@@ -41,6 +42,7 @@ __all__ = [
     "controller_views",
     "growing_file",
     "read_trace",
+    "write_profile",
     "write_trace",
 ]
 
@@ -143,8 +145,8 @@ def write_trace(
     written.
 
     ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``title`` is the name of what ran, and
-    ``ended`` (ns) when that ended; by default when all came to rest. ``formats`` by default: for a directory `USUAL`; what a
-    file is to be where its suffix does not tell. A window of time (``begin`` to ``until``, ns) and ``machines`` limit what is
+    ``ended`` (ns) when that ended; by default when all came to rest. ``formats``: by default `USUAL` for a directory,
+    otherwise that of the file's suffix. A window of time (``begin`` to ``until``, ns) and ``machines`` limit what is
     shown; JSON lines always have everything. Without ``until`` everything goes on to the end, but pictures end shortly after
     the last change. ``period`` (ns) is that of samples. Without ``texts`` a VCD has no signals of type
     string (events, frames, faults), which sigrok does not read. ``watch=bar`` shows on a terminal how far each file is.
@@ -178,6 +180,22 @@ def write_trace(
         except OSError as error:
             raise Misuse(f"cannot write {path}: {reason(error)}") from error
     return [path for _, path in targets]
+
+
+PICTURES = ("png", "svg")
+
+
+def write_profile(result: Calculation, where: Path | str) -> None:
+    """Write a picture of a calculated move; the suffix selects png or svg. Raises `Misuse`."""
+    where = Path(where)
+    form = where.suffix[1:].lower()
+    if form not in PICTURES:
+        raise Misuse(f"cannot write {where}: pictures are {', '.join(f'.{one}' for one in PICTURES)}")
+    _check(form)
+    check_writable(where)
+    from steptwin.files.export.profileplot import write_profile_plot
+
+    write_profile_plot(result, where, form)
 
 
 def check_target(where: Path | str) -> None:

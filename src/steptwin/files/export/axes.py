@@ -9,7 +9,7 @@ from steptwin.world.kind import AnyKind
 from steptwin.world.lanes import AxisLane, AxisViews, Mechanics
 
 if TYPE_CHECKING:
-    from steptwin.world.elements.axis import Fitted
+    from steptwin.world.elements.axis import BuiltAxis
     from steptwin.world.plant import Plant
 
 
@@ -29,7 +29,7 @@ def controller_views(name: str, kind: AnyKind, machine: MotionController) -> dic
     return {(name, axis): view for axis, view in kind.lanes(machine).items()}
 
 
-def _mechanics(fitted: Fitted) -> Mechanics:
+def _mechanics(fitted: BuiltAxis) -> Mechanics:
     spec, build = fitted.spec, fitted.mechanism.build
     slips = spec.encoder is not None and spec.encoder.slip != 0.0
     scale = build.sign * float(fitted.scale.pulses_per_unit)

@@ -42,10 +42,10 @@ _GREY = "(grey: commanded)"
 _CLOCK_STEPS_S = (30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200, 86400)
 
 _INK, _FAINT = "#22262b", "#c9ced6"
-_POSITION, _VELOCITY, _TRUE, _LEVEL, _ANALOG, _FRAME, _EVENT, _FAULT = (
+POSITION_COLOR, VELOCITY_COLOR, _TRUE, _LEVEL, _ANALOG, _FRAME, _EVENT, _FAULT = (
     "#1f5fa8", "#c2570c", "#0f7b8a", "#2f7d55", "#6b4fa0", "#5b6470", "#22262b", "#b3261e",
 )  # fmt: skip
-_STYLE = {
+STYLE = {
     "font.size": 8.5,
     "font.family": "DejaVu Sans",
     "text.color": _INK,
@@ -59,7 +59,7 @@ _STYLE = {
 }
 
 
-class _Row(NamedTuple):
+class _PlotRow(NamedTuple):
     """A thin lane: levels of a pin, or marks."""
 
     label: str
@@ -79,7 +79,7 @@ def write_plot(recording: Recording, path: Path, form: str, progress: Progress) 
     loads = [track.true() for track in axes]
     panels_each = [2 if load is None else 3 for load in loads]
     heights = [_MOTION_IN] * sum(panels_each) + ([_ROW_IN * len(rows)] if rows else [])
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         labels = [_label(track, recording) + " velocity" for track in axes] + [row.label for row in rows]
         labels += [text for load in loads if load is not None for text in (f"{load.view.name} position", _GREY)]
         left = max(_LEFT_IN, _room(labels))
@@ -107,11 +107,11 @@ def _moves(track: AxisTrack, recording: Recording) -> bool:
     )
 
 
-def _rows(recording: Recording) -> list[_Row]:
+def _rows(recording: Recording) -> list[_PlotRow]:
     """Pins that changed, then links, events and faults."""
     one = len(recording.machines) == 1
     rows = [
-        _Row(pin.pin if one else pin.name, _ANALOG if pin.analog else _LEVEL, pin)
+        _PlotRow(pin.pin if one else pin.name, _ANALOG if pin.analog else _LEVEL, pin)
         for pin in recording.pins
         if any(recording.begin < time <= recording.until for time in pin.times)
     ]
@@ -122,7 +122,7 @@ def _rows(recording: Recording) -> list[_Row]:
             marks.setdefault((record.machine, name, record.kind), []).append(record.time)
     colors = {"frame": _FRAME, "event": _EVENT, "fault": _FAULT}
     for (machine, name, kind), moments in marks.items():
-        rows.append(_Row(name if one else f"{machine}.{name}", colors[kind], None, moments))
+        rows.append(_PlotRow(name if one else f"{machine}.{name}", colors[kind], None, moments))
     return rows
 
 
@@ -192,8 +192,8 @@ def _motion(above: Axes, below: Axes, track: AxisTrack, recording: Recording) ->
     times, positions, velocities = _points(track.coordinate() or track, recording)
     name = _label(track, recording)
     for panel, values, color, label in (
-        (above, positions, _POSITION, f"{name} position\n{view.unit}"),
-        (below, velocities, _VELOCITY, f"{name} velocity\n{view.unit}/s"),
+        (above, positions, POSITION_COLOR, f"{name} position\n{view.unit}"),
+        (below, velocities, VELOCITY_COLOR, f"{name} velocity\n{view.unit}/s"),
     ):
         panel.plot(*_thinned(times, values / view.pulses_per_unit), color=color, linewidth=1.1)
         _scale(panel, label, color)
@@ -228,7 +228,7 @@ def _scale(panel: Axes, label: str, color: str) -> None:
         panel.set_ylim(panel.dataLim.y0 - 1, panel.dataLim.y0 + 1)
 
 
-def _lanes(panel: Axes, rows: list[_Row], recording: Recording) -> None:
+def _lanes(panel: Axes, rows: list[_PlotRow], recording: Recording) -> None:
     panel.set_ylim(len(rows), 0)
     panel.set_yticks([i + 0.5 for i in range(len(rows))], [row.label for row in rows], fontsize=8)
     for i, row in enumerate(rows):

@@ -12,7 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
-from steptwin.world.course import Carried
+from steptwin.world.course import LoadPiece
 from steptwin.world.lanes import AxisLane, AxisViews, plain_view
 from steptwin.world.trace import Trace, TraceRecord
 
@@ -25,7 +25,7 @@ class AxisTrack:
     view: AxisLane
     times: list[Nanos] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
-    loads: list[Carried] = field(default_factory=list)
+    loads: list[LoadPiece] = field(default_factory=list)
     """Positions of the load by moment, if it does not follow the pulses throughout."""
     origins: list[tuple[Nanos, int]] = field(default_factory=list)
     """By how many pulses the coordinate is above the count, by moments."""
@@ -72,7 +72,7 @@ class AxisTrack:
         track = AxisTrack(self.machine, view)
         for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
             past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
-            _, follows, pulses = self.loads[past] if past >= 0 else Carried(begin, True, 0)
+            _, follows, pulses = self.loads[past] if past >= 0 else LoadPiece(begin, True, 0)
             profile = profile_of(self.plan(begin)) if follows else at_rest(begin, pulses)
             off = mechanics.zero_p + (pulses if follows else 0)
             track.add(begin, profile, off)
@@ -185,7 +185,7 @@ def sort_out(
             loads = _axis(axes, machine, subject, views).loads
             while loads and loads[-1].begin >= time:
                 loads.pop()
-            loads += [Carried(*one) for one in value]
+            loads += [LoadPiece(*one) for one in value]
         elif isinstance(value, int) and kind == "coordinate":
             _axis(axes, machine, subject, views).origins.append((time, value))
         elif isinstance(value, (int, float)) and kind == "edge":

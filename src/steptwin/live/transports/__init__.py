@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.live.transports.contract import Opened, Opening, Transport
+from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
 from steptwin.live.transports.pty import PTY
 from steptwin.live.transports.rfc2217 import RFC2217
 from steptwin.live.transports.serial import SERIAL
@@ -18,4 +18,4 @@ TRANSPORTS = complete(
 )
 """By the key of ``[[line]]`` that opens it."""
 
-__all__ = ["TRANSPORTS", "VISION", "Opened", "Opening", "Transport"]
+__all__ = ["TRANSPORTS", "VISION", "LinkArguments", "OpenLink", "Transport"]

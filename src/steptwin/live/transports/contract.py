@@ -13,7 +13,7 @@ from steptwin.machine import Port
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Opening:
+class LinkArguments:
     """The arguments for opening a link."""
 
     where: str
@@ -31,7 +31,7 @@ class Opening:
 
 
 @dataclass(frozen=True, slots=True)
-class Opened:
+class OpenLink:
     """An open link. ``place`` is its address as text, ``details`` as fields."""
 
     link: Link
@@ -47,5 +47,5 @@ class Transport:
     """Whether the value of its key is an address on which it listens."""
     has_several: bool
     """Whether several programs may use it at once; else one after the other."""
-    open: Callable[[Opening], Awaitable[Opened]]
+    open: Callable[[LinkArguments], Awaitable[OpenLink]]
     """Opens the link. Raises `LineFailure`, or `Misuse` for an invalid value or a kind of link that the system lacks."""

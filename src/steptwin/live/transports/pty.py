@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from steptwin.live.ptys import pty_link
-from steptwin.live.transports.contract import Opened, Opening, Transport
+from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
 
 
-async def _open(opening: Opening) -> Opened:
+async def _open(opening: LinkArguments) -> OpenLink:
     link = pty_link(opening.cell, Path(opening.where), opening.make_port)
     path = str(await link.open())
-    return Opened(link, path, {"path": path})
+    return OpenLink(link, path, {"path": path})
 
 
 PTY = Transport(kind="pty", is_address=False, has_several=False, open=_open)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from steptwin.live.rfc2217 import over_network
-from steptwin.live.transports.contract import Opened, Opening, Transport
+from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
 from steptwin.live.transports.tcp import listen
 
 
-async def _open(opening: Opening) -> Opened:
+async def _open(opening: LinkArguments) -> OpenLink:
     return await listen(replace(opening, make_port=lambda: over_network(opening.make_port(), opening.line)))
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from steptwin.live.tcp import TcpLink
-from steptwin.live.transports.contract import Opened, Opening, Transport
+from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
 from steptwin.world.addresses import parse_address
 
 
-async def listen(opening: Opening) -> Opened:
+async def listen(opening: LinkArguments) -> OpenLink:
     address = parse_address(opening.where, listen_any=opening.listen_any)
     link = TcpLink(opening.cell, address, opening.make_port, opening.clients)
     listening = await link.open()
-    return Opened(link, str(listening), {"host": listening.host, "port": listening.port})
+    return OpenLink(link, str(listening), {"host": listening.host, "port": listening.port})
 
 
 def over_tcp(kind: str) -> Transport:

@@ -28,9 +28,9 @@ from steptwin.m1486.commands import find
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.structure import written_label
 from steptwin.m1486.symbols import by_chip, label_key, uses
-from steptwin.m1486.syntax import Command, JumpCondition, ProgramText, format_program, parse
+from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram, format_program, parse
 from steptwin.m1486.variants import Variant
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
 _TOKENS = {
     SymbolKind.LABEL: TokenKind.LABEL,
@@ -51,7 +51,7 @@ class M1486Analysis(Analysis):
         self._interface = interface
 
     @cached_property
-    def _program(self) -> ProgramText:
+    def _program(self) -> ParsedProgram:
         return parse(self.text).program
 
     @cached_property
@@ -180,7 +180,7 @@ class M1486Analysis(Analysis):
                 if span.end > span.start >= letter.end and self.lines.line_of(span.start) == self.lines.line_of(span.end):
                     use = by_start.get(span.start)
                     kind = TokenKind.NUMBER if use is None else _TOKENS[use.symbol.kind]
-                    found.append(SemanticToken(span, kind, use is not None and use.role is not Role.READ))
+                    found.append(SemanticToken(span, kind, use is not None and use.role is not SymbolRole.READ))
         for number, start in enumerate(self.lines.starts):
             content = self.lines.line(number)
             if ";" in content:

@@ -13,7 +13,7 @@ from steptwin.m1486.flow import Settings, follow
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.microsteps import HIGHEST_SPEED
 from steptwin.m1486.structure import streams
-from steptwin.m1486.syntax import ProgramText
+from steptwin.m1486.syntax import ParsedProgram
 from steptwin.m1486.variants import Variant
 from steptwin.machine import SECOND
 from steptwin.motion.ramps import plan_distance
@@ -22,7 +22,7 @@ MOST_COMMANDS = 1_000
 """Of a program whose moves are timed: more than any chip holds."""
 
 
-def hints(program: ProgramText, memory: Sequence[ChipMemory], variant: Variant, interface: Interface) -> Iterator[Hint]:
+def hints(program: ParsedProgram, memory: Sequence[ChipMemory], variant: Variant, interface: Interface) -> Iterator[Hint]:
     """In no order."""
     for command in program.commands:
         steps = texts.steps_hint(command, variant)
@@ -46,7 +46,7 @@ def _memory(chip: ChipMemory) -> Iterator[Hint]:
             yield Hint(taken.command.span.end, f"{bits} of {chip.limit} bits", f"command memory of {whose}")
 
 
-def _times(program: ProgramText, variant: Variant, interface: Interface) -> Iterator[Hint]:
+def _times(program: ParsedProgram, variant: Variant, interface: Interface) -> Iterator[Hint]:
     """How long a move takes that begins with the same settings whenever it is made."""
     for stream in streams(program):
         for index, states in follow(stream, variant, interface).states.items():

@@ -25,9 +25,9 @@ from steptwin.lsp.table import UsedRows
 from steptwin.lsp.wbc import items, names
 from steptwin.lsp.wbc.hints import hints
 from steptwin.lsp.wbc.names import Names
-from steptwin.lsp.wbc.surroundings import Surroundings
+from steptwin.lsp.wbc.surroundings import ProgramContext
 from steptwin.mic488.program import setup_of
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.wbc.check import CheckedProgram
 from steptwin.wbc.dialect import MAX_POSITIONS
 from steptwin.wbc.events import BY_LABEL, BY_REGISTER
@@ -54,12 +54,12 @@ _RENAMED = (SymbolKind.CONSTANT, SymbolKind.VARIABLE, SymbolKind.LABEL, SymbolKi
 class WbcAnalysis(Analysis):
     """``edited`` has been given the text, and is given no other one as long as this is asked."""
 
-    def __init__(self, uri: str, lines: LineIndex, edited: Edited, around: Surroundings) -> None:
+    def __init__(self, uri: str, lines: LineIndex, edited: Edited, around: ProgramContext) -> None:
         super().__init__(uri, lines)
         self._edited = edited
         self._around = around
 
-    # -- what the program says
+    # -- contents of the program
 
     @cached_property
     def checked(self) -> CheckedProgram:
@@ -69,7 +69,7 @@ class WbcAnalysis(Analysis):
 
     @cached_property
     def names(self) -> Names:
-        """Of the text as it is, also where nobody has checked it yet."""
+        """For the present text, also if it has not been checked yet."""
         return Names.of(self._edited.program, self._around)
 
     def diagnostics(self) -> Sequence[Diagnostic]:
@@ -143,7 +143,7 @@ class WbcAnalysis(Analysis):
             case SymbolKind.POSITION:
                 return names.position_text(key, self._around)
             case _:
-                jumps = sum(other.symbol == symbol and other.role is Role.READ for other in self.uses)
+                jumps = sum(other.symbol == symbol and other.role is SymbolRole.READ for other in self.uses)
                 return names.label_text(key, self.names, jumps)
 
     def items(self, place: int) -> Completions:
@@ -175,7 +175,7 @@ class WbcAnalysis(Analysis):
         if event is None:
             return ()
         labels = {key for key, (found, _) in BY_LABEL.items() if found is event}
-        return [use.span for use in self.uses if use.role is Role.DEFINE and use.symbol.key in labels]
+        return [use.span for use in self.uses if use.role is SymbolRole.DEFINE and use.symbol.key in labels]
 
     def new_name_problem(self, symbol: Symbol, text: str) -> str | None:
         if symbol.kind not in _RENAMED:
@@ -263,7 +263,7 @@ class WbcAnalysis(Analysis):
                 span, use = Span(word.start, word.end), by_start.get(word.start)
                 if use is not None:
                     yield SemanticToken(
-                        span, _TOKENS[use.symbol.kind], use.role is not Role.READ, use.symbol.kind is SymbolKind.CONSTANT
+                        span, _TOKENS[use.symbol.kind], use.role is not SymbolRole.READ, use.symbol.kind is SymbolKind.CONSTANT
                     )
                 elif word.kind in _WORDS:
                     yield SemanticToken(span, _WORDS[word.kind])
@@ -282,7 +282,7 @@ class WbcAnalysis(Analysis):
         for use in self.uses:
             if use.symbol.kind is not SymbolKind.LABEL:
                 continue
-            if use.role is Role.DEFINE:
+            if use.role is SymbolRole.DEFINE:
                 caller = use.symbol.key
             else:
                 found.append(CallEdge(caller, use.symbol.key, use.span))

@@ -10,7 +10,7 @@ from steptwin.lsp.wbc.names import Names, row_values
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.program import MAX_SPEED_P
 from steptwin.motion.planner import MotionState, plan_position
-from steptwin.symbols import Role, SymbolKind, Use
+from steptwin.symbols import SymbolKind, SymbolRole, Use
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import CheckedProgram
 from steptwin.wbc.incremental import Edited
@@ -24,7 +24,7 @@ def hints(edited: Edited, checked: CheckedProgram, names: Names, uses: Sequence[
     """In no order."""
     table = names.around.positions
     for use in uses:
-        if use.role is not Role.READ:
+        if use.role is not SymbolRole.READ:
             continue
         if use.symbol.kind is SymbolKind.CONSTANT:
             meaning = names.meaning(use.symbol.key)

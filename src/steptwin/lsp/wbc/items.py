@@ -35,8 +35,8 @@ _NEAR_REGISTERS = 8
 """User registers offered of a kind that the program does not use yet."""
 
 
-class Wanted(enum.Enum):
-    """What may come next."""
+class Expected(enum.Enum):
+    """The kind of operand expected at the cursor."""
 
     STATEMENT = enum.auto()
     TARGET = enum.auto()
@@ -56,58 +56,58 @@ class Wanted(enum.Enum):
 class Context(NamedTuple):
     """``other`` is the name that the value is compared with or given to."""
 
-    wanted: Wanted
+    wanted: Expected
     other: str = ""
 
 
 _OPERANDS = {
-    OperandKind.AXIS: Wanted.AXIS,
-    OperandKind.OUTPUT: Wanted.OUTPUT,
-    OperandKind.VALUE: Wanted.VALUE,
-    OperandKind.LABEL: Wanted.LABEL,
-    OperandKind.ROW: Wanted.ROW,
+    OperandKind.AXIS: Expected.AXIS,
+    OperandKind.OUTPUT: Expected.OUTPUT,
+    OperandKind.VALUE: Expected.VALUE,
+    OperandKind.LABEL: Expected.LABEL,
+    OperandKind.ROW: Expected.ROW,
 }
 
 
 def context(words: Sequence[Lexeme]) -> Context:
     """What may follow the words of a line."""
     if not words:
-        return Context(Wanted.STATEMENT)
+        return Context(Expected.STATEMENT)
     first = words[0].text.upper()
     if words[-1].text == "@":
-        return Context(Wanted.POSITION)
+        return Context(Expected.POSITION)
     if first == "#":
-        return Context(Wanted.CONSTANT if len(words) == 2 else Wanted.NOTHING)
+        return Context(Expected.CONSTANT if len(words) == 2 else Expected.NOTHING)
     if first in STATEMENTS:
         return _of_command(STATEMENTS[first], words[1:])
     if first == SET:
         if len(words) == 1:
-            return Context(Wanted.TARGET)
+            return Context(Expected.TARGET)
         return _of_assignment(words[1], words[2:])
     return _of_assignment(words[0], words[1:])
 
 
 def _of_assignment(target: Lexeme, rest: Sequence[Lexeme]) -> Context:
     if not rest or rest[0].text != "=":
-        return Context(Wanted.NOTHING)
+        return Context(Expected.NOTHING)
     if len(rest) == 1:
-        return Context(Wanted.EXPRESSION, target.text)
+        return Context(Expected.EXPRESSION, target.text)
     if rest[-1].kind == OPERATOR or rest[-1].text in ("(", ","):
-        return Context(Wanted.VALUE)
-    return Context(Wanted.OPERATOR if len(rest) == 2 else Wanted.NOTHING)
+        return Context(Expected.VALUE)
+    return Context(Expected.OPERATOR if len(rest) == 2 else Expected.NOTHING)
 
 
 def _of_command(row: StatementRow, rest: Sequence[Lexeme]) -> Context:
     given = [word for word in rest if word.text not in ("(", ")", ",", "-")]
     if row.operands and row.operands[0].kind is OperandKind.CONDITION:
         if not given:
-            return Context(Wanted.VALUE)
+            return Context(Expected.VALUE)
         if len(given) == 1:
-            return Context(Wanted.SIGN)
+            return Context(Expected.SIGN)
         comparison = len(given) == 2 and given[1].kind == COMPARISON
-        return Context(Wanted.VALUE, given[0].text) if comparison else Context(Wanted.NOTHING)
+        return Context(Expected.VALUE, given[0].text) if comparison else Context(Expected.NOTHING)
     if len(given) >= len(row.operands):
-        return Context(Wanted.NOTHING)
+        return Context(Expected.NOTHING)
     return Context(_OPERANDS[row.operands[len(given)].kind])
 
 
@@ -157,35 +157,35 @@ class _Maker:
 
     def items(self, context: Context) -> Iterator[Completion]:
         match context.wanted:
-            case Wanted.STATEMENT:
+            case Expected.STATEMENT:
                 yield from self._statements()
                 yield from self._targets(rank=3)
-            case Wanted.TARGET:
+            case Expected.TARGET:
                 yield from self._targets(rank=1)
-            case Wanted.VALUE:
+            case Expected.VALUE:
                 yield from self._values(context.other)
-            case Wanted.EXPRESSION:
+            case Expected.EXPRESSION:
                 yield from self._functions()
                 yield from self._values(context.other)
-            case Wanted.CONSTANT:
+            case Expected.CONSTANT:
                 yield from self._registers(rank=1)
                 yield from self._predefined(())
-            case Wanted.AXIS:
+            case Expected.AXIS:
                 yield from self._family("M")
-            case Wanted.OUTPUT:
+            case Expected.OUTPUT:
                 yield from self._family("OUT")
-            case Wanted.LABEL:
+            case Expected.LABEL:
                 yield from self._labels()
-            case Wanted.ROW:
+            case Expected.ROW:
                 yield from self._positions("@")
                 yield from self._values("")
-            case Wanted.POSITION:
+            case Expected.POSITION:
                 yield from self._positions("")
-            case Wanted.SIGN:
+            case Expected.SIGN:
                 yield from self._signs(COMPARISONS)
-            case Wanted.OPERATOR:
+            case Expected.OPERATOR:
                 yield from self._signs(OPERATORS)
-            case Wanted.NOTHING:
+            case Expected.NOTHING:
                 return
 
     def _item(self, label: str, kind: CompletionKind, detail: str, text: str = "", *, rank: int = 5) -> Completion:

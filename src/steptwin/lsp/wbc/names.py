@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from steptwin.lsp.wbc.surroundings import Surroundings
+from steptwin.lsp.wbc.surroundings import ProgramContext
 from steptwin.wbc import steps as s
 from steptwin.wbc.events import BY_LABEL, BY_REGISTER
 from steptwin.wbc.positions import PositionRow, number_text
@@ -27,10 +27,10 @@ class Names:
     scope: Scope
     labels: Mapping[str, str]
     values: Mapping[str, str]
-    around: Surroundings
+    around: ProgramContext
 
     @classmethod
-    def of(cls, program: ProgramTree, around: Surroundings) -> Names:
+    def of(cls, program: ProgramTree, around: ProgramContext) -> Names:
         labels: dict[str, str] = {}
         values: dict[str, str] = {}
         for line in program.lines:
@@ -64,7 +64,7 @@ def keyword_text(key: str) -> str | None:
     return None
 
 
-def register_text(key: str, around: Surroundings) -> str | None:
+def register_text(key: str, around: ProgramContext) -> str | None:
     found = parts(key)
     if found is None:
         return None
@@ -88,7 +88,7 @@ def register_text(key: str, around: Surroundings) -> str | None:
     return "\n\n".join([*lines, source(row.since)])
 
 
-def unit_of(row: RegisterRow, number: int, around: Surroundings) -> str:
+def unit_of(row: RegisterRow, number: int, around: ProgramContext) -> str:
     """The unit of a register; with a configuration that of its axis."""
     config = around.config
     if not row.unit or config is None or not row.unit.startswith("u") or row.last != len(config.axes) or number < 1:
@@ -168,7 +168,7 @@ def row_values(row: PositionRow) -> str:
     return "; ".join("x" if value is None else number_text(value) for value in row.values)
 
 
-def position_text(key: str, around: Surroundings) -> str:
+def position_text(key: str, around: ProgramContext) -> str:
     table = around.positions
     if table is None:
         return "Position: there is no table of the same name beside the program."

@@ -1,4 +1,4 @@
-"""What a program is looked at with: the other files of its machine."""
+"""The context of a program: the other files of its machine."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from steptwin.wbc.positions import PositionTable
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """Position table and configuration, None where the machine has none, and the firmware it is for."""
+class ProgramContext:
+    """Position table and configuration, None if the machine has none, and the firmware."""
 
     positions: PositionTable | None = None
     config: ControllerConfig | None = None

@@ -15,9 +15,10 @@ from steptwin.lsp.answers import Completions, DocumentLink, Fold, Hover, Outline
 from steptwin.lsp.files import name_of, relative
 from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.world.check import diagnose
-from steptwin.lsp.world.items import Maker, keys_of
+from steptwin.lsp.world.items import ItemBuilder, keys_of
 from steptwin.lsp.world.outline import Outline, Table
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
+from steptwin.world.elements import ELEMENTS
 from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
 from steptwin.world.names import RESERVED
@@ -27,6 +28,8 @@ _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=")
 _FILE = re.compile(r"""(["'])([^"'\n]+\.(?:prg|csv|cfg|m1486|wbc))\1""", re.IGNORECASE)
 _FILE_KEYS = frozenset({"config", "program", "programs", "positions"})
 _KINDS = {
+    **dict.fromkeys(KINDS, SymbolKind.CONTROLLER),
+    **dict.fromkeys(ELEMENTS, SymbolKind.ELEMENT),
     "line": SymbolKind.LINE,
     "axis": SymbolKind.AXIS,
     "button": SymbolKind.BUTTON,
@@ -99,7 +102,7 @@ class WorldAnalysis(Analysis):
         table = self._outline.table_at(place)
         present = () if table is None else self._present(table, number)
         files = [name_of(uri) for uri in self._around.beside(self.uri)]
-        return Maker(self._outline, self._controllers, files).items(before, place, present)
+        return ItemBuilder(self._outline, self._controllers, files).items(before, place, present)
 
     def _present(self, table: Table, without: int) -> Iterator[str]:
         """The keys of a table, but for those of one line."""
@@ -142,7 +145,7 @@ class WorldAnalysis(Analysis):
         span = Span(table.span.start, max(table.span.end, self.lines.ends[table.last]))
         first = bisect_left(self._defined, span.start, key=_start)
         inside = [use for use in self._defined[first : first + 1] if use.span.start <= span.end]
-        kind = _KINDS.get(table.kind, SymbolKind.CONTROLLER if table.kind in KINDS else SymbolKind.SECTION)
+        kind = _KINDS.get(table.kind, SymbolKind.SECTION)
         if not inside:
             return OutlineItem(".".join(table.names), kind, span, table.span)
         return OutlineItem(inside[0].symbol.text or "?", kind, span, inside[0].span, table.kind)
@@ -154,7 +157,7 @@ class WorldAnalysis(Analysis):
         """The names that mean something here; TOML itself every editor knows."""
         headers = [SemanticToken(table.span, TokenKind.SECTION) for table in self._outline.tables]
         names = [
-            SemanticToken(use.span, TokenKind.VARIABLE, use.role is Role.DEFINE)
+            SemanticToken(use.span, TokenKind.VARIABLE, use.role is SymbolRole.DEFINE)
             for use in self.uses
             if use.span.end > use.span.start
         ]

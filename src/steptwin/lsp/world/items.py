@@ -9,24 +9,17 @@ from steptwin.diagnostics import Span
 from steptwin.lsp.answers import Completion, CompletionKind, Completions
 from steptwin.lsp.world.outline import Outline, Table
 from steptwin.symbols import SymbolKind
-from steptwin.world.kind import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, AnyKind
+from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
 from steptwin.world.reader import Key
 from steptwin.world.script import ACTIONS
 from steptwin.world.tables import all_keys, written
-from steptwin.world.values import Word, flag
+from steptwin.world.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, NameOf, PinOf, Word, flag
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]*)\Z")
 _VALUE = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*([\"']?)([^\"'=,#]*)\Z")
 _STEP = re.compile(r"[{,][ \t]*([A-Za-z_]*)\Z")
 _STEP_VALUE = re.compile(r"([A-Za-z_]+)[ \t]*=[ \t]*([\"'])([^\"']*)\Z")
-_PINS = {
-    ("switch", "to"): DIGITAL_INPUT,
-    ("button", "to"): DIGITAL_INPUT,
-    ("source", "to"): ANALOG_INPUT,
-    ("wire", "from"): OUTPUT,
-    ("wire", "to"): DIGITAL_INPUT,
-}
 _STEP_NAMES = {
     "press": SymbolKind.BUTTON,
     "release": SymbolKind.BUTTON,
@@ -44,7 +37,7 @@ def keys_of(table: Table) -> Sequence[Key]:
     return all_keys().get(table.kind, ())
 
 
-class Maker:
+class ItemBuilder:
     """For one text. ``files`` gives the names of files beside it by ending."""
 
     def __init__(self, outline: Outline, controllers: Mapping[str, AnyKind], files: Iterable[str]) -> None:
@@ -96,8 +89,10 @@ class Maker:
             for controller, kind in self._controllers.items():
                 axes = [table for table in kind.inner_tables if table.startswith("M")] or ["M1"]
                 yield from (_text(f"{controller}.{axis}", span, mark, kind.title) for axis in axes)
-        elif (table.kind, name) in _PINS:
-            yield from self._pins(_PINS[table.kind, name], span, mark)
+        elif isinstance(key.read, PinOf):
+            yield from self._pins(key.read.kind, span, mark)
+        elif isinstance(key.read, NameOf):
+            yield from (_text(named, span, mark, key.read.element) for named in self._outline.named(key.read.element))
         elif name in _FILES:
             endings = _FILES[name]
             yield from (_text(file, span, mark, "file") for file in self._files if file.lower().endswith(endings))

@@ -10,9 +10,12 @@ from functools import cached_property
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.lsp.positions import LineIndex
-from steptwin.symbols import Role, Symbol, SymbolKind, Use
+from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
+from steptwin.world.elements import ELEMENTS
 from steptwin.world.kinds import KINDS
+from steptwin.world.tables import tables
 from steptwin.world.tomlplaces import Path, find_places
+from steptwin.world.values import NameOf, PinOf
 
 _HEADER = re.compile(r"[ \t]*(\[\[?)[ \t]*([A-Za-z0-9_.\- \t]*)(\]?\]?)")
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*")
@@ -21,9 +24,10 @@ _NAMED = {"line": SymbolKind.LINE, "axis": SymbolKind.AXIS, "button": SymbolKind
 _SCRIPTS = ("script", "event")
 NAMING = frozenset(
     {"line", "drive", "to", "from", "follows", "when", "until", "expect", "set", "press", "release", "write", "send"}
-    | {"power_cycle", "turn", "couple", "machine"}
+    | {"power_cycle", "turn", "couple", "machine", "element"}
+    | {key.name for rows in tables().values() for key in rows.keys if isinstance(key.read, PinOf | NameOf)}
 )
-"""Keys whose values name controllers, lines, axes and buttons."""
+"""Keys whose values name controllers, lines and elements."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +111,7 @@ class Outline:
             if kind is not None:
                 inner = self._text_span(self.value_span(path, span))
                 name = self._lines.text[inner.start : inner.end]
-                found.setdefault(name, Use(Symbol(kind, name, name), inner, Role.DEFINE))
+                found.setdefault(name, Use(Symbol(kind, name, name), inner, SymbolRole.DEFINE))
         return found
 
     @staticmethod
@@ -117,7 +121,16 @@ class Outline:
         table = str(path[0])
         if table in KINDS:
             return SymbolKind.CONTROLLER
-        return SymbolKind.SCRIPT if table in _SCRIPTS else _NAMED.get(table)
+        if table in _SCRIPTS:
+            return SymbolKind.SCRIPT
+        return _NAMED.get(table, SymbolKind.ELEMENT if table in ELEMENTS else None)
+
+    def named(self, table: str) -> Iterator[str]:
+        """The names in tables of a kind."""
+        for path, span in self._values:
+            if len(path) == 3 and (path[0], path[2]) == (table, "name"):
+                inner = self._text_span(self.value_span(path, span))
+                yield self._lines.text[inner.start : inner.end]
 
     def _text_span(self, span: Span) -> Span:
         """What stands between quotation marks."""
@@ -126,7 +139,7 @@ class Outline:
         return Span(span.start + 1, span.end - 1) if quoted else span
 
     def uses(self) -> Iterator[Use]:
-        """The names of controllers, lines, axes and buttons, where they are given and where they stand for these."""
+        """The names of controllers, lines and elements, where they are given and where they stand for these."""
         defined = {use.span.start: use for use in self.definitions.values()}
         for path, span in self._values:
             value = self.value_span(path, span)
@@ -140,7 +153,7 @@ class Outline:
         for found in _IDENTIFIER.finditer(self._lines.text, span.start, span.end):
             use = self.definitions.get(found[0])
             if use is not None and use.symbol.kind is not SymbolKind.SCRIPT:
-                yield Use(Symbol(use.symbol.kind, use.symbol.key, found[0]), Span(found.start(), found.end()), Role.READ)
+                yield Use(Symbol(use.symbol.kind, use.symbol.key, found[0]), Span(found.start(), found.end()), SymbolRole.READ)
 
 
 def _is_key(path: Path) -> bool:

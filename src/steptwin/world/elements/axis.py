@@ -14,7 +14,7 @@ from steptwin.world.course import Build
 from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
 from steptwin.world.elements.encoder import ENCODER, EncoderSpec, fit_encoder, read_encoder
 from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
-from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches
+from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.kernel import Kernel
 from steptwin.world.mechanics import Mechanism
 from steptwin.world.reader import Key, TomlText, optional
@@ -47,7 +47,7 @@ class AxisSpec(NamedSpec):
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
+class BuiltAxis:
     """An axis with its mechanics."""
 
     spec: AxisSpec
@@ -84,7 +84,7 @@ def _refers(spec: AxisSpec, world: WorldSpec) -> Iterator[Reference]:
             yield Reference(spec.drive[0], drives[spec.encoder.follows], (*spec.encoder.path, "follows"))
 
 
-def _build(spec: AxisSpec, site: Site) -> Fitted:
+def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
     machine, drive = spec.drive
     number = int(drive[1:]) if drive.startswith("M") and drive[1:].isdecimal() else 0
     axes = len(site.machine(machine).axes)
@@ -107,17 +107,23 @@ def _build(spec: AxisSpec, site: Site) -> Fitted:
     )
     mechanism = Mechanism(kernel, machine, number, build, spec.name)
     kernel.add_part(mechanism)
-    fitted = Fitted(spec, kernel, mechanism, scale)
+    fitted = BuiltAxis(spec, kernel, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
-        site.unless_wrong(switch.path, partial(put_switch, fitted, switch, lane_of(spec.name, n), site))
+        site.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
     return fitted
 
 
-def _connect(spec: AxisSpec, fitted: Fitted, site: Site) -> None:
+def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> None:
+    usual = axis.scale.turn if axis.spec.kind == "rotary" else None
+    period = usual if spec.period is None else axis.scale.pulses(spec.period)
+    put_switch(axis.kernel, axis.mechanism, zone_of(spec, axis.scale.nearest, period), spec, lane, site)
+
+
+def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:
     fit_encoder(fitted, spec.encoder, site.parts.built(AXIS), site)
 
 
-def _signals(fitted: Fitted) -> Mapping[str, SignalOf]:
+def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     mechanism = fitted.mechanism
 
     def turning(now: Nanos) -> Iterator[Nanos]:
@@ -132,14 +138,14 @@ def _signals(fitted: Fitted) -> Mapping[str, SignalOf]:
     return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
 
 
-AXIS: Element[AxisSpec, Fitted] = Element(
+AXIS: Element[AxisSpec, BuiltAxis] = Element(
     name="axis",
     spec=AxisSpec,
     rows=TableRows(
         written="[[axis]]",
         keys=(
             Key("name", name_value, "how scripts and conditions name it"),
-            Key("drive", pin_name, "what drives it: MACHINE.M1 to M4 of a MIC488, MACHINE.M1 of an M1486"),
+            Key("drive", pin_name, "what drives it: an axis of a controller, such as table.M1"),
             optional(word("linear", "rotary"), "kind", "linear or rotary", "linear"),
             optional(
                 text_value, "unit", "of its positions: mm, cm, m, degree, rev or anything; default mm, degree or its drive's"

@@ -15,7 +15,7 @@ from steptwin.world.sense import TableRows
 from steptwin.world.signals import SignalOf
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import name_value, pin_name
+from steptwin.world.values import INPUT_PIN, name_value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ BUTTON: Element[ButtonSpec, tuple[Button, Kernel]] = Element(
         written="[[button]]",
         keys=(
             Key("name", name_value, "how scripts name it"),
-            Key("to", pin_name, "the input: MACHINE.PIN", attribute="target"),
+            Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
             *CONTACT_KEYS,
         ),
         need={"bounces": "bounce"},

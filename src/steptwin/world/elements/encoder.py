@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from steptwin.errors import Misuse
 from steptwin.world.contacts import Switch, Zone
 from steptwin.world.element import Table
-from steptwin.world.kind import Encoders
+from steptwin.world.kind import EncoderInputs
 from steptwin.world.mechanics import EncoderBuild, RotorMark
 from steptwin.world.names import Unknown
 from steptwin.world.reader import TomlText, optional, read_table
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from typing import Any
 
-    from steptwin.world.elements.axis import Fitted
+    from steptwin.world.elements.axis import BuiltAxis
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ def read_encoder(text: TomlText, axis: Path, table: Table) -> EncoderSpec | None
     return spec
 
 
-def fit_encoder(axis: Fitted, spec: EncoderSpec | None, axes: Mapping[str, Fitted], site: Site) -> None:
+def fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, BuiltAxis], site: Site) -> None:
     """Put an encoder on an axis, or on the one that it follows. Without one, mechanics between pulses and load turn that of the
     controller."""
     mechanism = axis.mechanism
@@ -100,7 +100,7 @@ def fit_encoder(axis: Fitted, spec: EncoderSpec | None, axes: Mapping[str, Fitte
         axis.kernel.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now))
 
 
-def _counts(spec: EncoderSpec, turned: Fitted, encoders: Encoders[Any], machine: Any, number: int) -> Fraction | None:
+def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], machine: Any, number: int) -> Fraction | None:
     """Counts per pulse of what turns it; None: as the controller is configured."""
     counts: Fraction | None = None
     if spec.counts_per_unit is not None:

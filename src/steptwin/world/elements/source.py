@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.world.element import Element, ElementSpec, Reference, Row, Table
-from steptwin.world.kind import ANALOG_INPUT
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.site import Site, Terminal
 from steptwin.world.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import number, pin_name, points, positive_time, time_value, word
+from steptwin.world.values import ANALOG_INPUT, PinOf, number, points, positive_time, time_value, word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +79,7 @@ SOURCE: Element[SourceSpec, AnalogSource] = Element(
     rows=TableRows(
         written="[[source]]",
         keys=(
-            Key("to", pin_name, "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
+            Key("to", PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", attribute="target"),
             optional(word(*WAVEFORMS), "kind", "constant, ramp, sine or table", "constant"),
             optional(number(), "value", "volts; of a sine its mean", 0.0),
             optional(number(), "amplitude", "sine: volts", 0.0),

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from fractions import Fraction
 
 from steptwin.machine import Nanos
-from steptwin.world.contacts import Switch, Zone
+from steptwin.world.contacts import Carriage, Switch, Zone
 from steptwin.world.element import Table
 from steptwin.world.elements.contact import CONTACT_KEYS
+from steptwin.world.kernel import Kernel
 from steptwin.world.reader import Key, TomlText, optional, read_table
-from steptwin.world.scale import Scale
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.site import Site, Terminal
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import number, pin_name
-
-if TYPE_CHECKING:
-    from steptwin.world.elements.axis import Fitted
+from steptwin.world.values import INPUT_PIN, number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +42,7 @@ class SwitchSpec:
 SWITCH = TableRows(
     written="[[axis.switch]]",
     keys=(
-        Key("to", pin_name, "the input: MACHINE.PIN", attribute="target"),
+        Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
         optional(number(), "below", "on at and below this position"),
         optional(number(), "above", "on at and above this position"),
         optional(number(), "position", "on around this position, with width"),
@@ -78,32 +75,30 @@ def lane_of(axis: str, number: int) -> str:
     return f"{axis}.switch{number}"
 
 
-def put_switch(axis: Fitted, spec: SwitchSpec, lane: str, site: Site) -> None:
-    """Put a switch where an axis runs over it."""
-    circuit = site.circuit(axis.kernel, spec.target, (*spec.path, "to"), spec.join)
+def put_switch(kernel: Kernel, carriage: Carriage, zone: Zone, spec: SwitchSpec, lane: str, site: Site) -> None:
+    """Put a switch where a carriage runs over it."""
+    circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
     part = Switch(
         circuit,
-        axis.mechanism,
-        _zone(spec, axis.scale, is_rotary=axis.spec.kind == "rotary"),
-        axis.kernel.now,
+        carriage,
+        zone,
+        kernel.now,
         normally_closed=spec.contact == "NC",
         bounce_ns=spec.bounce,
         bounces=spec.bounces,
         chance=site.bounce_of(circuit),
         lane=lane,
     )
-    axis.kernel.add_part(part)
+    kernel.add_part(part)
 
 
-def _zone(spec: SwitchSpec, scale: Scale, *, is_rotary: bool) -> Zone:
-    pulses = scale.nearest
+def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:
+    """Where a switch is on. ``places`` gives places of its carriage for units, ``period`` those from zone to zone."""
     if spec.below is not None:
-        return Zone(None, pulses(spec.below), pulses(spec.hysteresis))
+        return Zone(None, places(spec.below), places(spec.hysteresis))
     if spec.above is not None:
-        return Zone(pulses(spec.above), None, pulses(spec.hysteresis))
+        return Zone(places(spec.above), None, places(spec.hysteresis))
     if spec.position is None:
         return Zone(None, None)
     half = 0.5 * spec.width
-    usual = scale.turn if is_rotary else None
-    period = usual if spec.period is None else scale.pulses(spec.period)
-    return Zone(pulses(spec.position - half), pulses(spec.position + half), pulses(spec.hysteresis), period)
+    return Zone(places(spec.position - half), places(spec.position + half), places(spec.hysteresis), period)

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from steptwin.machine import Nanos
 from steptwin.world.element import Element, ElementSpec, Reference, Row, Table
 from steptwin.world.kernel import Wire
-from steptwin.world.kind import OUTPUT
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.sense import TableRows
 from steptwin.world.site import Site, Terminal
 from steptwin.world.spec import WorldSpec
-from steptwin.world.values import flag, pin_name, time_value
+from steptwin.world.values import INPUT_PIN, OUTPUT, OUTPUT_PIN, flag, time_value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +45,8 @@ WIRE: Element[WireSpec, Wire] = Element(
     rows=TableRows(
         written="[[wire]]",
         keys=(
-            Key("from", pin_name, "the output: MACHINE.PIN", attribute="source"),
-            Key("to", pin_name, "the input: MACHINE.PIN", attribute="target"),
+            Key("from", OUTPUT_PIN, "the output: MACHINE.PIN", attribute="source"),
+            Key("to", INPUT_PIN, "the input: MACHINE.PIN", attribute="target"),
             optional(flag, "inverted", "whether the level is turned round", False),
             optional(time_value, "delay", "how much later it arrives", 0),
         ),

@@ -4,19 +4,19 @@
 between a link and a port, `rig` lets a machine in its kernel have faults. `steptwin fault --kinds` shows `KINDS`.
 """
 
-from steptwin.world.faults.active import Active, Faults
+from steptwin.world.faults.active import ActiveFault, Faults
 from steptwin.world.faults.fault import EXAMPLE, GRAMMAR, Fault, parse, read, schema
 from steptwin.world.faults.kinds import KINDS
 from steptwin.world.faults.machine import AxisLoad, Body, FaultyMachine, rig
 from steptwin.world.faults.places import RequestRoute, check_place
-from steptwin.world.faults.port import FaultyPort, FaultyTalkingPort
+from steptwin.world.faults.port import FaultyPort, FaultySendingPort
 from steptwin.world.faults.table import FaultKind, Layer, LineProtocol, Occasion, Parameter
 
 __all__ = [
     "EXAMPLE",
     "GRAMMAR",
     "KINDS",
-    "Active",
+    "ActiveFault",
     "AxisLoad",
     "Body",
     "Fault",
@@ -24,7 +24,7 @@ __all__ = [
     "Faults",
     "FaultyMachine",
     "FaultyPort",
-    "FaultyTalkingPort",
+    "FaultySendingPort",
     "Layer",
     "LineProtocol",
     "Occasion",

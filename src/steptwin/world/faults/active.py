@@ -1,4 +1,4 @@
-"""Faults that are set: when each one strikes, and the set of them that ports and machines ask."""
+"""Active faults: when each one occurs, and the set of faults of a world."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _LAST_WITH_COUNT = 4
 _LAST_ADDRESSED = 6
 
 
-class Active(Stateful):
-    """A fault that is set, what it has seen so far, and its stream of chance. Times count from ``since``."""
+class ActiveFault(Stateful):
+    """An active fault, its counters and its random stream. Times count from ``since``."""
 
     __slots__ = (
         "_count",
@@ -59,15 +59,15 @@ class Active(Stateful):
         self._probability = fault.number("probability") if fault.kind.parameter("probability") else 1.0
         self.chance = Chance(seed, name)
         self.seen = 0
-        """Occasions so far."""
+        """Number of occasions so far."""
         self.struck = 0
-        """How often it happened."""
+        """Number of occurrences."""
         self.left = 0
         """Bytes still to be lost."""
         self.due: Nanos | None = self._moment("at_s")
-        """The next moment of a fault that comes by itself."""
+        """The next moment of a timed fault."""
         self.worn: list[int] = []
-        """Places in the memory that keep what they have."""
+        """Addresses of worn bytes of the memory."""
 
     def _moment(self, name: str) -> Nanos | None:
         seconds = self.fault.get(name)
@@ -82,7 +82,7 @@ class Active(Stateful):
         return self._until
 
     def strikes(self, now: Nanos) -> bool:
-        """An occasion for this fault has come: whether it happens."""
+        """Count an occasion; returns whether the fault occurs."""
         if now < self._from or (self._until is not None and now > self._until):
             return False
         if self._count is not None and self.struck >= self._count:
@@ -96,7 +96,7 @@ class Active(Stateful):
         return True
 
     def step(self) -> None:
-        """The moment ``due`` has come: find the next one."""
+        """Find the moment after ``due``."""
         period = self.fault.get("period_s")
         if self.due is None or not isinstance(period, float):
             self.due = None
@@ -136,11 +136,10 @@ def addresses(pdu: bytes) -> range | None:
 
 
 class Faults(Stateful):
-    """The faults of a world or of a served twin. ``seed`` and the name of a fault are all that its chance comes from.
+    """The faults of a world. The random stream of a fault depends only on ``seed`` and its name.
 
-    ``sinks`` are called with all that happens, as records of kind ``fault``, and of the edges that faults make. Setting and
-    removing faults is for whoever builds the world or stands at the machine, not part of a snapshot: it is restored into the
-    same set of faults.
+    ``sinks`` are called with every occurrence, as a record of kind ``fault``, and with the edges that faults cause. The set of
+    faults is not part of its state: a state is restored into the same set.
     """
 
     __slots__ = ("active", "elements", "link", "machines", "ports", "seed", "sinks")
@@ -148,22 +147,22 @@ class Faults(Stateful):
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
-        self.active: tuple[Active, ...] = ()
+        self.active: tuple[ActiveFault, ...] = ()
         self.sinks: list[Recorder] = []
         self.machines: dict[str, FaultyMachine] = {}
-        """Machines whose physics can go wrong."""
+        """Machines prepared for faults of physics."""
         self.elements: dict[str, FaultyElement] = {}
-        """Elements that can."""
+        """Elements with faults."""
         self.link = ""
         """The link whose request is being served."""
         self.ports: WeakSet[FaultyPort] = WeakSet()
-        """Ports that are in use: they come and go with programs and clients."""
+        """Ports in use, which change with programs and clients."""
 
-    def add(self, fault: Fault, now: Nanos = 0) -> Active:
-        """Set a fault at ``now``. `Misuse` for a name that is taken, a machine, pin or axis that is not there."""
+    def add(self, fault: Fault, now: Nanos = 0) -> ActiveFault:
+        """Set a fault at ``now``. Raises `Misuse` for a name in use, or an unknown machine, pin or axis."""
         if fault.name and self._named(fault.name) is not None:
             raise Misuse(f"there is a fault {fault.name!r} already")
-        active = Active(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
+        active = ActiveFault(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
         failing = self.check(fault)
         self.active = (*self.active, active)
         if failing is not None:
@@ -184,7 +183,7 @@ class Faults(Stateful):
         return self._machine(fault) if fault.kind.layer is Layer.PHYSICS else None
 
     def remove(self, name: str, now: Nanos) -> None:
-        """Take a fault away; what it holds is let go. `Misuse` with the names there are."""
+        """Remove a fault and release what it holds. Raises `Misuse` with the existing names."""
         active = self.called(name)
         self.active = tuple(a for a in self.active if a is not active)
         failing = self._failing(active.fault)
@@ -192,8 +191,8 @@ class Faults(Stateful):
             failing.end(active, now)
         self._changed()
 
-    def called(self, name: str) -> Active:
-        """A fault that is set. `Misuse` with the names there are."""
+    def called(self, name: str) -> ActiveFault:
+        """The active fault called ``name``. Raises `Misuse` with the existing names."""
         active = self._named(name)
         if active is None:
             raise Misuse(f"no fault {name!r}: set are {', '.join(a.name for a in self.active) or 'none'}")
@@ -203,7 +202,7 @@ class Faults(Stateful):
         for active in self.active:
             self.remove(active.name, now)
 
-    def _named(self, name: str) -> Active | None:
+    def _named(self, name: str) -> ActiveFault | None:
         return next((active for active in self.active if active.name == name), None)
 
     def _free_name(self, kind: str) -> str:
@@ -233,11 +232,11 @@ class Faults(Stateful):
             raise Misuse(f"fault {fault.kind.name}: element = {wanted!r}: those that can fail are {there}")
         return found
 
-    def of_element(self, name: str) -> list[Active]:
+    def of_element(self, name: str) -> list[ActiveFault]:
         """The faults of an element."""
         return [active for active in self.active if active.fault.get("element") == name]
 
-    def of(self, machine: str) -> list[Active]:
+    def of(self, machine: str) -> list[ActiveFault]:
         """The faults of physics of a machine."""
         only = len(self.machines) == 1
         return [
@@ -247,7 +246,7 @@ class Faults(Stateful):
             and (active.fault.get("machine") == machine or (only and not active.fault.get("machine")))
         ]
 
-    def refusing(self) -> list[Active]:
+    def refusing(self) -> list[ActiveFault]:
         """The faults that keep a request from being carried out."""
         return [active for active in self.active if active.fault.refuses]
 
@@ -255,8 +254,8 @@ class Faults(Stateful):
         for port in list(self.ports):
             port.choose()
 
-    def report(self, active: Active, place: str, now: Nanos, text: str) -> None:
-        """A fault has happened to a machine or link."""
+    def report(self, active: ActiveFault, place: str, now: Nanos, text: str) -> None:
+        """Report an occurrence at a machine or link."""
         self.record(TraceRecord(now, place, "fault", active.name, text))
 
     def record(self, record: TraceRecord) -> None:

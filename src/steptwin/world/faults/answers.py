@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from steptwin.machine import Nanos
 from steptwin.wire.pdu import REFUSED
-from steptwin.world.faults.active import Active
+from steptwin.world.faults.active import ActiveFault
 from steptwin.world.faults.kinds_frames import NEVER_SENT
 from steptwin.world.faults.table import FaultReporter, LineProtocol
 
@@ -48,7 +48,9 @@ class AlteredAnswer(NamedTuple):
     later: bytes
 
 
-def spoil_answer(exchange: Exchange, unit: int, actives: Sequence[Active], now: Nanos, report: FaultReporter) -> AlteredAnswer:
+def spoil_answer(
+    exchange: Exchange, unit: int, actives: Sequence[ActiveFault], now: Nanos, report: FaultReporter
+) -> AlteredAnswer:
     """Faults in the order in which they were set; ``unit`` is the one that was addressed, whatever the frame calls it."""
     sent = AlteredAnswer(0, b"", exchange.answer, b"")
     for active in actives:

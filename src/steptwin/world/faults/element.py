@@ -11,7 +11,7 @@ from steptwin.state import Stateful
 from steptwin.world.faults.table import FaultKind
 
 if TYPE_CHECKING:
-    from steptwin.world.faults.active import Active, Faults
+    from steptwin.world.faults.active import ActiveFault, Faults
     from steptwin.world.faults.fault import Fault
     from steptwin.world.kernel import Kernel
 
@@ -36,29 +36,33 @@ class FaultyElement(Stateful):
         if fault.kind not in self._kinds:
             there = ", ".join(kind.name for kind in self._kinds) or "none"
             raise Misuse(f"fault {fault.kind.name}: element = {self.name!r}, whose faults are {there}")
+        if fault.kind.check is not None:
+            fault.kind.check(self._part, fault)
 
-    def begin(self, active: Active) -> None:
+    def begin(self, active: ActiveFault) -> None:
         """A fault has been set."""
         self._kernel.mark()
 
-    def end(self, active: Active, now: Nanos) -> None:
+    def end(self, active: ActiveFault, now: Nanos) -> None:
         """A fault has been removed."""
         if active.name in self._lasting:
             self._turn(active, now, begins=False)
         self._kernel.mark()
 
-    def look(self, now: Nanos) -> None:
+    def update(self, now: Nanos) -> None:
         for active in self._faults.of_element(self.name):
             lasts = active.begin <= now and (active.end is None or now < active.end)
             if lasts is not (active.name in self._lasting):
                 self._turn(active, now, begins=lasts)
 
-    def _turn(self, active: Active, now: Nanos, *, begins: bool) -> None:
+    def _turn(self, active: ActiveFault, now: Nanos, *, begins: bool) -> None:
         others = tuple(name for name in self._lasting if name != active.name)
         self._lasting = (*others, active.name) if begins else others
         if begins:
             active.struck += 1
-        self._faults.report(active, self.name, now, active.fault.kind.effect.act(active, self._part, begins, now))
+        text = active.fault.kind.effect.act(active, self._part, begins, now)
+        self._kernel.mark()  # the part may have been updated already at this moment
+        self._faults.report(active, self.name, now, text)
 
     def deadline(self) -> Nanos | None:
         now = self._kernel.now

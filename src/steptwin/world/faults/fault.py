@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.world.faults.kinds import KINDS
-from steptwin.world.faults.table import FaultKind, OfRequest, Parameter, ParameterForm, Value, check
+from steptwin.world.faults.table import FaultKind, Parameter, ParameterForm, RequestEffect, Value, check
 
 GRAMMAR = "KIND [NAME=VALUE ...]"
 EXAMPLE = "crc unit=1 nth=3"
@@ -44,7 +44,7 @@ class Fault:
     def refuses(self) -> bool:
         """Whether the requests it happens to are not carried out."""
         effect = self.kind.effect
-        return isinstance(effect, OfRequest) and (effect.is_refused is None or effect.is_refused(self))
+        return isinstance(effect, RequestEffect) and (effect.is_refused is None or effect.is_refused(self))
 
     def __str__(self) -> str:
         """The line that `read` makes this of."""

@@ -9,35 +9,35 @@ from steptwin.world.faults.table import (
     ALL_LINES,
     LONGEST_MS,
     SERIAL,
-    BeforeDelivery,
+    ByteEffect,
     FaultKind,
     FaultReporter,
-    InPieces,
+    InsertEffect,
     Layer,
     Occasion,
-    OfByte,
+    PiecesEffect,
     number,
     whole,
 )
 
 if TYPE_CHECKING:
-    from steptwin.world.faults.active import Active
+    from steptwin.world.faults.active import ActiveFault
     from steptwin.world.faults.stream import Run
 
 
-def _flip(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
+def _flip(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
     bit = active.fault.whole("bit")
     turned = byte ^ 1 << (active.chance.below(8) if bit is None else bit)
     report(active, f"{byte:02X} becomes {turned:02X}")
     return turned
 
 
-def _drop(active: Active, byte: int, run: Run, report: FaultReporter) -> None:
+def _drop(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> None:
     active.left = (active.fault.whole("length") or 1) - 1
     report(active, f"{byte:02X} is lost" + (f" and {active.left} more" if active.left else ""))
 
 
-def _insert(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
+def _insert(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
     value = active.fault.whole("value")
     extra = active.chance.below(256) if value is None else value
     report(active, f"{extra:02X} comes before it")
@@ -45,13 +45,13 @@ def _insert(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
     return byte
 
 
-def _gap(active: Active, byte: int, run: Run, report: FaultReporter) -> int:
+def _gap(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
     report(active, f"{active.fault.number('for_ms'):g} ms of silence before it")
     run.pause(active.ns("for_ms"))
     return byte
 
 
-def _split(active: Active, run: Run, count: int, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
+def _split(active: ActiveFault, run: Run, count: int, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
     length = active.fault.whole("length") or 1
     report(active, f"{count} bytes in pieces of {length}")
     pause = active.ns("for_ms")
@@ -62,7 +62,7 @@ def _split(active: Active, run: Run, count: int, report: FaultReporter) -> list[
     return pieces
 
 
-def _noise(active: Active, run: Run, report: FaultReporter) -> None:
+def _noise(active: ActiveFault, run: Run, report: FaultReporter) -> None:
     rubbish = active.chance.some_bytes(active.fault.whole("length") or 1)
     report(active, f"{len(rubbish)} bytes of noise: {rubbish.hex(' ')}")
     run.put(rubbish)
@@ -76,7 +76,7 @@ BYTES = (
         "A bit of a byte arrives turned round.",
         (whole("bit", "Which bit, 0 is the lowest.", 0, 7, otherwise="any"),),
         SERIAL,
-        effect=OfByte(_flip),
+        effect=ByteEffect(_flip),
     ),
     FaultKind(
         "drop",
@@ -85,7 +85,7 @@ BYTES = (
         "Bytes are lost.",
         (whole("length", "How many.", 1, 10_000, default=1),),
         SERIAL,
-        effect=OfByte(_drop),
+        effect=ByteEffect(_drop),
     ),
     FaultKind(
         "insert",
@@ -94,7 +94,7 @@ BYTES = (
         "A byte too much comes before a byte.",
         (whole("value", "Which.", 0, 255, otherwise="any"),),
         SERIAL,
-        effect=OfByte(_insert),
+        effect=ByteEffect(_insert),
     ),
     FaultKind(
         "gap",
@@ -103,7 +103,7 @@ BYTES = (
         "The line is silent before a byte.",
         (number("for_ms", "How long.", 1e-3, LONGEST_MS, default=30.0),),
         ALL_LINES,
-        effect=OfByte(_gap),
+        effect=ByteEffect(_gap),
     ),
     FaultKind(
         "split",
@@ -115,7 +115,7 @@ BYTES = (
             number("for_ms", "How long after each other pieces come.", 1e-3, LONGEST_MS, default=1.0),
         ),
         ALL_LINES,
-        effect=InPieces(_split),
+        effect=PiecesEffect(_split),
     ),
     FaultKind(
         "noise",
@@ -124,6 +124,6 @@ BYTES = (
         "Bytes of no meaning come before what was sent.",
         (whole("length", "How many.", 1, 10_000, default=8),),
         SERIAL,
-        effect=BeforeDelivery(_noise),
+        effect=InsertEffect(_noise),
     ),
 )

@@ -9,21 +9,21 @@ from steptwin.wire.pdu import DEVICE_BUSY
 from steptwin.world.faults.table import (
     LONGEST_MS,
     MODBUS,
+    AnswerEffect,
     FaultKind,
     FaultReporter,
     Layer,
     LineProtocol,
     Occasion,
-    OfAnswer,
-    OfRequest,
     Parameter,
     ParameterForm,
+    RequestEffect,
     number,
     whole,
 )
 
 if TYPE_CHECKING:
-    from steptwin.world.faults.active import Active
+    from steptwin.world.faults.active import ActiveFault
     from steptwin.world.faults.answers import AlteredAnswer, Exchange
     from steptwin.world.faults.fault import Fault
 
@@ -33,7 +33,7 @@ NEVER_SENT = 0
 _UNITS = {LineProtocol.RTU: 248, LineProtocol.TCP: 256}
 
 
-def _delay(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+def _delay(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     report(active, f"{active.fault.number('for_ms'):g} ms later: {sent.answer.hex(' ')}")
     return sent._replace(delay=sent.delay + active.ns("for_ms"))
 
@@ -42,21 +42,21 @@ def _is_request_lost(fault: Fault) -> bool:
     return fault.get("lost") == "request"
 
 
-def _lose_request(active: Active) -> tuple[int, str]:
+def _lose_request(active: ActiveFault) -> tuple[int, str]:
     return NEVER_SENT, "request lost on its way"
 
 
-def _lose_answer(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+def _lose_answer(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     report(active, f"lost on its way: {sent.answer.hex(' ')}")
     return sent._replace(answer=b"")
 
 
-def _hold_back(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+def _hold_back(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     report(active, f"held back: {sent.answer.hex(' ')}")
     return sent._replace(answer=b"", later=sent.answer)
 
 
-def _answer_as(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+def _answer_as(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     other = active.fault.whole("answers_as")
     other = (unit + 1) % _UNITS[exchange.line] if other is None else other
     report(active, f"answered as unit {other}: {sent.answer.hex(' ')}")
@@ -69,7 +69,7 @@ def _as_unit(line: LineProtocol, raw: bytes, unit: int) -> bytes:
     return raw[:6] + bytes((unit,)) + raw[7:]
 
 
-def _spoil_crc(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+def _spoil_crc(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     raw = sent.answer
     wrong = int.from_bytes(raw[-2:], "little") ^ 1 + active.chance.below(0xFFFF)
     raw = raw[:-2] + wrong.to_bytes(2, "little")
@@ -77,12 +77,12 @@ def _spoil_crc(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswe
     return sent._replace(answer=raw)
 
 
-def _echo(active: Active, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
+def _echo(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     report(active, f"echo: {exchange.request.hex(' ')}")
     return sent._replace(before=exchange.request)
 
 
-def _refuse(active: Active) -> tuple[int, str]:
+def _refuse(active: ActiveFault) -> tuple[int, str]:
     code = active.fault.whole("code") or DEVICE_BUSY
     return code, f"refused with exception {code:02X}"
 
@@ -95,7 +95,7 @@ FRAMES = (
         "The answer takes longer; the ones behind it wait.",
         (number("for_ms", "How much longer.", 1e-3, LONGEST_MS, default=500.0),),
         MODBUS,
-        effect=OfAnswer(_delay),
+        effect=AnswerEffect(_delay),
     ),
     FaultKind(
         "no-answer",
@@ -104,7 +104,7 @@ FRAMES = (
         "There is no answer: the request was lost on its way, or was carried out and the answer lost.",
         (Parameter("lost", ParameterForm.WORD, "What was lost.", words=("answer", "request"), default="answer"),),
         MODBUS,
-        effect=OfRequest(_lose_request, _is_request_lost, _lose_answer),
+        effect=RequestEffect(_lose_request, _is_request_lost, _lose_answer),
     ),
     FaultKind(
         "late",
@@ -113,7 +113,7 @@ FRAMES = (
         "The answer is held back and comes before the next one.",
         (),
         MODBUS,
-        effect=OfAnswer(_hold_back),
+        effect=AnswerEffect(_hold_back),
     ),
     FaultKind(
         "wrong-unit",
@@ -122,7 +122,7 @@ FRAMES = (
         "The answer carries the address of another unit.",
         (whole("answers_as", "Which.", 0, 255, otherwise="the next one"),),
         MODBUS,
-        effect=OfAnswer(_answer_as),
+        effect=AnswerEffect(_answer_as),
     ),
     FaultKind(
         "crc",
@@ -131,7 +131,7 @@ FRAMES = (
         "The answer has a wrong CRC.",
         (),
         (LineProtocol.RTU,),
-        effect=OfAnswer(_spoil_crc),
+        effect=AnswerEffect(_spoil_crc),
     ),
     FaultKind(
         "echo",
@@ -140,7 +140,7 @@ FRAMES = (
         "The request comes back before its answer.",
         (),
         (LineProtocol.RTU,),
-        effect=OfAnswer(_echo),
+        effect=AnswerEffect(_echo),
     ),
     FaultKind(
         "exception",
@@ -149,7 +149,7 @@ FRAMES = (
         "The request is refused and not carried out.",
         (whole("code", "The exception code.", 1, 255, default=4),),
         MODBUS,
-        effect=OfRequest(_refuse),
+        effect=RequestEffect(_refuse),
     ),
     FaultKind(
         "busy",
@@ -158,6 +158,6 @@ FRAMES = (
         "The request is refused with exception 6, device busy, and not carried out.",
         (),
         MODBUS,
-        effect=OfRequest(_refuse),
+        effect=RequestEffect(_refuse),
     ),
 )

@@ -12,60 +12,60 @@ from steptwin.world.faults.table import (
     LONGEST_S,
     OFF,
     PIN,
+    ChangeEffect,
     FaultKind,
     Layer,
+    MomentEffect,
     Need,
     Occasion,
-    OfChange,
-    OfMoment,
-    OfSave,
-    OfWindow,
+    SaveEffect,
+    WindowEffect,
     number,
     whole,
 )
 
 if TYPE_CHECKING:
-    from steptwin.world.faults.active import Active
+    from steptwin.world.faults.active import ActiveFault
     from steptwin.world.faults.fault import Fault
     from steptwin.world.faults.machine import FaultyMachine
 
 
-def _axis(active: Active) -> int:
+def _axis(active: ActiveFault) -> int:
     return active.fault.whole("axis") or 1
 
 
-def _stall(active: Active, machine: FaultyMachine, now: Nanos) -> None:
+def _stall(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
     axis = _axis(active)
     machine.report(active, now, f"M{axis} is blocked for {active.fault.number('for_s'):g} s")
     machine.block(active, axis, now, now + active.ns("for_s"))
 
 
-def _lose_steps(active: Active, machine: FaultyMachine, now: Nanos) -> None:
+def _lose_steps(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
     axis, pulses = _axis(active), int(active.fault.number("pulses"))
     machine.report(active, now, f"M{axis} loses {pulses} pulses")
     machine.body.shafts[axis - 1].lose(pulses, now)
 
 
-def _slip(active: Active, machine: FaultyMachine, now: Nanos) -> None:
+def _slip(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
     axis, counts = _axis(active), int(active.fault.number("counts"))
     machine.report(active, now, f"the encoder of M{axis} slips by {counts} counts")
     machine.body.shafts[axis - 1].slip(counts, now)
 
 
-def _drop_supply(active: Active, machine: FaultyMachine, now: Nanos) -> None:
+def _drop_supply(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
     machine.report(active, now, f"no supply for {active.fault.number('for_s'):g} s")
     machine.drop_supply(now, now + active.ns("for_s"))
 
 
-def _stick(active: Active, machine: FaultyMachine, now: Nanos) -> None:
+def _stick(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
     machine.stick(active, now)
 
 
-def _fail_master(active: Active, machine: FaultyMachine, now: Nanos) -> None:
+def _fail_master(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
     machine.fail_master(active, now)
 
 
-def _bounce(active: Active, machine: FaultyMachine, pin: str, levels: tuple[float, float], now: Nanos) -> None:
+def _bounce(active: ActiveFault, machine: FaultyMachine, pin: str, levels: tuple[float, float], now: Nanos) -> None:
     """To the second level it has gone; back and there again some times, the last time at the end of the bouncing."""
     bounces, within = active.fault.whole("bounces") or 1, active.ns("for_ms")
     moments = sorted(1 + active.chance.below(within) for _ in range(2 * bounces - 1))
@@ -80,7 +80,7 @@ def _needs_switch(machine: FaultyMachine, fault: Fault) -> None:
         raise Misuse(f"fault bounce: pin = {pin!r} is an analog input, which has no switch")
 
 
-def _cut_power(active: Active, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
+def _cut_power(active: ActiveFault, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
     written = active.fault.whole("written")
     written = active.chance.below(len(kept) + 1) if written is None else min(written, len(kept))
     kept[written:] = old[written:]
@@ -88,7 +88,7 @@ def _cut_power(active: Active, machine: FaultyMachine, old: bytes, kept: bytearr
     machine.cut_supply(now, now + active.ns("for_s"))
 
 
-def _wear(active: Active, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
+def _wear(active: ActiveFault, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
     good = active.fault.whole("writes") or 0
     if active.struck > good and len(active.worn) < len(kept):
         sound = [place for place in range(len(kept)) if place not in active.worn]
@@ -105,7 +105,7 @@ PHYSICS = (
         Occasion.MOMENT,
         "The shaft is blocked: pulses go on and turn nothing.",
         (AXIS, number("for_s", "How long.", 1e-6, LONGEST_S, default=1.0)),
-        effect=OfMoment(_stall),
+        effect=MomentEffect(_stall),
     ),
     FaultKind(
         "lost-steps",
@@ -113,7 +113,7 @@ PHYSICS = (
         Occasion.MOMENT,
         "The shaft falls behind the pulses and stays there.",
         (AXIS, whole("pulses", "By how many pulses; negative: ahead.", -(10**9), 10**9, default=4)),
-        effect=OfMoment(_lose_steps),
+        effect=MomentEffect(_lose_steps),
     ),
     FaultKind(
         "slip",
@@ -121,7 +121,7 @@ PHYSICS = (
         Occasion.MOMENT,
         "The encoder slips on the shaft.",
         (AXIS, whole("counts", "By how many counts.", -(10**9), 10**9, default=4)),
-        effect=OfMoment(_slip),
+        effect=MomentEffect(_slip),
         needs=Need.ENCODER,
     ),
     FaultKind(
@@ -130,14 +130,14 @@ PHYSICS = (
         Occasion.ALWAYS,
         "An input keeps a level, whatever its switch does.",
         (PIN, number("value", "The level; volts on analog inputs.", 0, 10, otherwise="the one it has")),
-        effect=OfWindow(_stick),
+        effect=WindowEffect(_stick),
     ),
     FaultKind(
         "master-error",
         Layer.PHYSICS,
         Occasion.ALWAYS,
-        "A slave of the controller's own Modbus master does not answer: M_STATUS is 3 (MIC488, firmware 1.70).",
-        effect=OfWindow(_fail_master),
+        "A slave of the controller's own Modbus master does not answer: M_STATUS is 3.",
+        effect=WindowEffect(_fail_master),
         needs=Need.MODBUS_MASTER,
     ),
     FaultKind(
@@ -150,7 +150,7 @@ PHYSICS = (
             whole("bounces", "How often it goes back.", 1, 1000, default=3),
             number("for_ms", "How long that takes.", 1e-3, LONGEST_MS, default=5.0),
         ),
-        effect=OfChange(_bounce),
+        effect=ChangeEffect(_bounce),
         check=_needs_switch,
     ),
     FaultKind(
@@ -159,7 +159,7 @@ PHYSICS = (
         Occasion.MOMENT,
         "The supply fails and comes back: nothing answers, drives and outputs are off, then it is as after power-on.",
         (OFF,),
-        effect=OfMoment(_drop_supply),
+        effect=MomentEffect(_drop_supply),
     ),
     FaultKind(
         "power-cut",
@@ -167,7 +167,7 @@ PHYSICS = (
         Occasion.SAVE,
         "The supply fails while memory is being saved: what was not yet written keeps its old content.",
         (OFF, whole("written", "Bytes written until then.", 0, None, otherwise="any number")),
-        effect=OfSave(_cut_power),
+        effect=SaveEffect(_cut_power),
     ),
     FaultKind(
         "wear",
@@ -175,6 +175,6 @@ PHYSICS = (
         Occasion.SAVE,
         "The memory is worn out: with each save one more byte, chosen by chance, keeps what it has for ever.",
         (whole("writes", "Saves that go well.", 0, None, default=100_000),),
-        effect=OfSave(_wear),
+        effect=SaveEffect(_wear),
     ),
 )

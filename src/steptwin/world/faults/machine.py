@@ -1,4 +1,4 @@
-"""Faults of physics: what goes wrong with the inputs, shafts, supply and memory of a machine, and which requests it refuses."""
+"""Faults of physics: inputs, shafts, supply and memory of a machine; and requests that it refuses."""
 
 from __future__ import annotations
 
@@ -9,42 +9,42 @@ from steptwin.errors import Misuse
 from steptwin.machine import Drive, MotionController, Nanos, PinEdge
 from steptwin.state import Plain, Stateful
 from steptwin.wire.pdu import exception_pdu
-from steptwin.world.faults.active import Active, Faults
+from steptwin.world.faults.active import ActiveFault, Faults
 from steptwin.world.faults.fault import Fault
 from steptwin.world.faults.kinds_frames import NEVER_SENT
-from steptwin.world.faults.table import FaultKind, Occasion, OfChange, OfSave
+from steptwin.world.faults.table import ChangeEffect, FaultKind, Occasion, SaveEffect
 from steptwin.world.kernel import Kernel, PinName
 from steptwin.world.trace import TraceRecord
 
 
 class AxisLoad(Protocol):
-    """What an axis moves. All take the moment."""
+    """The load of an axis, for faults. All methods take the moment."""
 
     def block(self, blocked: bool, now: Nanos) -> None:
-        """Hold the shaft: the drive's pulses turn nothing; let it go again."""
+        """Block the shaft, so that pulses are lost, or release it."""
         ...
 
     def lose(self, pulses: int, now: Nanos) -> None:
-        """The shaft falls ``pulses`` behind the drive (negative: ahead)."""
+        """Move the shaft ``pulses`` behind the drive (negative: ahead)."""
         ...
 
     def slip(self, counts: int, now: Nanos) -> None:
-        """The encoder turns by ``counts`` on the shaft."""
+        """Let the encoder slip by ``counts`` on the shaft."""
         ...
 
 
 class Body(Protocol):
-    """What a kind of machine has that can fail, beyond its pins."""
+    """The parts of a machine that can fail, besides its pins."""
 
     shafts: list[AxisLoad]
     """By axis. Mechanics put themselves in the place of what is there."""
 
     def lacks(self, kind: FaultKind) -> str | None:
-        """Why faults of a kind cannot happen to it, to follow its name in a message; None: they can."""
+        """The reason why faults of a kind are impossible, as the end of a message after its name; None if they are possible."""
         ...
 
     def show_master_error(self, shown: bool, now: Nanos) -> None:
-        """A slave of its own Modbus master does not answer; it does again."""
+        """Set or clear the error that a slave of its own Modbus master does not answer."""
         ...
 
     def watch(self, owner: FaultyMachine) -> None:
@@ -68,9 +68,9 @@ class FaultySnapshot(NamedTuple):
 
 
 class FaultyMachine(Stateful):
-    """Stands around a machine in its kernel and lets its inputs, shafts, supply and memory go wrong.
+    """Wraps a machine in its kernel and applies faults to its inputs, shafts, supply and memory.
 
-    Who sets an input by hand sets it here, so that a stuck switch stays stuck.
+    Inputs are set through it, so that a stuck switch remains stuck.
     """
 
     __slots__ = (
@@ -103,15 +103,15 @@ class FaultyMachine(Stateful):
         self.body = body
         self._faults = faults
         self._outer: dict[str, float] = {}
-        """Inputs with faults: what lies before the fault."""
+        """The level of each input with a fault, without the fault."""
         self._bounces: list[tuple[Nanos, str, float]] = []
-        """Levels to come."""
+        """Scheduled levels."""
         self._stuck: dict[str, str] = {}
-        """Which input which fault holds."""
+        """The fault that holds each input."""
         self._mute: list[str] = []
         """Faults because of which a slave of the machine does not answer."""
         self._released: list[tuple[Nanos, str, int]] = []
-        """When which fault lets which axis go."""
+        """The moment at which each fault releases its axis."""
         self._off_until: Nanos | None = None
         self._cut: Nanos | None = None
         """When the supply has failed in the middle of something that must come to its end first."""
@@ -131,7 +131,7 @@ class FaultyMachine(Stateful):
         return self.inner.take_edges()
 
     def pins(self) -> Mapping[str, float]:
-        """Levels at the machine, behind the faults."""
+        """Levels at the machine, with the faults."""
         return self.inner.pins()
 
     def power_off(self, now: Nanos) -> None:
@@ -186,8 +186,8 @@ class FaultyMachine(Stateful):
             self._let_go(released, now)
         self.changed()
 
-    def _moment(self, active: Active, now: Nanos) -> None:
-        """The moment of a fault that comes by itself."""
+    def _moment(self, active: ActiveFault, now: Nanos) -> None:
+        """Process the moment of a timed fault."""
         kind = active.fault.kind
         if kind.occasion is Occasion.ALWAYS:
             kind.effect.act(active, self, now)
@@ -196,13 +196,13 @@ class FaultyMachine(Stateful):
             kind.effect.act(active, self, now)
         active.step()
 
-    def block(self, active: Active, axis: int, now: Nanos, until: Nanos) -> None:
+    def block(self, active: ActiveFault, axis: int, now: Nanos, until: Nanos) -> None:
         """Block the shaft of an axis (from 1)."""
         self.body.shafts[axis - 1].block(True, now)
         self._released.append((until, active.name, axis))
 
     def drop_supply(self, now: Nanos, until: Nanos) -> None:
-        """The supply is off until a moment, or for longer where it is off already."""
+        """Switch the supply off until a moment, or longer if it is off already."""
         if self._off_until is None:
             self.inner.power_off(now)
         self._off_until = max(until, self._off_until or 0)
@@ -218,10 +218,10 @@ class FaultyMachine(Stateful):
         if not any(other == axis for *_, other in self._released):
             self.body.shafts[axis - 1].block(False, now)
 
-    def _mine(self) -> list[Active]:
+    def _mine(self) -> list[ActiveFault]:
         return self._faults.of(self.name)
 
-    def report(self, active: Active, now: Nanos, text: str) -> None:
+    def report(self, active: ActiveFault, now: Nanos, text: str) -> None:
         self._faults.report(active, self.name, now, text)
 
     # ------------------------------------------------------------------ setting and removing
@@ -247,7 +247,7 @@ class FaultyMachine(Stateful):
         level = fault.get("value")
         self.body.check_pin(pin, level if isinstance(level, float) else levels[pin])
 
-    def begin(self, active: Active) -> None:
+    def begin(self, active: ActiveFault) -> None:
         """A fault of this machine was set."""
         if active.fault.kind.parameter("pin") is not None:
             pin = self.pin_of(active.fault)
@@ -256,8 +256,9 @@ class FaultyMachine(Stateful):
             active.due = active.begin
         self.changed()
 
-    def end(self, active: Active, now: Nanos) -> None:
-        """A fault of this machine was removed: what it holds is let go."""
+    def end(self, active: ActiveFault, now: Nanos) -> None:
+        """Remove a fault of this machine and release what it holds."""
+
         if active.fault.kind.parameter("pin") is not None:
             pin = self.pin_of(active.fault)
             self._bounces = [b for b in self._bounces if b[1] != pin]
@@ -304,7 +305,7 @@ class FaultyMachine(Stateful):
         if value != before:
             for active in self._mine():
                 effect = active.fault.kind.effect
-                if isinstance(effect, OfChange) and self.pin_of(active.fault) == name and active.strikes(now):
+                if isinstance(effect, ChangeEffect) and self.pin_of(active.fault) == name and active.strikes(now):
                     effect.act(active, self, name, (before, value), now)
 
     def bounce(self, changes: list[tuple[Nanos, str, float]]) -> None:
@@ -312,7 +313,7 @@ class FaultyMachine(Stateful):
         self._bounces += changes
         self.changed()
 
-    def stick(self, active: Active, now: Nanos) -> None:
+    def stick(self, active: ActiveFault, now: Nanos) -> None:
         """The first moment sticks, the second lets go."""
         pin = self.pin_of(active.fault)
         if self._stuck.get(pin) != active.name:
@@ -330,7 +331,7 @@ class FaultyMachine(Stateful):
             self._put(pin, self._outer[pin], now)
             self.report(active, now, f"{pin} is free")
 
-    def fail_master(self, active: Active, now: Nanos) -> None:
+    def fail_master(self, active: ActiveFault, now: Nanos) -> None:
         """The first moment sets the error, the second clears it."""
         if active.struck == 0:
             self._mute.append(active.name)
@@ -360,7 +361,7 @@ class FaultyMachine(Stateful):
     def kept(self, old: bytes, new: bytes, now: Nanos) -> bytes:
         """What the memory holds when ``new`` was to be saved over ``old`` of the same length."""
         kept = bytearray(new)
-        saves = [active for active in self._mine() if isinstance(active.fault.kind.effect, OfSave)]
+        saves = [active for active in self._mine() if isinstance(active.fault.kind.effect, SaveEffect)]
         for active in saves:
             if active.strikes(now):
                 active.fault.kind.effect.act(active, self, old, kept, now)
@@ -382,7 +383,7 @@ def rig(kernel: Kernel, name: str, faults: Faults, body: Body) -> FaultyMachine:
     if there is None:
 
         def on_edge(pin: str, now: Nanos, level: float) -> None:
-            kernel.take_as_recorded(PinName(name, pin), now, level)
+            kernel.mark_recorded(PinName(name, pin), now, level)
 
         there = faults.machines[name] = FaultyMachine(kernel.machines[name], name, faults, body, on_edge)
         kernel.replace(name, there)

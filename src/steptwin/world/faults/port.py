@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import ClassVar
 
-from steptwin.machine import Nanos, Port, TalkingPort
+from steptwin.machine import Nanos, Port, SendingPort
 from steptwin.state import Plain, Stateful
 from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort
-from steptwin.world.faults.active import Active, Faults
+from steptwin.world.faults.active import ActiveFault, Faults
 from steptwin.world.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer
 from steptwin.world.faults.stream import spoil
 from steptwin.world.faults.table import Layer, LineProtocol
@@ -146,7 +146,7 @@ class FaultyPort(Stateful):
 
     def _exchange(self, data: bytes, now: Nanos) -> bytes:
         self._deliver(now)
-        for delay, piece in spoil(data, self._bytewise("in"), now, self._teller("towards the twin")):
+        for delay, piece in spoil(data, self._bytewise("in"), now, self._reporter("towards the twin")):
             # A line keeps the order of its bytes.
             at = max(now + delay, self._arriving[-1][0] if self._arriving else now)
             self._arriving.append((at, piece))
@@ -187,7 +187,7 @@ class FaultyPort(Stateful):
             fresh, self._fresh = self._fresh, []
         outgoing = self._bytewise("out")
         for moment, delay, data in fresh:
-            for more, piece in spoil(data, outgoing, now, self._teller("from the twin")):
+            for more, piece in spoil(data, outgoing, now, self._reporter("from the twin")):
                 at = moment + delay + more
                 self._leaving.append((max(at, self._leaving[-1][0]) if self._leaving else at, piece))
 
@@ -218,7 +218,7 @@ class FaultyPort(Stateful):
             if a.fault.kind.layer is Layer.FRAMES and self._is_for(a) and a.fault.get("lost") != "request"
         ]
         exchange = Exchange(self._line, request, raw)
-        sent = spoil_answer(exchange, self._addressed(exchange.unit), faults, moment, self._teller(""))
+        sent = spoil_answer(exchange, self._addressed(exchange.unit), faults, moment, self._reporter(""))
         if sent.before:
             self._fresh.append((moment, 0, sent.before))
         if sent.later:
@@ -246,44 +246,44 @@ class FaultyPort(Stateful):
     def _addressed(self, unit: int) -> int:
         return self._units[0] if self._line is LineProtocol.TCP and len(self._units) == 1 and unit in (0, 255) else unit
 
-    def _bytewise(self, direction: str) -> list[Active]:
+    def _bytewise(self, direction: str) -> list[ActiveFault]:
         faults = self._faults.active
         return [
             a for a in faults if a.fault.kind.layer is Layer.BYTES and a.fault.get("direction") == direction and self._is_for(a)
         ]
 
-    def _is_for(self, active: Active) -> bool:
+    def _is_for(self, active: ActiveFault) -> bool:
         return self._line in active.fault.kind.lines and active.is_on(self.link, self.line_name)
 
-    def _teller(self, which: str) -> Callable[[Active, str], None]:
+    def _reporter(self, which: str) -> Callable[[ActiveFault, str], None]:
         words = [*([self.link] if self.line_name else []), *([which] if which else [])]
         place = self.line_name or self.link
         return lambda active, text: self._faults.report(active, place, self._now, ", ".join([*words, text]))
 
 
-class FaultyTalkingPort(FaultyPort):
+class FaultySendingPort(FaultyPort):
     """Before a port that has something to send without having been asked.
 
     ``is_read``: a program reads what the port sends; otherwise its output gives no occasion for faults.
     """
 
-    __slots__ = ("_is_read", "_talking")
-    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_read", "_talking"}
+    __slots__ = ("_is_read", "_sending")
+    FIXED: ClassVar[frozenset[str]] = FaultyPort.FIXED | {"_is_read", "_sending"}
 
     def __init__(
-        self, port: TalkingPort, link: str, faults: Faults, line: LineProtocol, *, line_name: str = "", is_read: bool = True
+        self, port: SendingPort, link: str, faults: Faults, line: LineProtocol, *, line_name: str = "", is_read: bool = True
     ) -> None:
         self._is_read = is_read
-        self._talking = port
+        self._sending = port
         super().__init__(port, link, faults, line, line_name=line_name)
 
-    def _bytewise(self, direction: str) -> list[Active]:
+    def _bytewise(self, direction: str) -> list[ActiveFault]:
         return super()._bytewise(direction) if self._is_read or direction != "out" else []
 
     @property
     def on_output(self) -> Callable[[], None] | None:
-        return self._talking.on_output
+        return self._sending.on_output
 
     @on_output.setter
     def on_output(self, hook: Callable[[], None] | None) -> None:
-        self._talking.on_output = hook
+        self._sending.on_output = hook

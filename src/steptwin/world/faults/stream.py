@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from steptwin.machine import Nanos
-from steptwin.world.faults.active import Active
-from steptwin.world.faults.table import BeforeDelivery, FaultReporter, InPieces, OfByte
+from steptwin.world.faults.active import ActiveFault
+from steptwin.world.faults.table import ByteEffect, FaultReporter, InsertEffect, PiecesEffect
 
 
 class Run:
@@ -22,15 +22,15 @@ class Run:
         self.pieces.append((self.pieces[-1][0] + time, bytearray()))
 
 
-def spoil(data: bytes, actives: Sequence[Active], now: Nanos, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
+def spoil(data: bytes, actives: Sequence[ActiveFault], now: Nanos, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
     """The pieces that ``data`` arrives in, each with its delay; faults of the order in which they were set."""
     run = Run()
     bytewise = []
     for active in actives:
         effect = active.fault.kind.effect
-        if isinstance(effect, OfByte):
+        if isinstance(effect, ByteEffect):
             bytewise.append(active)
-        elif isinstance(effect, BeforeDelivery) and active.strikes(now):
+        elif isinstance(effect, InsertEffect) and active.strikes(now):
             effect.act(active, run, report)
     if bytewise:
         for place, byte in enumerate(data):
@@ -41,12 +41,12 @@ def spoil(data: bytes, actives: Sequence[Active], now: Nanos, report: FaultRepor
         run.put(data)
     for active in actives:
         effect = active.fault.kind.effect
-        if isinstance(effect, InPieces) and active.strikes(now):
+        if isinstance(effect, PiecesEffect) and active.strikes(now):
             return effect.act(active, run, len(data), report)
     return [(delay, bytes(piece)) for delay, piece in run.pieces if piece]
 
 
-def _pass(run: Run, byte: int, actives: Sequence[Active], now: Nanos, report: FaultReporter) -> None:
+def _pass(run: Run, byte: int, actives: Sequence[ActiveFault], now: Nanos, report: FaultReporter) -> None:
     lost = False
     for active in actives:
         if active.left:

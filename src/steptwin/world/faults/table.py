@@ -12,13 +12,13 @@ from steptwin.tables import IncompleteTable
 
 if TYPE_CHECKING:
     from steptwin.machine import Nanos
-    from steptwin.world.faults.active import Active
+    from steptwin.world.faults.active import ActiveFault
     from steptwin.world.faults.answers import AlteredAnswer, Exchange
     from steptwin.world.faults.fault import Fault
     from steptwin.world.faults.machine import FaultyMachine
     from steptwin.world.faults.stream import Run
 
-FaultReporter: TypeAlias = "Callable[[Active, str], None]"
+FaultReporter: TypeAlias = "Callable[[ActiveFault, str], None]"
 """A fault has happened, and what it did."""
 
 Value: TypeAlias = int | float | str | tuple[int, int]
@@ -123,86 +123,86 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class OfByte:
+class ByteEffect:
     """``act`` gives what arrives of a byte, None where it is lost; bytes before it are put into the run."""
 
-    act: Callable[[Active, int, Run, FaultReporter], int | None]
+    act: Callable[[ActiveFault, int, Run, FaultReporter], int | None]
 
 
 @dataclass(frozen=True, slots=True)
-class BeforeDelivery:
+class InsertEffect:
     """``act`` puts bytes into the run before those of a delivery."""
 
-    act: Callable[[Active, Run, FaultReporter], None]
+    act: Callable[[ActiveFault, Run, FaultReporter], None]
 
 
 @dataclass(frozen=True, slots=True)
-class InPieces:
+class PiecesEffect:
     """``act`` gives the pieces in which a run arrives, each with its delay; takes the run and the length of the delivery. Only
     one such fault happens to a delivery, the first."""
 
-    act: Callable[[Active, Run, int, FaultReporter], list[tuple[Nanos, bytes]]]
+    act: Callable[[ActiveFault, Run, int, FaultReporter], list[tuple[Nanos, bytes]]]
 
 
 @dataclass(frozen=True, slots=True)
-class OfAnswer:
+class AnswerEffect:
     """``answer`` gives what is sent of an answer; without bytes later faults have nothing to happen to."""
 
-    answer: Callable[[Active, Exchange, int, AlteredAnswer, FaultReporter], AlteredAnswer]
+    answer: Callable[[ActiveFault, Exchange, int, AlteredAnswer, FaultReporter], AlteredAnswer]
 
 
 @dataclass(frozen=True, slots=True)
-class OfRequest:
+class RequestEffect:
     """``refusal`` gives the exception code and the text for a request that is not carried out. ``is_refused``: whether this one
-    is not; else it is carried out, and ``answer`` gives what is sent, as in `OfAnswer`."""
+    is not; else it is carried out, and ``answer`` gives what is sent, as in `AnswerEffect`."""
 
-    refusal: Callable[[Active], tuple[int, str]]
+    refusal: Callable[[ActiveFault], tuple[int, str]]
     is_refused: Callable[[Fault], bool] | None = None
-    answer: Callable[[Active, Exchange, int, AlteredAnswer, FaultReporter], AlteredAnswer] | None = None
+    answer: Callable[[ActiveFault, Exchange, int, AlteredAnswer, FaultReporter], AlteredAnswer] | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class OfMoment:
-    act: Callable[[Active, FaultyMachine, Nanos], None]
+class MomentEffect:
+    act: Callable[[ActiveFault, FaultyMachine, Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)
-class OfWindow:
+class WindowEffect:
     """``act`` is called at the beginning and at the end."""
 
-    act: Callable[[Active, FaultyMachine, Nanos], None]
+    act: Callable[[ActiveFault, FaultyMachine, Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)
-class OfChange:
+class ChangeEffect:
     """``act`` takes the pin and its levels, before and after."""
 
-    act: Callable[[Active, FaultyMachine, str, tuple[float, float], Nanos], None]
+    act: Callable[[ActiveFault, FaultyMachine, str, tuple[float, float], Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)
-class OfSave:
+class SaveEffect:
     """``act`` takes what the memory held and changes what it keeps."""
 
-    act: Callable[[Active, FaultyMachine, bytes, bytearray, Nanos], None]
+    act: Callable[[ActiveFault, FaultyMachine, bytes, bytearray, Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)
-class OfElement:
+class ElementEffect:
     """``act`` takes what was built of the element, and whether the fault begins or ends; gives what it did, in words."""
 
-    act: Callable[[Active, Any, bool, Nanos], str]
+    act: Callable[[ActiveFault, Any, bool, Nanos], str]
 
 
 _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {
-    Occasion.BYTE: ((Layer.BYTES,), (OfByte,)),
-    Occasion.DELIVERY: ((Layer.BYTES,), (BeforeDelivery, InPieces)),
-    Occasion.ANSWER: ((Layer.FRAMES,), (OfAnswer,)),
-    Occasion.REQUEST: ((Layer.FRAMES, Layer.PROTOCOL), (OfRequest,)),
-    Occasion.MOMENT: ((Layer.PHYSICS,), (OfMoment,)),
-    Occasion.CHANGE: ((Layer.PHYSICS,), (OfChange,)),
-    Occasion.SAVE: ((Layer.PHYSICS,), (OfSave,)),
-    Occasion.ALWAYS: ((Layer.PHYSICS, Layer.ELEMENT), (OfWindow, OfElement)),
+    Occasion.BYTE: ((Layer.BYTES,), (ByteEffect,)),
+    Occasion.DELIVERY: ((Layer.BYTES,), (InsertEffect, PiecesEffect)),
+    Occasion.ANSWER: ((Layer.FRAMES,), (AnswerEffect,)),
+    Occasion.REQUEST: ((Layer.FRAMES, Layer.PROTOCOL), (RequestEffect,)),
+    Occasion.MOMENT: ((Layer.PHYSICS,), (MomentEffect,)),
+    Occasion.CHANGE: ((Layer.PHYSICS,), (ChangeEffect,)),
+    Occasion.SAVE: ((Layer.PHYSICS,), (SaveEffect,)),
+    Occasion.ALWAYS: ((Layer.PHYSICS, Layer.ELEMENT), (WindowEffect, ElementEffect)),
 }
 """The layers that have an occasion, and the effects of which one is needed there."""
 
@@ -210,7 +210,8 @@ _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {
 @dataclass(frozen=True, slots=True)
 class FaultKind:
     """A row. ``own`` are the parameters of this kind alone, ``lines`` what it can happen on. ``needs``: what a
-    machine must have beyond what parameters and occasion need. ``check`` raises `Misuse` where it cannot happen."""
+    machine must have beyond what parameters and occasion need. ``check`` takes the `FaultyMachine`, or what was built of the
+    element, and raises `Misuse` where it cannot happen."""
 
     name: str
     layer: Layer
@@ -221,7 +222,7 @@ class FaultKind:
     effect: Any = None
     """What it does: one of the effects that fit the occasion. A kind without it is refused when the table is built."""
     needs: Need | None = None
-    check: Callable[[FaultyMachine, Fault], None] | None = None
+    check: Callable[[Any, Fault], None] | None = None
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -337,7 +338,7 @@ def checked(kinds: Sequence[FaultKind]) -> dict[str, FaultKind]:
 def _check_effect(kind: FaultKind) -> None:
     layers, effects = _FITTING[kind.occasion]
     if kind.occasion is Occasion.ALWAYS:
-        effects = (OfElement,) if kind.layer is Layer.ELEMENT else (OfWindow,)
+        effects = (ElementEffect,) if kind.layer is Layer.ELEMENT else (WindowEffect,)
     fits = isinstance(kind.effect, effects)
     needed = " or ".join(effect.__name__ for effect in effects)
     if kind.layer not in layers:

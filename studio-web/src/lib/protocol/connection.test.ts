@@ -51,6 +51,8 @@ class Alarm {
 let server: Server;
 let alarm: Alarm;
 let hellos: Hello[];
+/** By hello, whether it was the first of its connection. */
+let isNew: boolean[];
 let pushed: Pushed[];
 let states: ConnectionState[];
 let connection: Connection;
@@ -58,9 +60,12 @@ let connection: Connection;
 beforeEach(() => {
   server = new Server();
   alarm = new Alarm();
-  [hellos, pushed, states] = [[], [], []];
+  [hellos, isNew, pushed, states] = [[], [], [], []];
   const events = {
-    hello: (hello: Hello) => void hellos.push(hello),
+    hello: (hello: Hello, isNewConnection: boolean) => {
+      hellos.push(hello);
+      isNew.push(isNewConnection);
+    },
     pushed: (messages: readonly Pushed[]) => void pushed.push(...messages),
     state: (state: ConnectionState) => void states.push(state),
   };
@@ -121,6 +126,28 @@ test("after a gap nothing is believed until the whole state has come again", () 
   ]);
   expect(hellos).toHaveLength(2);
   expect(pushed.at(-1)).toEqual({ seq: 1, viewers: 2 });
+});
+
+test("the whole state can be asked for, once at a time, and tells whether the connection is new", () => {
+  connection.resync();
+  expect(server.sent.filter((request) => request.do === "resync")).toHaveLength(0);
+  server.greet();
+  connection.resync();
+  connection.resync();
+  expect(server.sent.filter((request) => request.do === "resync")).toHaveLength(1);
+  server.link.messages([{ seq: 1, viewers: 7 }]);
+  server.link.messages([
+    { seq: 2, viewers: 8 },
+    { id: server.last("resync").id, ok: null },
+    { seq: 0, hello: { viewer: 1 } },
+    { seq: 1, viewers: 2 },
+  ]);
+  expect(pushed).toEqual([{ seq: 1, viewers: 2 }]);
+  server.link.closed();
+  alarm.goOff(100);
+  server.link.opened();
+  server.greet();
+  expect(isNew).toEqual([true, false, true]);
 });
 
 test("what was pushed before the whole state in the same batch is part of it", () => {

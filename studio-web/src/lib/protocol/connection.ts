@@ -17,8 +17,8 @@ export class RequestError extends Error {
 }
 
 export interface ConnectionEvents {
-  /** The whole state: after connecting, and after a gap. */
-  hello(hello: Hello): void;
+  /** The whole state. On a connection that is not new, what is watched and followed goes on. */
+  hello(hello: Hello, isNewConnection: boolean): void;
   /** What was pushed since the last call, without hello and without gaps. */
   pushed(messages: readonly Pushed[]): void;
   state(state: ConnectionState, why: string): void;
@@ -48,6 +48,7 @@ interface Waiting {
 export class Connection {
   private link: Link | null = null;
   private isOpen = false;
+  /** Of the last message; null before the whole state has come over this connection. */
   private seq: number | null = null;
   private resyncs = false;
   private nextId = 1;
@@ -97,6 +98,13 @@ export class Connection {
     return this.nextId++;
   }
 
+  /** The whole state once more. What is pushed until it has come is left out: the state has it. */
+  resync(): void {
+    if (this.seq === null || this.resyncs) return;
+    this.resyncs = true;
+    this.request("resync", {}).catch(() => this.link?.close());
+  }
+
   private opened(): void {
     this.isOpen = true;
     this.seq = null;
@@ -144,10 +152,11 @@ export class Connection {
   }
 
   private greeted(message: HelloMessage): void {
+    const isNewConnection = this.seq === null;
     this.seq = message.seq;
     this.resyncs = false;
     this.attempts = 0;
-    this.events.hello(message.hello);
+    this.events.hello(message.hello, isNewConnection);
     this.enter("open");
   }
 
@@ -158,8 +167,7 @@ export class Connection {
       this.seq = seq;
       return true;
     }
-    this.resyncs = true;
-    this.request("resync", {}).catch(() => this.link?.close());
+    this.resync();
     return false;
   }
 

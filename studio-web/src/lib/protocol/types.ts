@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | ProgramsRequest | ProgramTextRequest | AuditRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -68,8 +68,9 @@ export type SubjectEvent = {
   machine: string;
   kind: "sample";
   axis: string;
-  position: number;
+  position: number | null;
   unit: string;
+  velocity: number | null;
   /** The command or the event that led to it. */
   cause: number | null;
   /** As text; it adds nothing to the rest. */
@@ -220,7 +221,8 @@ export type SubjectEvent = {
   time_ns: string;
   machine: string;
   kind: "restored";
-  snapshot: string;
+  /** Its name; null without one. */
+  snapshot: string | null;
   /** The command or the event that led to it. */
   cause: number | null;
   /** As text; it adds nothing to the rest. */
@@ -240,7 +242,7 @@ export type SubjectEvent = {
   text: string;
 };
 
-/** What there is. It does not change. */
+/** What there is; another one when devices come or go. */
 export type Description = {
   name: string;
   axes: ({
@@ -257,8 +259,21 @@ export type Description = {
       high: number | null;
       period: number | null;
     })[];
+    pulses_per_unit: number;
   })[];
   buttons: string[];
+  elements: ({
+    name: string;
+    kind: string;
+    inputs: string[];
+    outputs: string[];
+    signals: ({
+      name: string;
+      unit: string;
+      low: number | null;
+      high: number | null;
+    })[];
+  })[];
   lines: ({
     name: string;
     kind: string;
@@ -292,6 +307,8 @@ export type Description = {
         is_optional: boolean;
       })[];
     })[];
+    /** A device: it gives samples instead of plans, and may move something. */
+    real: boolean;
   })[];
   datasheets: ({
     kind: string;
@@ -342,6 +359,7 @@ export type Description = {
         is_low_excluded: boolean;
       } | null;
       values: Record<string, string>;
+      conditions: Record<string, "off" | "rest" | "moving" | "warning" | "error">;
       access: "r" | "w" | "rw";
       effect: "none" | "parameter" | "acts" | "moves";
       addresses: ({
@@ -380,6 +398,8 @@ export type Description = {
         unit: string;
         is_optional: boolean;
       })[];
+      severity: "information" | "warning" | "alarm";
+      stops_motor: boolean | null;
     })[];
     details: ({
       name: string;
@@ -428,7 +448,7 @@ export type State = {
   details: Record<string, boolean | number | string | number[] | Record<string, number> | null>;
 };
 
-/** What there is. Answer: version, name, machines with the numbers of their datasheets, axes, buttons, lines, commands. */
+/** What there is. Answer: version, name, machines with the numbers of their datasheets, axes, buttons, elements, lines, commands. */
 export type DescribeRequest = {
   do: "describe";
   /** Comes back with the answer. */
@@ -566,7 +586,7 @@ export type ReleaseRequest = {
   button: string;
 };
 
-/** Registers of a MIC488 take values, as a master writes them. Answer: null. */
+/** Registers take values by name, as a Modbus master writes them. Answer: null. */
 export type WriteRequest = {
   do: "write";
   /** Comes back with the answer. */
@@ -614,7 +634,7 @@ export type PowerCycleRequest = {
   machine: string;
 };
 
-/** Turn the encoder shaft of an axis of a MIC488. Answer: null. */
+/** Turn the encoder shaft of an axis. Answer: null. */
 export type TurnRequest = {
   do: "turn";
   /** Comes back with the answer. */
@@ -628,7 +648,7 @@ export type TurnRequest = {
   counts: number;
 };
 
-/** What turns the encoder shaft of an axis of a MIC488. Answer: null. */
+/** What turns the encoder shaft of an axis without mechanics. Answer: null. */
 export type CoupleRequest = {
   do: "couple";
   /** Comes back with the answer. */
@@ -682,7 +702,7 @@ export type NoteRequest = {
   text: string;
 };
 
-/** A record of a vision system comes to a MIC488. Answer: null. */
+/** A record of a vision system comes to a controller. Answer: null. */
 export type SeeRequest = {
   do: "see";
   /** Comes back with the answer. */
@@ -758,7 +778,7 @@ export type JogRequest = {
   velocity: number;
 };
 
-/** Stop as fast as the controller does: a MIC488 without ramp, an M1486 with it (Kill). Answer: null. */
+/** Stop as fast as the controller does, with a ramp or without. Answer: null. */
 export type StopRequest = {
   do: "stop";
   /** Comes back with the answer. */
@@ -780,6 +800,20 @@ export type ProgramRequest = {
   machine: string;
   /** What to do. */
   action: "start" | "pause" | "stop";
+};
+
+/** Put a text into the program memory of a controller: a MIC488 has it at once, to an M1486 it is typed, and runs then. Answer: null. */
+export type DownloadRequest = {
+  do: "download";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** Where, such as program 0, positions 0 (MIC488, by bank), program (M1486). */
+  place: string;
+  /** The text. One with errors is refused with what is wrong. */
+  text: string;
 };
 
 /** Time stands. Answer: as time. */
@@ -952,7 +986,25 @@ export type StopAllRequest = {
   version?: 1;
 };
 
-/** The texts of programs and positions that the description gives to controllers. */
+/** Look at a moment of the past while the world goes on. The message past and values of all watches follow. Until the present is looked at again, state, read, pins, encoders, faults and programs are of that moment, and nothing can be changed but by stop. */
+export type LookRequest = {
+  do: "look";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Which moment; the present without. [ns] */
+  to_ns?: string | number | null;
+};
+
+/** The world itself goes back to the moment that this viewer looks at; time stands there. What happened since is undone. */
+export type GoBackRequest = {
+  do: "go_back";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** The program memories of controllers: each place, and what is there. */
 export type ProgramsRequest = {
   do: "programs";
   /** Comes back with the answer. */
@@ -972,6 +1024,36 @@ export type ProgramTextRequest = {
   place: string;
 };
 
+/** The serial ports of the computer on which the studio runs, and the pseudo terminals of running twins. */
+export type PortsRequest = {
+  do: "ports";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** A device becomes a machine here. Nothing moves by it, and no setting is changed. */
+export type ConnectRequest = {
+  do: "connect";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** As after --device: /dev/ttyUSB0,unit=2, tcp://192.168.0.9,config=machine.cfg. */
+  address: string;
+  /** Of the machine; its kind without one. */
+  name?: string | null;
+};
+
+/** A device is no machine here any more: jogs end, other motions and its program go on. */
+export type DisconnectRequest = {
+  do: "disconnect";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Of a device. */
+  machine: string;
+};
+
 /** Who did what, the newest last. */
 export type AuditRequest = {
   do: "audit";
@@ -980,6 +1062,74 @@ export type AuditRequest = {
   version?: 1;
   /** Entries. */
   most?: number | null;
+};
+
+/** The quantities of a move of an axis, and the times of which one may be given in place of a quantity. */
+export type CalculatorRequest = {
+  do: "calculator";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+};
+
+/** A move from rest to rest, as the controller would plan it: its times, or with one time the quantity that is left out. */
+export type CalculateRequest = {
+  do: "calculate";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The number of an axis. */
+  axis: number;
+  /** Quantities by name, and a time at most. */
+  given: Record<string, number>;
+  /** What a time determines; the one that is left out without. */
+  find?: string | null;
+};
+
+/** Pulses in each unit (GEAR), from the mechanics. */
+export type GearRequest = {
+  do: "gear";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Full steps in a revolution of the motor. */
+  motor_steps?: number | null;
+  /** Pulses in a full step. */
+  microsteps: number;
+  /** Revolutions of the motor in one of what it drives. */
+  ratio?: number | null;
+  /** Travel in one revolution of what is driven; it turns without. [mm] */
+  lead?: number | null;
+};
+
+/** The configuration file of a controller as a form: sections, settings with meaning, unit and range, what is wrong. */
+export type ConfigurationRequest = {
+  do: "configuration";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+};
+
+/** The form of a text of such a file, with other values in it. Nothing is written. */
+export type EditConfigurationRequest = {
+  do: "edit_configuration";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** The file. */
+  text: string;
+  /** Values by SECTION.KEY, such as Axis0.Gear. */
+  changes?: Record<string, string> | null;
 };
 
 export type JogAnswer = {
@@ -1025,6 +1175,15 @@ export type StopAllAnswer = {
   failed: Record<string, string>;
 };
 
+export type LookAnswer = {
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  /** Virtual time, as decimal text [ns] */
+  from_ns: string;
+} | null;
+
+export type GoBackAnswer = null;
+
 export type ProgramsAnswer = ({
   machine: string;
   /** Unlike all others of the machine, such as program 0. */
@@ -1032,6 +1191,10 @@ export type ProgramsAnswer = ({
   /** Of the file. */
   name: string;
   language: "wbc" | "m1486" | "csv";
+  /** At the editor server. */
+  address: string;
+  /** Whether nothing is there yet. */
+  empty: boolean;
   running: boolean;
   /** Of the present statement, from 1, while it runs or is paused; null where that is not known. */
   line: number | null;
@@ -1044,6 +1207,10 @@ export type ProgramTextAnswer = {
   /** Of the file. */
   name: string;
   language: "wbc" | "m1486" | "csv";
+  /** At the editor server. */
+  address: string;
+  /** Whether nothing is there yet. */
+  empty: boolean;
   running: boolean;
   /** Of the present statement, from 1, while it runs or is paused; null where that is not known. */
   line: number | null;
@@ -1060,6 +1227,17 @@ export type ProgramTextAnswer = {
   })[];
 };
 
+export type PortsAnswer = {
+  address: string;
+  what: string;
+}[];
+
+export type ConnectAnswer = {
+  machine: string;
+};
+
+export type DisconnectAnswer = null;
+
 export type AuditAnswer = ({
   /** Wall clock, ISO 8601. */
   at: string;
@@ -1071,6 +1249,172 @@ export type AuditAnswer = ({
   fields: Record<string, unknown>;
   outcome: "done" | "misuse" | "refusal" | "failure" | "internal";
 })[];
+
+export type CalculatorAnswer = {
+  title: string;
+  quantities: ({
+    name: string;
+    meaning: string;
+    unit: string;
+    /** Pulses (per s, per s²) in one of its unit. */
+    pulses: number;
+    limits: {
+      low: number | null;
+      high: number | null;
+      is_low_excluded: boolean;
+    };
+    choices: number[];
+    default: number | null;
+    /** The quantity whose value it has where none is given. */
+    same_as: string | null;
+    /** Register or command that sets it; empty where it is given with a motion. */
+    code: string;
+    /** The fact of the state that it is. */
+    detail: string;
+    source: string;
+  })[];
+  times: ({
+    name: string;
+    meaning: string;
+    unit: string;
+    /** Pulses (per s, per s²) in one of its unit. */
+    pulses: number;
+    limits: {
+      low: number | null;
+      high: number | null;
+      is_low_excluded: boolean;
+    };
+    choices: number[];
+    default: number | null;
+    /** The quantity whose value it has where none is given. */
+    same_as: string | null;
+    /** Register or command that sets it; empty where it is given with a motion. */
+    code: string;
+    /** The fact of the state that it is. */
+    detail: string;
+    source: string;
+  })[];
+};
+
+export type CalculateAnswer = {
+  title: string;
+  found: string | null;
+  /** Of what was found, before it was made what the controller takes. */
+  exact: number | null;
+  values: Record<string, number>;
+  units: Record<string, string>;
+  times: Record<string, number>;
+  peak: number;
+  /** Whether the peak is the velocity. */
+  reaches: boolean;
+  parts: {
+    name: string;
+    start_s: number;
+    duration_s: number;
+    from_velocity: number;
+    to_velocity: number;
+    distance: number;
+  }[];
+  formulas: {
+    name: string;
+    text: string;
+    source: string;
+  }[];
+  notes: string[];
+  settings: {
+    name: string;
+    code: string;
+    detail: string;
+    value: number;
+    unit: string;
+  }[];
+  /** Time [s], position, velocity. */
+  curve: number[][];
+};
+
+export type GearAnswer = Record<string, number>;
+
+export type ConfigurationAnswer = {
+  /** Of the file. */
+  name: string;
+  text: string;
+  sections: ({
+    name: string;
+    title: string;
+    settings: ({
+      name: string;
+      meaning: string;
+      unit: string;
+      /** As it is written; empty where it is not in the file. */
+      text: string;
+      value: number;
+      default: number;
+      limits: {
+        low: number | null;
+        high: number | null;
+        is_low_excluded: boolean;
+      };
+      is_whole: boolean;
+      choices: Record<string, string>;
+      /** The point that has it at run time; empty without one. */
+      point: string;
+      source: string;
+    })[];
+  })[];
+  diagnostics: ({
+    line: number;
+    column: number;
+    end_line: number;
+    end_column: number;
+    severity: "error" | "warning" | "note";
+    code: string;
+    message: string;
+    hint: string | null;
+  })[];
+  /** What points get from it, in the units that the controller has now. */
+  points: Record<string, number>;
+};
+
+export type EditConfigurationAnswer = {
+  /** Of the file. */
+  name: string;
+  text: string;
+  sections: ({
+    name: string;
+    title: string;
+    settings: ({
+      name: string;
+      meaning: string;
+      unit: string;
+      /** As it is written; empty where it is not in the file. */
+      text: string;
+      value: number;
+      default: number;
+      limits: {
+        low: number | null;
+        high: number | null;
+        is_low_excluded: boolean;
+      };
+      is_whole: boolean;
+      choices: Record<string, string>;
+      /** The point that has it at run time; empty without one. */
+      point: string;
+      source: string;
+    })[];
+  })[];
+  diagnostics: ({
+    line: number;
+    column: number;
+    end_line: number;
+    end_column: number;
+    severity: "error" | "warning" | "note";
+    code: string;
+    message: string;
+    hint: string | null;
+  })[];
+  /** What points get from it, in the units that the controller has now. */
+  points: Record<string, number>;
+};
 
 /** The whole state, after hello and resync. */
 export type HelloMessage = {
@@ -1109,7 +1453,7 @@ export type HelloMessage = {
       /** Virtual seconds in a second; the one at which time will go on where it stands. */
       speed: number | "max";
     };
-    /** Whether it is a twin; a device gives samples, not plans. */
+    /** Whether all machines are twins; a device gives samples, not plans. */
     virtual: boolean;
     description: Description;
     /** By machine, as the answer to state; empty for a device. */
@@ -1154,6 +1498,26 @@ export type ClockMessage = {
   };
 };
 
+/** The moment of the past that this viewer looks at from now on; null for the present. Events go on as they happen. */
+export type PastMessage = {
+  /** Counts the messages to this viewer from hello on, which has 0. */
+  seq: number;
+  past: {
+    /** Virtual time, as decimal text [ns] */
+    time_ns: string;
+    /** The oldest moment that is kept. [ns] */
+    from_ns: string;
+    /** Names of requests that can be done while the past is looked at. */
+    may: string[];
+    /** By machine, as the answer to state; empty for a device. */
+    state: Record<string, State>;
+    /** As the answer to faults. */
+    faults: Record<string, unknown>[];
+    /** Present plans of all axes. */
+    plans: SubjectEvent[];
+  } | null;
+};
+
 /** Who holds control from now on. */
 export type ControlMessage = {
   /** Counts the messages to this viewer from hello on, which has 0. */
@@ -1193,7 +1557,7 @@ export type LostMessage = {
 };
 
 /** What is sent without being asked for. */
-export type Pushed = HelloMessage | EventsMessage | ValuesMessage | ClockMessage | ControlMessage | ViewersMessage | LeasesMessage | LostMessage;
+export type Pushed = HelloMessage | EventsMessage | ValuesMessage | ClockMessage | PastMessage | ControlMessage | ViewersMessage | LeasesMessage | LostMessage;
 
 /** Requests and the types of their answers, by name. */
 export interface Requests {
@@ -1228,6 +1592,7 @@ export interface Requests {
   jog: { request: JogRequest; answer: JogAnswer };
   stop: { request: StopRequest; answer: unknown };
   program: { request: ProgramRequest; answer: unknown };
+  download: { request: DownloadRequest; answer: unknown };
   pause: { request: PauseRequest; answer: unknown };
   resume: { request: ResumeRequest; answer: unknown };
   step: { request: StepRequest; answer: unknown };
@@ -1245,7 +1610,17 @@ export interface Requests {
   renew: { request: RenewRequest; answer: RenewAnswer };
   let_go: { request: LetGoRequest; answer: LetGoAnswer };
   stop_all: { request: StopAllRequest; answer: StopAllAnswer };
+  look: { request: LookRequest; answer: LookAnswer };
+  go_back: { request: GoBackRequest; answer: GoBackAnswer };
   programs: { request: ProgramsRequest; answer: ProgramsAnswer };
   program_text: { request: ProgramTextRequest; answer: ProgramTextAnswer };
+  ports: { request: PortsRequest; answer: PortsAnswer };
+  connect: { request: ConnectRequest; answer: ConnectAnswer };
+  disconnect: { request: DisconnectRequest; answer: DisconnectAnswer };
   audit: { request: AuditRequest; answer: AuditAnswer };
+  calculator: { request: CalculatorRequest; answer: CalculatorAnswer };
+  calculate: { request: CalculateRequest; answer: CalculateAnswer };
+  gear: { request: GearRequest; answer: GearAnswer };
+  configuration: { request: ConfigurationRequest; answer: ConfigurationAnswer };
+  edit_configuration: { request: EditConfigurationRequest; answer: EditConfigurationAnswer };
 }

@@ -10,9 +10,11 @@ export interface Stretch {
   origin: number;
 }
 
+/** NaN is what is not known. */
 export interface Sample {
   time_ns: bigint;
   position: number;
+  velocity: number;
 }
 
 /** Stretches and samples kept of each axis. */
@@ -20,19 +22,34 @@ const KEPT = 5000;
 
 type OfKind<K extends SubjectEvent["kind"]> = Extract<SubjectEvent, { kind: K }>;
 
+/** Ends a list before the first element for which `isLate` holds. */
+function cut<T>(list: T[], isLate: (element: T) => boolean): void {
+  const first = list.findIndex(isLate);
+  if (first >= 0) list.length = first;
+}
+
 /** Where an axis is. A twin's follows from its plan at any moment, a device's from its last sample. */
 export class AxisState {
   /** Counts changes; a curve that has drawn this one is up to date. */
   revision = $state(0);
   readonly stretches: Stretch[] = [];
   readonly samples: Sample[] = [];
+  /** What held at a moment that is looked at: the page may not have been open then. */
+  private past: Stretch | null = null;
 
   constructor(readonly model: AxisModel) {}
 
   take(event: OfKind<"plan"> | OfKind<"coordinate"> | OfKind<"sample">): void {
     if (event.kind === "plan") this.plan(BigInt(event.time_ns), event.plan, event.origin);
     else if (event.kind === "coordinate") this.coordinate(BigInt(event.time_ns), event.origin);
-    else this.sample(BigInt(event.time_ns), event.position);
+    else this.sample(BigInt(event.time_ns), event.position ?? NaN, event.velocity ?? NaN);
+    this.revision++;
+  }
+
+  /** Time has gone back to `time_ns`: what was later has not happened. */
+  forgetAfter(time_ns: bigint): void {
+    cut(this.stretches, ({ from_ns }) => from_ns > time_ns);
+    cut(this.samples, (sample) => sample.time_ns > time_ns);
     this.revision++;
   }
 
@@ -44,7 +61,8 @@ export class AxisState {
       const { position, velocity } = stretch.course.at(now_ns);
       return { position: (position + stretch.origin) / scale, velocity: velocity / scale };
     }
-    return { position: this.samples.at(-1)?.position ?? NaN, velocity: NaN };
+    const { position, velocity } = this.samples.at(-1) ?? { position: NaN, velocity: NaN };
+    return { position, velocity };
   }
 
   /** As the controller shows it, in whole pulses, in units of the axis. */
@@ -54,12 +72,40 @@ export class AxisState {
     return (stretch.course.counted(now_ns) + stretch.origin) / (this.model.pulses_per_unit ?? 1);
   }
 
-  isMoving(now_ns: bigint): boolean {
-    return this.stretchAt(now_ns)?.course.isMoving(now_ns) ?? false;
+  /** Pulses of the plan, from power-on. NaN where there are samples only. */
+  pulses(now_ns: bigint): number {
+    return this.stretchAt(now_ns)?.course.at(now_ns).position ?? NaN;
+  }
+
+  /** Null where that is not known: it may move. */
+  isMoving(now_ns: bigint): boolean | null {
+    const stretch = this.stretchAt(now_ns);
+    if (stretch !== null) return stretch.course.isMoving(now_ns);
+    const { velocity } = this.at(now_ns);
+    return Number.isNaN(velocity) ? null : velocity !== 0;
+  }
+
+  /** Show the plan of a moment of the past; null: only what has been taken. */
+  show(event: OfKind<"plan"> | null): void {
+    this.past =
+      event === null
+        ? null
+        : { from_ns: BigInt(event.time_ns), course: new Course(event.plan), origin: event.origin ?? 0 };
+    this.revision++;
+  }
+
+  /** Moments at which motions begin and end, in no order. */
+  *moments(): Iterable<bigint> {
+    for (const { course } of this.stretches) {
+      if (course.end_ns === course.start_ns) continue;
+      yield course.start_ns;
+      if (course.end_ns !== null) yield course.end_ns;
+    }
   }
 
   /** What held at a moment; null where there are samples only, or nothing yet. */
   stretchAt(now_ns: bigint): Stretch | null {
+    if (this.past?.from_ns === now_ns) return this.past;
     for (let index = this.stretches.length - 1; index >= 0; index--) {
       const stretch = this.stretches[index] as Stretch;
       if (stretch.from_ns <= now_ns || index === 0) return stretch;
@@ -81,8 +127,8 @@ export class AxisState {
     if (this.stretches.length > KEPT) this.stretches.splice(0, KEPT / 10);
   }
 
-  private sample(time_ns: bigint, position: number): void {
-    this.samples.push({ time_ns, position });
+  private sample(time_ns: bigint, position: number, velocity: number): void {
+    this.samples.push({ time_ns, position, velocity });
     if (this.samples.length > KEPT) this.samples.splice(0, KEPT / 10);
   }
 }

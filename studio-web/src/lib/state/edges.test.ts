@@ -31,3 +31,13 @@ test("the oldest edges are forgotten", () => {
   expect(edges.at("a", 49_999n)).toBe(1);
   expect(edges.at("a", 10_000n)).toBeNaN();
 });
+
+test("where time has gone back, what was later is forgotten", () => {
+  const edges = three();
+  edges.forgetAfter(200n);
+  expect(edges.at("a", 900n)).toBe(1);
+  edges.take("a", 250n, 0);
+  expect([200n, 250n].map((at) => edges.at("a", at))).toEqual([1, 0]);
+  edges.forgetAfter(99n);
+  expect(edges.at("a", 900n)).toBeNaN();
+});

@@ -25,6 +25,18 @@ export class Edges {
     }
   }
 
+  /** Time has gone back to `time_ns`: what was later has not happened. */
+  forgetAfter(time_ns: bigint): void {
+    for (const kept of this.pins.values()) {
+      kept.times.length = kept.levels.length = this.before(kept, time_ns) + 1;
+    }
+  }
+
+  /** Of all edges, in no order. */
+  *moments(): Iterable<bigint> {
+    for (const { times } of this.pins.values()) yield* times;
+  }
+
   /** NaN where it is not known. */
   at(pin: string, time_ns: bigint): number {
     const kept = this.pins.get(pin);

@@ -1,21 +1,18 @@
 import type { SubjectEvent } from "../protocol/types";
+import type { Severity } from "./severity";
 
 /** Events that people read; the others are as frequent as requests. */
-const SHOWN = new Set<SubjectEvent["kind"]>(["status", "note", "report", "button", "input", "fault", "pace"]);
+const SHOWN = new Set<SubjectEvent["kind"]>([
+  "status",
+  "note",
+  "report",
+  "button",
+  "input",
+  "fault",
+  "pace",
+  "restored",
+]);
 const KEPT = 1000;
-
-export type Severity = "plain" | "warning" | "alarm";
-
-/** Codes of data sheets that say that something is wrong; `-error`, `-failure` and `-failed` are others by their ends. */
-const ALARMS = new Set(["overdue", "expectation", "wrong-data", "file-refused", "path-left", "overrun"]);
-const WARNINGS = new Set(["limit", "drive-off", "speed-clamped", "trigger-empty", "frame-pause", "shutdown"]);
-
-export function severityOf(event: SubjectEvent): Severity {
-  if (event.kind === "fault") return "warning";
-  if (event.kind !== "status" && event.kind !== "report") return "plain";
-  if (ALARMS.has(event.code) || /-(error|failure|failed)$/.test(event.code)) return "alarm";
-  return WARNINGS.has(event.code) ? "warning" : "plain";
-}
 
 export function isShown(event: SubjectEvent): boolean {
   return SHOWN.has(event.kind) && !(event.kind === "input" && event.what === "request");
@@ -29,10 +26,16 @@ export class EventLog {
   /** Events that were dropped on the way. */
   missed = $state(0);
 
+  constructor(private readonly severity: (event: SubjectEvent) => Severity) {}
+
+  *moments(): Iterable<bigint> {
+    for (const event of this.list) yield BigInt(event.time_ns);
+  }
+
   take(events: readonly SubjectEvent[]): void {
     const news = events.filter(isShown);
     if (!news.length) return;
-    this.alarms += news.filter((event) => severityOf(event) === "alarm").length;
+    this.alarms += news.filter((event) => this.severity(event) === "alarm").length;
     this.list = [...news.reverse(), ...this.list].slice(0, KEPT);
   }
 }

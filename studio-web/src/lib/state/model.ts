@@ -9,6 +9,8 @@ export type AxisSheet = Datasheet["axes"][number];
 export type Line = Description["lines"][number];
 /** What an axis of a controller moves. */
 export type Mechanics = Description["axes"][number];
+/** What is around the controllers and is no axis and no button, such as a cylinder. */
+export type Element = Description["elements"][number];
 export type Control = "enable" | "move" | "home" | "jog" | "stop" | "program";
 
 /** An axis of a controller, with the points of its data sheet that are about it. */
@@ -43,6 +45,8 @@ export interface AxisModel {
 
 export interface MachineModel {
   name: string;
+  /** A device: its positions are samples, and it may move something. */
+  isReal: boolean;
   sheet: Datasheet;
   line: string | null;
   unit: number | null;
@@ -60,6 +64,7 @@ export interface Model {
   lines: readonly Line[];
   mechanics: readonly Mechanics[];
   buttons: readonly string[];
+  elements: readonly Element[];
   commands: ReadonlySet<string>;
 }
 
@@ -119,6 +124,7 @@ export function modelOf(description: Description): Model {
     const full = (path: string) => (points.has(path) ? `${part.name}.${path}` : null);
     return {
       name: part.name,
+      isReal: part.real,
       sheet,
       line: part.line,
       unit: part.unit,
@@ -136,6 +142,7 @@ export function modelOf(description: Description): Model {
     lines: description.lines,
     mechanics: description.axes,
     buttons: description.buttons,
+    elements: description.elements,
     commands: new Set(description.commands),
   };
 }

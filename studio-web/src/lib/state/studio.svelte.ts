@@ -13,13 +13,23 @@ import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
 import { Edges } from "./edges";
 import { EventLog } from "./events.svelte";
+import { Lookback, plansOf, type Past } from "./lookback.svelte";
 import { modelOf, type AxisModel, type MachineModel, type Model } from "./model";
-import { Pins } from "./pins.svelte";
+import { levelsOf, Pins } from "./pins.svelte";
+import { severityOf, type Severity } from "./severity";
 import { Watches, type Watch } from "./watch.svelte";
 
 export type EventKind = SubjectEvent["kind"];
 
-const EMPTY: Model = { name: "", machines: [], lines: [], mechanics: [], buttons: [], commands: new Set() };
+const EMPTY: Model = {
+  name: "",
+  machines: [],
+  lines: [],
+  mechanics: [],
+  buttons: [],
+  elements: [],
+  commands: new Set(),
+};
 /** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */
 const FOLLOWED: readonly EventKind[] = [
   "plan",
@@ -34,6 +44,7 @@ const FOLLOWED: readonly EventKind[] = [
   "input",
   "fault",
   "pace",
+  "restored",
 ];
 /** Events that may wait for this page. */
 const EVENTS_BOUND = 10_000;
@@ -72,12 +83,18 @@ export class Studio {
   stops = $state(0);
 
   readonly clock = new WorldClock();
-  readonly log = new EventLog();
+  readonly log = new EventLog((event) => this.severity(event));
   readonly pins = new Pins();
   readonly edges = new Edges();
   /** By `table.M1`. */
   axes = $state.raw<ReadonlyMap<string, AxisState>>(new Map());
   private readonly watches = new Watches((name, fields) => this.ask(name, fields));
+  readonly lookback = new Lookback((name, fields, within_ms) => this.ask(name, fields, within_ms), {
+    show: (past) => this.showPast(past),
+    moments: () => this.moments(),
+    present: () => this.present(),
+    report: (error) => this.report(error),
+  });
   private readonly listeners = new Set<Listener>();
   private readonly followings = new Set<Following>();
   private readonly connection: Connection;
@@ -85,7 +102,7 @@ export class Studio {
 
   constructor(url: string, greeting: () => Fields<"hello">) {
     const events = {
-      hello: (hello: Hello) => this.greeted(hello),
+      hello: (hello: Hello, isNewConnection: boolean) => this.greeted(hello, isNewConnection),
       pushed: (messages: readonly Pushed[]) => messages.forEach((message) => this.pushed(message)),
       state: (state: ConnectionState, why: string) => {
         this.link = state;
@@ -100,8 +117,13 @@ export class Studio {
     this.connection.open();
   }
 
-  /** Virtual time, now. [ns] */
+  /** The moment that is shown: the present, or one that is looked at. Virtual time. [ns] */
   now(): bigint {
+    return this.lookback.moment ?? this.present();
+  }
+
+  /** Where the world is. Virtual time. [ns] */
+  present(): bigint {
     return this.clock.now(performance.now());
   }
 
@@ -113,13 +135,17 @@ export class Studio {
     return this.control !== null && this.control.viewer === this.hello?.viewer;
   }
 
-  /** Whether the role of this viewer permits a request, and the studio can do it here. */
+  /** Whether the role of this viewer permits a request, and the studio can do it here and now. */
   may(name: RequestName): boolean {
-    return this.hello?.may.includes(name) ?? false;
+    return (this.lookback.past ?? this.hello)?.may.includes(name) ?? false;
   }
 
   machine(name: string): MachineModel | undefined {
     return this.model.machines.find((machine) => machine.name === name);
+  }
+
+  severity(event: SubjectEvent): Severity {
+    return severityOf(event, this.machine(event.machine));
   }
 
   axis(model: AxisModel): AxisState {
@@ -164,6 +190,23 @@ export class Studio {
     );
   }
 
+  /** What a key does with time. Back and on go to where something happened; on from the present is a step of the world. */
+  turnTime(how: "live" | "pause" | "back" | "on"): void {
+    const isBack = this.lookback.moment !== null;
+    if (how === "back") {
+      if (this.may("look")) this.lookback.step(-1);
+    } else if (how === "on") {
+      if (isBack) this.lookback.step(1);
+      else void this.act("step", {});
+    } else if (how === "live" && isBack) {
+      this.lookback.live();
+    } else if (how === "pause" && this.pace.running) {
+      void this.act("pause", {});
+    } else if (!this.pace.running) {
+      void this.act("resume", {});
+    }
+  }
+
   /** Values of points for as long as something shows them; gives what ends it. */
   watch(points: readonly string[], rate?: number): [Watch, () => void] {
     return this.watches.add(points, rate);
@@ -180,23 +223,29 @@ export class Studio {
     };
   }
 
-  private greeted(hello: Hello): void {
+  private greeted(hello: Hello, isNewConnection: boolean): void {
     const isNew = this.hello === null || this.hello.description.name !== hello.description.name;
     this.hello = hello;
     this.control = hello.control;
     this.viewers = hello.viewers;
     this.leases = hello.leases;
     this.tellClock(BigInt(hello.time_ns), hello.pace, true);
+    this.forgetAfter(BigInt(hello.time_ns));
     if (isNew || JSON.stringify(hello.description) !== this.description) this.describe(hello);
     for (const event of hello.plans) this.toAxis(event);
     this.pins.reset(hello.state);
-    for (const [machine, { pins }] of Object.entries(hello.state)) {
-      for (const [pin, level] of Object.entries(pins))
-        this.edges.take(`${machine}.${pin}`, BigInt(hello.time_ns), level);
-    }
+    for (const [pin, level] of levelsOf(hello.state)) this.edges.take(pin, BigInt(hello.time_ns), level);
     if (!hello.virtual) this.askPins();
+    if (!isNewConnection) return;
+    this.lookback.forget();
     for (const following of this.followings) this.beginFollowing(following);
     this.watches.renew();
+  }
+
+  /** What the page shows of the time after a moment to which the world has gone back has not happened. */
+  private forgetAfter(time_ns: bigint): void {
+    for (const axis of this.axes.values()) axis.forgetAfter(time_ns);
+    this.edges.forgetAfter(time_ns);
   }
 
   private description = "";
@@ -237,6 +286,7 @@ export class Studio {
     if ("events" in message) this.happened(message.events, message.missed, BigInt(message.time_ns));
     else if ("values" in message) this.watches.take(message.values);
     else if ("clock" in message) this.tellClock(BigInt(message.clock.time_ns), message.clock, false);
+    else if ("past" in message) this.lookback.take(message.past);
     else if ("control" in message) this.control = message.control;
     else if ("viewers" in message) this.viewers = message.viewers;
     else if ("leases" in message) this.leases = message.leases;
@@ -255,7 +305,11 @@ export class Studio {
     this.clock.atLeast(time_ns, performance.now());
     for (const event of events) {
       this.toAxis(event);
-      if (event.kind === "edge") {
+      if (event.kind === "restored") {
+        this.tellClock(BigInt(event.time_ns), { ...this.pace, running: false }, true);
+        this.forgetAfter(BigInt(event.time_ns));
+        this.connection.resync();
+      } else if (event.kind === "edge") {
         const pin = `${event.machine}.${event.pin}`;
         this.pins.take({ [pin]: event.level });
         this.edges.take(pin, BigInt(event.time_ns), event.level);
@@ -263,6 +317,22 @@ export class Studio {
     }
     this.log.take(events);
     for (const listener of this.listeners) listener(events);
+  }
+
+  private showPast(past: Past | null): void {
+    this.pins.show(past === null ? null : past.state);
+    const plans = past === null ? [] : plansOf(past);
+    for (const axis of this.axes.values()) {
+      const { machine, number } = axis.model;
+      axis.show(plans.find((plan) => plan.machine === machine && plan.axis === String(number)) ?? null);
+    }
+  }
+
+  /** Moments at which something is known to have happened, in no order. */
+  private *moments(): Iterable<bigint> {
+    yield* this.log.moments();
+    yield* this.edges.moments();
+    for (const axis of this.axes.values()) yield* axis.moments();
   }
 
   private toAxis(event: SubjectEvent): void {

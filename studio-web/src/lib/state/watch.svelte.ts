@@ -1,7 +1,11 @@
 import type { Fields, RequestName } from "../protocol/connection";
 import type { Requests, ValuesMessage } from "../protocol/types";
 
-export type Ask = <N extends RequestName>(name: N, fields: Fields<N>) => Promise<Requests[N]["answer"]>;
+export type Ask = <N extends RequestName>(
+  name: N,
+  fields: Fields<N>,
+  within_ms?: number,
+) => Promise<Requests[N]["answer"]>;
 
 /** A value that is watched: undefined until it has come, null where it is not known. */
 export class Watched {

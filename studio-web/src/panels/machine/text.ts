@@ -15,6 +15,9 @@ export const t = texts(
     up: "Vertical axis",
     trail: "the last {seconds} s",
     buttons: "Buttons",
+    elements: "Elements",
+    element: "{name}, {kind}",
+    terminal: "{name}: {level}",
     axis: "{axis}, moved by {drive}",
   },
   {
@@ -31,6 +34,9 @@ export const t = texts(
     up: "Oś pionowa",
     trail: "ostatnie {seconds} s",
     buttons: "Przyciski",
+    elements: "Elementy",
+    element: "{name}, {kind}",
+    terminal: "{name}: {level}",
     axis: "{axis}, napęd {drive}",
   },
 );

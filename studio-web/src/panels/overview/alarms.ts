@@ -1,5 +1,5 @@
-import { severityOf, type Severity } from "../../lib/state/events.svelte";
 import type { SubjectEvent } from "../../lib/protocol/types";
+import type { Severity } from "../../lib/state/severity";
 
 /** An alarm, and how often it came: the same machine, code and axis. */
 export interface Alarm {
@@ -9,28 +9,15 @@ export interface Alarm {
   last: SubjectEvent;
 }
 
-/** Whether the motor of an axis stops with it, by code; others do it or not. */
-export const STOPS: Readonly<Record<string, boolean>> = {
-  limit: true,
-  "position-error": true,
-  "drive-off": true,
-  overrun: false,
-  "speed-clamped": false,
-  "trigger-empty": false,
-  "frame-pause": false,
-  "wrong-data": false,
-  "memory-failure": false,
-};
-
 const codeOf = (event: SubjectEvent): string => ("code" in event ? event.code : event.kind);
 const axisOf = (event: SubjectEvent): string => (event.kind === "status" ? (event.axis ?? "") : "");
 
 /** Warnings and alarms, the newest first; events come newest first. */
-export function alarmsOf(events: readonly SubjectEvent[]): Alarm[] {
+export function alarmsOf(events: readonly SubjectEvent[], severityOf: (event: SubjectEvent) => Severity): Alarm[] {
   const found = new Map<string, Alarm>();
   for (const event of events) {
     const severity = severityOf(event);
-    if (severity === "plain") continue;
+    if (severity === "information") continue;
     const key = `${event.machine} ${codeOf(event)} ${axisOf(event)}`;
     const known = found.get(key);
     if (known === undefined) found.set(key, { key, severity, count: 1, last: event });
@@ -38,5 +25,3 @@ export function alarmsOf(events: readonly SubjectEvent[]): Alarm[] {
   }
   return [...found.values()];
 }
-
-export const stopsMotor = (event: SubjectEvent): boolean | undefined => STOPS[codeOf(event)];

@@ -10,6 +10,7 @@ function point(path: string, space: string, place: number | string, words = 1, m
     unit: "",
     limits: null,
     values: {},
+    conditions: {},
     access: "rw",
     effect: "parameter",
     addresses: [{ space, place, words, type: "WORD" }],

@@ -104,6 +104,10 @@ function fillFromSamples(columns: Columns, axis: AxisState, from_ns: bigint, spa
   let before: [number, number] | null = null;
   for (const { time_ns, position } of axis.samples) {
     const at = Number(time_ns - from_ns);
+    if (Number.isNaN(position)) {
+      before = null;
+      continue;
+    }
     if (before !== null && at >= 0 && before[0] <= Number(span_ns)) {
       const [began, from] = before;
       const first = Math.max(0, Math.ceil(began / perColumn));

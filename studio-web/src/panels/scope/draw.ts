@@ -1,4 +1,5 @@
 import { shortNumber, shownNumber } from "../../lib/state/numbers";
+import type { Severity } from "../../lib/state/severity";
 import type { Studio } from "../../lib/state/studio.svelte";
 import { Columns, fill } from "./columns";
 import { isCurve, tracksOf, type Signal } from "./signals";
@@ -29,7 +30,7 @@ export interface Colours {
 
 export interface Mark {
   time_ns: bigint;
-  severity: "plain" | "warning" | "alarm";
+  severity: Severity;
 }
 
 export interface Scene {
@@ -38,6 +39,8 @@ export interface Scene {
   signals: readonly Signal[];
   marks: readonly Mark[];
   cursors: { a: bigint | null; b: bigint | null };
+  /** Of the past, that the page looks at. */
+  moment: bigint | null;
   trigger: { track: string; level: number } | null;
 }
 
@@ -98,8 +101,9 @@ export class Picture {
       this.lane(scene, signal, top, colours);
       top += LANE;
     }
-    this.cursor(scene, scene.cursors.a, "A", bottom, colours);
-    this.cursor(scene, scene.cursors.b, "B", bottom, colours);
+    this.cursor(scene, scene.moment, "◀", bottom, colours.warn, []);
+    this.cursor(scene, scene.cursors.a, "A", bottom, colours.accent, []);
+    this.cursor(scene, scene.cursors.b, "B", bottom, colours.accent, [5, 3]);
   }
 
   private x({ view }: Scene, time_ns: bigint): number {
@@ -137,11 +141,11 @@ export class Picture {
     for (const { time_ns, severity } of scene.marks) {
       const x = this.x(scene, time_ns);
       if (x < LEFT || x > LEFT + this.inner) continue;
-      this.ctx.fillStyle = { plain: colours.dim, warning: colours.warn, alarm: colours.danger }[severity];
+      this.ctx.fillStyle = { information: colours.dim, warning: colours.warn, alarm: colours.danger }[severity];
       this.ctx.beginPath();
       this.ctx.moveTo(x - 4, 1);
       this.ctx.lineTo(x + 4, 1);
-      this.ctx.lineTo(x, severity === "plain" ? 6 : 10);
+      this.ctx.lineTo(x, severity === "information" ? 6 : 10);
       this.ctx.fill();
     }
   }
@@ -290,14 +294,21 @@ export class Picture {
     ctx.stroke();
   }
 
-  private cursor(scene: Scene, time_ns: bigint | null, name: string, bottom: number, colours: Colours): void {
+  private cursor(
+    scene: Scene,
+    time_ns: bigint | null,
+    name: string,
+    bottom: number,
+    colour: string,
+    dash: readonly number[],
+  ): void {
     if (time_ns === null) return;
     const x = this.x(scene, time_ns);
     if (x < LEFT || x > LEFT + this.inner) return;
     const { ctx } = this;
-    ctx.strokeStyle = ctx.fillStyle = colours.accent;
+    ctx.strokeStyle = ctx.fillStyle = colour;
     ctx.lineWidth = 1;
-    ctx.setLineDash(name === "A" ? [] : [5, 3]);
+    ctx.setLineDash([...dash]);
     this.line(x, MARKS, x, bottom);
     ctx.setLineDash([]);
     ctx.textAlign = "center";

@@ -5,7 +5,7 @@ export const t = texts(
     title: "Scope",
     picture: "Curves",
     pictureHelp:
-      "Drag to move in time, wheel to zoom. Keys: ← → move, + − zoom, A and B set the cursors, Home follows the present.",
+      "Drag to move in time, wheel to zoom. A click shows its moment in all panels. Keys: ← → move, + − zoom, A and B set the cursors, Home follows the present.",
     signals: "Signals",
     choose: "Choose signals",
     find: "Find a signal",
@@ -43,7 +43,7 @@ export const t = texts(
     title: "Oscyloskop",
     picture: "Przebiegi",
     pictureHelp:
-      "Przeciągnij, by przesunąć czas, kółkiem powiększ. Klawisze: ← → przesuwają, + − powiększają, A i B ustawiają kursory, Home wraca do teraz.",
+      "Przeciągnij, by przesunąć czas, kółkiem powiększ. Kliknięcie pokazuje swoją chwilę we wszystkich panelach. Klawisze: ← → przesuwają, + − powiększają, A i B ustawiają kursory, Home wraca do teraz.",
     signals: "Sygnały",
     choose: "Wybierz sygnały",
     find: "Szukaj sygnału",

@@ -21,6 +21,12 @@ export const t = texts(
     nothing: "Nothing.",
     jogLimit: "A held jog needs a speed of at most 5×.",
     now: "World time",
+    past: "The past",
+    lookBack: "Look back",
+    moment: "Moment to look at",
+    lookAt: "Look at this moment",
+    pastHelp:
+      "All panels show the moment, while the machine goes on. A click on an event, a frame or a curve does the same.",
   },
   {
     title: "Czas",
@@ -42,5 +48,11 @@ export const t = texts(
     nothing: "Nic.",
     jogLimit: "Ruch trzymany wymaga tempa najwyżej 5×.",
     now: "Czas świata",
+    past: "Przeszłość",
+    lookBack: "Patrz wstecz",
+    moment: "Chwila do obejrzenia",
+    lookAt: "Pokaż tę chwilę",
+    pastHelp:
+      "Wszystkie panele pokazują tę chwilę, a maszyna pracuje dalej. Tak samo działa kliknięcie zdarzenia, ramki lub przebiegu.",
   },
 );

@@ -12,7 +12,7 @@ from steptwin.m1486.present import state_of
 from steptwin.m1486.variants import Store, variant
 from steptwin.machine import MachineEvent
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, Selection, Terminals
-from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line, table
+from steptwin.world.kinds.m1486 import axes, build, control, faults, lanes, line, memory, programs, table
 from steptwin.world.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.world.kinds.m1486.table import M1486Spec
 from steptwin.world.kinds.m1486.view import M1486View
@@ -63,7 +63,9 @@ M1486: ControllerKind[M1486Spec, M1486Chip, M1486View] = ControllerKind(
     control=control.CONTROL,
     held_jog=M1486HeldJog,
     state=state_of,
-    texts=build.texts,
+    texts=memory.texts,
+    download=memory.download,
+    programs=programs.programs,
     view=M1486View,
     lanes=lanes.lanes,
     body=faults.body,

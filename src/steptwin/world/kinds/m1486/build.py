@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from steptwin.controllerstate import ProgramActivity
 from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.errors import SourceErrors
-from steptwin.m1486.check import check
+from steptwin.m1486.check import CheckedChipProgram, check
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.eeprom import image_of
-from steptwin.m1486.lines import interface
-from steptwin.m1486.present import state_of
+from steptwin.m1486.lines import Interface, interface
 from steptwin.m1486.variants import Store, Variant, variant
 from steptwin.world.kind import BuildContext, text_of
 from steptwin.world.kinds.m1486.table import M1486Spec
-from steptwin.world.programtexts import CHIP, ProgramText
 
 
 def build(spec: M1486Spec, memory: bytes | None, context: BuildContext) -> M1486Chip:
@@ -42,23 +39,17 @@ def _image(spec: M1486Spec, kind: Variant, memory: bytes | None, context: BuildC
         return memory if memory is not None and kind.store is Store.EEPROM else b""
     source = SourceText(spec.program, text_of(context, spec.program))
     checked = check(source.text, kind, interface(spec.interface))
-    if not checked.is_sound:
-        errors = [finding for finding in checked.diagnostics if finding.severity is Severity.ERROR]
-        raise SourceErrors(render(source, errors))
-    context.warn(source, checked.diagnostics)
+    context.accept(source, checked.diagnostics)
     return image_of(checked.program, kind)
 
 
-def texts(spec: M1486Spec, chip: M1486Chip, context: BuildContext) -> tuple[ProgramText, ...]:
-    """See `steptwin.world.kind.ControllerKind.texts`. It does not run where another program has been stored since."""
-    if spec.program is None:
-        return ()
-    source = SourceText(spec.program, text_of(context, spec.program))
-    checked = check(source.text, chip.variant, interface(spec.interface))
-    is_stored = chip.image == image_of(checked.program, chip.variant)
-    activity = state_of(chip, chip.now).program.state
-    is_running = is_stored and activity in (ProgramActivity.RUNNING, ProgramActivity.WAITING)
-    return (ProgramText(place="program", language=CHIP, source=source, diagnostics=checked.diagnostics, is_running=is_running),)
+def sound(source: SourceText, kind: Variant, drive: Interface) -> CheckedChipProgram:
+    """A program that was checked. Raises `SourceErrors`."""
+    checked = check(source.text, kind, drive)
+    if not checked.is_sound:
+        errors = [finding for finding in checked.diagnostics if finding.severity is Severity.ERROR]
+        raise SourceErrors(render(source, errors))
+    return checked
 
 
 def keep_memory(chip: M1486Chip, memory: bytes | None, keep: Callable[[bytes], None]) -> None:

@@ -11,7 +11,7 @@ from steptwin.m1486.variants import Store
 from steptwin.machine import Nanos
 from steptwin.world.faults.machine import AxisLoad, FaultyMachine
 from steptwin.world.faults.table import FaultKind, Need, Occasion
-from steptwin.world.kind import Service
+from steptwin.world.kind import LineUnit
 
 
 class M1486Body:
@@ -59,5 +59,5 @@ def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner:
     return image if stored is None else stored
 
 
-def body(chip: M1486Chip, service: Service, shafts: Mapping[int, AxisLoad]) -> M1486Body:
+def body(chip: M1486Chip, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> M1486Body:
     return M1486Body(chip, shafts.values())

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from steptwin.m1486.characterlog import CharacterLog, LineSplitter
 from steptwin.machine import Nanos
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
-from steptwin.words.characters import CharacterLog, LineSplitter
-from steptwin.words.frames import FrameLine
 from steptwin.world.kinds.m1486.line import ChipLine
 from steptwin.world.trace import TraceRecord
 

@@ -13,7 +13,7 @@ from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.status import ProgramState
 from steptwin.mic488.vision import VisionReceiver, VisionRecord
 from steptwin.world.kind import ControllerKind, LineKind, LinkKind, NamedRegisters, Selection, Terminals, Vision
-from steptwin.world.kinds.mic488 import axes, build, control, faults, line, table
+from steptwin.world.kinds.mic488 import axes, build, control, faults, line, memory, programs, table
 from steptwin.world.kinds.mic488.heldjog import Mic488HeldJog
 from steptwin.world.kinds.mic488.program_watch import watch_program
 from steptwin.world.kinds.mic488.table import Mic488Spec
@@ -97,7 +97,10 @@ MIC488: ControllerKind[Mic488Spec, Mic488Device, Mic488View] = ControllerKind(
     body=faults.body,
     keeps_memory=lambda device: device.firmware.stored_user_registers is not None,
     watch_program=watch_program,
-    texts=build.texts,
+    texts=memory.texts,
+    download=memory.download,
+    programs=programs.programs,
+    configuration=build.configuration,
     remarks=empty_banks,
     encoders=axes.ENCODERS,
     registers=NamedRegisters(

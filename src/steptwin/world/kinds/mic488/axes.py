@@ -11,7 +11,7 @@ from steptwin.mic488.core import check_turn
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inputs import index_input
-from steptwin.world.kind import Encoders
+from steptwin.world.kind import EncoderInputs
 from steptwin.world.lanes import AxisLane, plain_view
 from steptwin.world.scale import FULL_STEPS, DriveScale
 
@@ -48,7 +48,7 @@ def _shown(device: Mic488Device, now: Nanos) -> list[dict[str, object]]:
     return [{"axis": a.number, "counts": a.encoder_counts(now), "turned_by": a.encoder.coupling.value} for a in device.axes]
 
 
-ENCODERS: Encoders[Mic488Device] = Encoders(
+ENCODERS: EncoderInputs[Mic488Device] = EncoderInputs(
     reader=lambda device: device,
     counts_per_pulse=_counts_per_pulse,
     index_input=lambda number: f"IN{index_input(number - 1) + 1}",

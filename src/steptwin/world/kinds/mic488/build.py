@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.diagnostics import Severity, SourceText, render
-from steptwin.errors import Misuse, SourceErrors
-from steptwin.mic488.config import ConfigError, ControllerConfig, examine_config
+from steptwin.diagnostics import SourceText
+from steptwin.errors import Misuse
+from steptwin.mic488.config import ControllerConfig, examine_config
+from steptwin.mic488.configtext import config_text
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.inifile import IniFile
-from steptwin.mic488.present import place_of
 from steptwin.mic488.program import LoadedProgram, load, setup_of
 from steptwin.mic488.registers import firmware
-from steptwin.mic488.status import ProgramState
 from steptwin.wbc.check import check
 from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import dialect_for
@@ -20,7 +19,6 @@ from steptwin.wbc.machine import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.world.kind import BuildContext, text_of
 from steptwin.world.kinds.mic488.table import Mic488Spec, config_of
-from steptwin.world.programtexts import CSV, WBC, ProgramText
 
 
 def build(spec: Mic488Spec, memory: bytes | None, context: BuildContext) -> Mic488Device:
@@ -38,29 +36,13 @@ def build(spec: Mic488Spec, memory: bytes | None, context: BuildContext) -> Mic4
     )
 
 
-def texts(spec: Mic488Spec, device: Mic488Device, context: BuildContext) -> list[ProgramText]:
-    """See `steptwin.world.kind.ControllerKind.texts`. A program that was given as an image is the text made of it."""
-    sources, tables = _texts(spec, context)
-    setup, dialect = setup_of(_config(spec, context)), dialect_for(spec.firmware)
-    control, place = device.program, place_of(device)
-    found: list[ProgramText] = []
-    for bank, source in sources.items():
-        line = place.line if place is not None and (control.program_bank, place.file) == (bank, source.name) else None
-        found.append(
-            ProgramText(
-                place=f"program {bank}",
-                language=WBC,
-                source=source,
-                diagnostics=check(source.text, _table_for(bank, tables), setup, dialect).diagnostics,
-                is_running=line is not None and control.state is ProgramState.RUNNING,
-                line=line,
-            )
-        )
-    for bank, name in spec.positions:
-        source = SourceText(name, text_of(context, name))
-        findings = parse_positions(source.text)[1]
-        found.append(ProgramText(place=f"positions {bank}", language=CSV, source=source, diagnostics=findings))
-    return found
+def configuration(spec: Mic488Spec, device: Mic488Device, context: BuildContext) -> SourceText:
+    """See `steptwin.world.kind.ControllerKind.configuration`: the file itself unless the description changes some of it."""
+    if spec.config is not None:
+        source = IniFile.parse(context.data(spec.config), spec.config).source
+        if examine_config(IniFile.of_text(source.text), spec.firmware)[0] == device.config:
+            return source
+    return SourceText(f"{spec.name}.cfg", config_text(device.config, device.firmware))
 
 
 def _config(spec: Mic488Spec, context: BuildContext) -> ControllerConfig:
@@ -68,9 +50,7 @@ def _config(spec: Mic488Spec, context: BuildContext) -> ControllerConfig:
     if spec.config is not None:
         file = IniFile.parse(context.data(spec.config), spec.config)
         base, found = examine_config(file, spec.firmware)
-        if any(finding.severity is Severity.ERROR for finding in found):
-            raise ConfigError(file.source, found)
-        context.warn(file.source, found)
+        context.accept(file.source, found)
     return config_of(spec, base)
 
 
@@ -81,16 +61,15 @@ def _banks(
     sources, tables = _texts(spec, context)
     programs: dict[int, LoadedProgram] = {}
     for bank, name in spec.all_programs:
-        table = _table_for(bank, tables)
+        table = table_for(bank, tables)
         checked = check(sources[bank].text, table, setup_of(config), dialect_for(spec.firmware))
-        if checked.errors:
-            raise SourceErrors(render(sources[bank], checked.errors))
-        context.warn(sources[bank], checked.diagnostics)
+        context.accept(sources[bank], checked.diagnostics)
         programs[bank] = load(checked, name)
     return programs, tables
 
 
-def _table_for(bank: int, tables: Mapping[int, PositionTable]) -> PositionTable | None:
+def table_for(bank: int, tables: Mapping[int, PositionTable]) -> PositionTable | None:
+    """In which names of positions are found: the table of the same bank, or else the only one there is."""
     only = next(iter(tables.values())) if len(tables) == 1 else None
     return tables.get(bank, only)
 
@@ -107,7 +86,7 @@ def _texts(spec: Mic488Spec, context: BuildContext) -> tuple[dict[int, SourceTex
     for bank, name in spec.all_programs:
         if name.lower().endswith(IMAGE):
             sources[bank], table, doubts = program_of(context.data(name), name)
-            context.warn(sources[bank], doubts)
+            context.accept(sources[bank], doubts)
             if table.rows:
                 tables.setdefault(bank, table)
         else:
@@ -118,8 +97,5 @@ def _texts(spec: Mic488Spec, context: BuildContext) -> tuple[dict[int, SourceTex
 def _positions(name: str, context: BuildContext) -> PositionTable:
     source = SourceText(name, text_of(context, name))
     table, findings = parse_positions(source.text)
-    errors = [finding for finding in findings if finding.severity is Severity.ERROR]
-    if errors or table is None:
-        raise SourceErrors(render(source, errors))
-    context.warn(source, findings)
+    context.accept(source, findings)
     return table

@@ -12,7 +12,7 @@ from steptwin.wire.pdu import exception_pdu
 from steptwin.world.faults.kinds_frames import NEVER_SENT
 from steptwin.world.faults.machine import AxisLoad, FaultyMachine
 from steptwin.world.faults.table import FaultKind, Need
-from steptwin.world.kind import Service
+from steptwin.world.kind import LineUnit
 
 
 class EncoderShaft:
@@ -91,7 +91,7 @@ def _keeping(
     return keep
 
 
-def body(device: Mic488Device, service: Service, shafts: Mapping[int, AxisLoad]) -> Mic488Body:
+def body(device: Mic488Device, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> Mic488Body:
     """Mechanics move the axes that have them."""
     found = Mic488Body(device, *service)
     for number, shaft in shafts.items():

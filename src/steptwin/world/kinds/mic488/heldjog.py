@@ -23,7 +23,7 @@ LAPSED = "lapsed"
 BEGIN_NS: Nanos = 200 * MILLISECOND
 """In which the first request gets over the line."""
 OWN = frozenset({AxisStatus.POSITION, AxisStatus.REACHED, AxisStatus.CORRECTION})
-"""Statuses of an axis that is jogged; with another one somebody has stopped it, or it does something else."""
+"""Statuses of an axis during a jog; another status means that the axis was stopped or has another motion."""
 SAME = 1e-6
 """Velocities that differ by less, as a fraction, are the same: they go through a REAL."""
 

@@ -87,9 +87,9 @@ class ModbusBus(Line):
         else:
             super()._came(place, found, pieces)
 
-    def look(self, now: Nanos) -> None:
-        super().look(now)
-        self._master.look(now)
+    def update(self, now: Nanos) -> None:
+        super().update(now)
+        self._master.update(now)
 
     def deadline(self) -> Nanos | None:
         own, masters = super().deadline(), self._master.deadline()

@@ -3,8 +3,8 @@ it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 from steptwin.diagnostics import visible
@@ -17,7 +17,7 @@ from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
 from steptwin.state import Plain
 from steptwin.wbc import steps as s
-from steptwin.wbc.code import Cells, Execution, StepCode
+from steptwin.wbc.controller import Reader
 from steptwin.wbc.real import real_text
 from steptwin.world.kernel import Kernel
 
@@ -48,7 +48,8 @@ def watch_program(device: Mic488Device, kernel: Kernel, name: str) -> ProgramWat
 class ProgramWatch:
     """Observes the programs in the banks of a controller, as a part of its kernel. ``happened`` is in order of time.
 
-    It does not change the run: the code of each step is wrapped by one that compares the state before and after.
+    It does not change the run: a hook before each statement notes what the statement may change, and that is compared before the
+    next one, or when signals settle at the same moment.
     """
 
     def __init__(self, device: Mic488Device, kernel: Kernel, name: str) -> None:
@@ -57,111 +58,62 @@ class ProgramWatch:
         self._name = name
         self.happened: list[ProgramEvent] = []
         self._statement: tuple[Nanos, int | None] = (-1, None)
-        self._told_wait: int | None = None
-        programs: Mapping[int, LoadedProgram] = dict(device.program.programs)
-        for bank, program in programs.items():
-            self.program = program
-            steps = [self._watched(number, step) for number, step in enumerate(program.code.steps)]
-            if len(programs) > 1:
-                steps = [self._of(program, step) for step in steps]
-            device.program.programs[bank] = replace(program, code=replace(program.code, steps=tuple(steps)))
+        self._pending: Callable[[], None] | None = None
+        """Reports what the present statement has done."""
+        self.program = next(iter(device.program.programs.values()))
+        """The one that was executed last."""
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
+        device.program.machine.hook(self._begins)
         kernel.add_part(self)
         kernel.observers.append(self._edge)
 
-    def _of(self, program: LoadedProgram, code: StepCode) -> StepCode:
-        """The code of a step if there are several programs; it also marks its program as the one that acts."""
-
-        def step(machine: Execution, cells: Cells) -> int:
-            self.program = program
-            return code(machine, cells)
-
-        return step
-
-    def _executed(self, now: Nanos, number: int) -> None:
-        """Step ``number`` is executed."""
-
     # ------------------------------------------------------------------ what the program does
 
-    def _watched(self, number: int, code: StepCode) -> StepCode:
-        """The code of a step, wrapped so that its effects are reported."""
-        steps = self.program.steps
-        if number == len(steps):
-            return self._telling(number, code, "end", "the program ends")
-        step = steps[number]
-        if isinstance(step, s.WaitStep | s.WaitPosStep):
-            return self._waiting(number, code)
-        if isinstance(step, s.DelayStep):
-            return self._delaying(number, code)
-        if isinstance(step, s.EndStep):
-            return self._telling(number, code, "end", "the program ends")
-        if isinstance(step, s.ProgResetStep):
-            return self._telling(number, code, "reset", "drives off, the program begins again")
-        if isinstance(step, s.InterruptStep):
-            return self._telling(number, code, "interrupt", f"interrupt of {step.event.name}")
-        if isinstance(step, s.SetStep) and isinstance(step.target, s.RegisterOperand) and step.target.row.words:
-            return self._setting(number, code, step.target)
-        return self._noting(number, code)
-
-    def _noting(self, number: int, code: StepCode) -> StepCode:
-        def step(machine: Execution, cells: Cells) -> int:
-            self._note(machine.now, number)
-            return code(machine, cells)
-
-        return step
-
-    def _telling(self, number: int, code: StepCode, kind: str, text: str) -> StepCode:
-        def step(machine: Execution, cells: Cells) -> int:
-            self._note(machine.now, number)
-            self._tell(machine.now, kind, text, number)
-            return code(machine, cells)
-
-        return step
-
-    def _waiting(self, number: int, code: StepCode) -> StepCode:
-        def step(machine: Execution, cells: Cells) -> int:
-            told = self._told_wait
-            self._note(machine.now, number)
-            following = code(machine, cells)
-            if machine.waiting:
-                self._told_wait = number
-                if told != number:
-                    self._tell(machine.now, "wait", "waits", number)
-            return following
-
-        return step
-
-    def _delaying(self, number: int, code: StepCode) -> StepCode:
-        def step(machine: Execution, cells: Cells) -> int:
-            self._note(machine.now, number)
-            following = code(machine, cells)
-            self._tell(machine.now, "delay", f"waits {real_text((machine.not_before - machine.now) / SECOND)} s", number)
-            return following
-
-        return step
-
-    def _setting(self, number: int, code: StepCode, register: s.RegisterOperand) -> StepCode:
-        read = ACCESS[register.row.key].read(register.number)
-
-        def step(machine: Execution, cells: Cells) -> int:
-            self._note(machine.now, number)
-            before = read(machine.controller, machine.now)
-            following = code(machine, cells)
-            after = read(machine.controller, machine.now)
-            if after != before:
-                self._tell(machine.now, "register", f"{register.name} = {real_text(after)}", number)
-            return following
-
-        return step
-
-    def _note(self, now: Nanos, number: int) -> None:
-        """Step ``number`` is executed."""
+    def _begins(self, now: Nanos, number: int) -> None:
+        """Step ``number`` is executed now."""
+        self._finish()
         if now == self._statement[0]:
             # What the statement before it did to axes comes first, and keeps its line.
-            self.look(now)
+            self.update(now)
+        running = self.device.program.running
+        if running is not None:
+            self.program = running
         self._statement = now, number
-        self._told_wait = None
-        self._executed(now, number)
+        steps = self.program.steps
+        step = steps[number] if number < len(steps) else None
+        match step:
+            case None | s.EndStep():
+                self._tell(now, "end", "the program ends", number)
+            case s.ProgResetStep():
+                self._tell(now, "reset", "drives off, the program begins again", number)
+            case s.InterruptStep():
+                self._tell(now, "interrupt", f"interrupt of {step.event.name}", number)
+            case s.WaitStep() | s.WaitPosStep():
+                self._pending = partial(self._waits, now, number)
+            case s.DelayStep():
+                self._pending = partial(self._delays, now, number)
+            case s.SetStep(target=s.RegisterOperand() as register) if register.row.words:
+                read = ACCESS[register.row.key].read(register.number)
+                self._pending = partial(self._sets, now, number, register.name, read, read(self.device.program, now))
+
+    def _finish(self) -> None:
+        """Report what the statement that was executed last has done."""
+        if self._pending is not None:
+            pending, self._pending = self._pending, None
+            pending()
+
+    def _waits(self, now: Nanos, number: int) -> None:
+        if self.device.program.machine.waiting:
+            self._tell(now, "wait", "waits", number)
+
+    def _delays(self, now: Nanos, number: int) -> None:
+        duration = self.device.program.machine.not_before - now
+        self._tell(now, "delay", f"waits {real_text(duration / SECOND)} s", number)
+
+    def _sets(self, now: Nanos, number: int, name: str, read: Reader, before: float) -> None:
+        after = read(self.device.program, now)
+        if after != before:
+            self._tell(now, "register", f"{name} = {real_text(after)}", number)
 
     def line(self, step: int) -> int:
         """Line of the program's text, from 1."""
@@ -186,8 +138,9 @@ class ProgramWatch:
         """Of the part of the kernel that watches the axes: it only looks."""
         return None
 
-    def look(self, now: Nanos) -> None:
-        """Report the motions that axes have begun or ended."""
+    def update(self, now: Nanos) -> None:
+        """Report what the present statement has done, and the motions that axes have begun or ended."""
+        self._finish()
         for index, axis in enumerate(self.device.axes):
             known = self._axes[index]
             if axis.revision != known[1] or axis.status is not known[0]:

@@ -38,7 +38,7 @@ class Mic488View(MachineView):
 
     def write(self, register: str, value: float) -> None:
         """Write a register by name as a master does, over the line if there is one. Raises `Misuse`."""
-        self._plant.outside(do.Write(((self.name, register.upper(), float(value)),)))
+        self._plant.apply_input(do.Write(((self.name, register.upper(), float(value)),)))
 
 
 class _Axes(dict[int, "Mic488AxisView"]):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from steptwin.machine import Nanos
+from steptwin.mic488.framelog import FrameLog
+from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection, FrameObserver
-from steptwin.words.frames import FrameLine, FrameLog
 from steptwin.world.kinds.mic488.line import ModbusBus
 from steptwin.world.trace import TraceRecord
 

@@ -1,0 +1,176 @@
+"""What a calculator of motions is given, and what it answers, alike for every kind of controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from steptwin.calc.units import Dimension
+from steptwin.datasheet import Limits
+from steptwin.motion import Profile
+
+DISTANCE, VELOCITY, ACCELERATION, DECELERATION = "distance", "velocity", "acceleration", "deceleration"
+START, KNEE = "start_stop", "profile"
+MICROSTEP, QUALIFICATION = "microstep", "qualification"
+TIME, RISE, CONSTANT, FALL = "time", "acceleration_time", "constant_time", "deceleration_time"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """A number of a move."""
+
+    name: str
+    meaning: str
+    dimension: Dimension
+    unit: str
+    """``mm/s``."""
+    pulses: float = 1.0
+    """Pulses (per s, per s²) in one of its unit."""
+    limits: Limits
+    """Of its size; a distance may also be negative."""
+    choices: tuple[int, ...] = ()
+    """All that is permitted, where it is a choice; it cannot be calculated then."""
+    default: float | None = None
+    same_as: str | None = None
+    """The quantity whose value it has where none is given."""
+    code: str = ""
+    """What it is set with: the name of a register, the letter of a command. Empty: it is given with each motion."""
+    back: str = ""
+    """The same, for a negative value; ``code`` where there is no difference."""
+    detail: str = ""
+    """The fact of the controller's state that it is (`steptwin.controllerstate`)."""
+    source: str
+    """Section of the manual, or id of an interpretation."""
+
+
+class Formula(NamedTuple):
+    """A rule that gave the result."""
+
+    name: str
+    text: str
+    source: str
+
+
+class Model(Protocol):
+    """A kind of controller, as far as a move from rest to rest goes."""
+
+    @property
+    def title(self) -> str: ...
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All that determines a move."""
+        ...
+
+    def plan(self, values: Mapping[str, float]) -> Profile:
+        """As the controller plans it, from 0 on, in pulses; ``values`` need not be such as it takes."""
+        ...
+
+    def settable(self, name: str, value: float, values: Mapping[str, float]) -> float:
+        """The nearest value that the controller takes."""
+        ...
+
+    def check(self, values: Mapping[str, float]) -> None:
+        """Raises `Misuse` for values that do not go together."""
+        ...
+
+    def notes(self, values: Mapping[str, float], profile: Profile) -> list[str]:
+        """What is worth knowing of them."""
+        ...
+
+    def formulas(self, values: Mapping[str, float], profile: Profile) -> list[Formula]: ...
+
+
+class Part(NamedTuple):
+    """A part of a move. Velocities and distance in the units of the quantities."""
+
+    name: str
+    start_s: float
+    duration_s: float
+    from_velocity: float
+    to_velocity: float
+    distance: float
+
+
+class Setting(NamedTuple):
+    """What has to be set for the result."""
+
+    name: str
+    code: str
+    detail: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calculation:
+    """A move: with the values that the controller takes, and what they give."""
+
+    title: str
+    found: str | None
+    """The quantity that was calculated, None where all were given."""
+    exact: float | None
+    """Its value before it was rounded to what the controller takes."""
+    values: Mapping[str, float]
+    units: Mapping[str, str]
+    times: Mapping[str, float]
+    """``time`` and the times of acceleration, constant velocity and deceleration [s]."""
+    peak: float
+    """Highest velocity that is reached."""
+    reaches: bool
+    """Whether that is the velocity that was asked for."""
+    parts: tuple[Part, ...]
+    formulas: tuple[Formula, ...]
+    notes: tuple[str, ...]
+    settings: tuple[Setting, ...]
+    profile: Profile
+    """In pulses, from 0 on."""
+    pulses: float
+    """Pulses in the unit of distance."""
+    speed_pulses: float
+    """Pulses/s in the unit of velocity."""
+
+
+def plain(result: Calculation) -> dict[str, object]:
+    """As JSON has values; ``curve`` has points of the profile (`curve`)."""
+    return {
+        "title": result.title,
+        "found": result.found,
+        "exact": result.exact,
+        "values": dict(result.values),
+        "units": dict(result.units),
+        "times": dict(result.times),
+        "peak": result.peak,
+        "reaches": result.reaches,
+        "parts": [part._asdict() for part in result.parts],
+        "formulas": [formula._asdict() for formula in result.formulas],
+        "notes": list(result.notes),
+        "settings": [setting._asdict() for setting in result.settings],
+        "curve": [list(point) for point in curve(result)],
+    }
+
+
+class CurvePoint(NamedTuple):
+    """A moment of a move, in the units of its quantities."""
+
+    time_s: float
+    position: float
+    velocity: float
+
+
+POINTS_IN_PART = 24
+"""More are not seen in a picture; the last of a part is the first of the next."""
+
+
+def curve(result: Calculation) -> list[CurvePoint]:
+    """Points to draw: the ends of all parts, and some between them where the curve bends."""
+    points = [CurvePoint(0.0, 0.0, 0.0)]
+    begin = 0.0
+    for segment in result.profile.segments:
+        steps = POINTS_IN_PART if segment.c2 else 1
+        for step in range(steps + 1):
+            t = segment.end_s if step == steps else begin + (segment.end_s - begin) * step / steps
+            points.append(CurvePoint(t, segment.position(t) / result.pulses, segment.velocity(t) / result.speed_pulses))
+        begin = segment.end_s
+    points.append(CurvePoint(begin, result.profile.final_p / result.pulses, 0.0))
+    return points

@@ -1,0 +1,133 @@
+"""Units of distance, and how many pulses they are: from the mechanics of an axis, or from its GEAR.
+
+The pulse is what the controller counts: the pulse (imp) of a MIC488, the smallest microstep (full step/64) of an M1486.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from math import isfinite
+from types import MappingProxyType
+
+from steptwin.errors import Misuse
+from steptwin.nearmiss import NearMiss
+
+
+class Dimension(Enum):
+    """What a quantity measures. The value is its unit's suffix behind a unit of distance."""
+
+    DISTANCE = ""
+    SPEED = "/s"
+    ACCELERATION = "/s²"
+    TIME = "s"
+
+
+PULSE, STEP, REV, DEGREE, MM, CM, M = "imp", "step", "rev", "degree", "mm", "cm", "m"
+UNITS = (PULSE, STEP, REV, DEGREE, MM, CM, M)
+_ALIASES = {"pulse": PULSE, "pulses": PULSE, "microstep": PULSE, "microsteps": PULSE, "steps": STEP, "deg": DEGREE, "°": DEGREE}
+_OF_TIME = {"s": 1.0, "ms": 1e-3, "min": 60.0}
+_IN_REV = {REV: 1.0, DEGREE: 1.0 / 360.0}
+_IN_MM = {MM: 1.0, CM: 10.0, M: 1000.0}
+DEGREES_IN_A_TURN = 360.0
+LARGEST_RATIO = 1e6
+_TEXT = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d{1,3})?) *(\S*)\Z", re.ASCII | re.IGNORECASE)
+
+
+def _positive(name: str, value: float, unit: str) -> None:
+    if not (isfinite(value) and 0.0 < value <= LARGEST_RATIO):
+        raise Misuse(f"{name} = {value:g}{unit}: permitted are numbers above 0, up to {LARGEST_RATIO:g}{unit}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mechanics:
+    """What turns pulses into motion."""
+
+    motor_steps: float = 200.0
+    """Full steps in a revolution of the motor: 200 for 1.8°."""
+    microsteps: float = 1.0
+    """Pulses in a full step, as the drive is set; 64 for an M1486, which counts so."""
+    ratio: float = 1.0
+    """Revolutions of the motor in one of what it drives."""
+    lead: float | None = None
+    """Travel in one revolution of what is driven [mm]: lead of a screw, teeth × pitch of a pulley. None: it turns."""
+
+    def scale(self) -> Scale:
+        """Pulses in each unit. Raises `Misuse` for numbers that are no mechanics."""
+        _positive("motor steps", self.motor_steps, " step/rev")
+        _positive("microsteps", self.microsteps, "/step")
+        _positive("gear ratio", self.ratio, "")
+        rev = self.motor_steps * self.microsteps * self.ratio
+        pulses = {PULSE: 1.0, STEP: self.microsteps, **{unit: rev * part for unit, part in _IN_REV.items()}}
+        if self.lead is not None:
+            _positive("lead", self.lead, " mm/rev")
+            pulses |= {unit: rev / self.lead * part for unit, part in _IN_MM.items()}
+        return Scale(MappingProxyType(pulses))
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Pulses in each unit of distance that is known."""
+
+    pulses: Mapping[str, float]
+
+    @classmethod
+    def of_gear(cls, unit: str, gear: float) -> Scale:
+        """From GEAR, the pulses in one unit; the units that follow from it are known, too. Raises `Misuse`."""
+        unit = unit_of(unit)
+        if not (isfinite(gear) and gear > 0.0):
+            raise Misuse(f"gear = {gear:g} pulses/{unit}: permitted are numbers above 0")
+        pulses = {PULSE: 1.0, unit: gear}
+        for family in (_IN_REV, _IN_MM):
+            if unit in family:
+                pulses |= {other: gear / family[unit] * part for other, part in family.items()}
+        return cls(MappingProxyType(pulses))
+
+    def in_pulses(self, unit: str) -> float:
+        """Pulses in one ``unit``: its GEAR. Raises `Misuse` for a unit that is not known, or needs mechanics."""
+        known = unit_of(unit)
+        if known not in self.pulses:
+            need = "the lead [mm/rev]" if known in _IN_MM else "the motor's steps in a revolution and its microsteps"
+            raise Misuse(f"{unit} is not known in pulses: give {need}; known are {', '.join(self.pulses)}")
+        return self.pulses[known]
+
+
+def unit_of(text: str) -> str:
+    """The unit of distance of a name. Raises `Misuse` with those that there are."""
+    name = _ALIASES.get(text.strip().lower(), text.strip().lower())
+    if name not in UNITS:
+        raise Misuse(f"no unit {text!r}{NearMiss().hint(text, (*UNITS, *_ALIASES))}: units are {', '.join(UNITS)}")
+    return name
+
+
+def read_quantity(text: str, dimension: Dimension) -> tuple[float, str | None]:
+    """A number with its unit of distance (None: none was given), such as ``150 mm``, ``2.5rev/s``, ``600 rpm``; of time in
+    seconds. Raises `Misuse` for what is none of this dimension."""
+    match = _TEXT.match(text.strip())
+    if match is None:
+        raise Misuse(f"{text!r} is not a number with a unit: expected such as {_EXAMPLES[dimension]}")
+    value, suffix = float(match[1].replace(",", ".")), match[2].lower().replace("s2", "s²").replace("s^2", "s²")
+    if not isfinite(value):
+        raise Misuse(f"{text!r} is too large")
+    if not suffix:
+        return value, None
+    if dimension is Dimension.TIME:
+        if suffix not in _OF_TIME:
+            raise Misuse(f"{text!r} is not a time: units are {', '.join(_OF_TIME)}")
+        return value * _OF_TIME[suffix], None
+    if dimension is Dimension.SPEED and suffix == "rpm":
+        return value / 60.0, REV
+    name, slash, per = suffix.partition("/")
+    if slash + per != dimension.value:
+        raise Misuse(f"{text!r} has the unit of something else: expected such as {_EXAMPLES[dimension]}")
+    return value, unit_of(name)
+
+
+_EXAMPLES = {
+    Dimension.DISTANCE: "150mm, 2.5rev, 3200imp",
+    Dimension.SPEED: "60mm/s, 2.5rev/s, 600rpm",
+    Dimension.ACCELERATION: "300mm/s2, 20rev/s2",
+    Dimension.TIME: "2s, 250ms",
+}

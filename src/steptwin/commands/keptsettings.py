@@ -1,0 +1,30 @@
+"""Settings of devices that are kept before the first write: files in the state directory of the user."""
+
+from __future__ import annotations
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+
+from steptwin.errors import Misuse
+from steptwin.live.directory import private_directory
+from steptwin.system import reason
+
+
+def state_directory() -> Path:
+    """``XDG_STATE_HOME`` or ``~/.local/state``, on Windows ``LOCALAPPDATA``; in it ``steptwin``. It need not exist."""
+    base = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
+    return (Path(base) if base else Path.home() / ".local" / "state") / "steptwin"
+
+
+def keep_settings(machine: str, text: str) -> str:
+    """Write a new file with the settings of a machine; where it is. Raises `Misuse` where that is not possible."""
+    path = state_directory() / "settings"
+    try:
+        private_directory(path)
+        path /= f"{machine}-{datetime.now(UTC):%Y%m%d-%H%M%S-%f}.json"
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise Misuse(f"nothing was written: the settings of {machine} cannot be kept in {path}: {reason(error)}") from error
+    return str(path)

@@ -1,0 +1,84 @@
+"""`steptwin serve mic488`: MIC488 controllers made from options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from steptwin.commands.descriptions import Named
+from steptwin.commands.serve import ServeOptions, check_links, serve
+from steptwin.durations import duration_text
+from steptwin.errors import Misuse
+from steptwin.files.programbanks import parse_banks
+from steptwin.live.serving import check_line_timing
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.mic488.config import BAUDS
+from steptwin.mic488.registers import firmware as known_firmware
+from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.world.kinds.mic488.small import mic488_world
+
+MOST_GAP_MS = 10_000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServeMic488(ServeOptions):
+    """The command's options as given; see ``steptwin serve mic488 --help``."""
+
+    name: str = "mic488"
+    firmware: str = "1.70"
+    units: str | None = None
+    config: Path | None = None
+    programs: tuple[str, ...] = ()
+    positions: tuple[str, ...] = ()
+    vision: str | None = None
+    statement_time: Nanos = STATEMENT_TIME
+    lenient: bool = False
+    gap_ms: float | None = None
+    demo: bool = False
+
+
+def serve_mic488(options: ServeMic488) -> None:
+    """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
+    check_links(options, options.vision)
+    serve(options, partial(describe_mic488, options), describe_mic488(replace(options, faults=())))
+
+
+def describe_mic488(options: ServeMic488, named: Named = str) -> str:
+    """The description of the world to serve. Raises `Misuse` for invalid options."""
+    check_line_timing(options.line_timing, "real", "strict")
+    if options.baud is not None and options.baud not in BAUDS:
+        raise Misuse(f"--baud {options.baud}: permitted are {', '.join(map(str, BAUDS))} bit/s")
+    if options.demo and options.config is not None:
+        raise Misuse(f"--demo and --config {options.config}: the demo has a configuration of its own; give one of the two")
+    if options.gap_ms is not None and not 0.0 < options.gap_ms <= MOST_GAP_MS:
+        raise Misuse(f"--gap {options.gap_ms:g}: permitted are more than 0 and at most {MOST_GAP_MS:g} ms")
+    units: list[int] | list[None] = [None] if options.units is None else parse_units(options.units)
+    if options.vision is not None and len(units) > 1:
+        raise Misuse("--vision is for a single unit: a vision system belongs to one controller")
+    banks = known_firmware(options.firmware).banks
+    programs = parse_banks("--program", options.programs, banks)
+    positions = parse_banks("--positions", options.positions, banks)
+    gap = None if options.gap_ms is None else duration_text(round(options.gap_ms * MILLISECOND))
+    values = {
+        "firmware": options.firmware,
+        "config": None if options.config is None else named(options.config),
+        "programs": {bank: named(file) for bank, file in programs.items()} or None,
+        "positions": {bank: named(file) for bank, file in positions.items()} or None,
+        "statement_time": None if options.statement_time == STATEMENT_TIME else duration_text(options.statement_time),
+        "lenient": options.lenient or None,
+        "vision": options.vision,
+    }
+    return mic488_world(options.whole(gap=gap), units, values, demo=options.demo)
+
+
+def parse_units(text: str) -> list[int]:
+    """``1,2,5`` → slave addresses. Raises `Misuse`."""
+    units: list[int] = []
+    for part in text.split(","):
+        if not part.strip().isdecimal() or not 1 <= int(part) <= 247:
+            raise Misuse(f"--units {text}: {part.strip()!r} is not a slave address; permitted are 1 to 247, separated by commas")
+        if int(part) in units:
+            raise Misuse(f"--units {text}: {int(part)} is given twice")
+        units.append(int(part))
+    return units

@@ -1,0 +1,468 @@
+"""An editor's session with a debugger, as the Debug Adapter Protocol has it: requests in, responses and events out.
+
+It reads and writes nothing by itself. What runs is run in parts (`Adapter.go_on`), so that requests are answered meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+from steptwin.dap.launch import Launch, open_world, read_launch
+from steptwin.debug.debugger import Debugger, Travel
+from steptwin.debug.observer import Logged
+from steptwin.debug.points import AnyPoint
+from steptwin.debug.scopes import SCOPES
+from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Location, SetPoint, Stop, StopReason, Value
+from steptwin.durations import duration
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+
+Body: TypeAlias = Mapping[str, object]
+Send: TypeAlias = Callable[[str, Body], None]
+"""An event and its body."""
+Arguments: TypeAlias = Mapping[str, Any]
+
+FRAMES = 1000
+"""Frames of a thread, at most: a frame has the number of its thread times this, and its depth."""
+_STOPS_USUALLY = (Events.PROGRAM_ERROR, Events.WRONG_DATA)
+CAPABILITIES: Body = {
+    "supportsConfigurationDoneRequest": True,
+    "supportsFunctionBreakpoints": True,
+    "supportsConditionalBreakpoints": True,
+    "supportsHitConditionalBreakpoints": True,
+    "supportsLogPoints": True,
+    "supportsDataBreakpoints": True,
+    "supportsEvaluateForHovers": True,
+    "supportsStepBack": True,
+    "supportsSetVariable": True,
+    "supportsSetExpression": True,
+    "supportsRestartRequest": True,
+    "supportsTerminateRequest": True,
+    "supportsLoadedSourcesRequest": True,
+    "supportsBreakpointLocationsRequest": True,
+    "exceptionBreakpointFilters": [
+        {"filter": event.code, "label": event.title, "default": event in _STOPS_USUALLY} for event in Events
+    ],
+}
+_REASONS: Mapping[StopReason, str] = {
+    StopReason.ENTRY: "entry",
+    StopReason.STEP: "step",
+    StopReason.BREAKPOINT: "breakpoint",
+    StopReason.FUNCTION: "function breakpoint",
+    StopReason.DATA: "data breakpoint",
+    StopReason.EXCEPTION: "exception",
+}
+"""The others are pauses, for editors."""
+_HELP = (
+    "an expression such as n + 1 or IN3 = ON shows a value; 'go 1.5 s' goes to a moment of the past; 'branch' has the world go on"
+    " from there, so that values can be changed"
+)
+
+
+class _Text(NamedTuple):
+    """A text of a controller, and its file."""
+
+    machine: str
+    text: str
+    path: Path
+
+
+class Adapter:
+    """One session. ``send`` takes the events."""
+
+    def __init__(self, send: Send) -> None:
+        self._send = send
+        self._debugger: Debugger | None = None
+        self._world: World | None = None
+        self._launch: Launch | None = None
+        self._travel: Travel | None = None
+        self._texts: list[_Text] = []
+        self._lines: dict[Path, list[AnyPoint]] = {}
+        """Breakpoints in lines, by file."""
+        self._labels: list[AnyPoint] = []
+        self._data: list[AnyPoint] = []
+        self._first_line = self._first_column = 1
+        self.has_ended = False
+        """The session is over."""
+
+    @property
+    def is_running(self) -> bool:
+        return self._travel is not None
+
+    # ------------------------------------------------------------------ requests
+
+    def answer(self, command: str, arguments: Arguments) -> Body:
+        """The body of the response. Raises `SteptwinError` for what cannot be done."""
+        handler = _HANDLERS.get(command)
+        if handler is None:
+            raise Misuse(f"{command}: there is no such request here")
+        try:
+            return handler(self, arguments)
+        except SteptwinError:
+            raise
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise Misuse(f"{command}: an argument is missing or of another type ({type(error).__name__}: {error})") from error
+
+    def after(self, command: str) -> None:
+        """What comes after the response to a request that was answered."""
+        if command in ("launch", "attach"):
+            self._send("initialized", {})
+
+    def _stopped(self) -> Debugger:
+        """The debugger, which stands."""
+        if self.is_running:
+            raise Misuse("the program runs: pause it first")
+        return self._started()
+
+    def _started(self) -> Debugger:
+        if self._debugger is None:
+            raise Misuse("nothing was launched")
+        return self._debugger
+
+    def _initialize(self, arguments: Arguments) -> Body:
+        self._first_line = 1 if arguments.get("linesStartAt1", True) else 0
+        self._first_column = 1 if arguments.get("columnsStartAt1", True) else 0
+        return CAPABILITIES
+
+    def _launch_world(self, arguments: Arguments) -> Body:
+        if self._debugger is not None:
+            raise Misuse("launch: a program was launched already")
+        asked = read_launch(arguments)
+        world = open_world(asked, self._tell)
+        try:
+            debugger = Debugger(world)
+            texts = [
+                _Text(machine, text, (asked.folder / source.name).resolve())
+                for machine in debugger.threads
+                for text, source in debugger.texts(machine).items()
+            ]
+            if asked.world is not None and asked.program is not None:
+                _check_program(asked.program, asked.world, texts)
+        except SteptwinError:
+            world.close()
+            raise
+        debugger.on_log = self._log
+        self._world, self._launch, self._debugger, self._texts = world, asked, debugger, texts
+        return {}
+
+    def _attach(self, arguments: Arguments) -> Body:
+        twin = arguments.get("twin")
+        raise Misuse(f"attach: twin = {twin!r}: a twin that runs cannot be stopped yet; launch its description as 'world'")
+
+    def _configuration_done(self, arguments: Arguments) -> Body:
+        debugger, asked = self._stopped(), self._launch
+        self._run(debugger.running_to_entry() if asked is not None and asked.stop_on_entry else debugger.running())
+        return {}
+
+    def _restart(self, arguments: Arguments) -> Body:
+        if self.is_running:
+            self._end_travel()
+        debugger = self._started()
+        debugger.go(debugger.begin)
+        debugger.branch()
+        return self._configuration_done(arguments)
+
+    def _end(self, arguments: Arguments) -> Body:
+        self._end_travel()
+        if not self.has_ended:
+            self.has_ended = True
+            self._send("terminated", {})
+        if self._world is not None:
+            self._world.close()
+        return {}
+
+    # ------------------------------------------------------------------ breakpoints
+
+    def _set_lines(self, arguments: Arguments) -> Body:
+        path = Path(arguments["source"]["path"]).resolve()
+        texts = [text for text in self._texts if text.path == path]
+        wanted: Sequence[Arguments] = arguments.get("breakpoints") or ()
+        if not texts:
+            known = ", ".join(str(text.path) for text in self._texts) or "none"
+            reason = f"{path.name} is no program of this session: there are {known}"
+            return {"breakpoints": [{"verified": False, "message": reason} for _ in wanted]}
+        points: list[AnyPoint] = []
+        for one in wanted:
+            more = {ours: one[theirs] for ours, theirs in _OF_POINTS.items() if one.get(theirs)}
+            line = one["line"] - self._first_line + 1
+            points += [LinePoint(machine=text.machine, text=text.text, line=line, **more) for text in texts]
+        self._lines[path] = points
+        # One breakpoint of the editor is one in each controller that executes the file.
+        found = self._set_all(points)[:: len(texts)]
+        return {"breakpoints": [self._point(one, arguments["source"]) for one in found]}
+
+    def _set_labels(self, arguments: Arguments) -> Body:
+        more = [{ours: one[theirs] for ours, theirs in _OF_LABELS.items() if one.get(theirs)} for one in arguments["breakpoints"]]
+        self._labels = [LabelPoint(label=one["name"], **its) for one, its in zip(arguments["breakpoints"], more, strict=True)]
+        return {"breakpoints": [self._point(one) for one in self._set_all(self._labels)]}
+
+    def _data_info(self, arguments: Arguments) -> Body:
+        debugger = self._stopped()
+        reference = arguments.get("variablesReference") or 0
+        machine = self._machine_of_scope(reference) if reference else self._machine_of_frame(arguments.get("frameId"))
+        name = arguments["name"]
+        try:
+            debugger.evaluate(machine, name)
+        except Misuse as error:
+            return {"dataId": None, "description": str(error)}
+        return {"dataId": f"{machine}/{name}", "description": f"{name} of {machine}", "accessTypes": ["write"]}
+
+    def _set_data(self, arguments: Arguments) -> Body:
+        points: list[AnyPoint] = []
+        for one in arguments["breakpoints"]:
+            machine, _, name = one["dataId"].partition("/")
+            points.append(DataPoint(machine=machine, name=name, condition=one.get("condition") or None))
+        self._data = points
+        return {"breakpoints": [self._point(one) for one in self._set_all(points)]}
+
+    def _set_all(self, wanted: Sequence[AnyPoint]) -> Sequence[SetPoint]:
+        """Set all breakpoints; what became of some of them."""
+        everything: list[AnyPoint] = [*(point for points in self._lines.values() for point in points), *self._labels, *self._data]
+        debugger = self._started()
+        found = debugger.set_breakpoints(everything)
+        if self._launch is not None and self._launch.no_debug:
+            debugger.set_breakpoints(())
+        by_point = dict(zip(everything, found, strict=True))
+        return [by_point[point] for point in wanted]
+
+    def _point(self, found: SetPoint, source: object = None) -> Body:
+        body: dict[str, object] = {"id": found.number, "verified": found.is_set}
+        if found.problem:
+            body["message"] = found.problem
+        if found.line is not None:
+            body |= {"line": found.line - 1 + self._first_line, "source": source}
+        return body
+
+    def _set_events(self, arguments: Arguments) -> Body:
+        known = {event.code: event for event in Events}
+        unknown = [name for name in arguments["filters"] if name not in known]
+        if unknown:
+            raise Misuse(f"setExceptionBreakpoints: {unknown[0]!r} is none of {', '.join(known)}")
+        if not (self._launch is not None and self._launch.no_debug):
+            self._started().set_events([known[name] for name in arguments["filters"]])
+        return {}
+
+    def _locations(self, arguments: Arguments) -> Body:
+        path = Path(arguments["source"]["path"]).resolve()
+        first = arguments["line"] - self._first_line + 1
+        last = arguments.get("endLine", arguments["line"]) - self._first_line + 1
+        text = next((text for text in self._texts if text.path == path), None)
+        if text is None:
+            return {"breakpoints": []}
+        lines = self._started().statement_lines(text.machine, text.text)
+        return {"breakpoints": [{"line": line - 1 + self._first_line} for line in sorted(set(lines)) if first <= line <= last]}
+
+    # ------------------------------------------------------------------ running
+
+    def _run(self, travel: Travel) -> None:
+        self._travel = travel
+
+    def _starting(self, arguments: Arguments, *, name: str) -> Body:
+        debugger = self._stopped()
+        machine = self._machine(arguments["threadId"])
+        travels: Mapping[str, Callable[[], Travel]] = {
+            "continue": debugger.running,
+            "reverseContinue": debugger.running_back,
+            "next": lambda: debugger.stepping_over(machine),
+            "stepIn": lambda: debugger.stepping_in(machine),
+            "stepOut": lambda: debugger.stepping_out(machine),
+            "stepBack": lambda: debugger.stepping_back(machine),
+        }
+        self._run(travels[name]())
+        return {"allThreadsContinued": True} if name == "continue" else {}
+
+    def go_on(self) -> None:
+        """Do a part of what runs; nothing where nothing does."""
+        if self._travel is None:
+            return
+        try:
+            next(self._travel)
+        except StopIteration as end:
+            self._travel = None
+            self._report(end.value)
+        except SteptwinError as error:
+            self._travel = None
+            self._tell(f"error: {error}", "stderr")
+            self._report(self._started().pause())
+
+    def _end_travel(self) -> None:
+        if self._travel is not None:
+            self._travel.close()
+            self._travel = None
+
+    def _pause(self, arguments: Arguments) -> Body:
+        if self.is_running:
+            self._end_travel()
+            self._report(self._started().pause())
+        return {}
+
+    def _report(self, stop: Stop) -> None:
+        debugger, asked = self._started(), self._launch
+        if stop.reason is StopReason.IDLE and debugger.has_ended and not (asked is not None and asked.stop_at_end):
+            self._tell(f"{stop.text} at {_seconds(stop.time)}")
+            self.has_ended = True
+            self._send("terminated", {})
+            self._send("exited", {"exitCode": 0})
+            return
+        threads = debugger.threads
+        where = f" of {_seconds(debugger.present)}: the past" if debugger.is_past else ""
+        body: dict[str, object] = {
+            "reason": _REASONS.get(stop.reason, "pause"),
+            "description": f"{stop.reason.value} at {_seconds(stop.time)}{where}",
+            "threadId": threads.index(stop.machine) + 1 if stop.machine in threads else 1,
+            "allThreadsStopped": True,
+        }
+        if stop.text:
+            body["text"] = stop.text
+        if stop.points:
+            body["hitBreakpointIds"] = list(stop.points)
+        self._send("stopped", body)
+
+    # ------------------------------------------------------------------ what is shown
+
+    def _threads(self, arguments: Arguments) -> Body:
+        return {"threads": [{"id": number, "name": name} for number, name in enumerate(self._started().threads, start=1)]}
+
+    def _machine(self, thread: object) -> str:
+        threads = self._started().threads
+        if not isinstance(thread, int) or not 1 <= thread <= len(threads):
+            raise Misuse(f"threadId = {thread!r}: permitted are 1 to {len(threads)}")
+        return threads[thread - 1]
+
+    def _machine_of_frame(self, frame: object) -> str:
+        """Of the first controller where no frame is named."""
+        return self._machine(1 if not isinstance(frame, int) else frame // FRAMES)
+
+    def _stack(self, arguments: Arguments) -> Body:
+        thread = arguments["threadId"]
+        frames = self._stopped().stack(self._machine(thread))
+        first = arguments.get("startFrame") or 0
+        count = arguments.get("levels") or len(frames)
+        shown = [
+            {"id": thread * FRAMES + depth, "name": frame.name, **self._placed(frame.location)}
+            for depth, frame in list(enumerate(frames))[first : first + count]
+        ]
+        return {"stackFrames": shown, "totalFrames": len(frames)}
+
+    def _placed(self, location: Location) -> Body:
+        path = next(t.path for t in self._texts if (t.machine, t.text) == (location.machine, location.text))
+        line, column = self._first_line - 1, self._first_column - 1
+        return {
+            "source": {"name": path.name, "path": str(path)},
+            "line": location.line + line,
+            "column": location.column + column,
+            "endLine": location.end_line + line,
+            "endColumn": location.end_column + column,
+        }
+
+    def _sources(self, arguments: Arguments) -> Body:
+        paths = dict.fromkeys(text.path for text in self._texts)
+        return {"sources": [{"name": path.name, "path": str(path)} for path in paths]}
+
+    def _scopes(self, arguments: Arguments) -> Body:
+        thread = arguments["frameId"] // FRAMES
+        self._machine(thread)
+        return {
+            "scopes": [
+                {"name": name, "variablesReference": thread * FRAMES + number, "expensive": name == "Registers"}
+                for number, name in enumerate(SCOPES, start=1)
+            ]
+        }
+
+    def _machine_of_scope(self, reference: int) -> str:
+        return self._machine(reference // FRAMES)
+
+    def _scope_of(self, reference: int) -> str:
+        number = reference % FRAMES
+        if not 1 <= number <= len(SCOPES):
+            raise Misuse(f"variablesReference = {reference}: there is no such group of values")
+        return SCOPES[number - 1]
+
+    def _variables(self, arguments: Arguments) -> Body:
+        reference = arguments["variablesReference"]
+        found = self._stopped().scope(self._machine_of_scope(reference), self._scope_of(reference)).values
+        first = arguments.get("start") or 0
+        count = arguments.get("count") or len(found)
+        return {"variables": [_variable(value) for value in found[first : first + count]]}
+
+    def _evaluate(self, arguments: Arguments) -> Body:
+        debugger, text = self._stopped(), arguments["expression"].strip()
+        if arguments.get("context") == "repl":
+            word, _, rest = text.partition(" ")
+            if word == "help":
+                return {"result": _HELP, "variablesReference": 0}
+            if word == "branch" and not rest:
+                debugger.branch()
+                return {"result": f"the world goes on from {_seconds(debugger.now)}", "variablesReference": 0}
+            if word == "go" and rest:
+                self._report(debugger.go(duration(rest)))
+                return {"result": f"at {_seconds(debugger.now)}", "variablesReference": 0}
+        value = debugger.evaluate(self._machine_of_frame(arguments.get("frameId")), text)
+        return {"result": value.text, "variablesReference": 0}
+
+    def _set_variable(self, arguments: Arguments) -> Body:
+        machine = self._machine_of_scope(arguments["variablesReference"])
+        return {"value": self._stopped().set_value(machine, arguments["name"], arguments["value"]).text}
+
+    def _set_expression(self, arguments: Arguments) -> Body:
+        machine = self._machine_of_frame(arguments.get("frameId"))
+        return {"value": self._stopped().set_value(machine, arguments["expression"].strip(), arguments["value"]).text}
+
+    # ------------------------------------------------------------------ the console
+
+    def _tell(self, text: str, category: str = "console") -> None:
+        self._send("output", {"category": category, "output": f"{text}\n"})
+
+    def _log(self, logged: Logged) -> None:
+        placed = self._placed(self._started().location(logged.machine, logged.place))
+        self._send("output", {"category": "console", "output": f"{_seconds(logged.time)}  {logged.text}\n", **placed})
+
+
+_OF_POINTS = {"condition": "condition", "hits": "hitCondition", "log": "logMessage"}
+_OF_LABELS = {"condition": "condition", "hits": "hitCondition"}
+_RUNNING = ("continue", "reverseContinue", "next", "stepIn", "stepOut", "stepBack")
+_HANDLERS: Mapping[str, Callable[[Adapter, Arguments], Body]] = {
+    "initialize": Adapter._initialize,
+    "launch": Adapter._launch_world,
+    "attach": Adapter._attach,
+    "configurationDone": Adapter._configuration_done,
+    "restart": Adapter._restart,
+    "disconnect": Adapter._end,
+    "terminate": Adapter._end,
+    "setBreakpoints": Adapter._set_lines,
+    "setFunctionBreakpoints": Adapter._set_labels,
+    "dataBreakpointInfo": Adapter._data_info,
+    "setDataBreakpoints": Adapter._set_data,
+    "setExceptionBreakpoints": Adapter._set_events,
+    "breakpointLocations": Adapter._locations,
+    "pause": Adapter._pause,
+    "threads": Adapter._threads,
+    "stackTrace": Adapter._stack,
+    "loadedSources": Adapter._sources,
+    "scopes": Adapter._scopes,
+    "variables": Adapter._variables,
+    "evaluate": Adapter._evaluate,
+    "setVariable": Adapter._set_variable,
+    "setExpression": Adapter._set_expression,
+    **{name: partial(Adapter._starting, name=name) for name in _RUNNING},
+}
+
+
+def _check_program(program: Path, world: Path, texts: Sequence[_Text]) -> None:
+    """Raises `Misuse` for a program that is none of a world."""
+    if program.resolve() not in [text.path for text in texts]:
+        known = ", ".join(str(text.path) for text in texts)
+        raise Misuse(f"launch: {program} is no program of {world}: there are {known}")
+
+
+def _variable(value: Value) -> Body:
+    hint = {} if value.is_settable else {"presentationHint": {"attributes": ["readOnly"]}}
+    return {"name": value.name, "value": value.text, "variablesReference": 0, "evaluateName": value.name, **hint}
+
+
+def _seconds(time: int) -> str:
+    return f"{time / SECOND:.6f} s"

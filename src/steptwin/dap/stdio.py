@@ -1,0 +1,93 @@
+"""The debug adapter on standard input and output."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Mapping
+from itertools import count
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import Any, BinaryIO
+
+from steptwin.dap.adapter import Adapter
+from steptwin.dap.wire import message_bytes, read_message
+from steptwin.errors import Misuse, SteptwinError
+
+
+def serve_stdio() -> None:
+    """Serve an editor until it goes away."""
+    source, target = sys.stdin.buffer, sys.stdout.buffer
+    sys.stdout = sys.stderr  # nothing but messages may go there
+    serve(source, target)
+
+
+def serve(source: BinaryIO, target: BinaryIO) -> None:
+    """Serve one session on two streams."""
+    _Session(source, target).run()
+
+
+class _Session:
+    def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
+        self._source, self._target = source, target
+        self._numbers = count(1)
+        self._waiting: SimpleQueue[dict[str, Any] | Misuse | None] = SimpleQueue()
+        self._adapter = Adapter(self._event)
+
+    def run(self) -> None:
+        Thread(target=self._read, daemon=True).start()
+        while True:
+            try:
+                message = self._waiting.get(block=not self._adapter.is_running)
+            except Empty:
+                self._adapter.go_on()
+                continue
+            if message is None:
+                return
+            if isinstance(message, Misuse):
+                sys.stderr.write(f"steptwin dap: {message}\n")
+                return
+            if message.get("type") == "request" and not self._answered(message):
+                return
+
+    def _read(self) -> None:
+        while True:
+            try:
+                message = read_message(self._source)
+            except Misuse as error:
+                self._waiting.put(error)
+                return
+            except (OSError, ValueError):
+                message = None
+            self._waiting.put(message)
+            if message is None or message.get("command") == "disconnect":
+                return
+
+    def _answered(self, request: Mapping[str, Any]) -> bool:
+        """Answer a request; False where it was the last."""
+        command = str(request.get("command"))
+        arguments = request.get("arguments")
+        response: dict[str, object] = {"type": "response", "request_seq": request.get("seq", 0), "command": command}
+        try:
+            body = self._adapter.answer(command, arguments if isinstance(arguments, dict) else {})
+        except SteptwinError as error:
+            self._write({**response, "success": False, **_failure(str(error))})
+            return True
+        except Exception as error:  # noqa: BLE001 - the editor is told, and the session goes on
+            traceback.print_exc()
+            self._write({**response, "success": False, **_failure(f"a mistake in steptwin: {type(error).__name__}: {error}")})
+            return True
+        self._write({**response, "success": True, "body": body})
+        self._adapter.after(command)
+        return command != "disconnect"
+
+    def _event(self, name: str, body: Mapping[str, object]) -> None:
+        self._write({"type": "event", "event": name, "body": body})
+
+    def _write(self, message: Mapping[str, object]) -> None:
+        self._target.write(message_bytes({"seq": next(self._numbers), **message}))
+        self._target.flush()
+
+
+def _failure(text: str) -> dict[str, object]:
+    return {"message": text, "body": {"error": {"id": 1, "format": "{text}", "variables": {"text": text}, "showUser": True}}}

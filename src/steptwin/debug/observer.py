@@ -1,0 +1,124 @@
+"""What a debugger observes in a world that runs: statements, breakpoints, events, values that change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import NamedTuple
+
+from steptwin.debug.points import Point, Points
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.statements import StatementHook
+from steptwin.world.plant import Plant
+from steptwin.world.programs import Place, Programs
+from steptwin.world.trace import TraceRecord
+
+
+class Begun(NamedTuple):
+    """A statement that was executed, with the breakpoints at it.
+
+    ``hit`` are those whose conditions hold, ``undecided`` those whose conditions are known only where the world stands before it.
+    """
+
+    time: Nanos
+    machine: str
+    place: Place
+    depth: int
+    hit: tuple[Point, ...]
+    undecided: tuple[Point, ...]
+
+    @property
+    def stand(self) -> Nanos:
+        """The last moment before it."""
+        return self.time - 1
+
+
+class Logged(NamedTuple):
+    time: Nanos
+    machine: str
+    place: Place
+    text: str
+
+
+class ObservedEvent(NamedTuple):
+    """An event of a controller."""
+
+    time: Nanos
+    machine: str
+    code: str
+    text: str
+
+
+class Observer:
+    """Observes the world ``world``, which nobody else uses.
+
+    Of controllers in ``stepping`` every statement is noted; of others those at breakpoints. It notes only while ``is_on``.
+    """
+
+    def __init__(self, world: Plant, points: Points) -> None:
+        self.world = world
+        self.points = points
+        self.is_on = False
+        self.stepping: Collection[str] = ()
+        self.codes: Collection[str] = ()
+        """Of events that are noted."""
+        self.begun: list[Begun] = []
+        self.logged: list[Logged] = []
+        self.happened: list[ObservedEvent] = []
+        for machine, programs in world.programs.items():
+            programs.hook(self._hook(machine, programs))
+        world.trace.watchers.append(self._recorded)
+
+    def clear(self) -> None:
+        self.begun.clear()
+        self.logged.clear()
+        self.happened.clear()
+
+    def _hook(self, machine: str, programs: Programs) -> StatementHook:
+        def hook(now: Nanos, number: int) -> None:
+            points = self.points.at.get(machine)
+            if not self.is_on or (not points and machine not in self.stepping):
+                return
+            place = programs.place(number)
+            if place is not None:
+                at = points.get(place, ()) if points else ()
+                if at or machine in self.stepping:
+                    self._begins(now, machine, programs, place, at)
+
+        return hook
+
+    def _begins(self, now: Nanos, machine: str, programs: Programs, place: Place, points: Collection[Point]) -> None:
+        hit: list[Point] = []
+        undecided: list[Point] = []
+        for point in points:
+            if point.condition is not None and not point.condition.is_local:
+                undecided.append(point)
+            elif point.holds(names := _local(programs, now)) and point.counts(now):
+                if point.log is None:
+                    hit.append(point)
+                else:
+                    self._log(now, machine, place, point, names)
+        if hit or undecided or machine in self.stepping:
+            self.begun.append(Begun(now, machine, place, programs.depth(), tuple(hit), tuple(undecided)))
+
+    def _log(self, now: Nanos, machine: str, place: Place, point: Point, names: Callable[[str], float]) -> None:
+        if point.log is not None:
+            try:
+                text = point.log.shown(names)
+            except Misuse as error:
+                text = f"log: {error}"
+            self.logged.append(Logged(now, machine, place, text))
+
+    def _recorded(self, record: TraceRecord) -> None:
+        if self.is_on and record.kind == "event" and record.subject in self.codes:
+            self.happened.append(ObservedEvent(record.time, record.machine, record.subject, str(record.value)))
+
+
+def _local(programs: Programs, now: Nanos) -> Callable[[str], float]:
+    def read(name: str) -> float:
+        value = programs.read(name, now)
+        if value is None:
+            raise Misuse(f"{name!r} means nothing here")
+        return value
+
+    return read

@@ -1,0 +1,170 @@
+"""Breakpoints as they are asked for while a world runs."""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeAlias
+
+from steptwin.debug.expression import Expression, HitCount, LogText, Names
+from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.nearmiss import NearMiss
+from steptwin.world.programs import Place, Programs
+
+AnyPoint: TypeAlias = LinePoint | LabelPoint | DataPoint
+
+
+class Point:
+    """A breakpoint at statements. Raises `Misuse` for a condition, hit count or log text that is none."""
+
+    def __init__(self, number: int, asked: LinePoint | LabelPoint, places: Mapping[str, Sequence[Place]]) -> None:
+        self.number = number
+        self.asked = asked
+        self.places = places
+        """By controller."""
+        self.condition = None if asked.condition is None else Expression(asked.condition)
+        self._counts = None if asked.hits is None else HitCount(asked.hits)
+        log = asked.log if isinstance(asked, LinePoint) else None
+        self.log = None if log is None else LogText(log)
+        if self.log is not None and any("." in name for name in self.log.names):
+            raise Misuse(f"log {log!r}: only names of the program can be in it")
+        self._times: array[int] = array("q")
+        """When the condition held, as far as hits are counted."""
+
+    def holds(self, names: Names) -> bool:
+        """Whether the condition holds. One that cannot be calculated does: it must not be overlooked."""
+        try:
+            return self.condition is None or self.condition.value(names) != 0.0
+        except Misuse:
+            return True
+
+    def counts(self, time: Nanos) -> bool:
+        """Whether this hit, at which the condition holds, is one that is asked for."""
+        if self._counts is None:
+            return True
+        times = self._times
+        if not times or time > times[-1]:
+            times.append(time)
+        at = bisect_left(times, time)
+        return times[at] == time and self._counts.counts(at + 1)
+
+    def forget_after(self, time: Nanos) -> None:
+        """What comes later will be different."""
+        del self._times[bisect_left(self._times, time + 1) :]
+
+    def take_hits(self, other: Point) -> None:
+        """Those of the same point, set before."""
+        self._times = other._times
+
+
+class Watch:
+    """A data breakpoint: what it looks at, and whether it is hit. Raises `Misuse` for a condition that is none."""
+
+    def __init__(self, number: int, asked: DataPoint) -> None:
+        self.number = number
+        self.machine = asked.machine
+        self.name = asked.name
+        text = asked.name if asked.condition is None else with_left_side(asked.name, asked.condition)
+        self.has_condition = asked.condition is not None
+        self.expression = Expression(text)
+
+    def value(self, names: Names) -> float | None:
+        """None where it is not known now, as a variable of a program that does not run."""
+        try:
+            return self.expression.value(names)
+        except Misuse:
+            return None
+
+    def is_hit(self, before: float | None, after: float | None) -> bool:
+        """A value must change, a condition come true."""
+        if self.has_condition:
+            return bool(after) and not before
+        return before is not None and after is not None and before != after
+
+
+def with_left_side(name: str, condition: str) -> str:
+    """``> 5`` as a condition on a value is ``VALUE > 5``."""
+    return f"{name} {condition}" if condition.lstrip()[:1] in "<>=!" else condition
+
+
+def places_of_line(programs: Mapping[str, Programs], asked: LinePoint) -> tuple[Place, int]:
+    """The first statement in a line or after it, and its line. Raises `Misuse`."""
+    if asked.machine not in programs:
+        raise Misuse(f"{asked.machine!r} has no program: {', '.join(programs) or 'no controller'} has one")
+    own = programs[asked.machine]
+    if asked.text not in own.texts:
+        raise Misuse(f"{asked.machine} has no text {asked.text!r}: texts are {', '.join(own.texts)}")
+    for number, statement in enumerate(own.statements(asked.text)):
+        if statement.line >= asked.line and statement.start < statement.end:
+            return Place(asked.text, number), statement.line
+    raise Misuse(f"no statement is in line {asked.line} of {own.texts[asked.text].name} or after it")
+
+
+def places_of_label(programs: Mapping[str, Programs], label: str) -> dict[str, list[Place]]:
+    """The statements at a label, by controller. Raises `Misuse` with the labels there are."""
+    found: dict[str, list[Place]] = {}
+    wanted = label.strip().lstrip("@").upper()
+    for machine, text, name, number in _labels(programs):
+        if name.upper() in (wanted, f"LABEL {wanted}"):
+            found.setdefault(machine, []).append(Place(text, number))
+    if not found:
+        known = list(dict.fromkeys(name for _, _, name, _ in _labels(programs)))
+        raise Misuse(f"no label is called {label!r}{NearMiss().hint(wanted, known)}; there are {', '.join(known) or 'none'}")
+    return found
+
+
+def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, int]]:
+    for machine, own in programs.items():
+        for text in own.texts:
+            for name, number in own.labels(text).items():
+                yield machine, text, name, number
+
+
+class Points:
+    """All breakpoints that are set."""
+
+    def __init__(self, programs: Mapping[str, Programs]) -> None:
+        self._programs = programs
+        self._all: list[Point] = []
+        self.watches: list[Watch] = []
+        self.at: dict[str, dict[Place, list[Point]]] = {}
+        """By controller and statement."""
+        self._next = 1
+
+    def set(self, asked: Sequence[AnyPoint]) -> list[SetPoint]:
+        """Set these and no others. Those that were set before keep their number and their hits."""
+        known: dict[AnyPoint, Point] = {point.asked: point for point in self._all}
+        self._all, self.watches, self.at = [], [], {}
+        return [self._set(one, known) for one in asked]
+
+    def _set(self, asked: AnyPoint, known: Mapping[AnyPoint, Point]) -> SetPoint:
+        before = known.get(asked)
+        number = self._next if before is None else before.number
+        self._next += before is None
+        try:
+            if isinstance(asked, DataPoint):
+                self.watches.append(Watch(number, asked))
+                return SetPoint(number)
+            line: int | None = None
+            if isinstance(asked, LabelPoint):
+                places = places_of_label(self._programs, asked.label)
+            else:
+                place, line = places_of_line(self._programs, asked)
+                places = {asked.machine: [place]}
+            point = Point(number, asked, places)
+        except Misuse as error:
+            return SetPoint(number, problem=str(error))
+        if before is not None:
+            point.take_hits(before)
+        self._all.append(point)
+        for machine, its_places in places.items():
+            for place in its_places:
+                self.at.setdefault(machine, {}).setdefault(place, []).append(point)
+        return SetPoint(number, [place for its in places.values() for place in its], line)
+
+    def forget_after(self, time: Nanos) -> None:
+        for point in self._all:
+            point.forget_after(time)

@@ -1,0 +1,141 @@
+"""The values of a controller in groups, for people: variables, axes, pins, controller, registers; and what a name means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from steptwin.controllerstate import StateAxis, StateStatus, detail_text
+from steptwin.datasheet import Access
+from steptwin.debug.expression import Expression, number_text
+from steptwin.debug.values import Scope, Value
+from steptwin.errors import Misuse
+from steptwin.machine import MotionController
+from steptwin.points import LivePoint
+from steptwin.world.actions import ExternalInput, SetVariable
+from steptwin.world.kind import AnyKind
+from steptwin.world.plant import Plant
+from steptwin.world.script import Set, Write
+
+VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = "Variables", "Axes", "Pins", "Controller", "Registers", "World"
+SCOPES = (VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS)
+
+
+def scope(world: Plant, machine: str, name: str) -> Scope:
+    """One of `SCOPES` of a controller, at the present moment of its world. Raises `Misuse`."""
+    world.touch(machine)
+    if name not in SCOPES:
+        raise Misuse(f"no group of values is called {name!r}: there are {', '.join(SCOPES)}")
+    return Scope(name, list(_VALUES[name](world, machine)))
+
+
+def _variables(world: Plant, machine: str) -> Iterator[Value]:
+    for name, value in world.programs_of(machine).variables(world.now).items():
+        yield Value(name, number_text(value), value, is_settable=True)
+
+
+def _axes(world: Plant, machine: str) -> Iterator[Value]:
+    for axis in world.kind(machine).state(world.machine(machine), world.now).axes:
+        yield from _axis(axis)
+
+
+def _axis(axis: StateAxis) -> Iterator[Value]:
+    yield _measured(f"{axis.name}.position", axis.position, axis.unit)
+    yield _measured(f"{axis.name}.velocity", axis.velocity, f"{axis.unit}/s")
+    moves = "" if axis.moving is None else ", moves" if axis.moving else ", at rest"
+    yield _status(f"{axis.name}.status", axis.status, moves)
+
+
+def _status(name: str, status: StateStatus, more: str = "") -> Value:
+    return Value(name, f"{status.text}{more}", None if status.code is None else float(status.code))
+
+
+def _measured(name: str, value: float | None, unit: str) -> Value:
+    return Value(name, "not known") if value is None else Value(name, f"{number_text(value)} {unit}".rstrip(), value)
+
+
+def _pins(world: Plant, machine: str) -> Iterator[Value]:
+    kind, device = world.kind(machine), world.machine(machine)
+    units = {pin.name: pin.unit for pin in kind.datasheet(device).pins}
+    inputs = {*kind.terminals.digital_inputs, *kind.terminals.analog_inputs}
+    for name, level in device.pins().items():
+        yield Value(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
+
+
+def _controller(world: Plant, machine: str) -> Iterator[Value]:
+    state = world.kind(machine).state(world.machine(machine), world.now)
+    yield Value("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
+    yield _status("status", state.status)
+    yield Value("program", state.program.text)
+    for name, detail in state.details.items():
+        yield Value(name, detail_text(detail))
+
+
+def _registers(world: Plant, machine: str) -> Iterator[Value]:
+    kind, device = world.kind(machine), world.machine(machine)
+    for point in kind.datasheet(device).points:
+        live = _live(kind, device, point.path)
+        if live is not None and live.read is not None:
+            value = float(live.read(world.now))
+            settable = kind.registers is not None and point.access is not Access.READ
+            yield Value(point.path, f"{number_text(value)} {point.unit}".rstrip(), value, is_settable=settable)
+
+
+def _live(kind: AnyKind, device: MotionController, path: str) -> LivePoint | None:
+    """None for a row of registers, of which one must be chosen; those that are not 0 are among `CONTROLLER`."""
+    try:
+        return kind.point(device, path)
+    except Misuse:
+        return None
+
+
+def _parts(world: Plant, machine: str) -> Iterator[Value]:
+    """Mechanics, by axis."""
+    for axis in world.axes:
+        name = f"{axis}.position"
+        yield _measured(name, world.read(name), world.signal(name).unit)
+
+
+_VALUES = {
+    VARIABLES: _variables, AXES: _axes, PINS: _pins, CONTROLLER: _controller, REGISTERS: _registers, PARTS: _parts,
+}  # fmt: skip
+
+
+def read(world: Plant, machine: str, name: str) -> float:
+    """What a name means to the program of a controller, or else in the world. Raises `Misuse`."""
+    world.touch(machine)
+    value = world.programs_of(machine).read(name, world.now)
+    if value is not None:
+        return value
+    owner = name.partition(".")[0]
+    if "." in name and (owner in world.machines or owner in world.parts.element_names):
+        return world.read(name)
+    try:
+        return world.read(f"{machine}.{name}")
+    except Misuse:
+        known = ", ".join(world.programs_of(machine).variables(world.now)) or "none"
+        raise Misuse(f"{name!r} means nothing to {machine}: its variables are {known}") from None
+
+
+def evaluate(world: Plant, machine: str, text: str) -> Value:
+    """The value of an expression. Raises `Misuse`."""
+    name = text.strip()
+    number = Expression(name).value(lambda name: read(world, machine, name))
+    return Value(name, number_text(number), number, is_settable=False)
+
+
+def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInput:
+    """What gives a variable, an input or a register another value. Raises `Misuse` for what cannot be set."""
+    own = world.programs_of(machine)
+    variables = {known.upper(): known for known in own.variables(world.now)}
+    if name.upper() in variables:
+        return SetVariable(machine, variables[name.upper()], value)
+    owner, dot, rest = name.partition(".")
+    target, path = (owner, rest) if dot and owner in world.machines else (machine, name)
+    kind, device = world.kind(target), world.machine(target)
+    if path.upper() in device.pins():
+        return Set(((target, kind.input_pin(path, value), value),))
+    if kind.registers is not None and kind.point(device, path) is not None:
+        world.requests(target, ((path, value),))  # raises `Misuse`
+        return Write(((target, path, value),))
+    known = ", ".join(variables.values()) or "none"
+    raise Misuse(f"{name!r} cannot be set: what can be are variables ({known}), inputs and registers that can be written")

@@ -1,0 +1,110 @@
+"""Jogging a chip as a dead-man's switch: a row of short moves (F or B), each of which begins when the one before it has ended.
+
+G+ and G- are never used: nothing ends them. No move is cut short, because Kill makes the position counter wrong (M-16). If the
+program dies or the line is cut, the chip completes its present move and gets no further one.
+"""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from steptwin.drivers.exchange import Overtaken, TooLate
+from steptwin.drivers.m1486.download import begin
+from steptwin.drivers.m1486.motion import ChipMotion
+from steptwin.drivers.permission import Permission
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.m1486.microsteps import FULL_STEP
+from steptwin.m1486.unit import MASK
+from steptwin.m1486.variants import Store
+from steptwin.machine import SECOND, Nanos
+
+if TYPE_CHECKING:
+    from steptwin.drivers.m1486.driver import AsyncM1486
+
+LINK_S = 0.15
+"""A move is as long as the velocity of the jog makes in this time; it lasts longer by its ramps."""
+BEGIN_NS: Nanos = SECOND
+"""A move is begun at most so long after the last sign of the one before it: a program that was suspended begins none."""
+PATIENCE_NS: Nanos = 2 * SECOND
+"""A move that lasts longer is not one of a jog: LIMIT or Kill holds the chip."""
+
+
+class AsyncM1486Jog:
+    """A jog at ``velocity`` (units/s): ``async with jog: while pressed(): await jog.hold()``.
+
+    `hold` waits for the end of the present move and begins the next one; False when the motor was stopped otherwise, which `end`
+    says. After the last `hold` the motor moves `reach` at most. V is that of the jog while it lasts, and is put back where it
+    was known. Raises `Misuse` for a velocity that V cannot have, `Refusal` for E types, which write every command into their
+    EEPROM.
+    """
+
+    def __init__(self, chip: AsyncM1486, velocity: float) -> None:
+        if not velocity:
+            raise Misuse("velocity = 0: the sign of the velocity is the direction")
+        if chip.variant.store is Store.EEPROM:
+            raise Refusal(f"{chip.variant.title} writes every command into its EEPROM, so it is not jogged")
+        self._chip = chip
+        self._unit = chip._unit
+        self._direction = 1 if velocity > 0.0 else -1
+        self._velocity = round(abs(velocity) * chip.scale_u / (FULL_STEP * chip.variant.clock))
+        self._before = chip.settings.velocity
+        self._distance_u = 0
+        self._counter = 0
+        self._permission: Permission | None = None
+        """For the next move; it ends with a stop, or when the program was suspended."""
+        self.end: str | None = None
+
+    @property
+    def reach(self) -> float:
+        """The longest distance that the motor moves after the last `hold`, in the unit of the chip."""
+        return self._distance_u / self._chip.scale_u
+
+    async def __aenter__(self) -> Self:
+        begun = self._unit.permission()
+        await self._chip.configure(velocity=self._velocity)
+        grid_u = self._chip.settings.grid_u
+        speed_u = self._velocity * FULL_STEP * self._chip.variant.clock
+        self._distance_u = max(1, round(speed_u * LINK_S / grid_u)) * grid_u
+        self._permission = Permission(self._unit.line.now, BEGIN_NS, begun.is_stopped)
+        async with self._unit.turn():
+            self._counter = await self._unit.read_number(1)
+            await self._go(begun)
+        return self
+
+    async def hold(self) -> bool:
+        """See the class. Raises `LineFailure`; the motor then stops by itself."""
+        if self._permission is None:
+            raise Misuse("a jog is held inside its with block")
+        if self.end is not None:
+            return False
+        permission = Permission(self._unit.line.now, BEGIN_NS, self._permission.is_stopped)
+        async with self._unit.turn():
+            if await self._unit.asks_who(PATIENCE_NS, permission) is None:
+                self.end = f"the chip {self._unit.why_busy()}"
+            elif permission.is_stopped():
+                self.end = "stopped"
+            else:
+                try:
+                    await self._go(permission)
+                except (Overtaken, TooLate) as refusal:
+                    self.end = str(refusal)
+        return self.end is None
+
+    async def _go(self, permission: Permission) -> None:
+        way_u = self._direction * self._distance_u
+        self._counter = self._counter + way_u & MASK
+        await self._unit.send(f"{'f' if way_u > 0 else 'b'}{self._distance_u}")
+        duration_s = self._chip.settings.travel_s(way_u, self._chip.variant)
+        await begin(self._unit, "r", ChipMotion.MOVE, permission, target_u=self._counter, duration_s=duration_s)
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Wait for the end of the present move, and put V back."""
+        try:
+            end = await self._chip.wait(check=False)
+            self.end = self.end or ("released" if end.ok else str(end))
+            if self._before is not None:
+                await self._chip.configure(velocity=self._before)
+        except SteptwinError:
+            if error is None:
+                raise

@@ -1,0 +1,119 @@
+"""The past of a live world, kept from its beginning on, and moments of it for whoever looks back while the world goes on."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from time import perf_counter
+
+from steptwin.errors import Refusal, SteptwinError
+from steptwin.later import Later
+from steptwin.live.cell import Cell
+from steptwin.live.pace import Pace
+from steptwin.live.world import LiveWorld
+from steptwin.machine import Nanos
+from steptwin.subject.world import WorldSubject
+from steptwin.world.history import History, Past
+from steptwin.world.plant import PlantSnapshot
+from steptwin.world.programtexts import WorldPrograms
+
+STATE_S = 1.0
+"""A state is kept so often, in real time: what is replayed from it then took no longer when it happened."""
+PART_S = 0.01
+"""While a moment is looked for, clients of the world wait at most so long, and are served as long. [real time]"""
+MOST_LOOKS = 8
+"""Worlds besides the one that goes on."""
+
+
+class Lookback:
+    """Of ``live``, from now on. A `Link` of its server."""
+
+    def __init__(self, live: LiveWorld, cell: Cell, pace: Pace) -> None:
+        self._live = live
+        self._cell = cell
+        self._pace = pace
+        self._looks = 0
+        self._history = live.history = History(live.world)
+        self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
+
+    def _keep(self) -> None:
+        self._cell.enter()
+        self._history.take()
+        self._live.stale = True
+        self._cell.leave()
+        self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
+
+    async def close(self) -> None:
+        self._timer.cancel()
+        self._live.history = None
+        self._history.close()
+
+    @property
+    def begin(self) -> Nanos:
+        """The oldest moment that can be looked at."""
+        return self._history.begin
+
+    def open(self) -> Look:
+        """For one more who looks back. Raises `Refusal` where there are too many."""
+        if self._looks >= MOST_LOOKS:
+            raise Refusal(f"{MOST_LOOKS} viewers look back already, which is the most")
+        self._looks += 1
+        return Look(Past(self._history), self._go_back, self._closed)
+
+    def _closed(self) -> None:
+        self._looks -= 1
+
+    def _go_back(self, snapshot: PlantSnapshot) -> None:
+        inputs = tuple(given for given in self._live.world.inputs if given.time <= snapshot.now)
+        self._pace.go_back(replace(snapshot, inputs=inputs))
+
+
+class Look:
+    """A moment of the past, to be looked at in `subject` and `programs`."""
+
+    def __init__(self, past: Past, go_back: Callable[[PlantSnapshot], None], closed: Callable[[], None]) -> None:
+        self._past = past
+        self._go_back = go_back
+        self._closed = closed
+        self._parts: Iterator[None] = iter(())
+        self._going: Later[None] | None = None
+        self.subject = WorldSubject(self._past.world)
+        self.programs = WorldPrograms(self._past.world)
+
+    @property
+    def now(self) -> Nanos:
+        return self._past.world.now
+
+    def go(self, moment: Nanos) -> Later[None]:
+        """To another moment, instead of one to which it goes still. Raises `Misuse` for one that is not kept."""
+        if self._going is not None:
+            self._going.fail(Refusal("another moment is looked for by now"))
+        self._going = later = Later[None]()
+        self._parts = self._past.go(moment)
+        self._part(later)
+        return later
+
+    def _part(self, later: Later[None]) -> None:
+        if later.is_done:
+            return
+        until = perf_counter() + PART_S
+        try:
+            for _ in self._parts:
+                if perf_counter() > until:
+                    asyncio.get_running_loop().call_later(PART_S, self._part, later)
+                    return
+        except SteptwinError as error:
+            later.fail(error)
+        else:
+            later.put(None)
+
+    def go_back(self) -> None:
+        """The world itself goes back to this moment; time stands there. Raises `Refusal`."""
+        self._go_back(self._past.world.snapshot())
+
+    def close(self) -> None:
+        """Nobody looks at it any more."""
+        if self._going is not None:
+            self._going.fail(Refusal("nobody looks back any more"))
+        self._closed()

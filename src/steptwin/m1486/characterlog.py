@@ -1,0 +1,109 @@
+"""Characters on the line of M1486 chips in words: commands as a host types them, and what the chips send."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from steptwin.m1486.commands import ArgType, find, grouped
+from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
+from steptwin.m1486.registers import UPLOADS
+from steptwin.m1486.syntax import Command, JumpCondition, parse_line
+from steptwin.m1486.variants import Variant
+from steptwin.machine import Nanos
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.slave import FrameDirection
+
+LONGEST_LINE = 256
+"""More characters than this without CR are shown as they are."""
+UPLOADS_WAITING = 1000
+"""Bytes announced and not seen on the line: they may have been lost there."""
+
+REPORTS = {
+    NO_ROOM: "no room in the input buffer: a character is lost",
+    EMPTY: "the input buffer is empty",
+    THREE_FREE: "three places are free in the input buffer",
+}
+"""What chips send unasked."""
+
+
+class CharacterLog:
+    """Puts characters into words and hands them to ``sinks``. The line to the host is shared, so its bytes come once."""
+
+    def __init__(self, variant: Variant) -> None:
+        self._variant = variant
+        self._uploads: deque[tuple[int, str]] = deque(maxlen=UPLOADS_WAITING)
+        self.sinks: list[Callable[[FrameLine], None]] = []
+
+    def upload(self, command: int, byte: int) -> None:
+        """A chip announces the byte that it sends for ``U<command>``; it comes over the line later."""
+        self._uploads.append((byte, f"U{command} {UPLOADS.get(command, 'reserved')}"))
+
+    def received(self, now: Nanos, link: str, raw: bytes) -> None:
+        """What a host typed up to CR."""
+        self._report(FrameLine(now, link, FrameDirection.IN, raw, _typed(raw, self._variant)))
+
+    def sent(self, now: Nanos, byte: int) -> None:
+        self._report(FrameLine(now, "line", FrameDirection.OUT, bytes((byte,)), self._sent(byte)))
+
+    def _sent(self, byte: int) -> str:
+        upload = next((i for i, (announced, _) in enumerate(self._uploads) if announced == byte), None)
+        if upload is not None:
+            for _ in range(upload):
+                self._uploads.popleft()  # lost on the line
+            return f"{self._uploads.popleft()[1]} = {byte}"
+        if byte in REPORTS:
+            return REPORTS[byte]
+        if byte > 0x7F:
+            return f"{chr(~byte & 0xFF)!r} inverted: it took one of the last three places of the input buffer"
+        return f"echo of {chr(byte)!r}"
+
+    def _report(self, line: FrameLine) -> None:
+        for sink in self.sinks:
+            sink(line)
+
+
+class LineSplitter:
+    """Cuts what one program sends into lines for the log."""
+
+    def __init__(self, log: CharacterLog, link: str) -> None:
+        self._log = log
+        self._link = link
+        self._begun = b""
+
+    def take(self, data: bytes, now: Nanos) -> None:
+        *lines, self._begun = (self._begun + data).split(b"\r")
+        for line in lines:
+            self._log.received(now, self._link, line + b"\r")
+        if len(self._begun) > LONGEST_LINE:
+            self._log.received(now, self._link, self._begun)
+            self._begun = b""
+
+
+def _typed(raw: bytes, variant: Variant) -> str:
+    text = raw.decode("latin-1").strip()
+    if raw[-1] != CR:
+        return f"{len(raw)} characters without CR"
+    line, found = parse_line(text)
+    if line.command is not None:
+        return f"{line.command}  {in_words(line.command, variant)}"
+    if found:
+        return f"{text}  {found[0].message}"
+    return "a comment" if line.comment is not None else "an empty line"
+
+
+def in_words(command: Command, variant: Variant) -> str:
+    """``Forward 12 800 min. microsteps``."""
+    argument = command.argument
+    if isinstance(argument, JumpCondition):
+        what = "line" if argument.line < 80 else "flag"
+        return f"If {what} {argument.line} is {'high' if argument.high else 'low'} go to {argument.label}"
+    spec = find(command.key, argument, variant)
+    if command.from_variable:
+        return "with the internal variable as number"
+    if spec is None:
+        return "out of range"
+    if argument is None:
+        return spec.name
+    number = f"{argument:X}" if spec.kind is ArgType.ADDRESS else grouped(argument)
+    return f"{spec.name} {number} {spec.unit}".rstrip()

@@ -1,0 +1,65 @@
+"""The frames of a Modbus line in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from steptwin.machine import Nanos
+from steptwin.mic488.describe import AxisScale, Wording
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.registermap import DataType
+from steptwin.wire.frameline import FrameLine
+from steptwin.wire.rtu import BROADCAST
+from steptwin.wire.slave import FrameDirection, FrameObserver
+
+ONE_DEVICE_UNITS = (0, 255)
+"""MIC-23: on TCP these address the only device too."""
+
+
+class FrameLog:
+    """Puts frames into words and hands them to ``sinks``."""
+
+    def __init__(self, devices: Mapping[int, Mic488Device]) -> None:
+        self._devices = devices
+        self._wording = {
+            unit: Wording(device.registers, [AxisScale(axis.unit_name, axis.gear) for axis in device.config.axes])
+            for unit, device in devices.items()
+        }
+        self.sinks: list[Callable[[FrameLine], None]] = []
+
+    def observer(self, link: str, *, tcp: bool) -> FrameObserver:
+        """An observer for the frames of one connection."""
+        asked: dict[int, bytes] = {}
+
+        def observe(now: Nanos, direction: FrameDirection, raw: bytes) -> None:
+            unit, pdu = (raw[6], raw[7:]) if tcp else (raw[0], raw[1:-2])
+            line = FrameLine(now, link, direction, raw, self._meaning(unit, pdu, direction, asked, tcp=tcp))
+            for sink in self.sinks:
+                sink(line)
+
+        return observe
+
+    def rubbish(self, now: Nanos, link: str, count: int) -> None:
+        """Bytes came that belong to no frame."""
+        words = "1 byte that belongs to no frame" if count == 1 else f"{count} bytes that belong to no frame"
+        line = FrameLine(now, link, FrameDirection.IN, b"", words)
+        for sink in self.sinks:
+            sink(line)
+
+    def _meaning(self, unit: int, pdu: bytes, direction: FrameDirection, asked: dict[int, bytes], *, tcp: bool) -> str:
+        several = len(self._devices) > 1
+        first = next(iter(self._devices))
+        if unit in self._devices:
+            addressed, whose = unit, f"unit {unit}: " if several else ""
+        elif unit == BROADCAST and (several or not tcp):
+            addressed, whose = first, "broadcast: "
+        elif tcp and unit in ONE_DEVICE_UNITS and not several:
+            addressed, whose = first, f"unit {unit}: "
+        else:
+            return f"unit {unit} is not served here"
+        wording = self._wording[addressed]
+        wording.data_type = DataType(self._devices[addressed].data_type)
+        if direction is FrameDirection.OUT:
+            return whose + wording.response(pdu, asked.pop(unit, None))
+        asked[unit] = pdu
+        return whose + wording.request(pdu)

@@ -1,0 +1,55 @@
+"""The motion calculator for the axes of a subject, as plain values: `steptwin.calc`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from steptwin.calc import TIMES, Calculator, Mechanics, Quantity, calculator_of, plain
+from steptwin.errors import Refusal
+from steptwin.studio.machines import Sheets
+
+
+class Calculations:
+    def __init__(self, sheets: Sheets) -> None:
+        self._sheets = sheets
+
+    def quantities(self, machine: str, axis: int) -> Mapping[str, object]:
+        """What a move of an axis is made of. Raises `Misuse` for another controller, `Refusal` where there is no calculator."""
+        calculator = self._calculator(machine, axis)
+        return {
+            "title": calculator.model.title,
+            "quantities": [_quantity(one) for one in calculator.model.quantities],
+            "times": [_quantity(one) for one in TIMES],
+        }
+
+    def calculate(self, machine: str, axis: int, given: Mapping[str, float], find: str | None) -> Mapping[str, object]:
+        """See `steptwin.calc.Calculator.calculate`."""
+        return plain(self._calculator(machine, axis).calculate(given, find))
+
+    def _calculator(self, machine: str, axis: int) -> Calculator:
+        found = calculator_of(self._sheets.of(machine), axis)
+        if found is None:
+            why = "its kind has none, or the pulses in a unit are not known (config=FILE behind the address of a device)"
+            raise Refusal(f"there is no motion calculator for axis {axis} of {machine}: {why}")
+        return found
+
+
+def gear(motor_steps: float, microsteps: float, ratio: float, lead: float | None) -> Mapping[str, float]:
+    """Pulses in each unit. Raises `Misuse`."""
+    return dict(Mechanics(motor_steps=motor_steps, microsteps=microsteps, ratio=ratio, lead=lead).scale().pulses)
+
+
+def _quantity(one: Quantity) -> Mapping[str, object]:
+    return {
+        "name": one.name,
+        "meaning": one.meaning,
+        "unit": one.unit,
+        "pulses": one.pulses,
+        "limits": {"low": one.limits.low, "high": one.limits.high, "is_low_excluded": one.limits.is_low_excluded},
+        "choices": list(one.choices),
+        "default": one.default,
+        "same_as": one.same_as,
+        "code": one.code,
+        "detail": one.detail,
+        "source": one.source,
+    }

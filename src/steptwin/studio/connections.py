@@ -1,0 +1,149 @@
+"""Connections to devices: drivers by address, lines that several devices share, machines of the subject that come and go."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from steptwin.drivers.address import DeviceAddress
+from steptwin.drivers.exchange import NoAnswer
+from steptwin.drivers.line import DriverLine
+from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.lines import AsyncM1486Line
+from steptwin.drivers.m1486.subject import M1486Part
+from steptwin.drivers.mic488.driver import AsyncMic488
+from steptwin.drivers.mic488.lines import AsyncModbusLine
+from steptwin.drivers.mic488.subject import Mic488Part
+from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
+from steptwin.errors import LineFailure, Misuse
+from steptwin.nearmiss import NearMiss
+from steptwin.studio.device import DeviceSurroundings, ShownDevice
+from steptwin.studio.eventloop import later
+from steptwin.studio.shown import Shown
+
+MOST_DEVICES = 32
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
+NAME_FORM = "1 to 40 letters, digits, '-' and '_', the first no digit"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Computer:
+    """What a computer has and knows. Both may block, and raise `SteptwinError`."""
+
+    ports: Callable[[], Sequence[Mapping[str, object]]]
+    """``address`` and ``what`` of serial ports."""
+    find: Callable[[str], DeviceAddress]
+    """The address in a text."""
+
+
+@dataclass(slots=True)
+class _Line:
+    line: DriverLine[Any, Any]
+    users: int = 0
+
+
+@dataclass(slots=True)
+class _Connected:
+    shown: ShownDevice
+    key: tuple[str, str, int]
+
+
+class DeviceConnections:
+    """See `steptwin.studio.hub.Connections`."""
+
+    def __init__(self, shown: Shown, around: DeviceSurroundings, computer: Computer) -> None:
+        self._shown = shown
+        self._around = around
+        self._computer = computer
+        self._lines: dict[tuple[str, str, int], _Line] = {}
+        self._devices: dict[str, _Connected] = {}
+        self._turn = asyncio.Lock()
+
+    async def ports(self) -> Sequence[Mapping[str, object]]:
+        return await later(asyncio.to_thread(self._computer.ports))
+
+    async def connect(self, address: str, name: str | None) -> str:
+        return await later(self.open(address, name))
+
+    async def disconnect(self, machine: str) -> None:
+        await later(self._close(machine))
+
+    async def open(self, text: str, name: str | None = None) -> str:
+        """As `connect`, in the event loop."""
+        address = await asyncio.to_thread(self._computer.find, text)
+        async with self._turn:
+            if len(self._devices) >= MOST_DEVICES:
+                raise Misuse(f"{MOST_DEVICES} devices are connected already, which is the most")
+            name = self._free_name(address, name)
+            key = address.kind, address.place, address.baud
+            line = self._lines.get(key) or _Line(_line_of(address))
+            try:
+                device = await _device_at(address, line.line)
+            except BaseException:
+                if not line.users:
+                    await line.line.close()
+                raise
+            self._lines[key] = line
+            line.users += 1
+            subject = AsyncDeviceSubject(name, device, clock=self._shown.now, numbering=self._shown.numbering)
+            shown = ShownDevice(subject, device, self._around)
+            self._devices[name] = _Connected(shown, key)
+            self._shown.add(shown)
+        return name
+
+    def _free_name(self, address: DeviceAddress, name: str | None) -> str:
+        taken = [machine.name for machine in self._shown.description.machines]
+        if name is not None:
+            if not NAME.fullmatch(name):
+                raise Misuse(f"name = {name!r}: permitted are {NAME_FORM}")
+            if name in taken:
+                raise Misuse(f"name = {name!r}: a machine is called that already")
+            return name
+        usual = address.kind if address.chip is None else f"{address.kind}-{address.chip:X}"
+        number = 1
+        while (found := usual if number == 1 else f"{usual}-{number}") in taken:
+            number += 1
+        return found
+
+    async def _close(self, machine: str) -> None:
+        async with self._turn:
+            if machine not in self._devices:
+                known = f"there are {', '.join(self._devices)}" if self._devices else "there is none"
+                raise Misuse(f"no device is called {machine!r}{NearMiss().hint(machine, self._devices)}; {known}")
+            connected = self._devices.pop(machine)
+            await connected.shown.close()
+            self._shown.remove(connected.shown)
+            line = self._lines[connected.key]
+            line.users -= 1
+            if not line.users:
+                del self._lines[connected.key]
+                await line.line.close()
+
+    async def close(self) -> None:
+        """All of them. Jogs end; other motions and programs of devices go on."""
+        for machine in list(self._devices):
+            await self._close(machine)
+
+
+def _line_of(address: DeviceAddress) -> DriverLine[Any, Any]:
+    kind = AsyncModbusLine if address.kind == "mic488" else AsyncM1486Line
+    return kind(address.place, baud=address.baud)
+
+
+async def _device_at(address: DeviceAddress, line: DriverLine[Any, Any]) -> DevicePart:
+    """Open the driver, which moves nothing. Raises `Misuse`, `Refusal`, `LineFailure`."""
+    if address.kind == "m1486":
+        chip = AsyncM1486(line, address.chip, variant=address.variant, timeout_s=address.timeout)
+        await chip.open()
+        return M1486Part(chip)
+    mic = AsyncMic488(
+        line, address.unit, firmware=address.firmware, config=address.config, timeout_s=address.timeout, observe=True
+    )
+    try:
+        await mic.open()
+    except NoAnswer as error:
+        raise LineFailure(f"{error}. If these are M1486 chips, put ',kind=m1486' behind the address") from error
+    return Mic488Part(mic)

@@ -1,0 +1,168 @@
+"""The editor server over WebSockets: help while typing, for the page and for any other client of its protocol.
+
+The first message is ``hello`` with a token, as at the other WebSocket; what follows are messages of the Language Server
+Protocol. Texts are looked at in a thread of its own: checking a long one takes longer than a master waits. Nothing but texts
+goes from one thread to the other.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import threading
+from collections.abc import Callable, Mapping
+from typing import Protocol, TypeVar
+
+from steptwin.access.rate import RateLimit
+from steptwin.access.tokens import AccessGate
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.machine import Nanos
+from steptwin.studio.requests import REQUESTS
+from steptwin.studio.viewers import HELLO_S, PATIENCE_S, REFUSED, SILENT, Receive, Scope, Send
+from steptwin.subject.dispatch import failure, fields_of, read_message
+from steptwin.subject.fields import read_fields
+
+PATH = "/editor"
+MOST_EDITORS = 32
+MOST_DOCUMENTS = 64
+MOST_WAITING = 1000
+"""Messages for a client that reads nothing."""
+RATE, BURST = 200.0, 1000.0
+"""Messages of a client in a second, and at once."""
+
+T = TypeVar("T")
+
+
+class Conversation(Protocol):
+    """An editor server for one client (`steptwin.lsp.messages.MessageServer`)."""
+
+    @property
+    def documents(self) -> int: ...
+    def receive(self, text: str) -> None: ...
+    def close(self) -> None: ...
+
+
+class Editors:
+    """All connections. ``files`` gives the present texts of the subject by address, ``clock`` the wall clock in nanoseconds."""
+
+    def __init__(self, gate: AccessGate, files: Callable[[], Mapping[str, bytes]], clock: Callable[[], Nanos]) -> None:
+        self._gate = gate
+        self._files = files
+        self._clock = clock
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+        self._count = 0
+
+    async def serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One connection, from its beginning to its end."""
+        await receive()  # that it wants to connect
+        await send({"type": "websocket.accept"})
+        try:
+            async with asyncio.timeout(HELLO_S):
+                self._enter((await receive()).get("text"))
+        except TimeoutError:
+            await _end(send, SILENT, Misuse("the first message is hello"))
+        except SteptwinError as error:
+            await _end(send, REFUSED, error)
+        else:
+            self._count += 1
+            try:
+                await self._converse(receive, send, scope["state"]["abort"])
+            finally:
+                self._count -= 1
+
+    def _enter(self, text: str | None) -> None:
+        """Raises `Misuse` and `Refusal`."""
+        message = read_message((text or "").encode("utf-8", "replace"))
+        if message["do"] != "hello":
+            raise Misuse("the first message is hello")
+        self._gate.enter(read_fields("hello", REQUESTS["hello"].fields, fields_of(message))["token"])
+        if self._count >= MOST_EDITORS:
+            raise Refusal(f"there are {MOST_EDITORS} editors already, the most possible")
+
+    async def _converse(self, receive: Receive, send: Send, abort: Callable[[], None]) -> None:
+        loop = asyncio.get_running_loop()
+        outgoing: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
+
+        def put(text: str) -> None:
+            if outgoing.full():
+                abort()
+            else:
+                outgoing.put_nowait(text)
+
+        def say(text: str) -> None:
+            """Called in the other thread."""
+            with contextlib.suppress(RuntimeError):  # the service has ended
+                loop.call_soon_threadsafe(put, text)
+
+        files = self._files()
+        there = await self._elsewhere(lambda: _begin(files, say))
+        writing = asyncio.create_task(_write(outgoing, send, abort))
+        await outgoing.put(json.dumps({"ok": None}))
+        limit = RateLimit(RATE, BURST)
+        try:
+            while (message := await receive())["type"] == "websocket.receive":
+                text = message.get("text")
+                if text is None:
+                    raise Misuse("a message is a text of JSON; this one is binary")
+                if not limit.allows(self._clock()):
+                    raise Refusal(f"too many messages: permitted are {RATE:g} a second")
+                if await self._elsewhere(lambda text=text: _receive(there, text)) > MOST_DOCUMENTS:
+                    raise Refusal(f"too many texts: permitted are {MOST_DOCUMENTS}")
+        except SteptwinError as error:
+            await _end(send, SILENT, error)
+        finally:
+            writing.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await writing
+            await self._elsewhere(there.close)
+
+    async def _elsewhere(self, call: Callable[[], T]) -> T:
+        """What a call gives that is made in the other thread."""
+        if self._loop is None:
+            self._loop = asyncio.new_event_loop()
+            self._thread = threading.Thread(target=self._loop.run_forever, name="editor server", daemon=True)
+            self._thread.start()
+
+        async def called() -> T:
+            return call()
+
+        return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(called(), self._loop))
+
+    def close(self) -> None:
+        if self._loop is not None and self._thread is not None:
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join(PATIENCE_S)
+            if not self._thread.is_alive():
+                self._loop.close()
+            self._loop = self._thread = None
+
+
+def _begin(files: Mapping[str, bytes], say: Callable[[str], None]) -> Conversation:
+    from steptwin.lsp.files import GivenTexts
+    from steptwin.lsp.messages import MessageServer
+
+    return MessageServer(GivenTexts(files), say)
+
+
+def _receive(there: Conversation, text: str) -> int:
+    """How many texts are open then."""
+    there.receive(text)
+    return there.documents
+
+
+async def _write(outgoing: asyncio.Queue[str], send: Send, abort: Callable[[], None]) -> None:
+    try:
+        while True:
+            text = await outgoing.get()
+            async with asyncio.timeout(PATIENCE_S):
+                await send({"type": "websocket.send", "text": text})
+    except (TimeoutError, OSError):
+        abort()
+
+
+async def _end(send: Send, code: int, error: Exception) -> None:
+    with contextlib.suppress(OSError):
+        await send({"type": "websocket.send", "text": json.dumps(failure(error))})
+        await send({"type": "websocket.close", "code": code})

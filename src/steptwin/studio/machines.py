@@ -1,0 +1,23 @@
+"""The data sheets of the controllers of a subject, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from steptwin.datasheet import Datasheet
+from steptwin.errors import Misuse
+from steptwin.nearmiss import NearMiss
+from steptwin.subject.contract import Description
+
+
+class Sheets:
+    def __init__(self, describe: Callable[[], Description]) -> None:
+        self._describe = describe
+
+    def of(self, machine: str) -> Datasheet:
+        """Raises `Misuse` with the names that there are."""
+        sheets = {part.name: part.datasheet for part in self._describe().machines}
+        if machine not in sheets:
+            hint = NearMiss().hint(machine, sheets)
+            raise Misuse(f"there is no controller {machine!r}{hint}: there are {', '.join(sheets)}")
+        return sheets[machine]

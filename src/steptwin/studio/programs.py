@@ -1,0 +1,20 @@
+"""The programs of a subject, as viewers are shown them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+
+class Programs(Protocol):
+    """The texts of programs that the controllers of a subject were given, as plain values."""
+
+    def list(self) -> Sequence[Mapping[str, object]]: ...
+
+    def text(self, machine: str, place: str) -> Mapping[str, object]:
+        """Raises `Misuse` where there is none."""
+        ...
+
+    def files(self) -> Mapping[str, bytes]:
+        """For editors: texts, and what belongs together, by address."""
+        ...

@@ -1,0 +1,245 @@
+"""What a viewer can ask of the tools: the motion calculator, configurations as forms. They change nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from steptwin.access.roles import LOOK
+from steptwin.calc import Formula, Part, Setting
+from steptwin.diagnostics import Severity
+from steptwin.errors import Misuse
+from steptwin.studio.requestrow import RequestRow
+from steptwin.subject.fields import MOST_ITEMS, TEXT, Field, Schema, ValueType, number, whole, wrong
+from steptwin.subject.shapes import members
+
+LONGEST_FILE = 48_000
+"""Characters of a configuration; those of the vendor have 3000."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadQuantities:
+    """What a move of an axis is made of."""
+
+    machine: str
+    axis: int
+
+
+@dataclass(frozen=True, slots=True)
+class Calculate:
+    """A move from its quantities."""
+
+    machine: str
+    axis: int
+    given: Mapping[str, float]
+    find: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConvertGear:
+    """Pulses in units, from mechanics."""
+
+    motor_steps: float
+    microsteps: float
+    ratio: float
+    lead: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReadConfiguration:
+    """The configuration file of a controller, as a form."""
+
+    machine: str
+
+
+@dataclass(frozen=True, slots=True)
+class EditConfiguration:
+    """A text of a configuration file with other values, as a form."""
+
+    machine: str
+    text: str
+    changes: Mapping[str, str]
+
+
+ToolRequest: TypeAlias = ReadQuantities | Calculate | ConvertGear | ReadConfiguration | EditConfiguration
+
+_TEXT: Schema = {"type": "string"}
+_WHOLE: Schema = {"type": "integer"}
+_NUMBER: Schema = {"type": "number"}
+_FLAG: Schema = {"type": "boolean"}
+_NUMBERS: Schema = {"type": "object", "additionalProperties": _NUMBER}
+_TEXTS: Schema = {"type": "object", "additionalProperties": _TEXT}
+
+
+def _or_null(schema: Schema) -> Schema:
+    return {"anyOf": [schema, {"type": "null"}]}
+
+
+def _list(schema: Schema) -> Schema:
+    return {"type": "array", "items": schema}
+
+
+_LIMITS = members({"low": _or_null(_NUMBER), "high": _or_null(_NUMBER), "is_low_excluded": _FLAG})
+_QUANTITY = members(
+    {
+        "name": _TEXT,
+        "meaning": _TEXT,
+        "unit": _TEXT,
+        "pulses": {**_NUMBER, "description": "Pulses (per s, per s²) in one of its unit."},
+        "limits": _LIMITS,
+        "choices": _list(_WHOLE),
+        "default": _or_null(_NUMBER),
+        "same_as": {**_or_null(_TEXT), "description": "The quantity whose value it has where none is given."},
+        "code": {**_TEXT, "description": "Register or command that sets it; empty where it is given with a motion."},
+        "detail": {**_TEXT, "description": "The fact of the state that it is."},
+        "source": _TEXT,
+    }
+)
+_QUANTITIES = members({"title": _TEXT, "quantities": _list(_QUANTITY), "times": _list(_QUANTITY)})
+_MOVE = members(
+    {
+        "title": _TEXT,
+        "found": _or_null(_TEXT),
+        "exact": {**_or_null(_NUMBER), "description": "Of what was found, before it was made what the controller takes."},
+        "values": _NUMBERS,
+        "units": _TEXTS,
+        "times": _NUMBERS,
+        "peak": _NUMBER,
+        "reaches": {**_FLAG, "description": "Whether the peak is the velocity."},
+        "parts": _list(members({name: _TEXT if name == "name" else _NUMBER for name in Part._fields})),
+        "formulas": _list(members(dict.fromkeys(Formula._fields, _TEXT))),
+        "notes": _list(_TEXT),
+        "settings": _list(members({name: _NUMBER if name == "value" else _TEXT for name in Setting._fields})),
+        "curve": {
+            "type": "array",
+            "items": {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},
+            "description": "Time [s], position, velocity.",
+        },
+    }
+)
+_FINDING = members(
+    {
+        **dict.fromkeys(("line", "column", "end_line", "end_column"), _WHOLE),
+        "severity": {"enum": [one.value for one in Severity]},
+        "code": _TEXT,
+        "message": _TEXT,
+        "hint": _or_null(_TEXT),
+    }
+)
+_SETTING = members(
+    {
+        "name": _TEXT,
+        "meaning": _TEXT,
+        "unit": _TEXT,
+        "text": {**_TEXT, "description": "As it is written; empty where it is not in the file."},
+        "value": _NUMBER,
+        "default": _NUMBER,
+        "limits": _LIMITS,
+        "is_whole": _FLAG,
+        "choices": _TEXTS,
+        "point": {**_TEXT, "description": "The point that has it at run time; empty without one."},
+        "source": _TEXT,
+    }
+)
+_FORM = members(
+    {
+        "name": {**_TEXT, "description": "Of the file."},
+        "text": _TEXT,
+        "sections": _list(members({"name": _TEXT, "title": _TEXT, "settings": _list(_SETTING)})),
+        "diagnostics": _list(_FINDING),
+        "points": {**_NUMBERS, "description": "What points get from it, in the units that the controller has now."},
+    }
+)
+
+
+def _file(value: Any) -> str:
+    if not isinstance(value, str) or len(value) > LONGEST_FILE:
+        raise wrong(value, _FILE.what)
+    return value
+
+
+_FILE = ValueType(f"a text of at most {LONGEST_FILE} characters", {"type": "string", "maxLength": LONGEST_FILE}, _file)
+
+
+def _numbers(value: Any) -> Mapping[str, float]:
+    form = number()
+    return {name: form.read(one) for name, one in _table(value).items()}
+
+
+def _texts(value: Any) -> Mapping[str, str]:
+    found = _table(value)
+    for name, one in found.items():
+        if not isinstance(one, str):
+            raise Misuse(f"{name}: {one!r}: expected a text")
+    return found
+
+
+def _table(value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, dict) or len(value) > MOST_ITEMS:
+        raise wrong(value, f"an object with at most {MOST_ITEMS} members")
+    return value
+
+
+_GIVEN = ValueType('{"QUANTITY": NUMBER, ...}', {**_NUMBERS, "maxProperties": MOST_ITEMS}, _numbers, dict)
+_CHANGES = ValueType('{"SECTION.KEY": TEXT, ...}', {**_TEXTS, "maxProperties": MOST_ITEMS}, _texts, dict)
+_MACHINE = Field("machine", TEXT, "The name of a machine.")
+_AXIS = Field("axis", whole(1, 64), "The number of an axis.")
+_RATIO = number(0.0, 1e6)
+
+TOOLS = (
+    RequestRow(
+        "calculator",
+        ReadQuantities,
+        LOOK,
+        "The quantities of a move of an axis, and the times of which one may be given in place of a quantity.",
+        _QUANTITIES,
+        (_MACHINE, _AXIS),
+    ),
+    RequestRow(
+        "calculate",
+        Calculate,
+        LOOK,
+        "A move from rest to rest, as the controller would plan it: its times, or with one time the quantity that is left out.",
+        _MOVE,
+        (
+            _MACHINE,
+            _AXIS,
+            Field("given", _GIVEN, "Quantities by name, and a time at most."),
+            Field("find", TEXT, "What a time determines; the one that is left out without.", None),
+        ),
+    ),
+    RequestRow(
+        "gear",
+        ConvertGear,
+        LOOK,
+        "Pulses in each unit (GEAR), from the mechanics.",
+        _NUMBERS,
+        (
+            Field("motor_steps", _RATIO, "Full steps in a revolution of the motor.", 200.0),
+            Field("microsteps", _RATIO, "Pulses in a full step."),
+            Field("ratio", _RATIO, "Revolutions of the motor in one of what it drives.", 1.0),
+            Field("lead", _RATIO, "Travel in one revolution of what is driven; it turns without.", None, "mm"),
+        ),
+    ),
+    RequestRow(
+        "configuration",
+        ReadConfiguration,
+        LOOK,
+        "The configuration file of a controller as a form: sections, settings with meaning, unit and range, what is wrong.",
+        _FORM,
+        (_MACHINE,),
+    ),
+    RequestRow(
+        "edit_configuration",
+        EditConfiguration,
+        LOOK,
+        "The form of a text of such a file, with other values in it. Nothing is written.",
+        _FORM,
+        (
+            _MACHINE,
+            Field("text", _FILE, "The file."),
+            Field("changes", _CHANGES, "Values by SECTION.KEY, such as Axis0.Gear.", {}),
+        ),
+    ),
+)

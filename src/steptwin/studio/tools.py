@@ -1,0 +1,21 @@
+"""What does the requests of `steptwin.studio.toolrequests`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from steptwin.studio import toolrequests as ask
+from steptwin.studio.calculations import Calculations, gear
+from steptwin.studio.configurations import Configurations
+
+
+def tools(calculations: Calculations, configurations: Configurations) -> Mapping[object, Callable[[Any], object]]:
+    """By class of request."""
+    return {
+        ask.ReadQuantities: lambda wanted: calculations.quantities(wanted.machine, wanted.axis),
+        ask.Calculate: lambda wanted: calculations.calculate(wanted.machine, wanted.axis, wanted.given, wanted.find),
+        ask.ConvertGear: lambda wanted: gear(wanted.motor_steps, wanted.microsteps, wanted.ratio, wanted.lead),
+        ask.ReadConfiguration: lambda wanted: configurations.read(wanted.machine),
+        ask.EditConfiguration: lambda wanted: configurations.edit(wanted.machine, wanted.text, wanted.changes),
+    }

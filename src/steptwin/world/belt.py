@@ -1,0 +1,106 @@
+"""Belts: what carries workpieces, and where they are on it, in whole places of the belt."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import ClassVar, NamedTuple, Protocol
+
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+
+
+class BeltDrive(Protocol):
+    """What moves a belt: a `steptwin.world.contacts.Carriage`."""
+
+    def version(self) -> object: ...
+    def place(self, now: Nanos) -> int: ...
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None: ...
+
+
+class ConstantDrive(Stateful):
+    """Moves forward at a constant speed while it runs, and stands at once when it does not. Places are picometres, so that a
+    millimetre per second is a place per nanosecond."""
+
+    __slots__ = ("_base", "_begin", "_changes", "_speed", "runs")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_speed"})
+
+    def __init__(self, speed: Fraction, now: Nanos) -> None:
+        """``speed`` in mm/s."""
+        self._speed = speed
+        self._base = 0
+        self._begin = now
+        self._changes = 0
+        self.runs = False
+
+    def run(self, runs: bool, now: Nanos) -> None:
+        if runs is not self.runs:
+            self._base, self._begin, self.runs = self.place(now), now, runs
+            self._changes += 1
+
+    def version(self) -> object:
+        return self._changes
+
+    def place(self, now: Nanos) -> int:
+        return self._base + (int(self._speed * (now - self._begin)) if self.runs else 0)
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        """As `Carriage.reaches`."""
+        if not self.runs or direction < 0 or position <= self.place(after):
+            return None
+        way = Fraction(position - self._base) / self._speed
+        return self._begin - (-way.numerator // way.denominator)
+
+
+class Workpiece(NamedTuple):
+    """One on a belt. ``origin`` is the place of the belt with the front of the workpiece at its beginning."""
+
+    name: str
+    """Of the conveyor that was fed with it, and its number there, from 1."""
+    origin: int
+    length: int
+
+
+class Load(Stateful):
+    """The workpieces on a belt."""
+
+    __slots__ = ("_changes", "pieces")
+
+    def __init__(self) -> None:
+        self.pieces: tuple[Workpiece, ...] = ()
+        self._changes = 0
+
+    def version(self) -> int:
+        """Another value whenever there are others."""
+        return self._changes
+
+    def put(self, piece: Workpiece) -> None:
+        self.pieces = (*self.pieces, piece)
+        self._changes += 1
+
+    def take(self, piece: Workpiece) -> None:
+        self.pieces = tuple(one for one in self.pieces if one != piece)
+        self._changes += 1
+
+    def covering(self, position: int, belt: int) -> Workpiece | None:
+        """The workpiece over ``position`` while the belt is at ``belt``; the first that was put there."""
+        return next((one for one in self.pieces if 0 <= belt - one.origin - position <= one.length), None)
+
+    def edges(self, position: int, belt: int) -> tuple[int | None, int | None]:
+        """Places of the belt next below and above ``belt`` at which ``position`` may be covered otherwise."""
+        below: int | None = None
+        above: int | None = None
+        for one in self.pieces:
+            begin = one.origin + position
+            for place in (begin - 1, begin, begin + one.length, begin + one.length + 1):
+                if place < belt and (below is None or place > below):
+                    below = place
+                elif place > belt and (above is None or place < above):
+                    above = place
+        return below, above
+
+
+def next_change(drive: BeltDrive, below: int | None, above: int | None, now: Nanos) -> Nanos | None:
+    """When the belt comes to one of two places, below and above where it is."""
+    down = None if below is None else drive.reaches(below, now, -1)
+    up = None if above is None else drive.reaches(above, now, 1)
+    return up if down is None else down if up is None else min(up, down)

@@ -1,0 +1,65 @@
+"""Terminals of an element: levels by name, which wires, contacts and other elements join as they join pins of controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+
+if TYPE_CHECKING:
+    from steptwin.world.kernel import Kernel
+
+
+class Board(Stateful):
+    """The terminals of the element ``name``. All levels are 0 until something drives them.
+
+    Its element reads inputs in `KernelPart.update`, never earlier, so that a loop of elements is found by the kernel.
+    """
+
+    __slots__ = ("_held", "_recorded", "_wanted", "kernel", "levels", "name", "outputs")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"kernel", "name", "outputs"})
+
+    def __init__(self, kernel: Kernel, name: str, inputs: Iterable[str], outputs: Iterable[str]) -> None:
+        self.kernel = kernel
+        self.name = name
+        self.outputs = tuple(outputs)
+        self.levels: dict[str, float] = dict.fromkeys((*inputs, *self.outputs), 0.0)
+        self._wanted: dict[str, float] = {}
+        """What the element gives its outputs."""
+        self._held: dict[str, float] = {}
+        """Outputs that a fault holds."""
+        self._recorded: tuple[str, ...] = ()
+        """Outputs whose first level has been recorded."""
+
+    def pins(self) -> Mapping[str, float]:
+        return self.levels
+
+    def set_pin(self, pin: str, level: float, now: Nanos) -> None:
+        """Drive an input. The element sees it when signals settle."""
+        self.levels[pin] = level
+
+    def is_on(self, terminal: str) -> bool:
+        return self.levels[terminal] != 0.0
+
+    def put(self, output: str, level: float) -> None:
+        """Give an output a level now; its first level and every change are recorded and carried along wires."""
+        self._wanted[output] = level
+        self._show(output, self._held.get(output, level))
+
+    def hold(self, output: str, level: float | None) -> None:
+        """Hold an output at a level, whatever its element gives it; None lets it go."""
+        if level is None:
+            self._held.pop(output, None)
+        else:
+            self._held[output] = level
+        self._show(output, self._held.get(output, self._wanted.get(output, 0.0)))
+
+    def _show(self, output: str, level: float) -> None:
+        if level == self.levels[output] and output in self._recorded:
+            return
+        self.levels[output] = level
+        if output not in self._recorded:
+            self._recorded = (*self._recorded, output)
+        self.kernel.put(self.name, output, level)

@@ -1,0 +1,198 @@
+"""What elements with terminals have in common: a board, keys that join outputs of others to it, its levels as signals and lanes,
+and the fault of an output that is stuck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+from steptwin.world.board import Board
+from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
+from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
+from steptwin.world.faults.table import ElementEffect, Parameter, ParameterForm, whole
+from steptwin.world.kind import Terminals
+from steptwin.world.reader import Key, TomlText
+from steptwin.world.sense import TableRows
+from steptwin.world.signals import SignalOf
+from steptwin.world.site import Site, Terminal
+from steptwin.world.spec import WorldSpec
+from steptwin.world.tomlplaces import Path
+from steptwin.world.values import name_value
+
+
+class Joint(NamedTuple):
+    """An output, which the key ``key`` names, joined to an input of the element."""
+
+    key: str
+    input: str
+    source: Terminal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardSpec(NamedSpec):
+    """The table of an element with terminals."""
+
+    @property
+    def terminals(self) -> Terminals:
+        raise NotImplementedError
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        """What its keys join to its inputs."""
+        raise NotImplementedError
+
+    def others(self, world: WorldSpec) -> Iterable[tuple[str, str]]:
+        """Keys that name other elements, and the names of these or of what they are in one kernel with."""
+        return ()
+
+    def check(self, text: TomlText) -> None:
+        """Report keys that do not fit together."""
+
+
+class BoardPart(Stateful):
+    """The part of a kernel that gives the outputs of a board their levels."""
+
+    __slots__ = ("board",)
+    FIXED: ClassVar[frozenset[str]] = frozenset()
+
+    def __init__(self, board: Board) -> None:
+        self.board = board
+
+    def update(self, now: Nanos) -> None:
+        """As `KernelPart.update`."""
+        raise NotImplementedError
+
+    def deadline(self) -> Nanos | None:
+        """As `KernelPart.deadline`; none for an element whose outputs follow its inputs alone."""
+        return None
+
+
+S = TypeVar("S", bound=BoardSpec)
+P = TypeVar("P", bound=BoardPart)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inner(Generic[S, P]):
+    """A kind of table in the table of an element: ``[[ELEMENT.KEY]]``."""
+
+    key: str
+    attribute: str
+    """Of the element's value, a tuple."""
+    rows: TableRows
+    read: Callable[[TomlText, Path, Table], tuple[Any, ...]]
+    refers: Callable[[S], Iterable[Reference]]
+    build: Callable[[S, P, Site], None]
+    lanes: Callable[[S], tuple[str, ...]]
+
+
+# ---------------------------------------------------------------------- faults
+
+
+def _check_stuck(part: BoardPart, fault: Fault) -> None:
+    output = str(fault.get("output")).upper()
+    if output not in part.board.outputs:
+        there = ", ".join(name.lower() for name in part.board.outputs)
+        raise Misuse(f"fault {fault.kind.name}: output = {fault.get('output')!r}: outputs of {part.board.name!r} are {there}")
+
+
+def _stick(active: ActiveFault, part: BoardPart, begins: bool, now: Nanos) -> str:
+    output, level = str(active.fault.get("output")), int(active.fault.get("level"))  # type: ignore[arg-type]
+    part.board.hold(output.upper(), float(level) if begins else None)
+    return f"{part.board.name}.{output} is stuck at {level}" if begins else f"{part.board.name}.{output} is free again"
+
+
+STUCK_OUTPUT = FaultKind(
+    "stuck-output",
+    Layer.ELEMENT,
+    Occasion.ALWAYS,
+    "An output of an element keeps its level.",
+    own=(
+        Parameter("output", ParameterForm.TEXT, "Which output.", default="out"),
+        whole("level", "The level it keeps.", 0, 1, default=0),
+    ),
+    effect=ElementEffect(_stick),
+    check=_check_stuck,
+)
+"""Of elements with outputs."""
+
+
+# ---------------------------------------------------------------------- an element
+
+
+def with_terminals(
+    name: str,
+    spec: type[S],
+    keys: Sequence[Key],
+    *,
+    make: Callable[[S, Site], P],
+    signals: Callable[[P], Mapping[str, SignalOf]] = lambda part: {},
+    faults: Sequence[FaultKind] = (),
+    inner: Inner[S, P] | None = None,
+    connect: Callable[[S, P, Site], None] | None = None,
+) -> Element[S, P]:
+    """An element with a name and terminals. Each terminal is a signal, each output a lane.
+
+    ``signals`` are those besides. ``connect`` is as in `Element`.
+    """
+
+    def read(text: TomlText, row: Row, table: Table) -> S:
+        more: dict[str, Any] = {} if inner is None else {inner.attribute: inner.read(text, row["path"], table)}
+        found = spec(**row, **more)
+        found.check(text)
+        return found
+
+    def refers(found: S, world: WorldSpec) -> Iterator[Reference]:
+        yield Reference(found.name, found.name, found.path)
+        for joint in found.joints:
+            yield Reference(found.name, joint.source[0], (*found.path, joint.key))
+        for key, other in found.others(world):
+            yield Reference(found.name, other, (*found.path, key))
+        if inner is not None:
+            yield from inner.refers(found)
+
+    def build(found: S, site: Site) -> P:
+        part = make(found, site)
+        part.board.kernel.add_part(part)
+        for joint in found.joints:
+            site.join(joint.source, (found.name, joint.input), (*found.path, joint.key))
+        if inner is not None:
+            inner.build(found, part, site)
+        return part
+
+    def all_signals(part: P) -> Mapping[str, SignalOf]:
+        return {
+            **{terminal.lower(): level_signal(part.board, terminal) for terminal in part.board.levels},
+            **signals(part),
+        }
+
+    return Element(
+        name=name,
+        spec=spec,
+        rows=TableRows(written=f"[[{name}]]", keys=(Key("name", name_value, "how others name it"), *keys)),
+        inner={} if inner is None else {inner.key: inner.rows},
+        inner_attributes={} if inner is None else {inner.key: inner.attribute},
+        read=read,
+        refers=refers,
+        build=build,
+        connect=connect,
+        terminals=lambda found: found.terminals,
+        signals=all_signals,
+        lanes=lambda found: (
+            *(f"{found.name}.{output.lower()}" for output in found.terminals.outputs),
+            *(() if inner is None else inner.lanes(found)),
+        ),
+        faults=tuple(faults),
+    )
+
+
+def level_signal(board: Board, terminal: str) -> SignalOf:
+    return SignalOf((board.kernel,), partial(_level, board, terminal))
+
+
+def _level(board: Board, terminal: str, now: Nanos) -> float:
+    return board.levels[terminal]

@@ -1,0 +1,91 @@
+"""``[[timer]]``: an output that follows an input later, or for a time: TON, TOF and TP of IEC 61131-3."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.world.board import Board
+from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.kind import Terminals
+from steptwin.world.reader import Key, optional
+from steptwin.world.site import Terminal
+from steptwin.world.values import OUTPUT_PIN, positive_time, word
+
+IN, OUT = "IN", "OUT"
+ON_DELAY, OFF_DELAY, PULSE = "on-delay", "off-delay", "pulse"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimerSpec(BoardSpec):
+    kind: str
+    input: Terminal | None
+    time: Nanos
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(IN,), outputs=(OUT,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.input is not None:
+            yield Joint("input", IN, self.input)
+
+
+class Timer(BoardPart):
+    """On-delay (TON): on once the input has been on for ``time``. Off-delay (TOF): off once it has been off for ``time``.
+    Pulse (TP): on for ``time`` from an edge of the input from 0 to 1; edges meanwhile do nothing."""
+
+    __slots__ = ("_due", "_kind", "_time", "_was_on")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_kind", "_time"}) | BoardPart.FIXED
+
+    def __init__(self, board: Board, kind: str, time: Nanos) -> None:
+        super().__init__(board)
+        self._kind = kind
+        self._time = time
+        self._was_on = False
+        self._due: Nanos | None = None
+        """When the time has passed, while it runs."""
+
+    def update(self, now: Nanos) -> None:
+        is_on = self.board.is_on(IN)
+        if self._due is not None and self._due <= now:
+            self._due = None
+        if is_on is not self._was_on:
+            self._was_on = is_on
+            self._turn(is_on, now)
+        runs = self._due is not None
+        if self._kind == ON_DELAY:
+            level = is_on and not runs
+        elif self._kind == OFF_DELAY:
+            level = is_on or runs
+        else:
+            level = runs
+        self.board.put(OUT, float(level))
+
+    def _turn(self, is_on: bool, now: Nanos) -> None:
+        if self._kind == PULSE:
+            if is_on and self._due is None:
+                self._due = now + self._time
+        elif is_on is (self._kind == ON_DELAY):
+            self._due = now + self._time
+        else:
+            self._due = None
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+
+TIMER = with_terminals(
+    "timer",
+    TimerSpec,
+    (
+        Key("kind", word(ON_DELAY, OFF_DELAY, PULSE), "on-delay (TON), off-delay (TOF) or pulse (TP)"),
+        Key("time", positive_time, "such as '200 ms'"),
+        optional(OUTPUT_PIN, "input", "output joined to IN; without it wires and contacts may be"),
+    ),
+    faults=(STUCK_OUTPUT,),
+    make=lambda spec, site: Timer(site.board(spec.name), spec.kind, spec.time),
+)

@@ -1,0 +1,150 @@
+"""The programs of a MIC488 while they are executed."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+from steptwin.diagnostics import SourceText
+from steptwin.machine import Nanos
+from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.program import LoadedProgram
+from steptwin.mic488.program_registers import ACCESS
+from steptwin.statements import StatementHook
+from steptwin.wbc.dialect import Dialect
+from steptwin.wbc.flow import returning
+from steptwin.wbc.scope import Scope
+from steptwin.wbc.steps import JumpStep, Literal, RegisterOperand, Source, Variable
+from steptwin.wbc.syntax import parse
+from steptwin.wbc.tree import Identifier, ProgramTree
+from steptwin.world.kind import TextContext
+from steptwin.world.kinds.mic488.table import Mic488Spec
+from steptwin.world.programs import Frame, Place, Statement
+from steptwin.world.programtexts import bank_text
+
+BEGIN = "program"
+"""The name of what is executed before the first label."""
+
+
+def programs(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> WbcPrograms:
+    """See `steptwin.world.kind.ControllerKind.programs`."""
+    return WbcPrograms(device)
+
+
+class WbcPrograms:
+    """See `steptwin.world.programs.Programs`. Numbers of statements are those of steps, the last one the end of the program."""
+
+    def __init__(self, device: Mic488Device) -> None:
+        self._device = device
+        self._banks: dict[str, _Bank] = {}
+        """What was in them when somebody asked last."""
+
+    @property
+    def statement_time(self) -> Nanos:
+        return self._device.program.machine.statement_time
+
+    @property
+    def texts(self) -> Mapping[str, SourceText]:
+        return {bank_text(bank): program.source for bank, program in self._device.program.programs.items()}
+
+    def _bank(self, text: str) -> _Bank:
+        program = self._device.program.programs[int(text.rpartition(" ")[2])]
+        found = self._banks.get(text)
+        if found is None or found.program is not program:
+            found = self._banks[text] = _Bank(program)
+        return found
+
+    def statements(self, text: str) -> Sequence[Statement]:
+        return self._bank(text).statements
+
+    def labels(self, text: str) -> Mapping[str, int]:
+        return self._bank(text).labels
+
+    def hook(self, hook: StatementHook) -> None:
+        self._device.program.machine.hook(hook)
+
+    def unhook(self, hook: StatementHook) -> None:
+        self._device.program.machine.unhook(hook)
+
+    def place(self, number: int) -> Place | None:
+        control = self._device.program
+        return None if control.running is None else Place(bank_text(control.running_bank), number)
+
+    def depth(self) -> int:
+        return len(self._device.program.machine.stack)
+
+    def comes_back(self, place: Place) -> bool:
+        return self._bank(place.text).comes_back(place.number)
+
+    def stack(self, now: Nanos) -> Sequence[Frame]:
+        control = self._device.program
+        if control.running is None:
+            return ()
+        text = bank_text(control.running_bank)
+        numbers = [control.machine.place(now), *(step for step, _ in reversed(control.machine.stack))]
+        return [Frame(self._bank(text).name(number), Place(text, number)) for number in numbers]
+
+    def variables(self, now: Nanos) -> Mapping[str, float]:
+        return self._device.program.variables(now)
+
+    def read(self, name: str, now: Nanos) -> float | None:
+        control = self._device.program
+        if control.running is None:
+            return None
+        source = self._bank(bank_text(control.running_bank)).meaning(name, control.dialect)
+        match source:
+            case Literal(value):
+                return float(value)
+            case Variable(index):
+                return control.machine.cells_at(now)[index]
+            case RegisterOperand(row, number):
+                return float(ACCESS[row.key].read(number)(control, now))
+        return None
+
+    def set_variable(self, name: str, value: float, now: Nanos) -> None:
+        self._device.command(lambda now: self._device.program.set_variable(name, value, now), now)
+
+    def execute_all(self, on: bool, now: Nanos) -> None:
+        self._device.command(lambda now: self._device.program.rest_in_loops(not on, now), now)
+
+
+class _Bank:
+    """A program with what is known of its text."""
+
+    def __init__(self, program: LoadedProgram) -> None:
+        self.program = program
+        source, end = program.source, len(program.source.text)
+        spans = [*((step.start, step.end) for step in program.steps), (end, end)]
+        self.statements = tuple(Statement(start, end, source.position(start)[0]) for start, end in spans)
+        self.labels = program.labels
+        self._scope: Scope | None = None
+        self._named = sorted((number, name) for name, number in self.labels.items())
+
+    @cached_property
+    def _returns(self) -> list[bool]:
+        return returning(self.program.steps)
+
+    @cached_property
+    def _tree(self) -> ProgramTree:
+        return parse(self.program.source.text)[0]
+
+    def meaning(self, name: str, dialect: Dialect) -> Source | None:
+        """What a name in the text is; its place in the text does not matter."""
+        key = name.upper()
+        for index, variable in enumerate(self.program.variables):
+            if variable.upper() == key:
+                return Variable(index, variable)
+        if self._scope is None:
+            self._scope = Scope(self._tree, None, dialect, [])
+        return self._scope.value(Identifier(0, 0, name, key))
+
+    def comes_back(self, number: int) -> bool:
+        steps = self.program.steps
+        step = steps[number] if number < len(steps) else None
+        return self._returns[step.target] if isinstance(step, JumpStep) else True
+
+    def name(self, number: int) -> str:
+        """Of the label at or before a statement."""
+        found = bisect_right(self._named, number, key=lambda row: row[0])
+        return self._named[found - 1][1] if found else BEGIN

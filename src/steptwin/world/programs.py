@@ -1,0 +1,125 @@
+"""The programs of controllers while they are executed: their statements, where they stand, their variables.
+
+One contract for all languages: traces, followers and the debugger ask for no more. A place is a statement of a text; texts are
+named as in `steptwin.world.programtexts`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from steptwin.diagnostics import SourceText
+from steptwin.machine import Nanos
+from steptwin.statements import StatementHook
+from steptwin.world.trace import Recorder, TraceRecord
+
+if TYPE_CHECKING:
+    from steptwin.world.plant import Plant
+
+
+class Place(NamedTuple):
+    """A statement of a text. ``number`` counts the statements of the text from 0."""
+
+    text: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """``start`` and ``end`` are its characters in the text, ``line`` counts from 1."""
+
+    start: int
+    end: int
+    line: int
+
+
+class Frame(NamedTuple):
+    """A place to which the execution has come, or to which it returns; ``name``: the label or interrupt before it."""
+
+    name: str
+    place: Place
+
+
+class Programs(Protocol):
+    """The programs of one controller."""
+
+    @property
+    def statement_time(self) -> Nanos:
+        """What a statement takes."""
+        ...
+
+    @property
+    def texts(self) -> Mapping[str, SourceText]:
+        """The present ones: a download replaces them."""
+        ...
+
+    def statements(self, text: str) -> Sequence[Statement]:
+        """All statements of a text, in its order."""
+        ...
+
+    def labels(self, text: str) -> Mapping[str, int]:
+        """Numbers of the statements at labels and interrupts, by name."""
+        ...
+
+    def hook(self, hook: StatementHook) -> None:
+        """Call ``hook`` before each statement (`steptwin.statements`)."""
+        ...
+
+    def unhook(self, hook: StatementHook) -> None: ...
+
+    def place(self, number: int) -> Place | None:
+        """Of a statement that a hook was called for, at that moment; None where it comes from no text."""
+        ...
+
+    def depth(self) -> int:
+        """How many calls and interrupts have not returned yet."""
+        ...
+
+    def comes_back(self, place: Place) -> bool:
+        """Whether what the statement calls returns to the one after it; True for what calls nothing."""
+        ...
+
+    def stack(self, now: Nanos) -> Sequence[Frame]:
+        """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""
+        ...
+
+    def variables(self, now: Nanos) -> Mapping[str, float]: ...
+
+    def read(self, name: str, now: Nanos) -> float | None:
+        """What a name of the program means to the statement of this moment; None where it means nothing."""
+        ...
+
+    def set_variable(self, name: str, value: float, now: Nanos) -> None:
+        """Raises `Misuse` for a name or value that is not permitted."""
+        ...
+
+    def execute_all(self, on: bool, now: Nanos) -> None:
+        """Whether every statement of a loop is executed even where nothing can change by it: a debugger stops at each."""
+        ...
+
+
+class StatementFollower:
+    """Reports each statement that a program of the world executes as a record of kind ``statement``, until `close`."""
+
+    def __init__(self, plant: Plant, report: Recorder) -> None:
+        self._hooks: list[tuple[Programs, StatementHook]] = []
+        for name, programs in plant.programs.items():
+            hook = _reporting(name, programs, report)
+            programs.hook(hook)
+            self._hooks.append((programs, hook))
+
+    def close(self) -> None:
+        for programs, hook in self._hooks:
+            programs.unhook(hook)
+        self._hooks.clear()
+
+
+def _reporting(name: str, programs: Programs, report: Recorder) -> StatementHook:
+    def hook(now: Nanos, number: int) -> None:
+        place = programs.place(number)
+        if place is not None:
+            report(TraceRecord(now, name, "statement", place.text, programs.statements(place.text)[place.number].line))
+
+    return hook

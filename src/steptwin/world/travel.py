@@ -1,0 +1,75 @@
+"""What moves between two ends at a constant speed each way, such as a pneumatic cylinder: exact, in whole numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+from steptwin.machine import Nanos
+from steptwin.state import Stateful
+
+
+class Travel(Stateful):
+    """A place from 0 to `full`, at either end or on its way; it carries switches (`steptwin.world.contacts.Carriage`).
+
+    The way takes ``forth`` to the upper end and ``back`` to the lower one. So that both speeds are whole numbers, the way has
+    forth × back places.
+    """
+
+    __slots__ = ("_back", "_begin", "_changes", "_direction", "_forth", "_place", "full")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_back", "_forth", "full"})
+
+    def __init__(self, forth: Nanos, back: Nanos, *, is_forth: bool, now: Nanos) -> None:
+        self.full = forth * back
+        self._forth = forth
+        self._back = back
+        self._place = self.full if is_forth else 0
+        """At `_begin`."""
+        self._begin = now
+        self._direction = 0
+        self._changes = 0
+
+    @property
+    def direction(self) -> int:
+        """+1, −1, or 0: where it was sent last."""
+        return self._direction
+
+    def send(self, direction: int, now: Nanos) -> None:
+        """Move to the upper end (+1), to the lower one (−1), or stop (0)."""
+        if direction == self._direction:
+            return
+        self._place = self.place(now)
+        self._begin = now
+        self._direction = direction
+        self._changes += 1
+
+    def _speed(self, direction: int) -> int:
+        """Places per nanosecond."""
+        return self._back if direction > 0 else self._forth
+
+    def place(self, now: Nanos) -> int:
+        """As `Carriage.place`."""
+        moved = self._direction * self._speed(self._direction) * (now - self._begin)
+        return min(max(self._place + moved, 0), self.full)
+
+    def version(self) -> object:
+        """As `Carriage.version`."""
+        return self._changes
+
+    def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
+        """As `Carriage.reaches`."""
+        way = (position - self._place) * direction
+        if direction != self._direction or (position - self.place(after)) * direction <= 0 or not 0 <= position <= self.full:
+            return None
+        return self._begin - (-way // self._speed(direction))
+
+    def turns(self, now: Nanos) -> Iterator[Nanos]:
+        """When it has left the end where it stands, and when it comes to the other one."""
+        if self._direction == 0:
+            return
+        near, far = (0, self.full) if self._direction > 0 else (self.full, 0)
+        if self.place(now) == near:
+            yield now + 1
+        arrival = self.reaches(far, now, self._direction)
+        if arrival is not None:
+            yield arrival

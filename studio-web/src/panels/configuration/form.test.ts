@@ -1,0 +1,37 @@
+import { expect, test } from "vitest";
+import type { Datasheet } from "../../lib/state/model";
+import { changedKeys, changesOf, settingsOf, shownText, type Form, type Setting } from "./form";
+
+const setting = (name: string, text: string, value: number, choices = {}): Setting =>
+  ({ name, text, value, choices }) as unknown as Setting;
+
+const form = (...settings: Setting[]): Form => ({ sections: [{ name: "Axis0", settings }] }) as unknown as Form;
+
+test("registers that have the value of the file, in single precision, are not written", () => {
+  const present = new Map([
+    ["M1_ACC", Math.fround(0.1)],
+    ["M1_DEC", 5],
+  ]);
+  expect(changesOf({ M1_ACC: 0.1, M1_DEC: 6, M1_VMAX: 7 }, present)).toEqual([
+    { point: "M1_DEC", value: 6, old: 5 },
+    { point: "M1_VMAX", value: 7, old: null },
+  ]);
+});
+
+test("a choice is shown by its word", () => {
+  expect(shownText(setting("Unit", "3", 3, { "3": "mm" }))).toBe("mm");
+  expect(shownText(setting("Gear", "", 1))).toBe("1");
+});
+
+test("what differs from the file as it was read", () => {
+  const before = form(setting("Gear", "100", 100), setting("Acc", "", 1000));
+  expect([...changedKeys(before, form(setting("Gear", "100", 100), setting("Acc", "300", 300)))]).toEqual([
+    "Axis0.Acc",
+  ]);
+});
+
+test("settings of a controller without a file are its commands whose number the state has", () => {
+  const command = (code: string, count: number) => ({ code, arguments: Array(count).fill({}) });
+  const sheet = { commands: [command("V", 1), command("R", 0), command("L", 1)] } as unknown as Datasheet;
+  expect(settingsOf(sheet, { V: 1000, R: 3 }).map(([one, value]) => [one.code, value])).toEqual([["V", 1000]]);
+});

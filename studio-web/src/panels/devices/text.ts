@@ -1,0 +1,46 @@
+import { texts } from "../../text";
+
+export const t = texts(
+  {
+    title: "Devices",
+    explained:
+      "A device is connected by its address. Nothing moves by it. Before the first write its settings are kept in a file.",
+    address: "Address of the device",
+    example: "/dev/ttyUSB0,unit=1 or 192.168.0.9:502",
+    name: "Name (may stay empty)",
+    connect: "Connect",
+    connecting: "connecting …",
+    ports: "Serial ports",
+    again: "List again",
+    noPorts: "This computer has no serial port.",
+    use: "Use {address}",
+    useWord: "Use",
+    connected: "Connected",
+    none: "No device is connected.",
+    disconnect: "Disconnect {machine}",
+    disconnectWord: "Disconnect",
+    done: "{machine} is connected",
+    options: "Behind a comma: unit=N, baud=N, config=FILE; for an M1486 kind=m1486, chip=0…F.",
+  },
+  {
+    title: "Urządzenia",
+    explained:
+      "Urządzenie łączy się przez adres. Nic się przy tym nie rusza. Przed pierwszym zapisem ustawienia trafiają do pliku.",
+    address: "Adres urządzenia",
+    example: "/dev/ttyUSB0,unit=1 lub 192.168.0.9:502",
+    name: "Nazwa (może być pusta)",
+    connect: "Połącz",
+    connecting: "łączenie …",
+    ports: "Porty szeregowe",
+    again: "Odśwież listę",
+    noPorts: "Ten komputer nie ma portu szeregowego.",
+    use: "Użyj {address}",
+    useWord: "Użyj",
+    connected: "Połączone",
+    none: "Żadne urządzenie nie jest połączone.",
+    disconnect: "Rozłącz {machine}",
+    disconnectWord: "Rozłącz",
+    done: "{machine} jest połączone",
+    options: "Po przecinku: unit=N, baud=N, config=PLIK; dla M1486 kind=m1486, chip=0…F.",
+  },
+);

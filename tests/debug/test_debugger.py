@@ -1,0 +1,361 @@
+"""The debugger of programs in worlds: breakpoints, steps, values, and going back in time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pytest
+from debug_rig import BOTH, ONE, make
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from steptwin.debug.debugger import Debugger
+from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stop, StopReason
+from steptwin.errors import Misuse
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.world.plant import Plant
+
+ENTRY = MILLISECOND - 1
+
+
+def line(debugger: Debugger, machine: str = "m") -> int:
+    return debugger.stack(machine)[0].location.line
+
+
+def at(number: int, **more: str) -> LinePoint:
+    return LinePoint(machine="m", text="program 0", line=number, **more)
+
+
+def state(world: Plant) -> str:
+    """All state of a world, as text. A controller at rest may know a moment before: looking at it does not count as a change."""
+    for machine in world.machines.values():
+        machine.advance(world.now)
+    found = world.snapshot(with_inputs=False)
+    text = repr((found.now, found.kernels, found.scripts, found.faults_state, world.trace.digest()))
+    return re.sub(r" at 0x[0-9a-f]+", "", text)
+
+
+def started(text: str | None = None, world: str = ONE) -> Debugger:
+    debugger = Debugger(make(world=world) if text is None else make(text, world))
+    assert debugger.run_to_entry() == Stop(StopReason.ENTRY, ENTRY, "m")
+    return debugger
+
+
+# ---------------------------------------------------------------------- the property
+
+
+Act = tuple[str, int]
+ACTS = st.lists(
+    st.tuples(
+        st.sampled_from(("in", "over", "out", "back", "run", "run back", "set", "go", "branch")),
+        st.integers(0, 100),
+    ),
+    max_size=20,
+)
+
+
+def act(debugger: Debugger, what: str, number: int) -> None:
+    machine = debugger.threads[number % 2]
+    match what:
+        case "in":
+            debugger.step_in(machine)
+        case "over":
+            debugger.step_over(machine)
+        case "out":
+            debugger.run(debugger.now + number * MILLISECOND)
+        case "back":
+            debugger.step_back(machine)
+        case "run":
+            debugger.run(debugger.now + 100 * MILLISECOND)
+        case "run back":
+            debugger.run_back()
+        case "set" if not debugger.is_past:
+            debugger.set_value("m", "IN3", str(number % 2))
+        case "go":
+            debugger.go(debugger.begin + (debugger.present - debugger.begin) * number // 100)
+        case "branch" if number > 90:
+            debugger.branch()
+
+
+@settings(max_examples=25, deadline=None)
+@given(ACTS)
+def test_however_one_goes_every_moment_is_as_it_was(acts: list[Act]) -> None:
+    debugger = Debugger(make(world=BOTH))
+    debugger.set_breakpoints([at(8), at(3, condition="n % 3 = 0"), LabelPoint(label="INT_IN3")])
+    seen: dict[int, str] = {}
+    for what, number in acts:
+        if what in ("set", "branch"):
+            # What is done at a moment changes it, and what follows.
+            seen = {moment: text for moment, text in seen.items() if moment < debugger.now}
+        act(debugger, what, number)
+        now = debugger.now
+        assert seen.setdefault(now, state(debugger.view)) == state(debugger.view)
+    for moment, text in seen.items():
+        if moment <= debugger.present:
+            debugger.go(moment)
+            assert state(debugger.view) == text
+
+
+def test_a_world_that_is_debugged_does_what_it_does_without() -> None:
+    plain = make(world=BOTH)
+    plain.run_to(SECOND)
+    debugger = Debugger(make(world=BOTH))
+    debugger.set_breakpoints([at(8), LinePoint(machine="c", text="program", line=8)])
+    while debugger.run(SECOND).reason is not StopReason.LIMIT:
+        debugger.step_back("c")
+        debugger.step_in("c")
+    assert debugger.view.trace.digest() == plain.trace.digest()
+
+
+# ---------------------------------------------------------------------- steps
+
+
+def test_steps_of_wbc() -> None:
+    debugger = started()
+    lines = [line(debugger)]
+    for _ in range(5):
+        assert debugger.step_in("m").reason is StopReason.STEP
+        lines.append(line(debugger))
+    assert lines == [1, 3, 4, 8, 9, 10]
+    assert [frame.name for frame in debugger.stack("m")] == ["COUNT", "MAIN"]
+    assert [frame.location.line for frame in debugger.stack("m")] == [10, 5]
+
+
+def test_a_call_is_stepped_over_and_out_of_and_a_delay_takes_its_time() -> None:
+    debugger = started()
+    debugger.step_over("m")
+    debugger.step_over("m")
+    assert line(debugger) == 4
+    before = debugger.now
+    debugger.step_over("m")
+    assert (line(debugger), debugger.now - before) == (5, 4 * MILLISECOND)
+    debugger.step_over("m")
+    assert line(debugger) == 6
+    assert debugger.now - before >= 50 * MILLISECOND
+    debugger.step_over("m")  # JUMP MAIN comes never back: as a step in
+    assert line(debugger) == 3
+    debugger.step_in("m")
+    debugger.step_in("m")
+    assert line(debugger) == 8
+    debugger.step_out("m")
+    assert line(debugger) == 5
+
+
+def test_steps_of_an_m1486_and_both_controllers_are_threads() -> None:
+    debugger = started(world=BOTH)
+    assert debugger.threads == ["m", "c"]
+    lines = [line(debugger, "c")]
+    for _ in range(5):
+        debugger.step_over("c")
+        lines.append(line(debugger, "c"))
+    assert lines == [4, 5, 6, 5, 6, 7]
+    debugger.step_over("c")  # '2
+    assert line(debugger, "c") == 8
+    assert line(debugger, "m") != 1
+
+
+def test_step_back_goes_through_the_same_statements_in_reverse() -> None:
+    debugger = started()
+    lines = []
+    for _ in range(12):
+        lines.append((line(debugger), debugger.now))
+        debugger.step_in("m")
+    for known in reversed(lines):
+        assert debugger.step_back("m").reason is StopReason.STEP
+        assert (line(debugger), debugger.now) == known
+        assert debugger.is_past
+    assert debugger.step_back("m") == Stop(StopReason.BEGIN, 0, text="no older moment is kept")
+    for known in lines:
+        debugger.step_in("m")
+        assert (line(debugger), debugger.now) == known
+
+
+def test_a_pause_in_a_delay_goes_back_to_its_beginning() -> None:
+    debugger = started()
+    debugger.run(30 * MILLISECOND)
+    assert line(debugger) == 5
+    debugger.step_back("m")
+    assert (line(debugger), debugger.now) == (5, 7 * MILLISECOND - 1)
+
+
+# ---------------------------------------------------------------------- breakpoints
+
+
+def test_a_breakpoint_stops_before_its_statement_forwards_and_backwards() -> None:
+    debugger = started()
+    (point,) = debugger.set_breakpoints([at(7)])
+    assert (point.line, point.is_set) == (8, True)  # line 7 has no statement
+    stops = [debugger.run() for _ in range(3)]
+    assert [(stop.reason, stop.points) for stop in stops] == [(StopReason.BREAKPOINT, (point.number,))] * 3
+    assert line(debugger) == 8
+    assert debugger.evaluate("m", "n").number == 3.0
+    back = [debugger.run_back() for _ in range(3)]
+    assert back[:2] == stops[1::-1]
+    assert back[2].reason is StopReason.BEGIN
+    assert debugger.run() == stops[0]
+
+
+def test_conditions_hit_counts_and_logs() -> None:
+    debugger = started()
+    logged: list[str] = []
+    debugger.on_log = lambda entry: logged.append(entry.text)
+    debugger.set_breakpoints([at(8, condition="n > 2 and OUT1 = OFF"), at(9, log="n is {n}, twice {n * 2}")])
+    debugger.run()
+    assert debugger.evaluate("m", "n").number == 3.0
+    assert logged == ["n is 1, twice 2", "n is 2, twice 4"]
+    debugger.run_back()
+    debugger.run()
+    assert len(logged) == 2  # once
+    debugger.set_breakpoints([at(8, hits="% 3")])
+    debugger.run()
+    debugger.run()
+    assert debugger.evaluate("m", "n").number == 8.0
+
+
+def test_a_condition_that_cannot_be_calculated_stops() -> None:
+    debugger = started()
+    debugger.set_breakpoints([at(8, condition="unknown = 5")])
+    assert debugger.run().reason is StopReason.BREAKPOINT
+
+
+def test_a_condition_on_another_controller() -> None:
+    debugger = started(world=BOTH)
+    debugger.set_breakpoints([at(8, condition="c.variable > 30")])
+    debugger.run()
+    assert line(debugger) == 8
+    assert debugger.evaluate("m", "c.variable").number > 30.0  # type: ignore[operator]
+
+
+def test_a_label_and_an_interrupt() -> None:
+    debugger = started()
+    (label, interrupt) = debugger.set_breakpoints([LabelPoint(label="count"), LabelPoint(label="INT_IN3")])
+    assert label.is_set
+    assert interrupt.is_set
+    assert debugger.run().reason is StopReason.FUNCTION
+    assert line(debugger) == 8
+
+
+def test_a_data_breakpoint_stops_after_the_change() -> None:
+    debugger = started()
+    debugger.set_breakpoints([DataPoint(machine="m", name="n")])
+    assert debugger.run() == Stop(StopReason.DATA, MILLISECOND * 2, "m", "n: 0 → 1", (1,))
+    debugger.set_breakpoints([DataPoint(machine="m", name="OUT1", condition="= 1")])
+    stops = [debugger.run() for _ in range(2)]
+    assert [stop.reason for stop in stops] == [StopReason.DATA] * 2
+    assert line(debugger) == 9
+    assert debugger.run_back() == stops[0]
+
+
+def test_a_program_error_is_an_event_to_stop_at() -> None:
+    debugger = started("n = 0\nx = 5 / n\nEND\n")
+    debugger.set_events([Events.PROGRAM_ERROR])
+    stop = debugger.run()
+    assert (stop.reason, stop.time, stop.text) == (StopReason.EXCEPTION, 2 * MILLISECOND, "line 2: division by zero")
+
+
+@pytest.mark.parametrize(
+    ("point", "problem"),
+    [
+        (at(99), "no statement is in line 99 of m.prg or after it"),
+        (at(1, condition="n >"), "expression 'n >' ends too early: expected a name or a number"),
+        (at(1, condition="n = = 2"), "expression 'n = = 2', column 5: found '=', expected a name or a number"),
+        (at(1, hits="0"), "hit count '0': expected a number from 1 on, after nothing, or one of = < <= > >= %"),
+        (at(1, log="{n"), "log '{n': a brace has no partner"),
+        (LabelPoint(label="MIAN"), "no label is called 'MIAN' (did you mean 'MAIN'?); there are MAIN, COUNT, INT_IN3"),
+        (LinePoint(machine="x", text="program 0", line=1), "'x' has no program: m has one"),
+        (LinePoint(machine="m", text="program 3", line=1), "m has no text 'program 3': texts are program 0"),
+    ],
+)
+def test_what_is_no_breakpoint_has_its_reason(point: LinePoint, problem: str) -> None:
+    (found,) = started().set_breakpoints([point])
+    assert not found.is_set
+    assert found.problem == problem
+
+
+# ---------------------------------------------------------------------- values
+
+
+def test_values_are_read_and_set_with_their_units() -> None:
+    debugger = started()
+    debugger.step_over("m")
+    assert debugger.set_value("m", "n", "6 * 7").number == 42.0
+    debugger.step_over("m")
+    (variable,) = debugger.scope("m", "Variables").values
+    assert (variable.name, variable.text, variable.is_settable) == ("n", "43", True)
+    assert debugger.set_value("m", "IN3", "1").text == "1"
+    assert debugger.set_value("m", "M1_ACC", "55").number == 55.0
+    names = {value.name for value in debugger.scope("m", "Axes").values}
+    assert {"M1.position", "M1.velocity", "M1.status"} <= names
+    pins = {value.name: value for value in debugger.scope("m", "Pins").values}
+    assert (pins["IN3"].text, pins["IN3"].is_settable, pins["OUT1"].is_settable) == ("1", True, False)
+
+
+def test_the_past_cannot_be_changed_unless_it_becomes_a_branch() -> None:
+    debugger = started()
+    debugger.run(200 * MILLISECOND)
+    debugger.go(100 * MILLISECOND)
+    with pytest.raises(Misuse, match=r"n cannot be set 0.1 s before the present: branch"):
+        debugger.set_value("m", "n", "100")
+    debugger.branch()
+    assert (debugger.present, debugger.is_past) == (100 * MILLISECOND, False)
+    debugger.set_value("m", "n", "100")
+    debugger.run(200 * MILLISECOND)
+    assert debugger.evaluate("m", "n").number > 100  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("do", "problem"),
+    [
+        (lambda d: d.set_value("m", "OUT1", "1"), "'OUT1': "),
+        (lambda d: d.set_value("m", "nothing", "1"), "'nothing' cannot be set"),
+        (lambda d: d.evaluate("m", "nothing"), "'nothing' means nothing to m: its variables are n"),
+        (lambda d: d.evaluate("m", "1 / 0"), "division by zero"),
+        (lambda d: d.scope("m", "x"), "no group of values is called 'x'"),
+        (lambda d: d.stack("x"), "no machine is called 'x'"),
+        (lambda d: d.go(5 * SECOND), "5000000000 ns: the past is kept from 0 to 999999 ns"),
+    ],
+)
+def test_what_cannot_be_done_has_its_reason(do: Callable[[Debugger], object], problem: str) -> None:
+    with pytest.raises(Misuse, match=problem):
+        do(started())
+
+
+def test_programs_without_statement_time_are_refused() -> None:
+    world = make(world=f'{ONE}statement_time = "0"\n')
+    with pytest.raises(Misuse, match="m: statement_time = 0"):
+        Debugger(world)
+
+
+# ---------------------------------------------------------------------- the end
+
+
+def test_the_end_of_a_program_is_where_nothing_happens_any_more() -> None:
+    debugger = started("n = 1\nEND\n")
+    stop = debugger.run()
+    assert (stop.reason, stop.text) == (StopReason.IDLE, "the program has ended")
+    assert debugger.has_ended
+    debugger.step_back("m")
+    assert line(debugger) == 2
+
+
+def test_a_wait_that_nothing_ends_is_named() -> None:
+    debugger = started("n = 1\nWAIT IN1 = 1\nEND\n")
+    stop = debugger.run()
+    assert (stop.reason, stop.text) == (StopReason.IDLE, "nothing will happen any more: m in line 2 waits for ever")
+    debugger.set_value("m", "IN1", "1")
+    debugger.step_over("m")
+    assert line(debugger) == 3
+
+
+def test_a_run_in_parts_can_be_ended_anywhere() -> None:
+    debugger = started()
+    travel = debugger.running()
+    for _ in range(10):
+        next(travel)
+    travel.close()
+    stop = debugger.pause()
+    assert stop.reason is StopReason.PAUSE
+    assert stop.time == debugger.now > SECOND
+    debugger.step_over("m")
+    debugger.step_back("m")

@@ -1,0 +1,189 @@
+"""Viewers who look back, in memory: what they are shown, and what they cannot do meanwhile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from tests.support.studio_rig import Studio, Tab
+
+from steptwin.errors import Refusal
+from steptwin.later import Later
+from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.subject.world import WorldSubject
+from steptwin.world.history import History, Past
+from steptwin.world.programtexts import WorldPrograms
+
+
+class Kept:
+    """The past of the world of a studio, looked at at once."""
+
+    def __init__(self, studio: Studio) -> None:
+        self.history = History(studio.world)
+        self.open_looks = 0
+        self._studio = studio
+
+    @property
+    def begin(self) -> Nanos:
+        return self.history.begin
+
+    def open(self) -> _Look:
+        if self.open_looks:
+            raise Refusal("too many")
+        self.open_looks += 1
+        return _Look(self, Past(self.history), self._studio.subject)
+
+
+class _Look:
+    def __init__(self, kept: Kept, past: Past, real: WorldSubject) -> None:
+        self._kept, self._past, self._real = kept, past, real
+        self.subject = WorldSubject(past.world)
+        self.programs = WorldPrograms(past.world)
+
+    @property
+    def now(self) -> Nanos:
+        return self._past.world.now
+
+    def go(self, moment: Nanos) -> Later[None]:
+        for _ in self._past.go(moment):
+            pass
+        later = Later[None]()
+        later.put(None)
+        return later
+
+    def go_back(self) -> None:
+        self._real.go_back(self._past.world.snapshot(), None)
+        self._kept.history.gone_back()
+
+    def close(self) -> None:
+        self._kept.open_looks -= 1
+
+
+@pytest.fixture
+def studio() -> Studio:
+    """M1 has moved from 0 mm to 20 mm from 1 s on; now it is 4 s later."""
+    made = Studio(lookback=Kept)
+    tab = made.open()
+    made.run(1000)
+    tab.ok("enable", machine="table", axis=1)
+    tab.ok("move", machine="table", axis=1, to=20)
+    made.run(4000)
+    tab.close()
+    return made
+
+
+def values(tab: Tab) -> dict[int, Any]:
+    return dict(map(tuple, tab.newest("values")["1"]))
+
+
+def test_the_past_is_shown_while_the_world_goes_on(studio: Studio) -> None:
+    tab, other = studio.open(), studio.open()
+    tab.ok("watch", points=["table.M1.position", "table.M1.status", "time"])
+    tab.read()
+    assert values(tab) == {0: 20.0, 1: 4, 2: 5.0}
+    assert tab.ok("look", to_ns=str(1200 * MILLISECOND)) == {"time_ns": "1200000000", "from_ns": "0"}
+    tab.read()
+    past = tab.newest("past")
+    assert (past["time_ns"], past["from_ns"]) == ("1200000000", "0")
+    assert past["state"]["table"]["axes"][0]["enabled"] is True
+    assert [plan["axis"] for plan in past["plans"] if plan["plan"]["segments"]] == ["1"]
+    seen = values(tab)
+    assert 0.0 < seen[0] < 20.0
+    assert seen[2] == 1.2
+    # The same over requests, and for what is watched from now on.
+    assert tab.ok("read", points=["table.M1.position"])[0]["value"] == seen[0]
+    assert tab.ok("state", machine="table") == past["state"]["table"]
+    tab.ok("watch", points=["time"])
+    (message,) = tab.read()
+    assert message["values"] == {"2": [[0, 1.2]]}
+    # Others see the present, events go on, and what is shown stands.
+    assert other.ok("read", points=["time"])[0]["value"] == 5.0
+    tab.ok("follow", kinds=["note"], id=70)
+    other.ok("note", text="later")
+    studio.run(1000)
+    messages = tab.read()
+    assert [event["note"] for message in messages for event in message.get("events", ())] == ["later"]
+    assert not any("values" in message for message in messages)
+    # Another moment, then the present.
+    tab.ok("look", to_ns="0")
+    tab.read()
+    assert values(tab) == {0: 0.0, 1: 0, 2: 0.0}
+    assert tab.ok("look") is None
+    studio.run(40)
+    tab.read()
+    assert tab.newest("past") is None
+    assert values(tab)[0] == 20.0
+    assert values(tab)[2] > 5.9
+
+
+def test_who_looks_back_changes_nothing_but_may_stop(studio: Studio) -> None:
+    tab = studio.open()
+    tab.ok("look", to_ns=str(SECOND))
+    tab.read()
+    may = tab.newest("past")["may"]
+    assert {"read", "stop", "stop_all", "look", "go_back"} <= set(may)
+    assert not {"move", "write", "pause", "set", "jog"} & set(may)
+    code, message = tab.error("move", machine="table", axis=1, to=3)
+    assert (code, message) == ("refusal", "move: the past is looked at, which cannot be changed: look at the present first")
+    assert tab.ok("stop", machine="table") is None
+    assert tab.ok("stop_all")["failed"] == {}
+    tab.ok("look")
+    tab.ok("move", machine="table", axis=1, to=3)
+
+
+def test_the_whole_state_and_the_past_with_it(studio: Studio) -> None:
+    tab = studio.open()
+    tab.ok("watch", points=["time"])
+    tab.ok("look", to_ns=str(SECOND))
+    tab.read()
+    tab.ok("resync")
+    messages = tab.read()
+    assert [next(key for key in one if key not in ("seq", "time_ns")) for one in messages] == ["hello", "past", "values"]
+    assert messages[0]["hello"]["time_ns"] == "5000000000"
+    assert messages[2]["values"] == {"1": [[0, 1.0]]}
+
+
+def test_moments_that_are_not_kept_are_refused(studio: Studio) -> None:
+    tab = studio.open()
+    assert tab.error("look", to_ns=str(60 * SECOND)) == (
+        "misuse",
+        "to_ns = 60000000000: the past is kept from 0 to 5000000000 ns",
+    )
+    assert tab.error("go_back") == ("refusal", "this viewer looks at the present")
+    tab.ok("look", to_ns="0")  # the first one has left nothing open
+    other = studio.open()
+    assert other.error("look", to_ns="0") == ("refusal", "too many")
+    tab.close()
+    other.ok("look", to_ns="0")
+
+
+def test_the_world_goes_back_for_all(studio: Studio) -> None:
+    tab, other = studio.open(), studio.open()
+    other.ok("watch", points=["table.M1.position"])
+    other.ok("follow", kinds=["restored"], id=71)
+    other.read()
+    tab.ok("look", to_ns=str(1200 * MILLISECOND))
+    seen = tab.ok("read", points=["table.M1.position"])[0]["value"]
+    tab.ok("go_back")
+    tab.read()
+    assert tab.newest("past") is None
+    assert studio.world.now == 1200 * MILLISECOND
+    assert studio.value("table.M1.position") == seen
+    studio.hub.tick(studio.now)
+    (event,) = other.read()[-1]["events"]
+    assert (event["kind"], event["snapshot"], event["text"]) == ("restored", None, "time went back to here")
+    studio.run(4000)
+    assert studio.value("table.M1.position") == 20.0
+
+
+def test_going_back_is_for_who_holds_control(studio: Studio) -> None:
+    tab, other = studio.open(), studio.open("Anna")
+    other.ok("take_control")
+    tab.ok("look", to_ns="0")
+    assert tab.error("go_back")[1].startswith("go_back needs control, which Anna")
+
+
+def test_where_no_past_is_kept_nothing_is_offered() -> None:
+    tab = Studio().open()
+    assert not {"look", "go_back"} & set(tab.messages[0]["hello"]["may"])
+    assert tab.error("look", to_ns="0") == ("refusal", "look: no past is kept here")

@@ -1,0 +1,223 @@
+"""The program panel in a real browser: help while typing, download. What the twin does is seen by a Modbus master."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+from tests.conftest import until
+from tests.studio.conftest import Process
+from tests.studio.test_page_panels import AXE, Studio, browser, button
+
+__all__ = ["browser"]
+
+WORLD = """
+    [world]
+    name = "cell"
+    [[line]]
+    name = "bus"
+    kind = "modbus"
+    tcp = "127.0.0.1:0"
+    [[mic488]]
+    name = "table"
+    line = "bus"
+    program = "cell.prg"
+    positions = "cell.csv"
+    [mic488.M1]
+    unit = "mm"
+    gear = 100.0
+    [[line]]
+    name = "chips"
+    kind = "m1486"
+    tcp = "127.0.0.1:0"
+    [[m1486]]
+    name = "drum"
+    line = "chips"
+    address = 7
+"""
+PROGRAM = "LOOP:\n$R0 = $R0 + 1\nDELAY 0.1\nJUMP LOOP\n"
+TABLE = "HOME;1;x;x;x\nPICK;5;x;x;x\n"
+
+
+@pytest.fixture
+def studio(start_studio: Callable[..., Process], browser: Browser, monkeypatch: pytest.MonkeyPatch) -> Iterator[Studio]:
+    monkeypatch.setattr("tests.studio.conftest.WORLD", WORLD)
+    monkeypatch.setattr("tests.studio.conftest.FILES", {"cell.prg": PROGRAM, "cell.csv": TABLE})
+    found = Studio(start_studio(), browser)
+    yield found
+    found.close()
+    assert found.complaints == []
+
+
+def text_of(page: Page, name: str = "cell.prg") -> Locator:
+    return page.get_by_role("textbox", name=f"Text of {name}")
+
+
+def begin(page: Page, name: str = "cell.prg") -> None:
+    """With the cursor in a new line at the beginning of the text, when the editor server is there."""
+    text_of(page, name).click()
+    expect(text_of(page, name).locator("span[class^=tok-]").first).to_be_visible()
+    page.keyboard.press("Control+Home")
+    page.keyboard.press("Enter")
+    page.keyboard.press("ArrowUp")
+
+
+def write(page: Page, text: str, name: str = "cell.prg") -> None:
+    """In the place of the whole text."""
+    text_of(page, name).click()
+    page.keyboard.press("Control+a")
+    page.keyboard.press("Delete")
+    page.keyboard.insert_text(text)
+
+
+def choose(page: Page, address: str) -> None:
+    page.get_by_label("Text", exact=True).select_option(f"steptwin:///{address}")
+
+
+def user_register(studio: Studio, number: int) -> float:
+    response = httpx.get(f"{studio.process.url}/api/points", params={"names": f"table.USER_REGISTER[{number}]:real"})
+    return response.json()["ok"][0]["value"]
+
+
+def findings(page: Page) -> Locator:
+    return page.get_by_role("complementary", name="Findings")
+
+
+def test_a_mistake_is_found_while_it_is_typed_and_mended(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    begin(page)
+    page.keyboard.type("DELAI 1")
+    expect(findings(page)).to_contain_text("unknown statement DELAI")
+    expect(page.get_by_text("The text differs from what is in the twin.")).to_be_visible()
+    wrong = text_of(page).locator(".cm-lintRange-error").first
+    wrong.hover()
+    page.get_by_role("tooltip").or_(page.locator(".cm-tooltip")).get_by_role("button").first.click()
+    expect(text_of(page)).to_contain_text("DELAY 1")
+    expect(findings(page)).not_to_contain_text("DELAI")
+    button(page, "As in the twin").click()
+    expect(page.get_by_text("The text differs from what is in the twin.")).to_have_count(0)
+    expect(text_of(page)).not_to_contain_text("DELAY 1")
+
+
+def test_a_name_is_completed_explained_and_renamed_in_both_texts(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    begin(page)
+    page.keyboard.type("MOVEPTP @P")
+    option = page.get_by_role("option", name=re.compile("^PICK"))
+    expect(option).to_be_visible()
+    option.click()
+    page.keyboard.press("Enter")
+    expect(text_of(page)).to_contain_text("MOVEPTP @PICK")
+    text_of(page).get_by_text("MOVEPTP").hover()
+    expect(page.locator(".cm-lsp-hover-tooltip")).to_contain_text("MOVEPTP")
+    page.keyboard.press("Control+Home")
+    for _ in range(11):
+        page.keyboard.press("ArrowRight")
+    page.keyboard.press("F2")
+    page.get_by_label("New name").fill("TAKE")
+    page.keyboard.press("Enter")
+    expect(text_of(page)).to_contain_text("MOVEPTP @TAKE")
+    choose(page, "table/positions-0.csv")
+    expect(text_of(page, "cell.csv")).to_contain_text("TAKE;5;x;x;x")
+
+
+def test_a_program_is_downloaded_and_runs(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    begin(page)
+    write(page, "$R4 = 7\n$R6 = 1 +\nEND\n")
+    download = button(page, "Download cell.prg into table")
+    download.click()
+    refusal = page.get_by_role("alert").filter(has_text="It was not downloaded")
+    expect(refusal).to_contain_text("cell.prg:2:")
+    assert studio.master.words(10003)[0] == 0
+    write(page, "$R4 = 7\nWAITING:\nDELAY 1\nJUMP WAITING\n")
+    download.click()
+    expect(refusal).to_have_count(0)
+    expect(page.get_by_text("cell.prg is in table now.")).to_be_visible()
+    expect(page.get_by_text("The text differs from what is in the twin.")).to_have_count(0)
+    button(page, "Start the program of table").click()
+    until(lambda: studio.master.words(10003)[0] == 1, "the master sees that it runs")
+    until(lambda: user_register(studio, 4) == 7.0, "the new program has written its register")
+    expect(page.get_by_role("status").filter(has_text="running, line 3")).to_be_visible()
+    download.click()
+    expect(refusal).to_contain_text("stop it first")
+    button(page, "Stop the program of table").click()
+    until(lambda: studio.master.words(10003)[0] == 0, "the master sees that it has stopped")
+
+
+def test_a_draft_outlives_the_page(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    begin(page)
+    page.keyboard.type("// kept")
+    kept = "localStorage['steptwin.drafts'] ?? ''"
+    until(lambda: "// kept" in page.evaluate(kept), "the browser has the draft")
+    page.reload()
+    expect(text_of(page)).to_contain_text("// kept")
+    expect(page.get_by_text("The text differs from what is in the twin.")).to_be_visible()
+
+
+def test_positions_are_taught(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    begin(page)
+    choose(page, "table/positions-0.csv")
+    assert httpx.post(f"{studio.process.url}/api/do/enable", json={"machine": "table", "axis": 1}).status_code == 200
+    move = {"machine": "table", "axis": 1, "to": 12.5}
+    assert httpx.post(f"{studio.process.url}/api/do/move", json=move).status_code == 200
+    until(lambda: studio.at(1) == 12.5 and studio.stands(1), "the axis is there")
+    page.get_by_label("Row", exact=True).fill("PICK")
+    for axis in ("M2", "M3", "M4"):
+        page.get_by_label(axis, exact=True).uncheck()
+    button(page, "Take position").click()
+    expect(text_of(page, "cell.csv")).to_contain_text("PICK;12.5;x;x;x")
+    button(page, "Download cell.csv into table").click()
+    expect(page.get_by_text("cell.csv is in table now.")).to_be_visible()
+    asked = {"machine": "table", "place": "positions 0"}
+    answer = httpx.post(f"{studio.process.url}/api/do/program_text", json=asked).json()["ok"]
+    assert answer["text"] == "HOME;1;x;x;x\nPICK;12.5;x;x;x\n"
+
+
+def test_a_chip_is_given_a_program_and_typed_to(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    choose(page, "drum/program.m1486")
+    text = text_of(page, "program")
+    text.click()
+    page.keyboard.type("f640\nr\n")
+    button(page, "Download program into drum").click()
+    points = f"{studio.process.url}/api/points?names=drum.position"
+    until(lambda: httpx.get(points).json()["ok"][0]["value"] == 640.0, "the drum has turned")
+    button(page, "Terminal").click()
+    typed = page.get_by_label("To send to chips")
+    for command in ("b640", "r"):
+        typed.fill(command)
+        typed.press("Enter")
+    until(lambda: httpx.get(points).json()["ok"][0]["value"] == 0.0, "the drum has turned back")
+    typed.press("ArrowUp")
+    typed.press("ArrowUp")
+    expect(typed).to_have_value("b640")
+
+
+def test_the_keyboard_is_enough(studio: Studio) -> None:
+    """Space and figures are typed, nothing is stopped by them; Tab leaves the text; Download by Enter."""
+    page = studio.page(panel="Program")
+    begin(page)
+    page.keyboard.type("// 1 , ; / ?")
+    expect(text_of(page)).to_contain_text("// 1 , ; / ?")
+    page.keyboard.press("Tab")
+    expect(text_of(page)).not_to_be_focused()
+    button(page, "Download cell.prg into table").press("Enter")
+    expect(page.get_by_text("cell.prg is in table now.")).to_be_visible()
+
+
+@pytest.mark.parametrize("language", ["en-US", "pl-PL"])
+def test_axe_finds_nothing_serious(studio: Studio, language: str) -> None:
+    page = studio.page(language, panel=None)
+    page.get_by_role("navigation").get_by_role("button", name="Program", exact=True).click()
+    expect(page.locator(".cm-content span[class^=tok-]").first).to_be_visible()
+    page.evaluate(AXE.read_text())
+    found = page.evaluate("axe.run({resultTypes: ['violations']})")
+    serious = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
+    assert not serious, json.dumps(serious, indent=1)[:3000]

@@ -1,0 +1,43 @@
+"""Worlds to debug."""
+
+from __future__ import annotations
+
+from steptwin.files.world import World
+
+WBC = """\
+n = 0
+MAIN:
+    n = n + 1
+    JUMP COUNT
+    DELAY 0.05
+JUMP MAIN
+COUNT:
+    OUT1 = ON
+    OUT1 = OFF
+    RETURN
+INT_IN3:
+    OUT2 = ON
+    RETURN
+"""
+CHIP = "[\n:5\n@1\nL2\n+1\nE\n'2\nW5\nJ1\n@2\n+2\n.\n]\n"
+BOTH = """
+[world]
+name = "two"
+[[line]]
+name = "chips"
+kind = "m1486"
+[[mic488]]
+name = "m"
+program = "m.prg"
+start = true
+[[m1486]]
+name = "c"
+line = "chips"
+program = "c.m1486"
+"""
+ONE = '[world]\nname = "one"\n[[mic488]]\nname = "m"\nprogram = "m.prg"\nstart = true\n'
+
+
+def make(text: str = WBC, world: str = ONE) -> World:
+    files = {"m.prg": text.encode(), "c.m1486": CHIP.encode()}
+    return World.from_toml(world, files, keep_trace=False, keep_inputs=False)

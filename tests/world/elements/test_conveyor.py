@@ -1,0 +1,220 @@
+"""Belts against an integration of their own: every workpiece moves by speed times step."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.files.world import World
+from steptwin.machine import MILLISECOND
+from steptwin.world.reader import WorldError
+
+TEXT = """
+[[mic488]]
+name = "a"
+[[button]]
+name = "feeder"
+to = "belt.feed"
+[[conveyor]]
+name = "belt"
+length = 400.0
+speed = 125.0
+run = "a.OUT1"
+workpiece = 40.0
+[[conveyor.sensor]]
+at = 300.0
+to = "a.IN1"
+"""
+
+
+def edges(world: World, lane: str) -> list[tuple[float, object]]:
+    """Milliseconds and levels."""
+    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == lane]
+
+
+def happened(world: World) -> list[tuple[float, str]]:
+    return [(record.time / MILLISECOND, str(record.value)) for record in world.trace.of("event") if record.subject == "workpiece"]
+
+
+def test_a_workpiece_is_carried_past_a_sensor() -> None:
+    world = World.from_toml(TEXT)
+    world.mic488["a"].write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.run(until=4.0)
+    # 300 mm at 125 mm/s; the rear is 40 mm behind the front.
+    assert edges(world, "belt.sensor1") == [(0, 0), (2400, 1), (2720 + 1e-6, 0)]
+    assert happened(world) == [(0, "belt.1 is on belt"), (3200, "belt.1 leaves belt")]
+    assert [world.read(f"belt.{name}") for name in ("fed", "count", "delivered")] == [1, 0, 1]
+
+
+def integrated(runs: list[tuple[int, bool]], feeds: list[int], end: int) -> tuple[list[tuple[int, bool]], int]:
+    """Edges of the sensor in milliseconds, and how many were delivered."""
+    fronts: list[float] = []
+    is_running, before, delivered, edges = False, False, 0, []
+    for step in range(end):
+        is_running = dict(runs).get(step, is_running)
+        if step in feeds and not any(front <= 40.0 for front in fronts):
+            fronts.append(0.0)
+        covered = any(300.0 <= front <= 340.0 for front in fronts)
+        if covered is not before:
+            before = covered
+            edges.append((step, covered))
+        fronts = [front + 0.125 * is_running for front in fronts]
+        delivered += sum(front >= 400.0 for front in fronts)
+        fronts = [front for front in fronts if front < 400.0]
+    return edges, delivered
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 8000), st.booleans()), max_size=6, unique_by=lambda one: one[0]),
+    st.lists(st.integers(0, 400), max_size=6, unique=True),
+)
+def test_it_is_where_an_integration_has_it(runs: list[tuple[int, bool]], feeds: list[int]) -> None:
+    runs = sorted({0: True, **dict(runs)}.items())
+    feeds = sorted(20 * feed + 7 for feed in feeds)
+    world = World.from_toml(TEXT)
+    for at, level in runs:
+        world.at(at / 1000, lambda level=level: world.mic488["a"].write("OUT1", int(level)))  # type: ignore[misc]
+    for at in feeds:
+        world.at(at / 1000, lambda: world.press("feeder", "5 ms"))
+    world.run(until=10.0)
+    expected, delivered = integrated(runs, feeds, 10_001)
+    found = edges(world, "belt.sensor1")[1:]
+    assert [bool(level) for _, level in found] == [level for _, level in expected]
+    assert [time for time, _ in found] == pytest.approx([time for time, _ in expected], abs=1.5)
+    assert world.read("belt.delivered") == pytest.approx(delivered, abs=1)
+
+
+ON_AN_AXIS = """
+[[mic488]]
+name = "a"
+[mic488.M1]
+unit = "mm"
+gear = 100.0
+acc = 1000.0
+vel = 200.0
+[[axis]]
+name = "drum"
+drive = "a.M1"
+unit = "rev"
+kind = "rotary"
+pulses_per_unit = 3200
+[[button]]
+name = "feeder"
+to = "belt.feed"
+[[conveyor]]
+name = "belt"
+axis = "drum"
+mm_per_unit = 160.0
+length = 300.0
+workpiece = 20.0
+next = "second"
+[[conveyor.sensor]]
+at = 100.0
+to = "a.IN1"
+contact = "NC"
+[[conveyor]]
+name = "second"
+speed = 50.0
+length = 100.0
+[[conveyor.sensor]]
+at = 50.0
+to = "a.IN2"
+[[wire]]
+from = "a.OUT1"
+to = "second.run"
+"""
+
+
+def test_an_axis_moves_a_belt_both_ways() -> None:
+    world = World.from_toml(ON_AN_AXIS)
+    device = world.mic488["a"]
+    device.axis[1].enable()
+    world.press("feeder", "10 ms")
+    world.run(for_=0.1)
+    # 3200 pulses are 160 mm: a pulse is 0.05 mm, and 100 pulses are a mm of the controller.
+    device.axis[1].move_to(20.5)
+    world.run(until="idle")
+    assert world.read("a.IN1") == 0
+    moved = world.read("drum.position") * 160.0
+    assert moved == pytest.approx(102.5)
+    device.axis[1].move_to(19.5)
+    world.run(until="idle")
+    assert world.read("a.IN1") == 1
+    device.axis[1].move_to(-1.0)
+    world.run(until="idle")
+    assert happened(world)[-1][1] == "belt.1 falls off the beginning of belt"
+    assert world.read("belt.count") == 0
+
+
+def test_a_workpiece_goes_on_to_the_next_belt() -> None:
+    world = World.from_toml(ON_AN_AXIS)
+    device = world.mic488["a"]
+    device.axis[1].enable()
+    device.write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.run(for_=0.1)
+    device.axis[1].move_to(70.0)
+    world.run(until="second.count == 1", for_=10)
+    began = world.now
+    world.run(until="a.IN2", for_=10)
+    assert world.now - began == 1000 * MILLISECOND
+    # 20 mm long there too.
+    world.run(until="not a.IN2", for_=10)
+    assert world.now - began == pytest.approx(1400 * MILLISECOND, abs=1)
+    world.run(until="second.delivered == 1", for_=10)
+    assert world.now - began == 2000 * MILLISECOND
+
+
+def test_workpieces_come_at_a_period_where_there_is_room() -> None:
+    world = World.from_toml(TEXT.replace("workpiece", 'feed_every = "300 ms"\nworkpiece'))
+    world.mic488["a"].write("OUT1", 1)
+    world.run(until=1.0)
+    # 37.5 mm in 300 ms, less than the 40 mm of a workpiece.
+    assert [time for time, _ in happened(world)] == [300, 900]
+
+
+def test_a_belt_whose_drive_fails_stands() -> None:
+    world = World.from_toml(TEXT)
+    world.mic488["a"].write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.fault("belt-stop element=belt from_s=1 until_s=1.5")
+    world.run(until=4.0)
+    assert [time for time, _ in edges(world, "belt.sensor1")][1] == 2900
+    with pytest.raises(Misuse, match="'belt' is moved by axis 'drum'"):
+        World.from_toml(ON_AN_AXIS).fault("belt-stop element=belt")
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 0.3, 1.0, 2.41, 2.9])
+def test_snapshots_have_it(moment_s: float) -> None:
+    text = TEXT.replace("workpiece", 'feed_every = "700 ms"\nworkpiece')
+    world = World.from_toml(text)
+    world.mic488["a"].write("OUT1", 1)
+    world.run(until=moment_s)
+    snapshot = world.snapshot()
+    world.run(until=5.0)
+    other = World.from_toml(text)
+    other.restore(snapshot)
+    other.run(until=5.0)
+    assert other.trace.digest() == world.trace.digest()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("speed = 125.0", "", "a conveyor needs one of speed and axis"),
+        ("speed = 125.0", 'speed = 125.0\naxis = "x"', "a conveyor needs one of speed and axis"),
+        ("speed = 125.0", 'axis = "x"', "no axis is called 'x'"),
+        ("at = 300.0", "at = 400.5", "at = 400.5 is beyond length = 400"),
+        ("at = 300.0", "", r"\[conveyor.sensor\]: at is missing"),
+        ("workpiece = 40.0", 'next = "belt"', "belt is followed by itself"),
+        ("workpiece = 40.0", 'next = "other"', "nothing is called 'other'"),
+        ("workpiece = 40.0", 'next = "a"', "no conveyor is called 'a'"),
+        ('to = "a.IN1"', 'to = "a.AIN1"', "a.AIN1 is not a digital input"),
+    ],
+)
+def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
+    with pytest.raises(WorldError, match=text):
+        World.from_toml(TEXT.replace(old, new, 1))

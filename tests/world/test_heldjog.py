@@ -1,0 +1,296 @@
+"""Held jogs of twins, kept as the studio keeps them: bounded moves only, and a standstill in time whatever happens."""
+
+from __future__ import annotations
+
+from textwrap import dedent
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.files.world import World
+from steptwin.later import start
+from steptwin.machine import MILLISECOND, Nanos
+from steptwin.motion.divisions import profile_of
+from steptwin.studio.jogs import Held, WorldJogs
+from steptwin.subject.commands import Enable, Home, Jog, StopAxes
+from steptwin.subject.following import filter_of
+from steptwin.subject.payloads import FramePayload, PlanPayload
+from steptwin.subject.world import WorldSubject
+from steptwin.world import script as do
+from steptwin.world.heldjog import STANDS_NS
+
+MIC = """
+    [[line]]
+    name = "bus"
+    kind = "modbus"
+    {timing}
+    [[mic488]]
+    name = "a"
+    line = "bus"
+    [mic488.M1]
+    unit = "mm"
+    gear = 100.0
+    acc = {acc}
+    dec = {acc}
+    vel = 40.0
+"""
+CHIPS = """
+    [[line]]
+    name = "chips"
+    kind = "m1486"
+    {timing}
+    [[m1486]]
+    name = "drum"
+    line = "chips"
+    address = 7
+    variant = "{variant}"
+"""
+TIMED = 'timing = "real"'
+
+
+class Rig:
+    """A world in virtual time with held jogs, as a live world keeps them."""
+
+    def __init__(self, text: str) -> None:
+        self.world = World.from_toml(dedent(text))
+        self.subject = WorldSubject(self.world)
+        self.jogs = WorldJogs(self.subject)
+        self.followed = self.subject.follow(filter_of(["plan", "frame"]), 100_000)
+
+    def begin(self, wanted: Jog) -> Held:
+        return start(self.jogs.begin(wanted)).result()
+
+    def run(self, for_ms: float) -> None:
+        end = self.world.now + round(for_ms * MILLISECOND)
+        while (due := self.jogs.deadline()) is not None and due <= end:
+            self.world.advance(max(due, self.world.now))
+            self.world.settle_all()
+            self.jogs.advance(self.world.now)
+        self.world.advance(end)
+        self.world.settle_all()
+
+    def stands_at(self) -> Nanos:
+        """When the last plan ends or ended."""
+        end: Nanos = 0
+        for event in self.followed.take().events:
+            if isinstance(event.payload, PlanPayload):
+                end = profile_of(event.payload.plan).end or event.time
+        return end
+
+    def sent(self) -> str:
+        """What was typed on a line of chips."""
+        frames = (event.payload for event in self.followed.take().events)
+        return b"".join(one.data for one in frames if isinstance(one, FramePayload) and one.direction == "in").decode("ascii")
+
+    def position(self, point: str) -> float:
+        (reading,) = self.subject.read(point)
+        assert reading.value is not None
+        return reading.value
+
+
+def mic(acc: float = 1000.0, timing: str = "") -> Rig:
+    rig = Rig(MIC.format(acc=acc, timing=timing))
+    rig.subject.do(Enable("a", 1))
+    rig.run(100)
+    return rig
+
+
+def chip(variant: str = "A", timing: str = "") -> Rig:
+    return Rig(CHIPS.format(variant=variant, timing=timing))
+
+
+@pytest.mark.parametrize("timing", ["", TIMED])
+@pytest.mark.parametrize("acc", [20.0, 100.0, 400.0, 5000.0])
+@pytest.mark.parametrize("renewals", [0, 1, 7])
+def test_a_mic488_stands_in_time_after_the_last_renewal(acc: float, renewals: int, timing: str) -> None:
+    rig = mic(acc, timing)
+    held = rig.begin(Jog("a", 1, 40.0))
+    for _ in range(renewals):
+        rig.run(held.lasts_ns / MILLISECOND / 3)
+        held.extend()
+    last = rig.world.now
+    rig.run(50)
+    assert rig.position("a.M1.velocity") > 0
+    rig.run(2000)
+    assert rig.position("a.M1.velocity") == 0
+    assert rig.stands_at() <= last + STANDS_NS
+    assert held.over == "lapsed"
+    assert rig.jogs.deadline() is None
+
+
+@pytest.mark.parametrize("acc", [20.0, 100.0, 400.0, 5000.0])
+def test_a_mic488_whose_viewer_has_gone_brakes_at_once_and_stands_in_time(acc: float) -> None:
+    rig = mic(acc)
+    held = rig.begin(Jog("a", 1, 40.0))
+    for _ in range(20):
+        rig.run(50)
+        held.extend()
+    last = rig.world.now
+    held.drop()
+    rig.run(20)
+    assert rig.position("a.M1.velocity") < 40.0
+    rig.run(2000)
+    assert rig.stands_at() <= last + STANDS_NS
+    assert rig.position("a.M1_VMAX") == 40.0
+
+
+def test_an_axis_that_is_let_go_has_its_whole_ramp() -> None:
+    rig = mic(20.0)
+    held = rig.begin(Jog("a", 1, 10.0))
+    for _ in range(20):
+        rig.run(50)
+        held.extend()
+    last = rig.world.now
+    held.release()
+    rig.run(2000)
+    assert rig.stands_at() == pytest.approx(last + 500 * MILLISECOND, abs=5 * MILLISECOND)
+
+
+def test_a_held_jog_of_a_mic488_runs_evenly_and_goes_where_it_is_held() -> None:
+    rig = mic(4000.0)
+    held = rig.begin(Jog("a", 1, -40.0))
+    rig.run(50)
+    for _ in range(50):
+        rig.run(80)
+        held.extend()
+        assert rig.position("a.M1.velocity") == -40.0
+    held.release()
+    rig.run(1000)
+    assert held.over == "let go"
+    # 4.05 s at 40 mm/s, with ramps of 10 ms at both ends
+    assert rig.position("a.M1.position") == pytest.approx(-40.0 * 4.05, abs=0.05)
+
+
+@pytest.mark.parametrize("ends", ["release", "lapse", "stop"])
+def test_vmax_is_the_velocity_of_the_jog_only_while_it_lasts(ends: str) -> None:
+    rig = mic()
+    held = rig.begin(Jog("a", 1, 10.0))
+    rig.run(60)
+    assert rig.position("a.M1_VMAX") == 10.0
+    if ends == "release":
+        held.release()
+    elif ends == "stop":
+        rig.subject.do(StopAxes("a", 1))
+        with pytest.raises(Refusal, match="has ended"):
+            held.extend()
+    rig.run(500)
+    assert rig.position("a.M1_VMAX") == 40.0
+
+
+def test_a_jog_uses_relative_moves_and_nothing_without_end() -> None:
+    rig = mic()
+    rig.followed.take()
+    held = rig.begin(Jog("a", 1, 10.0))
+    for _ in range(5):
+        rig.run(80)
+        held.extend()
+    frames = (event.payload for event in rig.followed.take().events)
+    requests = [one.data for one in frames if isinstance(one, FramePayload) and one.direction == "in"]
+    written = {int.from_bytes(frame[2:4], "big") for frame in requests}
+    named = {name: int(_address(rig, name)) for name in ("M1_POS_REL", "M1_VMAX", "M1_VEL_ABS")}
+    assert {named["M1_POS_REL"], named["M1_VMAX"]} <= written
+    assert named["M1_VEL_ABS"] not in written
+    assert all(frame[1] != 5 for frame in requests)  # no coil
+
+
+def _address(rig: Rig, name: str) -> Any:
+    return rig.subject.description.machines[0].datasheet.point(name).addresses[0].place
+
+
+def test_who_stops_the_axis_otherwise_ends_the_jog() -> None:
+    rig = mic()
+    held = rig.begin(Jog("a", 1, 10.0))
+    rig.run(80)
+    held.extend()
+    rig.run(40)
+    rig.subject.do(do.Write((("a", "M1_STOP", 1.0),)))
+    rig.run(40)
+    with pytest.raises(Refusal, match="has ended"):
+        held.extend()
+    at = rig.position("a.M1.position")
+    rig.run(1000)
+    assert rig.position("a.M1.position") == at
+
+
+def test_another_motion_is_not_stopped_by_a_jog_that_lapses() -> None:
+    rig = mic()
+    rig.begin(Jog("a", 1, 10.0))
+    rig.run(80)
+    rig.subject.do(Home("a", 1, -5.0))
+    rig.run(1000)
+    assert rig.position("a.M1.velocity") == -5.0
+
+
+@pytest.mark.parametrize("velocity", [0.0, 40.5, -41.0])
+def test_velocities_are_limited_to_vmax(velocity: float) -> None:
+    with pytest.raises(Misuse, match=r"more than 0 and at most VMAX, 40 mm/s"):
+        mic().begin(Jog("a", 1, velocity))
+
+
+def test_a_drive_that_is_off_is_not_jogged() -> None:
+    rig = Rig(MIC.format(acc=100.0, timing=""))
+    with pytest.raises(Refusal, match="not enabled"):
+        rig.begin(Jog("a", 1, 5.0))
+    with pytest.raises(Misuse, match="no axis 5"):
+        rig.begin(Jog("a", 5, 5.0))
+
+
+@pytest.mark.parametrize("timing", ["", TIMED])
+@pytest.mark.parametrize("velocity", [64.0 * 20, 64.0 * 640, -64.0 * 4000])
+@pytest.mark.parametrize("renewals", [0, 1, 7])
+def test_an_m1486_stands_in_time_after_the_last_renewal(velocity: float, renewals: int, timing: str) -> None:
+    rig = chip(timing=timing)
+    rig.run(100)
+    held = rig.begin(Jog("drum", 1, velocity))
+    for _ in range(renewals):
+        rig.run(held.lasts_ns / MILLISECOND / 3)
+        held.extend()
+    last = rig.world.now
+    rig.run(2000)
+    assert rig.stands_at() <= last + STANDS_NS
+    assert rig.position("drum.position") * velocity > 0
+    assert held.over == "lapsed"
+    assert rig.jogs.deadline() is None
+
+
+def test_a_jog_of_an_m1486_is_a_row_of_moves_without_any_that_never_ends() -> None:
+    rig = chip()
+    held = rig.begin(Jog("drum", 1, -64.0 * 640))
+    for _ in range(10):
+        rig.run(60)
+        held.extend()
+    held.release()
+    rig.run(1000)
+    commands = rig.sent().split("\r")
+    assert commands[:2] == ["x7", "v640"]
+    assert commands.count("r") >= 5
+    assert {one[0] for one in commands if one} == {"x", "v", "b", "r"}
+    assert commands[-2] == "v1000"  # as before: the default
+    assert rig.position("drum.counter") == (rig.position("drum.position") % 2**24)
+
+
+def test_an_m1486_that_was_killed_is_not_jogged_on() -> None:
+    rig = chip()
+    held = rig.begin(Jog("drum", 1, 64.0 * 640))
+    rig.run(30)
+    rig.subject.do(StopAxes("drum"))
+    for _ in range(30):
+        rig.run(80)
+        if held.over is None:
+            try:
+                held.extend()
+            except Refusal:
+                break
+    assert held.over is not None
+    assert rig.sent().count("r\r") == 1
+
+
+def test_what_cannot_be_jogged_is_refused() -> None:
+    with pytest.raises(Refusal, match="EEPROM"):
+        chip("E1").begin(Jog("drum", 1, 6400.0))
+    rig = chip()
+    rig.subject.do(Jog("drum", 1, 6400.0))
+    rig.run(50)
+    with pytest.raises(Refusal, match="not at rest"):
+        rig.begin(Jog("drum", 1, 6400.0))

@@ -1,0 +1,182 @@
+"""The past of a world that runs: any moment of it is as it was, and memory is bounded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from steptwin.errors import Misuse
+from steptwin.files.world import World
+from steptwin.machine import SECOND, Nanos
+from steptwin.world import history as module
+from steptwin.world.history import History, Past
+from steptwin.world.plant import Plant
+from steptwin.world.script import Set, Write
+
+TEXT = """
+[[mic488]]
+name = "m"
+[mic488.M1]
+unit = "mm"
+gear = 100.0
+acc = 100.0
+dec = 100.0
+vel = 40.0
+[[event]]
+every = "700 ms"
+steps = [{ set = { "m.IN5" = 1 } }, { wait = "300 ms" }, { set = { "m.IN5" = 0 } }]
+"""
+
+
+def make() -> World:
+    world = World.from_toml(TEXT, keep_trace=False, keep_inputs=False)
+    world.stop_recording()
+    return world
+
+
+def shown(world: Plant) -> tuple[object, ...]:
+    found = world.snapshot(with_inputs=False)
+    return world.now, world.machine("m").pins(), world.read("m.M1.position"), world.read("m.M1.velocity"), repr(found.kernels)
+
+
+def go(past: Past, moment: Nanos) -> Plant:
+    for _ in past.go(moment):
+        pass
+    return past.world
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(st.integers(1, 900), st.sampled_from(("in", "out", "move", "state"))), max_size=25), st.randoms())
+def test_every_moment_is_as_it_was(acts: list[tuple[int, str]], chance: object) -> None:
+    world = make()
+    world.apply_input(Write((("m", "M1_EN", 1.0),)))
+    history, past = History(world), None
+    seen: dict[Nanos, tuple[object, ...]] = {}
+    level = 0.0
+    for wait_ms, act in acts:
+        world.run(for_=wait_ms / 1000)
+        if act == "state":
+            history.take()
+        elif act == "move":
+            world.apply_input(Write((("m", "M1_POS_ABS", float(wait_ms)),)))
+        else:
+            level = 1.0 - level
+            world.apply_input(Set((("m", "IN3", level),)))
+        world.settle_all()
+        seen[world.now] = shown(world)
+    past = Past(history)
+    moments = list(seen)
+    chance.shuffle(moments)  # type: ignore[attr-defined]
+    for moment in moments:
+        assert shown(go(past, moment)) == seen[moment]
+    assert world.now == max(seen, default=0)
+
+
+def test_what_is_looked_at_touches_nothing() -> None:
+    world = make()
+    history = History(world)
+    world.run(for_=2)
+    before = shown(world)
+    past = Past(history)
+    go(past, SECOND)
+    past.world.apply_input(Set((("m", "IN3", 1.0),)))
+    past.world.run_to(5 * SECOND)
+    assert shown(world) == before
+
+
+def test_moments_outside_of_what_is_kept_are_refused() -> None:
+    world = make()
+    world.run(for_=1)
+    history = History(world)
+    world.run(for_=1)
+    past = Past(history)
+    with pytest.raises(Misuse, match="to_ns = 999999999: the past is kept from 1000000000 to 2000000000 ns"):
+        go(past, SECOND - 1)
+    with pytest.raises(Misuse, match="to_ns = 2000000001: the past is kept from 1000000000 to 2000000000 ns"):
+        go(past, 2 * SECOND + 1)
+    assert go(past, SECOND).now == SECOND
+
+
+def test_states_are_bounded_and_dense_where_they_are_new() -> None:
+    world = make()
+    history = History(world)
+    for _ in range(1200):
+        world.run(for_=1)
+        history.take()
+        history.take()  # of the same moment: not another one
+    assert len(history) == module.MOST_STATES
+    assert history.begin == 0
+    times = [history.state_at(moment)[0].now for moment in range(0, 1200 * SECOND + 1, SECOND // 2)]
+    ages = [moment * SECOND // 2 - time for moment, time in enumerate(times)]
+    assert max(ages[-20:]) < SECOND
+    assert max(ages) < 60 * SECOND
+    assert all(age <= 2 * SECOND + (2400 - moment) * SECOND // 40 for moment, age in enumerate(ages))
+
+
+def test_inputs_are_bounded_and_the_oldest_states_go_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_INPUTS", 10)
+    world = make()
+    history = History(world)
+    for count in range(25):
+        world.run(for_=0.1)
+        if count % 5 == 0:
+            history.take()
+        world.apply_input(Set((("m", "IN3", float(count % 2)),)))
+    assert history.begin == 1_600_000_000
+    assert history.inputs_from(0) is None
+    past = Past(history)
+    assert go(past, 1_600_000_000).now == history.begin
+    assert go(past, 2_500_000_000).machine("m").pins()["IN3"] == 0.0
+    for count in range(25):  # more than may be kept, and no state among them
+        world.apply_input(Set((("m", "IN3", float(count % 2)),)))
+    assert (len(history), history.begin) == (0, world.now)
+    with pytest.raises(Misuse, match="the past is kept from"):
+        go(past, world.now)
+    history.take()
+    assert go(past, world.now).now == world.now
+
+
+def test_what_is_undone_is_no_past() -> None:
+    world = make()
+    history = History(world)
+    world.run(for_=1)
+    snapshot = world.snapshot()
+    history.take()
+    world.apply_input(Set((("m", "IN3", 1.0),)))
+    world.run(for_=1)
+    past = Past(history)
+    assert go(past, 2 * SECOND).machine("m").pins()["IN3"] == 1.0
+    world.restore(snapshot)
+    history.gone_back()
+    with pytest.raises(Misuse, match="from 0 to 1000000000 ns"):
+        go(past, 2 * SECOND)
+    world.run(for_=1)
+    assert go(past, 2 * SECOND).machine("m").pins()["IN3"] == 0.0
+
+
+def test_the_world_can_go_back_to_what_is_looked_at_and_its_digest_with_it() -> None:
+    world = World.from_toml(TEXT)
+    world.trace.let_go()
+    history = History(world)
+    world.apply_input(Set((("m", "IN3", 1.0),)))
+    world.run(for_=1.5)
+    digest = world.trace.digest()
+    world.run(for_=1)
+    past = Past(history)
+    world.restore(replace(go(past, 1_500_000_000).snapshot(), inputs=tuple(world.inputs[:1])))
+    history.gone_back()
+    assert world.now == 1_500_000_000
+    assert world.trace.digest() == digest
+
+
+def test_nothing_is_recorded_after_the_end() -> None:
+    world = make()
+    history = History(world)
+    assert world.notes_inputs
+    history.close()
+    assert not world.notes_inputs
+    world.apply_input(Set((("m", "IN3", 1.0),)))
+    assert history.inputs_from(0) == []

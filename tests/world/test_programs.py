@@ -1,0 +1,181 @@
+"""The programs of controllers while they are executed: statements, labels, where they stand, what is reported of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.errors import Misuse
+from steptwin.files.world import World
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.subject.following import filter_of
+from steptwin.subject.world import WorldSubject
+from steptwin.world.programs import Place, Programs, StatementFollower
+from steptwin.world.trace import TraceRecord
+
+WBC = """\
+n = 0
+MAIN:
+    n = n + 1
+    IF IN1 = 1
+        JUMP COUNT
+    ENDIF
+    WAIT IN2 = 1
+JUMP MAIN
+COUNT:
+    OUT1 = ON
+    RETURN
+INT_IN3:
+    OUT2 = ON
+    RETURN
+"""
+CHIP = "[\n:5\n@1\nL2\n+1\nE\n'2\nW5\nJ1\n@2\n+2\n.\n]\n"
+WORLD = """
+[world]
+name = "two"
+[[line]]
+name = "chips"
+kind = "m1486"
+[[mic488]]
+name = "m"
+program = "m.prg"
+start = true
+[[m1486]]
+name = "c"
+line = "chips"
+program = "c.m1486"
+"""
+
+
+def two() -> World:
+    return World.from_toml(WORLD, {"m.prg": WBC.encode(), "c.m1486": CHIP.encode()})
+
+
+def executed(world: World, seconds: float) -> list[tuple[int, str, str, object]]:
+    found: list[TraceRecord] = []
+    follower = StatementFollower(world, found.append)
+    world.run_to(world.now + round(seconds * SECOND))
+    follower.close()
+    count = len(found)
+    world.run_to(world.now + SECOND)
+    assert len(found) == count  # nobody is called after `close`
+    return [(record.time, record.machine, record.subject, record.value) for record in found]
+
+
+def test_statements_of_wbc_are_reported_with_their_lines_and_a_wait_once() -> None:
+    world = two()
+    rows = [(time, line) for time, machine, text, line in executed(world, 0.02) if (machine, text) == ("m", "program 0")]
+    assert rows == [(1_000_000, 1), (2_000_000, 3), (3_000_000, 4), (4_000_000, 7)]
+
+
+def test_commands_of_an_m1486_are_reported_with_their_lines() -> None:
+    world = two()
+    rows = [(time, line) for time, machine, _, line in executed(world, 0.012) if machine == "c"]
+    # The first command is done at power-on, before anybody can follow.
+    lines = [4, 5, 6, 5, 6, 7, 11, 12, 8]
+    assert rows == [(n * MILLISECOND, line) for n, line in enumerate(lines, start=1)]
+
+
+def test_the_programs_of_a_world() -> None:
+    world = two()
+    assert list(world.programs) == ["m", "c"]
+    mic, chip = world.programs["m"], world.programs["c"]
+    assert mic.texts["program 0"].name == "m.prg"
+    assert [statement.line for statement in mic.statements("program 0")] == [1, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14, 15]
+    assert mic.labels("program 0") == {"MAIN": 1, "COUNT": 7, "INT_IN3": 9}
+    assert chip.labels("program") == {"label 1": 1, "label 2": 7}
+    text = chip.texts["program"].text
+    first = [text[one.start : one.end] for one in chip.statements("program")][:3]
+    assert first == [":5", "L2", "+1"]
+
+
+def test_calls_come_back_and_loops_do_not() -> None:
+    mic = two().programs["m"]
+    assert mic.comes_back(Place("program 0", 3))  # JUMP COUNT
+    assert not mic.comes_back(Place("program 0", 6))  # JUMP MAIN
+    assert mic.comes_back(Place("program 0", 0))
+
+
+def stack(programs: Programs, now: int) -> list[tuple[str, int]]:
+    return [(frame.name, programs.statements(frame.place.text)[frame.place.number].line) for frame in programs.stack(now)]
+
+
+def test_the_stack_has_what_is_executed_and_where_it_returns_to() -> None:
+    world = two()
+    mic, chip = world.programs["m"], world.programs["c"]
+    world.run_to(0)
+    assert stack(mic, 0) == [("program", 1)]
+    world.run_to(6 * MILLISECOND)
+    assert stack(chip, world.now) == [("label 2", 11), ("label 1", 8)]
+    world.run_to(11 * MILLISECOND)
+    assert stack(chip, world.now) == [("label 1", 8)]  # W5 goes on
+    assert stack(mic, world.now) == [("MAIN", 7)]
+    world.machines["m"].set_pin("IN1", 1.0, world.now)
+    world.machines["m"].set_pin("IN2", 1.0, world.now)
+    while mic.depth() < 2:  # JUMP MAIN, JUMP COUNT
+        world.run_to(world.now + MILLISECOND)
+    assert stack(mic, world.now) == [("COUNT", 10), ("MAIN", 6), ("COUNT", 10)]
+
+
+def test_variables_are_read_and_set() -> None:
+    world = two()
+    mic, chip = world.programs["m"], world.programs["c"]
+    world.run_to(100 * MILLISECOND)
+    assert mic.variables(world.now) == {"n": 1.0}
+    mic.set_variable("n", 7.5, world.now)
+    chip.set_variable("variable", 1000, world.now)
+    chip.set_variable("register3", 77, world.now)
+    assert mic.variables(world.now) == {"n": 7.5}
+    assert chip.variables(world.now)["register3"] == 77.0
+    world.machines["m"].set_pin("IN2", 1.0, world.now)
+    world.run_to(200 * MILLISECOND)
+    assert mic.variables(world.now)["n"] > 8.0
+    with pytest.raises(Misuse, match="no variable 'x': there are n"):
+        mic.set_variable("x", 1, world.now)
+    with pytest.raises(Misuse, match=r"n = 1e\+39: permitted are -3.40282e\+38…3.40282e\+38"):
+        mic.set_variable("n", 1e39, world.now)
+    with pytest.raises(Misuse, match="register3 = 65536: permitted are whole numbers from 0 to 65535"):
+        chip.set_variable("register3", 65536, world.now)
+    with pytest.raises(Misuse, match="no variable 'n': there are variable, register1"):
+        chip.set_variable("n", 1, world.now)
+
+
+def test_a_command_that_was_overwritten_comes_from_no_text() -> None:
+    world = two()
+    chip = world.programs["c"]
+    assert chip.place(0) == Place("program", 0)
+    assert chip.place(1) is None  # inside a command
+    machine = world.m1486["c"].chip
+    machine.memory.reset()
+    assert chip.place(0) is None
+
+
+def test_following_statements_does_not_change_what_happens() -> None:
+    plain, followed = two(), two()
+    subject = WorldSubject(followed)
+    following = subject.follow(filter_of(["statement"]), 10_000)
+    for world in (plain, followed):
+        world.run_to(2 * SECOND)
+    assert followed.trace.digest() == plain.trace.digest()
+    _, events = following.take()
+    assert {("c", "program: line 4"), ("m", "program 0: line 1")} <= {(event.machine, event.payload.text) for event in events}
+    following.close()
+    assert not followed.m1486["c"].chip.program._hooks
+    assert not followed.mic488["m"].device.program.machine._hooks
+
+
+def test_statements_are_not_among_what_is_usually_followed() -> None:
+    world = two()
+    following = WorldSubject(world).follow(filter_of(), 1000)
+    world.run_to(SECOND)
+    assert "statement" not in {event.kind for event in following.take().events}
+    assert not world.mic488["m"].device.program.machine._hooks
+
+
+def test_every_statement_of_a_loop_is_executed_where_that_is_asked_for() -> None:
+    text = "n = 0\nMAIN:\nIF IN1 = 1\nn = n + 1\nENDIF\nJUMP MAIN\n"
+    world = World.from_toml('[world]\nname = "w"\n[[mic488]]\nname = "m"\nprogram = "p"\nstart = true\n', {"p": text.encode()})
+    world.run_to(SECOND)
+    assert len(executed(world, 0.1)) == 0  # it rests
+    world.programs["m"].execute_all(True, world.now)
+    lines = [line for *_, line in executed(world, 0.006)]
+    assert lines in ([3, 6] * 3, [6, 3] * 3)

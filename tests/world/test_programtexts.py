@@ -1,0 +1,208 @@
+"""Texts that are put into the program memories of controllers while a world runs."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Mapping
+
+import pytest
+
+from steptwin.errors import Misuse, Refusal, SourceErrors
+from steptwin.files.session import session_of
+from steptwin.files.world import World
+from steptwin.machine import SECOND
+from steptwin.subject.commands import ControlProgram
+from steptwin.subject.world import WorldSubject
+from steptwin.world import script as do
+from steptwin.world.actions import Download
+from steptwin.world.programs import StatementFollower
+from steptwin.world.programtexts import WorldPrograms
+
+WORLD = """
+[world]
+name = "hall"
+[[line]]
+name = "bus"
+kind = "modbus"
+[[mic488]]
+name = "table"
+line = "bus"
+program = "a.prg"
+positions = "p.csv"
+[[line]]
+name = "chips"
+kind = "m1486"
+[[m1486]]
+name = "drum"
+line = "chips"
+variant = "B"
+address = 7
+[[m1486]]
+name = "feeder"
+line = "chips"
+variant = "E1"
+address = 9
+[[m1486]]
+name = "alone"
+"""
+FILES = {"a.prg": b"LOOP:\n$R0 = $R0 + 1\nDELAY 0.1\nJUMP LOOP\n", "p.csv": b"HOME;1;2;3;4\n"}
+
+
+def world(files: Mapping[str, bytes] = FILES) -> World:
+    return World.from_toml(WORLD, files)
+
+
+def start(there: World) -> None:
+    WorldSubject(there).do(ControlProgram("table", "start"))
+
+
+def test_a_program_runs_from_its_next_start_on() -> None:
+    there = world()
+    there.apply_input(Download("table", "program 0", "M1 = ON\nPABS M1 5\n$R4 = 9\nEND\n"))
+    start(there)
+    there.run(for_="1 s")
+    assert there.read("table.USER_REGISTER[4]:real") == 9.0
+    text = WorldPrograms(there).text("table", "program 0")
+    assert (text["name"], text["text"]) == ("a.prg", "M1 = ON\nPABS M1 5\n$R4 = 9\nEND\n")
+
+
+def test_names_of_positions_are_those_of_the_table_of_the_bank() -> None:
+    there = world()
+    with pytest.raises(SourceErrors, match=r"a\.prg:1:9"):
+        there.apply_input(Download("table", "program 0", "MOVEPTP @PICK\n"))
+    there.apply_input(Download("table", "positions 0", "HOME;1;2;3;4\nPICK;5;x;x;x\n"))
+    there.apply_input(Download("table", "program 0", "M1 = ON\nMOVEPTP @PICK\nDELAY 1\n$R6 = 1\nEND\n"))
+    start(there)
+    there.run(for_="2 s")
+    assert there.read("table.USER_REGISTER[6]:real") == 1.0
+    assert WorldPrograms(there).text("table", "positions 0")["text"] == "HOME;1;2;3;4\nPICK;5;x;x;x\n"
+
+
+@pytest.mark.parametrize(
+    ("place", "text", "error", "message"),
+    [
+        ("program 0", "DELAY\n", SourceErrors, "a.prg:1:1: error"),
+        ("positions 0", "HOME;1;2\n", SourceErrors, "p.csv:1:1: error"),
+        ("program 6", "END\n", Misuse, "table has no place 'program 6' for a program: places are program 0, "),
+    ],
+)
+def test_what_is_wrong_is_refused_and_nothing_changes(place: str, text: str, error: type[Exception], message: str) -> None:
+    there = world()
+    before = there.machines["table"].snapshot()
+    with pytest.raises(error) as refused:
+        there.apply_input(Download("table", place, text))
+    assert str(refused.value).startswith(message)
+    assert there.machines["table"].snapshot() == before
+    assert not there.inputs
+
+
+def test_a_program_that_runs_is_stopped_first() -> None:
+    there = world()
+    start(there)
+    for place in ("program 0", "positions 0"):
+        with pytest.raises(Refusal, match=f"{place} is in use by the program that runs or is paused: stop it first"):
+            there.apply_input(Download("table", place, "END\n"))
+    there.apply_input(Download("table", "program 3", "END\n"))
+    WorldSubject(there).do(ControlProgram("table", "stop"))
+    there.apply_input(Download("table", "program 0", "END\n"))
+
+
+def test_snapshots_and_copies_have_what_was_downloaded() -> None:
+    there = world()
+    first = there.snapshot()
+    there.apply_input(Download("table", "program 0", "$R2 = 3\nLOOP:\nDELAY 0.1\nJUMP LOOP\n"))
+    there.apply_input(Download("drum", "program", "w5000\n"))
+    start(there)
+    there.run(for_="500 ms")
+    second = there.snapshot()
+    there.restore(first)
+    programs = WorldPrograms(there)
+    assert programs.text("table", "program 0")["text"] == FILES["a.prg"].decode()
+    assert programs.text("drum", "program")["empty"] is True
+    start(there)
+    there.run(for_="1 s")
+    assert there.read("table.USER_REGISTER[0]:real") > 5.0
+    there.restore(second)
+    for one in (there, pickle.loads(pickle.dumps(there))):
+        assert one.read("table.USER_REGISTER[2]:real") == 3.0
+        assert one.now == SECOND // 2
+        assert WorldPrograms(one).text("table", "program 0")["line"] == 3
+        assert WorldPrograms(one).text("drum", "program")["running"] is True
+
+
+def test_a_session_has_what_was_downloaded() -> None:
+    there = world()
+    there.apply_input(Download("table", "program 0", "$R2 = 3\n"))
+    there.apply_input(Download("feeder", "program", "f640\nr\n"))
+    start(there)
+    there.run(for_="5 s")
+    session = session_of(there)
+    assert session.replay().trace.digest() == session.digest
+
+
+def test_a_program_is_typed_to_a_chip_and_runs_then() -> None:
+    there = world()
+    there.apply_input(Download("drum", "program", "f640 ; a full turn\nr\nw1000\n"))
+    there.run(for_="500 ms")
+    assert there.read("drum.position") == 640.0
+    text = WorldPrograms(there).text("drum", "program")
+    assert (text["text"], text["running"], text["empty"]) == ("f640 ; a full turn\nr\nw1000\n", True, False)
+    there.apply_input(Download("drum", "program", "[\nb640\nr\n]\n"))
+    there.run(for_="1 s")
+    assert there.read("drum.position") == 0.0
+
+
+def test_a_chip_that_moves_on_and_on_is_stopped_with_its_ramp_first() -> None:
+    there = world()
+    there.apply_input(Download("drum", "program", "@1\nf6400\nr\nj1\n"))
+    there.run(for_="10 s")
+    assert there.read("drum.moving") == 1.0
+    before = there.read("drum.position")
+    there.apply_input(Download("drum", "program", "w1\n"))
+    there.run(for_="5 s")
+    assert there.read("drum.moving") == 0.0
+    assert 0 < there.read("drum.position") - before < 6400
+    assert WorldPrograms(there).text("drum", "program")["text"] == "w1\n"
+
+
+def test_an_eeprom_takes_its_time_and_keeps_the_program() -> None:
+    """Erased in 1 s (E1), 0.5 s for each of two commands (chapter II, Memory)."""
+    there = world()
+    there.apply_input(Download("feeder", "program", "f640\nr\n"))
+    there.run(for_="1900 ms")
+    assert there.read("feeder.position") == 0.0
+    there.run(for_="1500 ms")
+    assert there.read("feeder.position") == 640.0
+    there.apply_input(do.PowerCycle("feeder"))
+    there.run(for_="1 s")
+    assert there.read("feeder.position") == 1280.0
+
+
+@pytest.mark.parametrize(
+    ("machine", "text", "error", "message"),
+    [
+        ("alone", "f640\n", Refusal, "alone is on no line, so nothing can be typed to it"),
+        ("drum", "; nothing\n", Misuse, "program has no commands"),
+        ("drum", "f0\n", SourceErrors, "program:1:2: error"),
+        ("drum", "x3\nf640\n", Misuse, "X3 cannot be stored: a program to switch on with is one file for one chip"),
+    ],
+)
+def test_what_a_chip_does_not_take(machine: str, text: str, error: type[Exception], message: str) -> None:
+    there = world()
+    with pytest.raises(error) as refused:
+        there.apply_input(Download(machine, "program", text))
+    assert str(refused.value).startswith(message)
+
+
+def test_statements_are_those_of_the_present_texts() -> None:
+    there = world()
+    seen: list[tuple[str, str, object]] = []
+    follower = StatementFollower(there, lambda record: seen.append((record.machine, record.subject, record.value)))
+    there.apply_input(Download("drum", "program", "; two\n\nf640\nr\n"))
+    there.apply_input(Download("table", "program 3", "\n\nDELAY 0.5\n"))
+    there.apply_input(do.Write((("table", "PROG_BANK_SEL", 3.0),)))
+    start(there)
+    there.run(for_="1 s")
+    follower.close()
+    assert [row for row in seen if row[0] == "drum"] == [("drum", "program", 3), ("drum", "program", 4)]
+    assert ("table", "program 3", 3) in seen
