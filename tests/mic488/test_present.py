@@ -26,7 +26,8 @@ def program(rig: Rig) -> StateProgram:
     ("code", "text", "level"),
     [
         (0, "off", OK), (1, "on at rest", OK), (2, "velocity mode", OK), (3, "moving to position", OK),
-        (4, "position reached", OK), (5, "position error", ERROR), (6, "homing", OK), (8, "position correction", OK), (9, "stopped at limit L", WARNING),
+        (4, "position reached", OK), (5, "position error", ERROR), (6, "homing", OK),
+        (8, "position correction", OK), (9, "stopped at limit L", WARNING),
         (10, "stopped at limit R", WARNING), (7, "unknown status 7", OK),
     ],
 )  # fmt: skip
@@ -136,20 +137,22 @@ def test_nothing_is_missing_without_start_at_power_on() -> None:
 def test_an_empty_bank_is_named_with_what_fills_it() -> None:
     rig = Rig(controller(program=ProgramConfig(activate=1, prog_bank=2)))
     assert rig.pins()["ERR"] == 1.0
-    assert empty_banks("feeder", rig.device) == [
+    (message,) = empty_banks("feeder", rig.device)
+    assert message == (
         "ERR of feeder is on: Activate=1 starts program bank 2 at power-on, which is empty "
-        + "(--program 2=FILE, or programs = { 2 = 'FILE' })"
-    ]
+        "(--program 2=FILE, or programs = { 2 = 'FILE' })"
+    )
 
 
 def test_wbc_25_an_empty_position_bank_is_named_where_the_program_uses_positions() -> None:
     config = controller(MM, program=ProgramConfig(activate=1, prog_bank=0, pos_bank=4))
     rig = programmed("M1 = ON\nMOVEPTP 0\n", "a;1;x;x;x\n", config)
     assert rig.pins()["ERR"] == 1.0
-    assert empty_banks("m", rig.device) == [
+    (message,) = empty_banks("m", rig.device)
+    assert message == (
         "ERR of m is on: Activate=1 starts program bank 0 at power-on with position bank 4, which is empty "
-        + "(--positions 4=FILE, or positions = { 4 = 'FILE' })"
-    ]
+        "(--positions 4=FILE, or positions = { 4 = 'FILE' })"
+    )
     rig.device.load_positions(4, loaded("M1 = ON\n", "a;1;x;x;x\n")[1])
     assert empty_banks("m", rig.device) == []
     assert empty_banks("m", programmed("M1 = ON\nWAIT IN1 = ON\n", "", config).device) == []
