@@ -80,6 +80,11 @@ class PositionTable:
         return parse_positions(text)[0]
 
 
+def rows_text(count: int) -> str:
+    """A number of rows in words."""
+    return "1 row" if count == 1 else f"{count} rows"
+
+
 def row_text(name: str, values: Sequence[float | None]) -> str:
     """A line of the table; numbers are written so that reading them gives the same REAL."""
     return ";".join([name, *(_LEFT_ALONE if value is None else number_text(value) for value in values)])

@@ -10,16 +10,16 @@ from steptwin.nearmiss import NearMiss
 from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
-from steptwin.wbc.blocks import BLOCK_WORDS, BlockMatcher, Blocks
 from steptwin.wbc.dialect import Dialect
-from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS, PREFIX, InterruptEvent
+from steptwin.wbc.events import BY_LABEL
 from steptwin.wbc.foreign import IF_UNKNOWN
 from steptwin.wbc.memory import StepMemory
+from steptwin.wbc.outline import outline
 from steptwin.wbc.paths import names_no_axis, row_problem
-from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.registers import PREDEFINED, ROW_0, parts
+from steptwin.wbc.positions import PositionTable, rows_text
+from steptwin.wbc.registers import parts
 from steptwin.wbc.scope import Scope
-from steptwin.wbc.statements import FUNCTIONS, HALTS, KEYWORDS, MOTIONS, ROW_MOTIONS, SET, STATEMENTS
+from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS, SET, STATEMENTS
 from steptwin.wbc.tree import (
     Assign,
     Binary,
@@ -32,7 +32,6 @@ from steptwin.wbc.tree import (
     Label,
     Operand,
     Position,
-    PositionRecord,
     ProgramTree,
     Relation,
     Statement,
@@ -74,132 +73,28 @@ class _Resolver:
         self._diagnostics: list[Diagnostic] = []
         self._scope = Scope(program, positions, dialect, self._diagnostics)
         self._near = NearMiss()
-        self._labels: dict[str, int] = {}
-        self._broken_labels = False
-        self._entries: dict[InterruptEvent, int] = {}
-        self._records: dict[int, bytes] = {}
-        self._lines: list[Statement] = []
+        self._outline = outline(program, self._scope, positions, dialect, self._diagnostics)
+        self._lines, self._blocks = self._outline.lines, self._outline.blocks
         self._unchecked = False
         self._has_reported_unchecked = False
-        self._writes_row_0 = False
-        self._blocks = Blocks()
 
     def resolution(self) -> Resolution:
-        self._blocks = self._outline()
         steps = tuple(self._steps(StepMemory() if self._memory is None else self._memory))
-        executable = s.Executable(
-            steps, tuple(name.text for name in self._scope.variables.values()), self._labels, self._entries, self._records
-        )
+        names = tuple(name.text for name in self._scope.variables.values())
+        executable = s.Executable(steps, names, self._outline.labels, self._outline.entries, self._outline.records)
         broken = any(isinstance(line.statement, Broken) for line in self._program.lines)
         wrong = broken or any(d.severity is Severity.ERROR for d in self._diagnostics)
         return Resolution(executable, self._scope, not wrong and not self._unchecked, self._diagnostics)
 
-    # -- first pass: which statements are steps, where labels are, which blocks belong together
-
-    def _outline(self) -> Blocks:
-        matcher = BlockMatcher(self._diagnostics)
-        lines = self._lines
-        defined: dict[str, Identifier] = {}
-        assigned: dict[str, Identifier] = {}
-        last: Label | None = None
-        for line in self._program.lines:
-            statement = line.statement
-            if statement is None:
-                continue
-            if isinstance(statement, Assign):
-                assigned.setdefault(statement.target.key, statement.target)
-                lines.append(statement)
-            elif isinstance(statement, ImageRecord):
-                lines.append(statement)
-            elif isinstance(statement, KeywordStatement):
-                if statement.keyword in BLOCK_WORDS:
-                    matcher.take(statement.keyword, len(lines), statement)
-                lines.append(statement)
-            elif isinstance(statement, Label):
-                self._define_label(statement, defined)
-                last = statement
-                continue
-            elif isinstance(statement, Broken) and statement.label is not None:
-                self._labels.setdefault(statement.label.key, len(lines))
-                continue
-            elif isinstance(statement, Broken):
-                if statement.keyword is not None:
-                    matcher.take(statement.keyword, len(lines), statement)
-                if ":" in statement.text:
-                    self._broken_labels = True
-                lines.append(statement)
-            elif isinstance(statement, PositionRecord):
-                self._records[statement.index] = statement.data
-                self._check_record(statement)
-                continue
-            else:
-                continue
-            last = None
-        self._writes_row_0 = any(self._scope.family(name) in ROW_0 for name in assigned.values())
-        if last is not None:
-            self._report(f.LABEL_AT_END.at(last.name, f"nothing follows the label {last.name.text}", "put an END after it"))
-        limit = self._dialect.max_steps
-        if len(lines) > limit:
-            hint = f"firmware {self._dialect.firmware} holds {limit} executable lines"
-            self._report(f.TOO_MANY_LINES.at(lines[limit], f"{len(lines)} executable lines", hint))
-        return matcher.finish()
-
-    def _define_label(self, label: Label, defined: dict[str, Identifier]) -> None:
-        name, key = label.name, label.name.key
-        found = BY_LABEL.get(key)
-        if key in defined:
-            self._report(f.DUPLICATE_LABEL.at(name, f"the label {name.text} is defined twice", "give one of them another name"))
-            return
-        defined[key] = name
-        if found is None:
-            reason = _reserved_label(key)
-            if key.startswith((PREFIX, HARD_PREFIX)) and key not in PREDEFINED:
-                known = f"INT_IN1…INT_IN{INPUT_LABELS}, INT_MODBUS, INT_TICK"
-                hint = f"{known}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
-                self._report(
-                    f.RESERVED_LABEL.at(
-                        name, f"{name.text} is not an interrupt label, although it begins with INT_ or HARDINT_", hint
-                    )
-                )
-            elif key in self._scope.constants or key in self._scope.variables:
-                kind = "a constant" if key in self._scope.constants else "a variable"
-                message = f"{name.text} cannot be a label: it is {kind}"
-                self._report(f.RESERVED_LABEL.at(name, message, "give one of them another name"))
-            elif reason is not None:
-                self._report(f.RESERVED_LABEL.at(name, f"{name.text} cannot be a label: it is {reason}", "take another name"))
-            self._labels[key] = len(self._lines)
-            return
-        event, hard = found
-        since = HARD_SINCE if hard else event.since
-        if not self._dialect.has(since):
-            hint = f"checked for {self._dialect.firmware}"
-            self._report(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint))
-        if event in self._entries:
-            other = (PREFIX if hard else HARD_PREFIX) + event.name
-            hint = "an event has one label"
-            self._report(f.DUPLICATE_LABEL.at(name, f"{name.text} and {other} are labels of one event", hint))
-        else:
-            self._entries[event] = len(self._lines)
-        self._labels[key] = len(self._lines)
-        self._lines.append(label)
-
-    def _check_record(self, record: PositionRecord) -> None:
-        rows = self._dialect.max_positions if self._positions is None else len(self._positions.rows)
-        if record.index >= rows:
-            hint = f"the table has {_rows(rows)}, numbered from 0"
-            self._report(f.OUT_OF_RANGE.at(record, f"row {record.index} is outside the position table", hint))
-
-    # -- second pass: the steps
-
     def _steps(self, memory: StepMemory) -> Iterator[s.Step]:
-        memory.begin(self._scope, self._positions, (self._dialect, self._writes_row_0, tuple(self._records)))
+        memory.begin(self._scope, self._positions, (self._dialect, self._outline.writes_row_0, tuple(self._outline.records)))
         for number, (statement, kept) in enumerate(zip(self._lines, memory.steps(self._lines), strict=True)):
             if kept is not None:
                 yield kept
                 continue
-            said = len(self._diagnostics)
+            before = len(self._diagnostics)
             step = self._step(number, statement)
-            if len(self._diagnostics) == said:
+            if len(self._diagnostics) == before:
                 memory.keep(statement, step, self._scope)
             yield step
         memory.end()
@@ -335,11 +230,11 @@ class _Resolver:
         name = statement.operands[0]
         if not isinstance(name, Identifier):
             return None
-        target = self._labels.get(name.key)
+        target = self._outline.labels.get(name.key)
         if target is not None:
             return s.JumpStep(statement.start, statement.end, target)
-        if not self._broken_labels:
-            meant = self._near.of(name.text, self._labels)
+        if not self._outline.has_broken_labels:
+            meant = self._near.of(name.text, self._outline.labels)
             hint = f"did you mean {meant}?" if meant else f"define the label as {name.text}: on a line of its own"
             self._report(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, fix=meant))
         return None
@@ -394,7 +289,11 @@ class _Resolver:
         row = self._position(operand) if isinstance(operand, Position) else self._value(operand, is_row=True)
         if row is None:
             return None
-        if self._positions is None and not isinstance(operand, Position) and not (self._writes_row_0 and row == s.Literal(0.0)):
+        if (
+            self._positions is None
+            and not isinstance(operand, Position)
+            and not (self._outline.writes_row_0 and row == s.Literal(0.0))
+        ):
             self._report_unchecked(operand)
         if isinstance(row, s.Literal) and self._positions is not None:
             index = self._row_index(operand, row.value)
@@ -413,7 +312,7 @@ class _Resolver:
         if index is not None:
             return s.Literal(float(index))
         meant = self._near.of(name.text, self._positions.names())
-        hint = f"did you mean @{meant}?" if meant else f"the table has {_rows(len(self._positions.rows))}"
+        hint = f"did you mean @{meant}?" if meant else f"the table has {rows_text(len(self._positions.rows))}"
         self._report(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, fix=meant and f"@{meant}"))
         return None
 
@@ -425,15 +324,15 @@ class _Resolver:
 
     def _row_index(self, place: Operand, value: float) -> int | None:
         rows = 0 if self._positions is None else len(self._positions.rows)
-        if (0 <= value < rows and value == int(value)) or (value == 0 and self._writes_row_0):
+        if (0 <= value < rows and value == int(value)) or (value == 0 and self._outline.writes_row_0):
             return int(value)
-        hint = f"the table has {_rows(rows)}, numbered from 0"
+        hint = f"the table has {rows_text(rows)}, numbered from 0"
         self._report(f.UNKNOWN_POSITION.at(place, f"there is no row {value:g}", hint))
         return None
 
     def _check_row(self, statement: KeywordStatement, index: int) -> None:
         """Check the parameters of a row. Row 0 is not checked if the program writes it."""
-        if self._positions is None or index in self._records or (index == 0 and self._writes_row_0):
+        if self._positions is None or index in self._outline.records or (index == 0 and self._outline.writes_row_0):
             return
         values = self._positions.rows[index].values
         name = self._positions.rows[index].name or f"row {index}"
@@ -480,19 +379,3 @@ _STEPS: Mapping[str, Callable[[_Resolver, int, KeywordStatement], s.Step | None]
     },
 )
 """The step of a statement by its keyword: resolver, number of the step, statement. None: something in it is wrong."""
-
-
-def _rows(count: int) -> str:
-    return "1 row" if count == 1 else f"{count} rows"
-
-
-def _reserved_label(key: str) -> str | None:
-    if key in KEYWORDS:
-        return "a statement"
-    if parts(key) is not None:
-        return "a register"
-    if key in PREDEFINED:
-        return "a predefined name"
-    if key in FUNCTIONS:
-        return "a function"
-    return None

@@ -1,0 +1,176 @@
+"""First pass over a tree: which statements are steps, where labels are, which blocks belong together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from steptwin.diagnostics import Diagnostic
+from steptwin.wbc import findings as f
+from steptwin.wbc.blocks import BLOCK_WORDS, BlockMatcher, Blocks
+from steptwin.wbc.dialect import Dialect
+from steptwin.wbc.events import BY_LABEL, HARD_PREFIX, HARD_SINCE, INPUT_LABELS, PREFIX, InterruptEvent
+from steptwin.wbc.positions import PositionTable, rows_text
+from steptwin.wbc.registers import PREDEFINED, ROW_0, parts
+from steptwin.wbc.scope import Scope
+from steptwin.wbc.statements import FUNCTIONS, KEYWORDS
+from steptwin.wbc.tree import (
+    Assign,
+    Broken,
+    Identifier,
+    ImageRecord,
+    KeywordStatement,
+    Label,
+    PositionRecord,
+    ProgramTree,
+    Statement,
+)
+
+
+@dataclass(slots=True)
+class Outline:
+    """The structure of a program. Steps are numbered from 0."""
+
+    lines: list[Statement] = field(default_factory=list)
+    """The statement of each step."""
+    labels: dict[str, int] = field(default_factory=dict)
+    """Steps at labels, by name in upper case."""
+    entries: dict[InterruptEvent, int] = field(default_factory=dict)
+    """Steps at labels of interrupts."""
+    records: dict[int, bytes] = field(default_factory=dict)
+    """Rows of the position table that the text has as records of an image."""
+    blocks: Blocks = field(default_factory=Blocks)
+    has_broken_labels: bool = False
+    """A statement that could not be read may have been a label."""
+    writes_row_0: bool = False
+    """The program assigns parameters of row 0 (WBC-25)."""
+
+
+def outline(
+    program: ProgramTree, scope: Scope, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]
+) -> Outline:
+    """The structure of ``program``; ``diagnostics`` gets what is wrong with labels, blocks, records and the number of steps."""
+    return _Outliner(scope, positions, dialect, diagnostics).outline(program)
+
+
+class _Outliner:
+    def __init__(self, scope: Scope, positions: PositionTable | None, dialect: Dialect, diagnostics: list[Diagnostic]) -> None:
+        self._scope = scope
+        self._positions = positions
+        self._dialect = dialect
+        self._diagnostics = diagnostics
+        self._matcher = BlockMatcher(diagnostics)
+        self._defined: set[str] = set()
+        self._outline = Outline()
+
+    def outline(self, program: ProgramTree) -> Outline:
+        result = self._outline
+        assigned: dict[str, Identifier] = {}
+        last: Label | None = None
+        for line in program.lines:
+            statement = line.statement
+            if isinstance(statement, Label):
+                self._define_label(statement)
+                last = statement
+            elif statement is not None and self._take(statement):
+                result.lines.append(statement)
+                last = None
+            if isinstance(statement, Assign):
+                assigned.setdefault(statement.target.key, statement.target)
+        result.writes_row_0 = any(self._scope.family(name) in ROW_0 for name in assigned.values())
+        if last is not None:
+            self._report(f.LABEL_AT_END.at(last.name, f"nothing follows the label {last.name.text}", "put an END after it"))
+        self._check_length()
+        result.blocks = self._matcher.finish()
+        return result
+
+    def _take(self, statement: Statement) -> bool:
+        """Take in a statement other than a label. Result: whether it is a step."""
+        result = self._outline
+        if isinstance(statement, KeywordStatement):
+            if statement.keyword in BLOCK_WORDS:
+                self._matcher.take(statement.keyword, len(result.lines), statement)
+            return True
+        if isinstance(statement, Broken):
+            if statement.label is not None:
+                result.labels.setdefault(statement.label.key, len(result.lines))
+                return False
+            if statement.keyword is not None:
+                self._matcher.take(statement.keyword, len(result.lines), statement)
+            if ":" in statement.text:
+                result.has_broken_labels = True
+            return True
+        if isinstance(statement, PositionRecord):
+            result.records[statement.index] = statement.data
+            self._check_record(statement)
+        return isinstance(statement, Assign | ImageRecord)
+
+    def _define_label(self, label: Label) -> None:
+        name, key = label.name, label.name.key
+        if key in self._defined:
+            self._report(f.DUPLICATE_LABEL.at(name, f"the label {name.text} is defined twice", "give one of them another name"))
+            return
+        self._defined.add(key)
+        self._outline.labels[key] = len(self._outline.lines)
+        interrupt = BY_LABEL.get(key)
+        if interrupt is None:
+            self._check_name(name)
+        else:
+            self._define_entry(label, *interrupt)
+
+    def _check_name(self, name: Identifier) -> None:
+        """Report a label that looks like that of an interrupt, or that has another meaning."""
+        key = name.key
+        reason = _reserved_label(key)
+        if key.startswith((PREFIX, HARD_PREFIX)) and key not in PREDEFINED:
+            message = f"{name.text} is not an interrupt label, although it begins with INT_ or HARDINT_"
+            known = f"INT_IN1…INT_IN{INPUT_LABELS}, INT_MODBUS, INT_TICK"
+            hint = f"{known}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
+            self._report(f.RESERVED_LABEL.at(name, message, hint))
+        elif key in self._scope.constants or key in self._scope.variables:
+            kind = "a constant" if key in self._scope.constants else "a variable"
+            message = f"{name.text} cannot be a label: it is {kind}"
+            self._report(f.RESERVED_LABEL.at(name, message, "give one of them another name"))
+        elif reason is not None:
+            self._report(f.RESERVED_LABEL.at(name, f"{name.text} cannot be a label: it is {reason}", "take another name"))
+
+    def _define_entry(self, label: Label, event: InterruptEvent, hard: bool) -> None:
+        """The label of an interrupt is a step of its own."""
+        name, entries = label.name, self._outline.entries
+        since = HARD_SINCE if hard else event.since
+        if not self._dialect.has(since):
+            hint = f"checked for {self._dialect.firmware}"
+            self._report(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint))
+        if event in entries:
+            other = (PREFIX if hard else HARD_PREFIX) + event.name
+            hint = "an event has one label"
+            self._report(f.DUPLICATE_LABEL.at(name, f"{name.text} and {other} are labels of one event", hint))
+        else:
+            entries[event] = len(self._outline.lines)
+        self._outline.lines.append(label)
+
+    def _check_record(self, record: PositionRecord) -> None:
+        rows = self._dialect.max_positions if self._positions is None else len(self._positions.rows)
+        if record.index >= rows:
+            hint = f"the table has {rows_text(rows)}, numbered from 0"
+            self._report(f.OUT_OF_RANGE.at(record, f"row {record.index} is outside the position table", hint))
+
+    def _check_length(self) -> None:
+        lines, limit = self._outline.lines, self._dialect.max_steps
+        if len(lines) > limit:
+            hint = f"firmware {self._dialect.firmware} holds {limit} executable lines"
+            self._report(f.TOO_MANY_LINES.at(lines[limit], f"{len(lines)} executable lines", hint))
+
+    def _report(self, diagnostic: Diagnostic) -> None:
+        self._diagnostics.append(diagnostic)
+
+
+def _reserved_label(key: str) -> str | None:
+    if key in KEYWORDS:
+        return "a statement"
+    if parts(key) is not None:
+        return "a register"
+    if key in PREDEFINED:
+        return "a predefined name"
+    if key in FUNCTIONS:
+        return "a function"
+    return None
