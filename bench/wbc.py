@@ -8,7 +8,7 @@ from time import perf_counter
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.program import load
+from steptwin.mic488.program_banks import load
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
 from steptwin.world.kernel import Kernel, PinName, Wire

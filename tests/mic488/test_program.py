@@ -15,7 +15,7 @@ from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.mic488.axis_motion import MAX_SPEED_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.program import load, setup_of
+from steptwin.mic488.program_banks import load, setup_of
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
 from steptwin.world.kernel import Kernel, PinName, Wire
@@ -263,10 +263,10 @@ def test_a_snapshot_brings_the_contents_of_the_banks() -> None:
         other.start()
         other.device.restore(copy)
         control = other.device.program
-        assert control.contents() == rig.device.program.contents()
+        assert control.banks.contents() == rig.device.program.banks.contents()
         assert control.statement(other.device.now) == rig.device.program.statement(rig.device.now)
-        assert control.positions[0].rows[1].values[0] == 8.0
-        assert control.programs[0].steps == rig.device.program.programs[0].steps
+        assert control.banks.positions[0].rows[1].values[0] == 8.0
+        assert control.banks.programs[0].steps == rig.device.program.banks.programs[0].steps
         other.device.restore(copy)
 
 

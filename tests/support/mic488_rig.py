@@ -16,7 +16,7 @@ from steptwin.mic488.config import AxisConfig, ControllerConfig, read_config
 from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.inifile import IniFile
-from steptwin.mic488.program import LoadedProgram, load
+from steptwin.mic488.program_banks import LoadedProgram, load
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.positions import PositionTable, parse_positions

@@ -383,7 +383,7 @@ def test_wbc_5_a_program_error_stops_the_program_and_ramps_drives_down(line: str
     (event,) = rig.events("program-error")
     assert event.text.startswith(f"line {number}: ")
     assert control.fault is not None
-    source = control.programs[0].source
+    source = control.banks.programs[0].source
     assert source.position(control.fault.span.start) == (number, 1)
     with pytest.raises(AssertionError, match=text):
         raise AssertionError(control.fault.text)
@@ -464,7 +464,7 @@ def test_a_paused_program_can_be_stopped_and_a_stopped_one_not_paused() -> None:
 
 def test_where_a_program_stands_can_be_seen() -> None:
     rig = run("OUT1 = ON\nWAIT IN1 = ON\nWHILE IN1 = ON\nOUT2 = IN2\nENDWHILE\nDELAY 1\nEND\n", 0.1)
-    source = rig.device.program.programs[0].source
+    source = rig.device.program.banks.programs[0].source
 
     def line() -> int:
         span = rig.device.program.statement(rig.device.now)

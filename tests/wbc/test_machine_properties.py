@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.program import LoadedProgram, load
+from steptwin.mic488.program_banks import LoadedProgram, load
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import PositionTable, parse_positions
 

@@ -31,7 +31,7 @@ def world(keys: str, **files: bytes) -> World:
 def test_programs_go_into_their_banks(keys: str, banks: dict[int, str]) -> None:
     made = world(keys)
     device = made.mic488["a"].device
-    assert {bank: program.source.name for bank, program in device.program.programs.items()} == banks
+    assert {bank: program.source.name for bank, program in device.program.banks.programs.items()} == banks
     assert session_of(made).replay().mic488["a"].device.snapshot() == device.snapshot()
 
 
@@ -63,8 +63,8 @@ def test_names_of_positions_are_those_of_the_own_bank_or_of_the_only_table() -> 
     }
     programs = world('programs = ["go.prg", "one.prg", "go.prg"]\npositions = { 0 = "a.csv", 2 = "b.csv" }', **files)
     device = programs.mic488["a"].device
-    assert device.program.programs[0].steps != device.program.programs[2].steps
+    assert device.program.banks.programs[0].steps != device.program.banks.programs[2].steps
     alone = world('programs = { 3 = "go.prg" }\npositions = { 1 = "a.csv" }', **files).mic488["a"].device
-    assert alone.program.programs[3].steps == device.program.programs[0].steps
+    assert alone.program.banks.programs[3].steps == device.program.banks.programs[0].steps
     with pytest.raises(Misuse, match="positions"):
         world('programs = { 3 = "go.prg" }\npositions = { 0 = "a.csv", 2 = "b.csv" }', **files)

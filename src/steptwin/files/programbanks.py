@@ -12,7 +12,7 @@ from steptwin.errors import Misuse, SourceErrors
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.program import LoadedProgram, load, setup_of
+from steptwin.mic488.program_banks import LoadedProgram, load, setup_of
 from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import DEFAULT, Dialect

@@ -10,7 +10,7 @@ from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import read_bytes
 from steptwin.mic488.config import ControllerConfig, examine_config
 from steptwin.mic488.inifile import IniFile
-from steptwin.mic488.program import setup_of
+from steptwin.mic488.program_banks import setup_of
 from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.decompile import IMAGE
 from steptwin.wbc.dialect import DEFAULT, Dialect

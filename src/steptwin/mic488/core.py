@@ -16,7 +16,8 @@ from steptwin.mic488.encoder import Coupling, ShaftMotion
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 from steptwin.mic488.inputs import Inputs
 from steptwin.mic488.position_control import PositionControl
-from steptwin.mic488.program import LoadedProgram, ProgramControl
+from steptwin.mic488.program import ProgramControl
+from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, MOTION_REGISTERS, OUTPUTS, register_map
 from steptwin.mic488.status import AxisStatus, ControllerStatus
 from steptwin.mic488.vision import VisionRecord

@@ -11,7 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.core import NO_BANKS, ControllerCore
-from steptwin.mic488.program import BankContents, LoadedProgram
+from steptwin.mic488.program_banks import BankContents, LoadedProgram
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.slave import slave
 from steptwin.state import Plain
@@ -97,7 +97,7 @@ class Mic488Device(ControllerCore):
 
     def snapshot(self) -> ControllerSnapshot:
         """All state at the present moment; hooks are not part of it."""
-        return ControllerSnapshot(self.config, self.firmware.name, self.copy_state(), self.program.contents())
+        return ControllerSnapshot(self.config, self.firmware.name, self.copy_state(), self.program.banks.contents())
 
     def restore(self, snapshot: ControllerSnapshot) -> None:
         """Take the state of a snapshot, its moment and the contents of its banks too. `Misuse` when it is of another
@@ -106,6 +106,6 @@ class Mic488Device(ControllerCore):
             raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {self.firmware.name}")
         if snapshot.config != self.config:
             raise Misuse("the snapshot is of a controller with another configuration")
-        self.program.hold(snapshot.banks)
+        self.program.banks.restore(snapshot.banks)
         self.set_state(snapshot.state)
         self.changed()

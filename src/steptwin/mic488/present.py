@@ -67,10 +67,10 @@ def empty_banks(name: str, device: Mic488Device) -> list[str]:
     if not device.config.program.activate:
         return []
     begin = f"ERR of {name} is on: Activate=1 starts program bank {bank} at power-on"
-    program = device.program.programs.get(bank)
+    program = device.program.banks.programs.get(bank)
     if program is None:
         return [f"{begin}, which is empty (--program {bank}=FILE, or programs = {{ {bank} = 'FILE' }})"]
-    if program.uses_positions and table not in device.program.positions:
+    if program.uses_positions and table not in device.program.banks.positions:
         where = f"(--positions {table}=FILE, or positions = {{ {table} = 'FILE' }})"
         return [f"{begin} with position bank {table}, which is empty {where}"]
     return []

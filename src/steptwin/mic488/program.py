@@ -1,35 +1,27 @@
-"""Program control: banks, start, stop, pause (manual 4.1, MIC-22, MIC-26, MIC-28, MIC-31), and the program that runs."""
+"""Program control: start, stop, pause (manual 4.1, MIC-22, MIC-26, MIC-28, MIC-31), and the program that runs."""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from math import isfinite
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from steptwin.diagnostics import SourceText, Span
+from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.mic488 import program_motion as motion
-from steptwin.mic488.axis_motion import MAX_SPEED_P
-from steptwin.mic488.config import NO_INPUT, ControllerConfig
-from steptwin.mic488.homing import Homing
+from steptwin.mic488.program_banks import LoadedProgram, ProgramBanks, row_values
 from steptwin.mic488.program_device import ProgramDevice
-from steptwin.mic488.program_registers import ACCESS, ProgramRegisters
+from steptwin.mic488.program_registers import ProgramRegisters
 from steptwin.mic488.registers import OUTPUTS
 from steptwin.mic488.status import ProgramState
 from steptwin.state import Stateful
-from steptwin.wbc import steps as s
-from steptwin.wbc.check import CheckedProgram, check
-from steptwin.wbc.compile import Code, compile_program
+from steptwin.wbc.compile import Code
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.events import EVENTS
 from steptwin.wbc.machine import Interpreter
-from steptwin.wbc.positions import PositionTable, parse_positions
+from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.real import ProgramFault, real_text
-from steptwin.wbc.registers import REAL_MAX, ROW_0
-from steptwin.wbc.usage import Setup, sources
+from steptwin.wbc.registers import REAL_MAX
 
 _MODBUS = next(number for number, event in enumerate(EVENTS) if event.name == "MODBUS")
 _DRIVES = {event.axis - 1: number for number, event in enumerate(EVENTS) if event.axis}
@@ -39,90 +31,11 @@ STOPPED, RUNNING, PAUSED = ProgramState
 """Asked for at every statement: a member found through its class costs more than all the rest of the question."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LoadedProgram:
-    """A program in a bank, ready to run. Code has no state: any number of controllers may share it."""
-
-    source: SourceText
-    steps: tuple[s.Step, ...]
-    code: Code
-    position_records: Mapping[int, bytes]
-    uses_positions: bool
-    """It needs a position table: for more than a row 0 that it writes itself (WBC-25)."""
-    variables: tuple[str, ...] = ()
-    """Their names; their values are the first cells."""
-    labels: Mapping[str, int] = field(default_factory=dict)
-    """Steps at labels, by name in upper case."""
-    positions: str | None = None
-    """The text of the table in which names after @ were found; None without one."""
-
-
-class BankContents(NamedTuple):
-    """The texts in all banks, from which programs and tables can be made again."""
-
-    programs: tuple[tuple[int, str, str, str | None], ...] = ()
-    """Bank, name, text, text of the table in which its names were found."""
-    positions: tuple[tuple[int, str], ...] = ()
-    """Bank, text."""
-
-
 class ProgramError(NamedTuple):
     """What stopped a program (WBC-5), and the statement of its text."""
 
     span: Span
     text: str
-
-
-def row_values(record: bytes) -> tuple[float | None, ...]:
-    """Parameters of a row of an image: an axis mask, big-endian, and four REAL numbers."""
-    mask, values = int.from_bytes(record[:2], "big"), struct.unpack("<4f", record[2:])
-    return tuple(value if mask >> number & 1 and isfinite(value) else None for number, value in enumerate(values))
-
-
-def load(checked: CheckedProgram, name: str = "program") -> LoadedProgram:
-    """A program for banks of controllers. `Misuse` when it has errors."""
-    executable = checked.executable
-    if executable is None:
-        errors = checked.errors
-        reason = errors[0].message if errors else "its positions are not known without a table"
-        raise Misuse(f"{name} cannot run: {reason}")
-    steps = executable.steps
-    code = compile_program(executable, ACCESS)
-    source, records = SourceText(name, checked.text), executable.position_records
-    table = None if checked.positions is None else checked.positions.text
-    used = _uses_positions(steps)
-    return LoadedProgram(source, steps, code, records, used, executable.variables, executable.labels, table)
-
-
-def setup_of(config: ControllerConfig) -> Setup:
-    """What the checker of programs needs of a configuration."""
-    return Setup(
-        gears=tuple(axis.gear for axis in config.axes),
-        accelerations=tuple(axis.acc for axis in config.axes),
-        decelerations=tuple(axis.dec for axis in config.axes),
-        input_interrupts=tuple(settings.interrupt for settings in config.inputs),
-        homing_ends=tuple(
-            (axis.home_mode == Homing.HOME3 or axis.in_kl != NO_INPUT, axis.home_mode == Homing.HOME3 or axis.in_kr != NO_INPUT)
-            for axis in config.axes
-        ),
-        most_speed_p=MAX_SPEED_P,
-    )
-
-
-def _table(text: str | None) -> PositionTable | None:
-    return None if text is None else parse_positions(text)[0]
-
-
-def _uses_positions(steps: Sequence[s.Step]) -> bool:
-    """Whether rows are needed that the program does not write itself (WBC-25)."""
-    rows = [step.row for step in steps if isinstance(step, s.RowMotionStep)]
-    if any(isinstance(step, s.SetStep) and _is_row_0(step.target) for step in steps):
-        return any(row != s.Literal(0.0) for row in rows)
-    return bool(rows) or any(_is_row_0(source) for step in steps for source in sources(step))
-
-
-def _is_row_0(source: s.Source) -> bool:
-    return isinstance(source, s.RegisterOperand) and source.row.key in ROW_0
 
 
 class ProgramControl(Stateful):
@@ -136,20 +49,19 @@ class ProgramControl(Stateful):
         "_pulses",
         "_statuses",
         "_table",
+        "banks",
         "device",
         "dialect",
         "error",
         "fault",
         "machine",
         "position_bank",
-        "positions",
         "program_bank",
-        "programs",
         "registers",
         "state",
         "together",
     )
-    FIXED = frozenset({"device", "dialect", "positions", "programs"})
+    FIXED = frozenset({"banks", "device", "dialect"})
 
     def __init__(
         self,
@@ -160,8 +72,7 @@ class ProgramControl(Stateful):
     ) -> None:
         self.device = device
         self.dialect = dialect_for(device.firmware.name)
-        self.programs: dict[int, LoadedProgram] = {}
-        self.positions: dict[int, PositionTable] = {}
+        self.banks = ProgramBanks(device.firmware.banks, self.dialect)
         self.machine = Interpreter(self, statement_time)
         self.registers = ProgramRegisters()
         self.program_bank = 0
@@ -188,18 +99,15 @@ class ProgramControl(Stateful):
 
     def load_program(self, bank: int, program: LoadedProgram) -> None:
         """Fill a program bank. `Misuse` for a bank that does not exist or whose program is running or paused."""
-        self._check_bank("program", bank, in_use=self.runs_program(bank))
-        if len(program.steps) > self.dialect.max_steps:
-            lines = f"{len(program.steps)} executable lines"
-            raise Misuse(f"{program.source.name}: {lines}, firmware {self.dialect.firmware} holds {self.dialect.max_steps}")
-        self.programs[bank] = program
+        if self.runs_program(bank):
+            raise Misuse(f"program bank {bank} is in use: stop the program first")
+        self.banks.load_program(bank, program)
 
     def load_positions(self, bank: int, table: PositionTable) -> None:
         """Fill a position bank. `Misuse` for a bank that does not exist or is in use."""
-        self._check_bank("position", bank, in_use=self.runs_positions(bank))
-        if len(table.rows) > self.dialect.max_positions:
-            raise Misuse(f"{len(table.rows)} positions: a bank holds {self.dialect.max_positions}")
-        self.positions[bank] = table
+        if self.runs_positions(bank):
+            raise Misuse(f"position bank {bank} is in use: stop the program first")
+        self.banks.load_positions(bank, table)
 
     def runs_program(self, bank: int) -> bool:
         """Whether the program of a bank runs or is paused."""
@@ -208,30 +116,6 @@ class ProgramControl(Stateful):
     def runs_positions(self, bank: int) -> bool:
         """Whether the positions of a bank are those of a program that runs or is paused."""
         return self.state is not STOPPED and bank == self._table
-
-    def _check_bank(self, kind: str, bank: int, *, in_use: bool) -> None:
-        last = self.device.firmware.banks - 1
-        if not 0 <= bank <= last:
-            raise Misuse(f"{kind} bank {bank}: permitted are 0…{last}")
-        if in_use:
-            raise Misuse(f"{kind} bank {bank} is in use: stop the program first")
-
-    def contents(self) -> BankContents:
-        """What is in all banks."""
-        programs = [(bank, one.source.name, one.source.text, one.positions) for bank, one in sorted(self.programs.items())]
-        return BankContents(tuple(programs), tuple((bank, table.text) for bank, table in sorted(self.positions.items())))
-
-    def hold(self, contents: BankContents) -> None:
-        """Have these contents of all banks, which were those of a controller with this firmware; whatever runs."""
-        before = self.contents()
-        if contents == before:
-            return
-        kept = {row[0] for row in contents.programs if row in before.programs}
-        self.programs = {
-            bank: self.programs[bank] if bank in kept else load(check(text, _table(positions), dialect=self.dialect), name)
-            for bank, name, text, positions in contents.programs
-        }
-        self.positions = {bank: parse_positions(text)[0] for bank, text in contents.positions}
 
     # ------------------------------------------------------------------ start, stop, pause
 
@@ -264,7 +148,7 @@ class ProgramControl(Stateful):
             self.error = False  # MIC-26, MIC-31
 
     def _start(self, now: Nanos) -> None:
-        program, table = self.programs.get(self.program_bank), self.positions.get(self.position_bank)
+        program, table = self.banks.programs.get(self.program_bank), self.banks.positions.get(self.position_bank)
         self.error = False
         self.fault = None
         if program is None:
@@ -319,14 +203,14 @@ class ProgramControl(Stateful):
         self.machine.resume(self._code(), now)
 
     def _code(self) -> Code:
-        return self.programs[self._program].code
+        return self.banks.programs[self._program].code
 
     # ------------------------------------------------------------------ where it stands
 
     @property
     def running(self) -> LoadedProgram | None:
         """The program that runs or is paused, whatever bank is selected."""
-        return None if self.state is STOPPED else self.programs[self._program]
+        return None if self.state is STOPPED else self.banks.programs[self._program]
 
     @property
     def running_bank(self) -> int:
@@ -360,7 +244,7 @@ class ProgramControl(Stateful):
         return self._span(self.machine.place(now))
 
     def _span(self, number: int) -> Span:
-        program = self.programs[self._program]
+        program = self.banks.programs[self._program]
         if number < len(program.steps):
             return Span(program.steps[number].start, program.steps[number].end)
         return Span(len(program.source.text), len(program.source.text))
@@ -424,7 +308,7 @@ class ProgramControl(Stateful):
         span = self._span(self.machine.pc)
         self.fault = ProgramError(span, text)
         self._stop()
-        line, _ = self.programs[self._program].source.position(span.start)
+        line, _ = self.banks.programs[self._program].source.position(span.start)
         self._refuse(f"line {line}: {text}", now)
         for axis in self.device.axes:
             axis.brake(now)
@@ -499,17 +383,17 @@ class ProgramControl(Stateful):
         """Row ``index`` (from 0) of the table in use."""
         if index == 0 and self.registers.row_0 is not None:
             return self.registers.row_0
-        table = self.positions.get(self._table)
+        table = self.banks.positions.get(self._table)
         rows = () if table is None else table.rows
         if not 0 <= index < len(rows) or index != int(index):
             raise ProgramFault(f"{keyword} {real_text(index)}: the position table has rows 0…{len(rows) - 1}")
         return self._row(int(index))
 
     def _row(self, index: int) -> tuple[float | None, ...]:
-        record = self.programs[self._program].position_records.get(index)
+        record = self.banks.programs[self._program].position_records.get(index)
         if record is not None:
             return row_values(record)
-        table = self.positions.get(self._table)
+        table = self.banks.positions.get(self._table)
         return table.rows[index].values if table is not None and index < len(table.rows) else (None,) * 4
 
     def at_rest(self, now: Nanos) -> bool:

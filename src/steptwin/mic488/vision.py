@@ -9,7 +9,7 @@ import re
 from typing import NamedTuple, Protocol
 
 from steptwin.machine import Nanos
-from steptwin.mic488.program import LoadedProgram
+from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.state import Stateful
 from steptwin.wbc import steps as s
 from steptwin.wbc.usage import sources

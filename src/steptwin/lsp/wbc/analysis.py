@@ -26,7 +26,7 @@ from steptwin.lsp.wbc import items, names
 from steptwin.lsp.wbc.hints import hints
 from steptwin.lsp.wbc.names import Names
 from steptwin.lsp.wbc.surroundings import ProgramContext
-from steptwin.mic488.program import setup_of
+from steptwin.mic488.program_banks import setup_of
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.wbc.check import CheckedProgram
 from steptwin.wbc.dialect import MAX_POSITIONS

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from steptwin.errors import Misuse
 from steptwin.lsp.answers import Hint
 from steptwin.lsp.wbc.names import Names, row_values
+from steptwin.mic488.axis_motion import MAX_SPEED_P
 from steptwin.mic488.config import ControllerConfig
-from steptwin.mic488.program import MAX_SPEED_P
 from steptwin.motion.planner import MotionState, plan_position
 from steptwin.symbols import SymbolKind, SymbolRole, Use
 from steptwin.wbc import steps as s

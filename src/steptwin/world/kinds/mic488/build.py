@@ -10,7 +10,7 @@ from steptwin.mic488.config import ControllerConfig, examine_config
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.inifile import IniFile
-from steptwin.mic488.program import LoadedProgram, load, setup_of
+from steptwin.mic488.program_banks import LoadedProgram, load, setup_of
 from steptwin.mic488.registers import firmware
 from steptwin.wbc.check import check
 from steptwin.wbc.decompile import IMAGE, program_of

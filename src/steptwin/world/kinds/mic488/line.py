@@ -57,7 +57,7 @@ class ModbusBus(Line):
         self._gap = gap
         # WBC-15: a vision system belongs to one controller; without its registers in a program it costs nothing.
         device = next(iter(devices.values()))
-        sees = len(devices) == 1 and any(map(uses_vision, device.program.programs.values()))
+        sees = len(devices) == 1 and any(map(uses_vision, device.program.banks.programs.values()))
         self._seeing = device if sees else None
         self._timed: tuple[TimedUnits, Gateway] | None = None
         if timing is not None:

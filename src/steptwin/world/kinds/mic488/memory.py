@@ -8,7 +8,7 @@ from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
 from steptwin.errors import Refusal, SourceErrors
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.present import place_of
-from steptwin.mic488.program import load, setup_of
+from steptwin.mic488.program_banks import load, setup_of
 from steptwin.mic488.status import ProgramState
 from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.positions import PositionTable, parse_positions
@@ -28,7 +28,7 @@ def texts(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> list[
 def _programs(device: Mic488Device) -> Iterator[ProgramText]:
     control, at = device.program, place_of(device)
     for bank in range(device.firmware.banks):
-        place, program = bank_text(bank), control.programs.get(bank)
+        place, program = bank_text(bank), control.banks.programs.get(bank)
         source = SourceText(place, "") if program is None else program.source
         line = at.line if at is not None and control.runs_program(bank) else None
         yield ProgramText(
@@ -45,7 +45,7 @@ def _programs(device: Mic488Device) -> Iterator[ProgramText]:
 def _positions(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> Iterator[ProgramText]:
     names = dict(spec.positions)
     for bank in range(device.firmware.banks):
-        place, table = f"{POSITIONS} {bank}", device.program.positions.get(bank)
+        place, table = f"{POSITIONS} {bank}", device.program.banks.positions.get(bank)
         source = SourceText(names.get(bank, place), "" if table is None else table.text)
         yield ProgramText(
             place=place,
@@ -74,7 +74,7 @@ def download(device: Mic488Device, to: Destination, source: SourceText) -> Downl
 
 def _checked(device: Mic488Device, bank: int, text: str) -> CheckedProgram:
     control = device.program
-    return check(text, table_for(bank, control.positions), setup_of(device.config), control.dialect)
+    return check(text, table_for(bank, control.banks.positions), setup_of(device.config), control.dialect)
 
 
 def _table(source: SourceText) -> PositionTable:

@@ -11,7 +11,7 @@ from steptwin.diagnostics import visible
 from steptwin.machine import SECOND, Nanos, PinEdge
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.program import LoadedProgram
+from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
@@ -42,7 +42,7 @@ class ProgramEvent(NamedTuple):
 
 def watch_program(device: Mic488Device, kernel: Kernel, name: str) -> ProgramWatch | None:
     """See `steptwin.world.kind.ControllerKind.watch_program`."""
-    return ProgramWatch(device, kernel, name) if device.program.programs else None
+    return ProgramWatch(device, kernel, name) if device.program.banks.programs else None
 
 
 class ProgramWatch:
@@ -60,7 +60,7 @@ class ProgramWatch:
         self._statement: tuple[Nanos, int | None] = (-1, None)
         self._pending: Callable[[], None] | None = None
         """Reports what the present statement has done."""
-        self.program = next(iter(device.program.programs.values()))
+        self.program = next(iter(device.program.banks.programs.values()))
         """The one that was executed last."""
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
         device.program.machine.hook(self._begins)

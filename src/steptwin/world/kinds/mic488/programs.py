@@ -9,7 +9,7 @@ from functools import cached_property
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.program import LoadedProgram
+from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
@@ -46,10 +46,10 @@ class WbcPrograms:
 
     @property
     def texts(self) -> Mapping[str, SourceText]:
-        return {bank_text(bank): program.source for bank, program in self._device.program.programs.items()}
+        return {bank_text(bank): program.source for bank, program in self._device.program.banks.programs.items()}
 
     def _bank(self, text: str) -> _Bank:
-        program = self._device.program.programs[int(text.rpartition(" ")[2])]
+        program = self._device.program.banks.programs[int(text.rpartition(" ")[2])]
         found = self._banks.get(text)
         if found is None or found.program is not program:
             found = self._banks[text] = _Bank(program)
