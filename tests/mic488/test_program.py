@@ -278,7 +278,7 @@ def test_controllers_share_a_program_and_nothing_else() -> None:
         rig.word("PROGRAM_CTRL", 1)
     for rig in rigs:
         rig.wait(5.5)
-    assert [rig.device.program.machine.cells[0] for rig in rigs] == [0, 6, 12]
+    assert [rig.device.program.interpreter.cells[0] for rig in rigs] == [0, 6, 12]
 
 
 def test_outputs_of_programs_travel_over_wires_and_back_in_one_world() -> None:
@@ -295,7 +295,7 @@ def test_outputs_of_programs_travel_over_wires_and_back_in_one_world() -> None:
     for device in (one, other):
         device.command(partial(device.program.command, 1), 0)
     kernel.advance(SECOND)
-    rounds = one.program.machine.cells[0]
+    rounds = one.program.interpreter.cells[0]
     # Every way takes the filter of the input and a statement or two.
     assert 18 <= rounds <= 22
     assert [edge.time for edge in seen] == sorted(edge.time for edge in seen)

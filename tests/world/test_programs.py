@@ -160,7 +160,7 @@ def test_following_statements_does_not_change_what_happens() -> None:
     assert {("c", "program: line 4"), ("m", "program 0: line 1")} <= {(event.machine, event.payload.text) for event in events}
     following.close()
     assert not followed.m1486["c"].chip.program._hooks
-    assert not followed.mic488["m"].device.program.machine._hooks
+    assert not followed.mic488["m"].device.program.interpreter._hooks
 
 
 def test_statements_are_not_among_what_is_usually_followed() -> None:
@@ -168,7 +168,7 @@ def test_statements_are_not_among_what_is_usually_followed() -> None:
     following = WorldSubject(world).follow(filter_of(), 1000)
     world.run_to(SECOND)
     assert "statement" not in {event.kind for event in following.take().events}
-    assert not world.mic488["m"].device.program.machine._hooks
+    assert not world.mic488["m"].device.program.interpreter._hooks
 
 
 def test_every_statement_of_a_loop_is_executed_where_that_is_asked_for() -> None:

@@ -35,7 +35,7 @@ from steptwin.mic488.present import place_of, state_of
 from steptwin.mic488.program import RUNNING
 from steptwin.mic488.status import AxisStatus, ProgramState
 from steptwin.wbc.dialect import DEFAULT, dialect_for
-from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.wbc.real import real_text
 from steptwin.wbc.usage import homing_sides
 from steptwin.world.kinds.mic488.program_watch import ProgramEvent, ProgramWatch

@@ -15,7 +15,7 @@ from steptwin.live.serving import check_line_timing
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import BAUDS
 from steptwin.mic488.registers import firmware as known_firmware
-from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.world.kinds.mic488.small import mic488_world
 
 MOST_GAP_MS = 10_000.0

@@ -22,7 +22,7 @@ from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, INPUTS, MOTION_REG
 from steptwin.mic488.status import AxisStatus, ControllerStatus
 from steptwin.mic488.vision import VisionRecord
 from steptwin.state import Stateful
-from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable
 
 MAX_EVENTS_PER_INSTANT = 10_000

@@ -15,7 +15,7 @@ from steptwin.mic488.program_banks import BankContents, LoadedProgram
 from steptwin.mic488.registers import DEFAULT_FIRMWARE
 from steptwin.mic488.slave import slave
 from steptwin.state import Plain
-from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable
 from steptwin.wire.pdu import DEVICE_FAILURE, exception_pdu
 

@@ -18,7 +18,7 @@ from steptwin.state import Stateful
 from steptwin.wbc.compile import Code
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.events import EVENTS
-from steptwin.wbc.machine import Interpreter
+from steptwin.wbc.interpreter import Interpreter
 from steptwin.wbc.positions import PositionTable
 from steptwin.wbc.real import ProgramFault, real_text
 from steptwin.wbc.registers import REAL_MAX
@@ -54,7 +54,7 @@ class ProgramControl(Stateful):
         "dialect",
         "error",
         "fault",
-        "machine",
+        "interpreter",
         "position_bank",
         "program_bank",
         "registers",
@@ -73,7 +73,7 @@ class ProgramControl(Stateful):
         self.device = device
         self.dialect = dialect_for(device.firmware.name)
         self.banks = ProgramBanks(device.firmware.banks, self.dialect)
-        self.machine = Interpreter(self, statement_time)
+        self.interpreter = Interpreter(self, statement_time)
         self.registers = ProgramRegisters()
         self.program_bank = 0
         self.position_bank = 0
@@ -160,7 +160,7 @@ class ProgramControl(Stateful):
             self._program, self._table = self.program_bank, self.position_bank
             self.state = RUNNING
             self._begin(now)
-            self.machine.start(program.code, now)
+            self.interpreter.start(program.code, now)
 
     def _refuse(self, text: str, now: Nanos) -> None:
         self.error = True
@@ -173,7 +173,7 @@ class ProgramControl(Stateful):
         self._statuses = tuple(axis.status for axis in self.device.axes)
 
     def _stop(self) -> None:
-        self.machine.stop()
+        self.interpreter.stop()
         self.state = STOPPED
 
     def _end(self, now: Nanos) -> None:
@@ -193,14 +193,14 @@ class ProgramControl(Stateful):
         """WBC-9. Ticks do not go on meanwhile."""
         if self.state is RUNNING:
             self.state = PAUSED
-            self.machine.pause(now)
+            self.interpreter.pause(now)
 
     def _resume(self, now: Nanos) -> None:
-        begun = self.machine.paused_at
+        begun = self.interpreter.paused_at
         if begun is not None:
             self.registers.ticks = {event: at + now - begun for event, at in self.registers.ticks.items()}
         self.state = RUNNING
-        self.machine.resume(self._code(), now)
+        self.interpreter.resume(self._code(), now)
 
     def _code(self) -> Code:
         return self.banks.programs[self._program].code
@@ -220,7 +220,7 @@ class ProgramControl(Stateful):
     def variables(self, now: Nanos) -> dict[str, float]:
         """Values of the variables of the running or paused program, by name."""
         running = self.running
-        return {} if running is None else dict(zip(running.variables, self.machine.cells_at(now), strict=False))
+        return {} if running is None else dict(zip(running.variables, self.interpreter.cells_at(now), strict=False))
 
     def set_variable(self, name: str, value: float, now: Nanos) -> None:
         """Of the running or paused program. Raises `Misuse` for another name, and for what is no REAL."""
@@ -229,19 +229,19 @@ class ProgramControl(Stateful):
             raise Misuse(f"the program has no variable {name!r}: there are {', '.join(names) or 'none'}")
         if not -REAL_MAX <= value <= REAL_MAX:
             raise Misuse(f"{name} = {value:g}: permitted are {-REAL_MAX:g}…{REAL_MAX:g}")
-        self.machine.disturb(self.machine.after(now))
-        self.machine.cells[names.index(name)] = value
+        self.interpreter.disturb(self.interpreter.after(now))
+        self.interpreter.cells[names.index(name)] = value
 
     def rest_in_loops(self, on: bool, now: Nanos) -> None:
         """Off, every statement of a loop is executed even where nothing can change by it; only the computing time changes."""
-        self.machine.disturb(self.machine.after(now))
-        self.machine.rests_in_loops = on
+        self.interpreter.disturb(self.interpreter.after(now))
+        self.interpreter.rests_in_loops = on
 
     def statement(self, now: Nanos) -> Span | None:
         """Place, in the source, of the statement in execution at ``now`` or executed next; None when nothing runs."""
         if self.state is STOPPED:
             return None
-        return self._span(self.machine.place(now))
+        return self._span(self.interpreter.place(now))
 
     def _span(self, number: int) -> Span:
         program = self.banks.programs[self._program]
@@ -254,7 +254,7 @@ class ProgramControl(Stateful):
     def deadline(self) -> Nanos | None:
         due = None
         if self.state is RUNNING:
-            due = self.machine.due
+            due = self.interpreter.due
             for at in self.registers.ticks.values():
                 if due is None or at < due:
                     due = at
@@ -268,7 +268,7 @@ class ProgramControl(Stateful):
 
         Returns the moment at which it acted on the rest of the controller, where it goes no further; None if it did not.
         """
-        machine = self.machine
+        interpreter = self.interpreter
         acted = now if self._pulses and self._invert(now) else None
         if self.state is not RUNNING:
             return acted
@@ -277,19 +277,19 @@ class ProgramControl(Stateful):
         if ticks:
             for event in sorted(event for event, at in ticks.items() if at <= now):
                 ticks[event] += EVENTS[event].period
-                machine.happen(code, event, now, now)
-        if machine.due is None or machine.due > now:
+                interpreter.happen(code, event, now, now)
+        if interpreter.due is None or interpreter.due > now:
             return acted
         for at in (*ticks.values(), *self._pulses.values()):
             until = min(until, at - 1)
-        machine.acted = False
+        interpreter.acted = False
         try:
-            machine.run(code, max(until, now))
+            interpreter.run(code, max(until, now))
         except ProgramFault as fault:
             self._fail(str(fault))
-        if machine.acted:
-            self._look_at_drives(machine.now, machine.after(machine.now))
-            return machine.now
+        if interpreter.acted:
+            self._look_at_drives(interpreter.now, interpreter.after(interpreter.now))
+            return interpreter.now
         return acted
 
     def _invert(self, now: Nanos) -> bool:
@@ -298,14 +298,14 @@ class ProgramControl(Stateful):
         for number in over:
             del self._pulses[number]
             self.device.set_output(number, not self.device.outputs[number], now)
-            self.machine.disturb(now)
+            self.interpreter.disturb(now)
         return bool(over)
 
     def _fail(self, text: str) -> None:
         """WBC-5."""
-        now = self.machine.now
-        self.machine.acting()
-        span = self._span(self.machine.pc)
+        now = self.interpreter.now
+        self.interpreter.acting()
+        span = self._span(self.interpreter.pc)
         self.fault = ProgramError(span, text)
         self._stop()
         line, _ = self.banks.programs[self._program].source.position(span.start)
@@ -317,9 +317,9 @@ class ProgramControl(Stateful):
 
     def disturbed(self, now: Nanos, *, inside: bool) -> None:
         """Something happened at ``now`` that was not the program's doing; ``inside``: before its statement of this moment."""
-        first = now if inside else self.machine.after(now)
+        first = now if inside else self.interpreter.after(now)
         if self.state is RUNNING:
-            self.machine.disturb(first)
+            self.interpreter.disturb(first)
         self._look_at_drives(now, first)
 
     def _look_at_drives(self, now: Nanos, first: Nanos) -> None:
@@ -341,12 +341,12 @@ class ProgramControl(Stateful):
             before, self._statuses = self._statuses, statuses
             for index, event in _DRIVES.items():
                 if before[index] != statuses[index] and self.registers.switches[event]:
-                    self.machine.happen(self._code(), event, now, first)
+                    self.interpreter.happen(self._code(), event, now, first)
 
     def registers_written(self, now: Nanos) -> None:
         """A user register was written over Modbus."""
         if self.state is not STOPPED and self.registers.switches[_MODBUS]:
-            self.machine.happen(self._code(), _MODBUS, now, self.machine.after(now))
+            self.interpreter.happen(self._code(), _MODBUS, now, self.interpreter.after(now))
 
     def inputs_changed(self, numbers: list[int], now: Nanos) -> None:
         """Filtered inputs ``numbers`` (from 0) changed: inside an instant, before the program's statement."""
@@ -356,7 +356,7 @@ class ProgramControl(Stateful):
             edge = 1 if self.device.inputs.filtered[number] else 2
             # Events of inputs come first in `EVENTS`.
             if self.registers.switches[number] & edge:
-                self.machine.happen(self._code(), number, now, now)
+                self.interpreter.happen(self._code(), number, now, now)
 
     def interrupt_by_position_error(self, now: Nanos) -> None:
         """ERRMODE1: the program stops; firmware 1.70 pauses it [1.74]."""
@@ -414,7 +414,7 @@ class ProgramControl(Stateful):
     def set_switch(self, event: int, mode: int, now: Nanos) -> bool:
         """CFGINT_… written: switched off, what waits is forgotten."""
         if not mode:
-            self.machine.pending &= ~(1 << event)
+            self.interpreter.pending &= ~(1 << event)
         return self.registers.switch(event, mode, now)
 
     def end(self, now: Nanos) -> None:
@@ -424,4 +424,4 @@ class ProgramControl(Stateful):
         self._drives_off(now)
         self._pulses = {}
         self._begin(now)
-        self.machine.restart(self._code())
+        self.interpreter.restart(self._code())

@@ -23,10 +23,10 @@ from steptwin.state import Stateful
 from steptwin.wbc.controller import FOREVER, Reader, RegisterFamily, Tendency, Writer, complete_access
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.events import BY_REGISTER, EVENTS, INPUTS
-from steptwin.wbc.machine import HORIZON
 from steptwin.wbc.positions import PARAMETERS
 from steptwin.wbc.real import ProgramFault, real, real_text
 from steptwin.wbc.registers import ROWS, TIMER
+from steptwin.wbc.resting import HORIZON
 
 TIMERS = 16
 TIMER_PERIODS: Mapping[str, Nanos] = MappingProxyType({"TIMA": 10 * MILLISECOND, "TIMB": SECOND})

@@ -1,4 +1,4 @@
-"""The code of a program: what `steptwin.wbc.compile` makes and `steptwin.wbc.machine` executes.
+"""The code of a program: what `steptwin.wbc.compile` makes and `steptwin.wbc.interpreter` executes.
 
 The function of a step takes the execution and its cells (variables, then constants) and returns the number of the step that
 follows; with all bits inverted (``~number``) if the machine must check for waits and interrupts before it continues.
@@ -22,7 +22,7 @@ Seen: TypeAlias = Callable[[Any, Cells, Nanos], float]
 
 
 class Execution(Protocol):
-    """The interface of a program's execution to its steps; see `steptwin.wbc.machine.Interpreter`."""
+    """The interface of a program's execution to its steps; see `steptwin.wbc.interpreter.Interpreter`."""
 
     controller: ProgramController
     now: Nanos

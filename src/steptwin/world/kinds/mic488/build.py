@@ -15,7 +15,7 @@ from steptwin.mic488.registers import firmware
 from steptwin.wbc.check import check
 from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import dialect_for
-from steptwin.wbc.machine import STATEMENT_TIME
+from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.world.kind import BuildContext, text_of
 from steptwin.world.kinds.mic488.table import Mic488Spec, config_of

@@ -63,7 +63,7 @@ class ProgramWatch:
         self.program = next(iter(device.program.banks.programs.values()))
         """The one that was executed last."""
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
-        device.program.machine.hook(self._begins)
+        device.program.interpreter.hook(self._begins)
         kernel.add_part(self)
         kernel.observers.append(self._edge)
 
@@ -103,11 +103,11 @@ class ProgramWatch:
             pending()
 
     def _waits(self, now: Nanos, number: int) -> None:
-        if self.device.program.machine.waiting:
+        if self.device.program.interpreter.waiting:
             self._tell(now, "wait", "waits", number)
 
     def _delays(self, now: Nanos, number: int) -> None:
-        duration = self.device.program.machine.not_before - now
+        duration = self.device.program.interpreter.not_before - now
         self._tell(now, "delay", f"waits {real_text(duration / SECOND)} s", number)
 
     def _sets(self, now: Nanos, number: int, name: str, read: Reader, before: float) -> None:

@@ -42,7 +42,7 @@ class WbcPrograms:
 
     @property
     def statement_time(self) -> Nanos:
-        return self._device.program.machine.statement_time
+        return self._device.program.interpreter.statement_time
 
     @property
     def texts(self) -> Mapping[str, SourceText]:
@@ -62,17 +62,17 @@ class WbcPrograms:
         return self._bank(text).labels
 
     def hook(self, hook: StatementHook) -> None:
-        self._device.program.machine.hook(hook)
+        self._device.program.interpreter.hook(hook)
 
     def unhook(self, hook: StatementHook) -> None:
-        self._device.program.machine.unhook(hook)
+        self._device.program.interpreter.unhook(hook)
 
     def place(self, number: int) -> Place | None:
         control = self._device.program
         return None if control.running is None else Place(bank_text(control.running_bank), number)
 
     def depth(self) -> int:
-        return len(self._device.program.machine.stack)
+        return len(self._device.program.interpreter.stack)
 
     def comes_back(self, place: Place) -> bool:
         return self._bank(place.text).comes_back(place.number)
@@ -82,7 +82,7 @@ class WbcPrograms:
         if control.running is None:
             return ()
         text = bank_text(control.running_bank)
-        numbers = [control.machine.place(now), *(step for step, _ in reversed(control.machine.stack))]
+        numbers = [control.interpreter.place(now), *(step for step, _ in reversed(control.interpreter.stack))]
         return [Frame(self._bank(text).name(number), Place(text, number)) for number in numbers]
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
@@ -97,7 +97,7 @@ class WbcPrograms:
             case Literal(value):
                 return float(value)
             case Variable(index):
-                return control.machine.cells_at(now)[index]
+                return control.interpreter.cells_at(now)[index]
             case RegisterOperand(row, number):
                 return float(ACCESS[row.key].read(number)(control, now))
         return None

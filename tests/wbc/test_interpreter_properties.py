@@ -52,7 +52,7 @@ def started(
 ) -> Mic488Device:
     program, table = loaded
     device = Mic488Device(CONFIG, programs={0: program}, positions={0: table}, statement_time=statement_time)
-    device.program.machine.rests = rests
+    device.program.interpreter.rests = rests
     device.command(partial(device.program.command, 1), 0)
     return device
 

@@ -14,8 +14,6 @@ from __future__ import annotations
 from array import array
 from collections import deque
 from collections.abc import Iterator, Sequence
-from functools import partial
-from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
@@ -23,7 +21,7 @@ from steptwin.state import Stateful
 from steptwin.statements import StatementHook, StatementHooks, joined, without
 from steptwin.wbc.code import Cells, Code, Execution, StepCode
 from steptwin.wbc.controller import ProgramController
-from steptwin.wbc.looks import first_change
+from steptwin.wbc.resting import NEVER, RestingLoop, Visit
 
 # WBC-6
 STATEMENT_TIME: Nanos = MILLISECOND
@@ -47,23 +45,6 @@ MARKS = 40
 sixteen rounds."""
 MOST_UNMARKED = 256
 
-HORIZON: Nanos = 3600 * SECOND
-"""How far is foreseen; then the look is taken, which does no harm."""
-
-
-class Visit(NamedTuple):
-    """A statement of a loop, and the state in which it is executed.
-
-    ``offset`` from the mark; ``held``: by a DELAY before it, until that moment.
-    """
-
-    step: int
-    offset: Nanos
-    held: bool
-    handling: bool
-    stack: tuple[tuple[int, Nanos], ...]
-    cells: bytes
-
 
 class Interpreter(Stateful):
     """One program in execution, or none. `Misuse` for a ``statement_time`` that is not permitted.
@@ -72,15 +53,13 @@ class Interpreter(Stateful):
     """
 
     __slots__ = (
-        "_base",
         "_hooked",
         "_hooks",
         "_is_repeated",
-        "_loop",
         "_mark",
         "_marks",
         "_moment",
-        "_period",
+        "_resting",
         "_spent",
         "_trail",
         "_unmarked",
@@ -155,10 +134,7 @@ class Interpreter(Stateful):
         """No loop is being recorded, none rests."""
         self._trail: list[Visit] | None = None
         self._mark: Nanos = 0
-        self._loop: tuple[Visit, ...] = ()
-        self._base: Nanos = 0
-        """When the loop, or the look of a WAIT, begins anew, and after which time again."""
-        self._period: Nanos = 0
+        self._resting: RestingLoop | None = None
 
     # ------------------------------------------------------------------ start, stop, pause
 
@@ -212,8 +188,8 @@ class Interpreter(Stateful):
     def disturb(self, first: Nanos) -> None:
         """Something happened: looks from ``first`` on may turn out differently."""
         self._trail = None
-        if self._loop:
-            self._settle(first)
+        if self._resting is not None:
+            self._settle(self._resting, first)
         if self.waiting and self.statement_time == 0 and self.running:
             self.due = first
 
@@ -269,8 +245,8 @@ class Interpreter(Stateful):
         now = self.due
         if now is None:
             return
-        if self._loop:
-            self._settle(now)
+        if self._resting is not None:
+            self._settle(self._resting, now)
         self.now = now
         if self.pending and not self.handling and not self.waiting:
             at_end = now >= self.not_before
@@ -401,13 +377,7 @@ class Interpreter(Stateful):
         period = self.statement_time or BREATH
         self.due = self.now + period
         if self.rests:
-            self._base, self._period = self.now, period
-            self._loop = (self._visit(0),)
-            foreseen = self._foresee(code)
-            if foreseen is None:
-                self._loop = ()
-            else:
-                self.due = foreseen if foreseen >= 0 else None
+            self._rest(code, RestingLoop((self._visit(0),), self.now, period))
 
     def _visit(self, offset: Nanos) -> Visit:
         return Visit(self.pc, offset, self.not_before > 0, self.handling, tuple(self.stack), self.cells.tobytes())
@@ -428,7 +398,7 @@ class Interpreter(Stateful):
             if trail and visit.step <= trail[-1].step:
                 again = next((i for i, earlier in enumerate(trail) if earlier.step == visit.step), None)
                 if again is not None:
-                    if self.effects == 0 and self._rest(code, trail[again:], visit):
+                    if self.effects == 0 and self._close(code, trail[again:], visit):
                         return False
                     break
             trail.append(visit)
@@ -448,75 +418,45 @@ class Interpreter(Stateful):
         self._marks += 1
         return True
 
-    def _rest(self, code: Code, loop: list[Visit], again: Visit) -> bool:
-        """Rest in a loop that has come round to ``again``; False when it has not, or cannot be foreseen."""
+    def _close(self, code: Code, loop: list[Visit], again: Visit) -> bool:
+        """Rest in a loop that has come round to ``again``; False if its state is another, or if it cannot be foreseen."""
         begin = loop[0].offset
         if again._replace(offset=begin) != loop[0]:
             return False
-        self._loop = tuple(visit._replace(offset=visit.offset - begin) for visit in loop)
-        self._base, self._period = self._mark + begin, again.offset - begin
-        foreseen = self._foresee(code)
-        if foreseen is None:
-            self._loop = ()
+        visits = tuple(visit._replace(offset=visit.offset - begin) for visit in loop)
+        if not self._rest(code, RestingLoop(visits, self._mark + begin, again.offset - begin)):
             return False
         self._trail = None
         self._marks = 0
-        self.due = foreseen if foreseen >= 0 else None
         return True
 
-    def _foresee(self, code: Code) -> Nanos | None:
-        """When a look of the loop first turns out differently; −1 if never as it looks, None if that is not known."""
-        controller, period = self.controller, self._period
-        soonest = -1
-        for visit in self._loop:
-            watches = code.watches[visit.step]
-            if not watches:
-                continue
-            cells = array("f")
-            cells.frombytes(visit.cells)
-            at = self._base + visit.offset
-            for seen, tendency in watches:
-                stretches = None if tendency is None else tendency(controller, at)
-                if stretches is None:
-                    return None
-                change = first_change(partial(seen, controller, cells), at, period, stretches, at + HORIZON)
-                if change is not None and not 0 <= soonest <= change:
-                    soonest = change
-        return soonest
+    def _rest(self, code: Code, loop: RestingLoop) -> bool:
+        """Execute nothing before a look of ``loop`` can turn out differently; False if that moment is not known."""
+        change = loop.next_change(code, self.controller)
+        if change is None:
+            return False
+        self._resting = loop
+        self.due = None if change == NEVER else change
+        return True
 
-    def _next_visit(self, first: Nanos) -> tuple[Nanos, Visit]:
-        """The first statement of the resting loop at or after ``first``."""
-        rounds, into = divmod(max(first - self._base, 0), self._period)
-        for visit in self._loop:
-            if visit.offset >= into:
-                break
-        else:
-            rounds, visit = rounds + 1, self._loop[0]
-        return self._base + rounds * self._period + visit.offset, visit
-
-    def _settle(self, first: Nanos) -> None:
+    def _settle(self, loop: RestingLoop, first: Nanos) -> None:
         """End the rest: stand before the first statement of the loop at or after ``first``."""
-        self.due, visit = self._next_visit(first)
+        self.due, visit = loop.next_visit(first)
         self.pc = visit.step
         self.handling = visit.handling
         self.stack = deque(visit.stack, maxlen=RETURNS)
-        self.cells = array("f")
-        self.cells.frombytes(visit.cells)
+        self.cells = visit.values()
         self.not_before = self.due if visit.held else 0
-        self._loop = ()
+        self._resting = None
 
     def cells_at(self, now: Nanos) -> Sequence[float]:
         """Variables, then constants, as the statement in execution at ``now`` finds them."""
-        if not self._loop:
-            return self.cells
-        cells = array("f")
-        cells.frombytes(self._next_visit(self.after(now))[1].cells)
-        return cells
+        return self.cells if self._resting is None else self._resting.next_visit(self.after(now))[1].values()
 
     def place(self, now: Nanos) -> int:
         """The step in execution at ``now`` (a DELAY until it ends), or executed next."""
-        if self._loop:
-            visit = self._next_visit(self.after(now))[1]
+        if self._resting is not None:
+            _, visit = self._resting.next_visit(self.after(now))
             return visit.step - 1 if visit.held else visit.step
         if self.paused_at is not None:
             now = self.paused_at
