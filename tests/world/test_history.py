@@ -126,7 +126,9 @@ def test_inputs_are_bounded_and_the_oldest_states_go_with_them(monkeypatch: pyte
             history.take()
         world.apply_input(Set((("m", "IN3", float(count % 2)),)))
     assert history.begin == 1_600_000_000
-    assert history.inputs_from(0) is None
+    assert not history.keeps_inputs_from(0)
+    with pytest.raises(Misuse, match=r"kept from 1600000000 to"):
+        history.inputs_from(0)
     past = Past(history)
     assert go(past, 1_600_000_000).now == history.begin
     assert go(past, 2_500_000_000).machine("m").pins()["IN3"] == 0.0
@@ -137,6 +139,24 @@ def test_inputs_are_bounded_and_the_oldest_states_go_with_them(monkeypatch: pyte
         go(past, world.now)
     history.take()
     assert go(past, world.now).now == world.now
+
+
+def test_the_way_to_a_moment_leaves_a_state_for_each_slice_of_time_not_for_each_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = make()
+    history = History(world)
+    for count in range(200):
+        world.run(for_=0.01)
+        world.apply_input(Set((("m", "IN3", float(count % 2)),)))
+    past, taken = Past(history), []
+    snapshot = past.world.snapshot
+
+    def counted(*, with_inputs: bool = True) -> object:
+        taken.append(past.world.now)
+        return snapshot(with_inputs=with_inputs)
+
+    monkeypatch.setattr(past.world, "snapshot", counted)
+    go(past, 2_000_000_000)
+    assert taken == [count * module.SLICE_NS for count in range(1, 8)]
 
 
 def test_what_is_undone_is_no_past() -> None:

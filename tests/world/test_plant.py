@@ -448,3 +448,19 @@ def test_frames_can_be_followed_on_a_link_that_is_in_use() -> None:
     line.unfollow_frames(heard)
     world.apply_input(Bytes("bus", "plc", "rtu", request))
     assert len(heard.frames) == 2
+
+
+def test_programs_that_are_answered_at_one_moment_are_answered_in_the_same_order_after_a_snapshot() -> None:
+    world = World.from_toml('[[mic488]]\nname = "t"\nline = "bus"\n[[line]]\nname = "bus"\n', name="w.toml")
+    unknown = with_crc(bytes.fromhex("01 41 01 02"))  # it is refused after a gap, for its length is not known
+    world.apply_input(Bytes("bus", "first", "rtu", unknown))
+    world.run(for_=0.5)
+    for place in ("second", "first"):
+        world.apply_input(Bytes("bus", place, "rtu", unknown))
+    again = world.branch()
+    for one in (world, again):
+        one.run(for_=0.5)
+    places = [record.subject for record in world.trace.frames()][2:]
+    assert places == ["second/in", "second/out", "first/in", "first/out"]
+    assert [record.subject for record in again.trace.frames()][2:] == places
+    assert again.trace.digest() == world.trace.digest()

@@ -142,10 +142,15 @@ class History:
             raise Misuse(f"to_ns = {moment}: the past is kept from {self.begin} to {self.world.now} ns")
         return self._states[index - 1]
 
-    def inputs_from(self, number: int) -> list[RecordedInput] | None:
-        """Those after the first ``number``; None where they are no longer kept."""
-        skipped = number - self._dropped
-        return None if skipped < 0 else list(islice(self._inputs, skipped, None))
+    def keeps_inputs_from(self, number: int) -> bool:
+        """Whether the inputs after the first ``number`` are still kept."""
+        return number >= self._dropped
+
+    def inputs_from(self, number: int) -> list[RecordedInput]:
+        """The inputs after the first ``number``. Raises `Misuse` where they are no longer kept."""
+        if not self.keeps_inputs_from(number):
+            raise Misuse(f"the past is kept from {self.begin} to {self.world.now} ns")
+        return list(islice(self._inputs, number - self._dropped, None))
 
 
 class Past:
@@ -177,20 +182,22 @@ class Past:
             self._near.clear()
         state = self._state_at(moment)
         if (
-            history.inputs_from(self._inputs) is None
+            not history.keeps_inputs_from(self._inputs)
             or self._branch != history.branch
             or not state.snapshot.now <= self.world.now <= moment
         ):
             self.world.restore(state.snapshot)
             self._branch, self._inputs = history.branch, state.inputs
+        kept = state.snapshot.now
         for _ in self.go_on(moment):
-            if self.world.now < moment:
+            if kept + SLICE_NS <= self.world.now < moment:
+                kept = self.world.now
                 self._near.append(_State(self.world.snapshot(with_inputs=False), self._inputs))
             yield
 
     def go_on(self, moment: Nanos) -> Iterator[None]:
         """Bring it from where it is to a later moment; nothing that happens meanwhile is left out."""
-        for is_input in replay(self.world, self._history.inputs_from(self._inputs) or (), moment, SLICE_NS):
+        for is_input in replay(self.world, self._history.inputs_from(self._inputs), moment, SLICE_NS):
             self._inputs += is_input
             yield
 
@@ -200,6 +207,6 @@ class Past:
         near = [
             state
             for state in self._near
-            if kept.snapshot.now < state.snapshot.now <= moment and self._history.inputs_from(state.inputs) is not None
+            if kept.snapshot.now < state.snapshot.now <= moment and self._history.keeps_inputs_from(state.inputs)
         ]
         return max(near, key=lambda state: state.snapshot.now, default=kept)

@@ -285,10 +285,10 @@ class Line(Stateful):
             (name, place.kind, place.copy_state(), place.port.copy_state(), self._port_state(place))
             for name, place in self.places.items()
         )
-        return super().copy_state(), places
+        return super().copy_state(), places, tuple(self._busy)
 
     def set_state(self, plain: Plain) -> None:
-        own, places = plain
+        own, places, busy = plain
         super().set_state(own)
         kept = {name for name, *_ in places}
         for name in [name for name in self.places if name not in kept]:
@@ -298,7 +298,7 @@ class Line(Stateful):
             place.set_state(state)
             place.port.set_state(faulty)
             self._set_port_state(place, port_state)
-        self._busy = dict(self.places)
+        self._busy = {name: self.places[name] for name in busy}  # in their order, which is that of simultaneous answers
 
     def _port_state(self, place: LineEndPoint) -> Plain:
         return place.inner.copy_state()

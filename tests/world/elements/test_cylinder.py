@@ -54,6 +54,18 @@ def test_it_extends_and_retracts_in_its_times() -> None:
     assert (world.read("a.IN1"), world.read("a.IN2"), world.read("a.IN3")) == (0, 1, 0)
 
 
+@pytest.mark.parametrize("coil", ["pulse.out", "a.OUT1"])
+def test_a_pulse_as_long_as_the_switching_time_moves_the_valve_whatever_gives_it(coil: str) -> None:
+    timer = '[[timer]]\nname = "pulse"\nkind = "pulse"\ntime = "12 ms"\ninput = "a.OUT1"\n'
+    world = World.from_toml(TEXT.replace('extend = "a.OUT1"', f'extend = "{coil}"') + timer)
+    out = world.mic488["a"]
+    world.at(0.1, lambda: out.write("OUT1", 1))
+    world.at(0.112, lambda: out.write("OUT1", 0))
+    world.run(until=0.2)
+    # Forth for 12 ms of 200, back over the same way in 12 ms of 200 · 300.
+    assert edges(world, "clamp.retracted") == [(0, 1), (112 + 1e-6, 0), (142, 1)]
+
+
 def test_conditions_see_its_position() -> None:
     world = World.from_toml(TEXT)
     world.mic488["a"].write("OUT1", 1)

@@ -215,6 +215,36 @@ def test_a_pulse_that_is_too_short_does_not_move_a_relay() -> None:
     assert edges(there, "safety.no") == [(0, 0), (15, 1)]
 
 
+EQUAL = """
+[[mic488]]
+name = "a"
+[[timer]]
+name = "pulse"
+kind = "pulse"
+time = "20 ms"
+input = "a.OUT1"
+[[relay]]
+name = "it"
+coil = "{coil}"
+pull_in = "20 ms"
+drop_out = "7 ms"
+[[wire]]
+from = "it.no"
+to = "a.IN1"
+"""
+
+
+@pytest.mark.parametrize("coil", ["pulse.out", "a.OUT1"])
+def test_a_pulse_as_long_as_the_pull_in_moves_a_relay_whatever_gives_it(coil: str) -> None:
+    """What is due at a moment comes before an input at the same moment."""
+    there = World.from_toml(EQUAL.format(coil=coil))
+    out = there.mic488["a"]
+    there.at(0.1, lambda: out.write("OUT1", 1))
+    there.at(0.12, lambda: out.write("OUT1", 0))
+    there.run(until=0.3)
+    assert edges(there, "it.no") == [(0, 0), (120, 1), (127, 0)]
+
+
 def test_faults_of_a_relay() -> None:
     there = World.from_toml(RELAY)
     there.run(until=0.1)

@@ -82,17 +82,22 @@ class Cylinder(BoardPart):
         self.travel = Travel(spec.extend_time, spec.retract_time, is_forth=starts_out, now=board.kernel.now)
 
     def update(self, now: Nanos) -> None:
+        self._switch(now)  # before the coils change: an input at a moment comes after what is due then
         wanted = self._coils()
         if wanted != self._wanted:
             self._wanted = wanted
             self._due = None if wanted == self._spool else now + self._spec.switching
-        if self._due is not None and self._due <= now:
-            self._due = None
-            self._spool = wanted
+            self._switch(now)
         self.travel.send(self._force(), now)
         place = self.travel.place(now)
         self.board.put(EXTENDED, float(place == self.travel.full))
         self.board.put(RETRACTED, float(place == 0))
+
+    def _switch(self, now: Nanos) -> None:
+        """Move the spool if that is due."""
+        if self._due is not None and self._due <= now:
+            self._due = None
+            self._spool = self._wanted
 
     def _coils(self) -> int:
         """Where the coils move the spool."""

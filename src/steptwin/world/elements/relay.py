@@ -56,16 +56,21 @@ class Relay(BoardPart):
         """Fault: the contact NO stays closed once it is."""
 
     def update(self, now: Nanos) -> None:
+        self._move(now)  # before the coil changes: an input at a moment comes after what is due then
         is_on = self.board.is_on(COIL) and not self.is_open
         if is_on is not self._was_on:
             self._was_on = is_on
             self._due = None if is_on is self.is_on else now + (self._pull_in if is_on else self._drop_out)
-        if self._due is not None and self._due <= now:
-            self._due = None
-            self.is_on = is_on
+            self._move(now)
         closed = self.is_on or (self.is_welded and self.board.is_on(NO))
         self.board.put(NO, float(closed))
         self.board.put(NC, float(not closed))
+
+    def _move(self, now: Nanos) -> None:
+        """Move the contact if that is due."""
+        if self._due is not None and self._due <= now:
+            self._due = None
+            self.is_on = self._was_on
 
     def deadline(self) -> Nanos | None:
         return self._due
