@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from steptwin.cli import app
+from steptwin.commands.serve import ServeOptions
 from steptwin.commands.serve_m1486 import ServeM1486, serve_m1486
 from steptwin.commands.serve_mic488 import ServeMic488, serve_mic488
 from steptwin.errors import Misuse
@@ -82,7 +83,7 @@ def test_a_twin_that_cannot_have_the_fault_does_not_start(
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(Misuse) as refused:
-        serve_mic488(ServeMic488(links={"tcp": "127.0.0.1:0"}, faults=(fault,)))
+        serve_mic488(ServeOptions(name="mic488", links={"tcp": "127.0.0.1:0"}, faults=(fault,)), ServeMic488())
     assert str(refused.value).startswith(text)
     assert [file for _, _, files in os.walk(tmp_path) for file in files] == []
 
@@ -90,4 +91,4 @@ def test_a_twin_that_cannot_have_the_fault_does_not_start(
 def test_frames_of_chips_cannot_go_wrong(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(Misuse, match="fault late happens on Modbus RTU and Modbus TCP: line 'bus' carries M1486"):
-        serve_m1486(ServeM1486(links={"tcp": "127.0.0.1:0"}, faults=("late",)))
+        serve_m1486(ServeOptions(name="m1486", links={"tcp": "127.0.0.1:0"}, faults=("late",)), ServeM1486())

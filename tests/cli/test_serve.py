@@ -32,7 +32,7 @@ def test_links_are_those_of_the_options_or_the_usual_ones(
     monkeypatch: pytest.MonkeyPatch, device: str, option: list[str], expected: dict[str, str]
 ) -> None:
     served: list[Any] = []
-    monkeypatch.setattr(f"steptwin.commands.serve_{device}.serve_{device}", served.append)
+    monkeypatch.setattr(f"steptwin.commands.serve_{device}.serve_{device}", lambda twin, controllers: served.append(twin))
     assert CliRunner().invoke(app, ["serve", device, *option]).exit_code == 0
     links = served[0].links.items()
     assert {key: Path(value).name if key == "pty" else value for key, value in links if value is not None} == expected

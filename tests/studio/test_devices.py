@@ -16,9 +16,9 @@ from pymodbus.client import ModbusTcpClient
 from tests.conftest import STEPTWIN, until
 from tests.peers.conftest import Master
 from tests.studio.conftest import WORLD, Process
+from typer.testing import CliRunner
 
-from steptwin.commands.studio_devices import OF_WORLD, check_without_world
-from steptwin.commands.up_world import UpOptions
+from steptwin.cli import app
 from steptwin.drivers.mic488.snapshot import Mic488Snapshot
 from steptwin.errors import Misuse
 
@@ -239,10 +239,7 @@ def test_devices_come_and_go(twin: Twin, start_studio: Callable[..., Process]) -
     assert viewer.ask("disconnect", machine="table")["error"]["code"] == "misuse"
 
 
-@pytest.mark.parametrize("key", OF_WORLD)
-def test_options_of_a_world_need_one(key: str) -> None:
-    given: dict[str, Any] = {key: "2"}
-    options = UpOptions(world=None, **given)
-    with pytest.raises(Misuse, match=f"{OF_WORLD[key]} is about a world"):
-        check_without_world(options)
-    check_without_world(UpOptions(world=None))
+@pytest.mark.parametrize("option", ["--seed=2", "--from=2s", "--speed=2", "--log-frames"])
+def test_options_of_a_world_need_one(option: str) -> None:
+    with pytest.raises(Misuse, match=f"{option.partition('=')[0]} is not for devices without a world: give a MACHINE.toml too"):
+        CliRunner().invoke(app, ["studio", "--device", "127.0.0.1:1", option], catch_exceptions=False)

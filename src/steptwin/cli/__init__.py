@@ -51,6 +51,7 @@ from steptwin.cli import (
     up,
     watch,
 )
+from steptwin.cli.optiongroups import GroupedCommand
 from steptwin.errors import Misuse, SourceErrors, SteptwinError
 
 COMMANDS: Mapping[str, Mapping[str, Callable[..., None]]] = {
@@ -155,7 +156,7 @@ app = typer.Typer(
 app.add_typer(serve.app, name="serve", cls=_Commands)
 for _group in COMMANDS.values():
     for _name, _command in _group.items():
-        app.command(_name)(_command)
+        app.command(_name, cls=GroupedCommand)(_command)
 
 
 def _show_version(wanted: bool) -> None:

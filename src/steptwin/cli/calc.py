@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.cli.device import Json, table
+from steptwin.cli.optiongroups import OptionGroup, grouped, option_of
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -29,93 +31,109 @@ def _value(meaning: str) -> typer.models.OptionInfo:
     return typer.Option(help=meaning, metavar="VALUE")
 
 
-def calc(
-    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="mic488 or m1486.")],
-    distance: Annotated[str | None, _value("Distance: 150mm, 2.5rev, 96000.")] = None,
-    velocity: Annotated[str | None, _value("Velocity (VMAX, V): 60mm/s, 600rpm.")] = None,
-    acceleration: Annotated[str | None, _value("Acceleration (ACC, A): 300mm/s2.")] = None,
-    deceleration: Annotated[str | None, _value("Deceleration (DEC) of a MIC488; as the acceleration without.")] = None,
-    start_stop: Annotated[str | None, _value("Start/stop velocity (S) of an M1486.")] = None,
-    profile: Annotated[str | None, _value("Profile point (P) of an M1486; none without.")] = None,
-    time: Annotated[str | None, _value("Total time: 2s, 250ms.")] = None,
-    acceleration_time: Annotated[str | None, _value("Time of acceleration.")] = None,
-    constant_time: Annotated[str | None, _value("Time at constant velocity.")] = None,
-    deceleration_time: Annotated[str | None, _value("Time of deceleration.")] = None,
-    find: Annotated[
-        str | None, typer.Option(metavar="QUANTITY", help="What a time determines. Default: the one that is left out.")
-    ] = None,
-    motor_steps: Annotated[float | None, typer.Option(help="Full steps in a revolution of the motor. Default: 200.")] = None,
-    microsteps: Annotated[float | None, typer.Option(help="Pulses in a full step of a MIC488, as its drive is set.")] = None,
-    ratio: Annotated[float | None, typer.Option(help="Revolutions of the motor in one of what it drives. Default: 1.")] = None,
+@dataclass(frozen=True, kw_only=True)
+class QuantityOptions(OptionGroup):
+    heading = "Quantities of the move"
+
+    distance: Annotated[str | None, _value("Distance: 150mm, 2.5rev, 96000.")] = None
+    velocity: Annotated[str | None, _value("Velocity (VMAX, V): 60mm/s, 600rpm.")] = None
+    acceleration: Annotated[str | None, _value("Acceleration (ACC, A): 300mm/s2.")] = None
+    deceleration: Annotated[str | None, _value("Deceleration (DEC) of a MIC488. Default: the acceleration.")] = None
+    start_stop: Annotated[str | None, _value("Start/stop velocity (S) of an M1486.")] = None
+    profile: Annotated[str | None, _value("Profile point (P) of an M1486. Default: none.")] = None
+    time: Annotated[str | None, _value("Total time: 2s, 250ms.")] = None
+    acceleration_time: Annotated[str | None, _value("Time of acceleration.")] = None
+    constant_time: Annotated[str | None, _value("Time at constant velocity.")] = None
+    deceleration_time: Annotated[str | None, _value("Time of deceleration.")] = None
+    microstep: Annotated[int | None, typer.Option("--microstep", "-M", help="M of an M1486. Default: 4.")] = None
+    qualification: Annotated[int | None, typer.Option("--qualification", "-Q", help="Q of an M1486. Default: 1.")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MechanicsOptions(OptionGroup):
+    heading = "Mechanics"
+
+    motor_steps: Annotated[float | None, typer.Option(help="Full steps in a revolution of the motor. Default: 200.")] = None
+    microsteps: Annotated[float | None, typer.Option(help="Pulses in a full step of a MIC488, as its drive is set.")] = None
+    ratio: Annotated[float | None, typer.Option(help="Revolutions of the motor for one revolution of its load. Default: 1.")] = (
+        None
+    )
     lead: Annotated[
         float | None, typer.Option(help="Travel in one revolution: lead of a screw, teeth × pitch of a pulley [mm].")
-    ] = None,
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mic488Options(OptionGroup):
+    heading = "Options of the MIC488"
+
     unit: Annotated[
         str | None,
         typer.Option(
             metavar="UNIT",
-            help="Of a MIC488: imp, rev, degree, mm, cm, m. Default: mm with --lead, rev with --microsteps, else imp.",
+            help="imp, rev, degree, mm, cm or m. Default: mm with --lead, rev with --microsteps, else imp.",
         ),
+    ] = None
+    gear: Annotated[float | None, typer.Option(help="GEAR, pulses in a unit, instead of the mechanics.")] = None
+    axis: Annotated[int | None, typer.Option(help="Axis, for the names of registers. Default: 1.")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChipOptions(OptionGroup):
+    heading = "Options of the M1486"
+
+    variant: Annotated[str | None, typer.Option(metavar="TYPE", help="Type. Default: A.", autocompletion=completion.variants)] = (
+        None
+    )
+
+
+@grouped
+def calc(
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="mic488 or m1486.")],
+    find: Annotated[
+        str | None,
+        typer.Option(metavar="QUANTITY", help="The quantity that a time determines. Default: the one that is not given."),
     ] = None,
-    gear: Annotated[float | None, typer.Option(help="GEAR of a MIC488, pulses in a unit, instead of its mechanics.")] = None,
-    axis: Annotated[int | None, typer.Option(help="Axis of a MIC488, for the names of registers. Default: 1.")] = None,
-    variant: Annotated[
-        str | None, typer.Option(metavar="TYPE", help="Type of an M1486. Default: A.", autocompletion=completion.variants)
-    ] = None,
-    microstep: Annotated[int | None, typer.Option("--microstep", "-M", help="M of an M1486. Default: 4.")] = None,
-    qualification: Annotated[int | None, typer.Option("--qualification", "-Q", help="Q of an M1486. Default: 1.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A picture of the profile: FILE.svg or FILE.png.")] = None,
     json: Json = False,
+    *,
+    quantities: QuantityOptions,
+    mechanics: MechanicsOptions,
+    controller: Mic488Options,
+    chip: ChipOptions,
 ) -> None:
-    """Calculate a move: its times, or with a time the quantity that is left out; and GEAR from the mechanics.
+    """Calculate a move: its times, or with a time the quantity that is not given; and GEAR from the mechanics.
 
     Values have units: of distance imp, step, rev, degree, mm, cm, m, with /s or /s2 behind them, of time s, ms, min; a number
-    alone is in the controller's own unit. Exit code 2 where a value is outside its range or a time cannot be.
+    without a unit is in the controller's own unit. Exit code 2 if a value is outside its range or a time is not possible.
     """
-    from steptwin.calc import plain
-
-    mechanics = {"motor_steps": motor_steps, "microsteps": microsteps, "ratio": ratio, "lead": lead}
-    given_mechanics = {name: value for name, value in mechanics.items() if value is not None}
+    known_mechanics = mechanics.given()
     if kind is Kind.MIC488:
-        _refuse(kind, {"variant": variant})
-        calculator, scale = _mic488(given_mechanics, unit, gear, axis)
+        chip.refuse("the MIC488")
+        calculator, scale = _mic488(known_mechanics, controller)
     else:
-        _refuse(kind, {"unit": unit, "gear": gear, "axis": axis, "microsteps": microsteps})
-        calculator, scale = _m1486(given_mechanics, variant)
-    texts = {
-        "distance": distance, "velocity": velocity, "acceleration": acceleration, "deceleration": deceleration,
-        "start_stop": start_stop, "profile": profile, "time": time, "acceleration_time": acceleration_time,
-        "constant_time": constant_time, "deceleration_time": deceleration_time,
-        "microstep": None if microstep is None else str(microstep),
-        "qualification": None if qualification is None else str(qualification),
-    }  # fmt: skip
-    given = _given(calculator, scale, {name: text for name, text in texts.items() if text is not None})
-    if not given and given_mechanics and find is None and output is None:
+        controller.refuse("the M1486")
+        calculator, scale = _m1486(known_mechanics, chip)
+    values = _values(calculator, scale, quantities.given())
+    if not values and known_mechanics and find is None and output is None:
         _print_scale(scale, json=json)
         return
-    result = calculator.calculate(given, None if find is None else find.replace("-", "_"))
+    result = calculator.calculate(values, None if find is None else find.replace("-", "_"))
     if output is not None:
         from steptwin.files.export import write_profile
 
         write_profile(result, output)
     if json:
-        from json import dumps
-
-        typer.echo(dumps({**plain(result), "pulses_per_unit": dict(scale.pulses)}, ensure_ascii=False, indent=2))
+        _print_json(result, scale)
     else:
         typer.echo("\n\n".join(_sections(calculator, result)))
 
 
-def _refuse(kind: Kind, options: Mapping[str, object]) -> None:
-    for name, value in options.items():
-        if value is not None:
-            raise Misuse(f"--{name.replace('_', '-')} is not for the {kind.upper()}")
-
-
-def _mic488(given: Mapping[str, float], unit: str | None, gear: float | None, axis: int | None) -> tuple[Calculator, Scale]:
+def _mic488(given: Mapping[str, float], options: Mic488Options) -> tuple[Calculator, Scale]:
     from steptwin.calc import Calculator, Mechanics, Mic488Model, Scale, unit_of
     from steptwin.mic488.config import UNITS
 
+    unit, gear = options.unit, options.gear
     if gear is not None and given:
         raise Misuse("--gear and the mechanics exclude each other: GEAR follows from them")
     if given and "microsteps" not in given:
@@ -129,35 +147,44 @@ def _mic488(given: Mapping[str, float], unit: str | None, gear: float | None, ax
     scale = Scale.of_gear(own, gear or 1.0) if not given else Mechanics(**given).scale()
     if gear is None and not given and own != "imp":
         raise Misuse(f"how many pulses are 1 {own} is not known: give --gear, or --microsteps and the rest of the mechanics")
-    return Calculator(Mic488Model(own, scale.in_pulses(own), 1 if axis is None else axis)), scale
+    return Calculator(Mic488Model(own, scale.in_pulses(own), 1 if options.axis is None else options.axis)), scale
 
 
-def _m1486(given: Mapping[str, float], variant: str | None) -> tuple[Calculator, Scale]:
+def _m1486(given: Mapping[str, float], options: ChipOptions) -> tuple[Calculator, Scale]:
     from steptwin.calc import Calculator, M1486Model, Mechanics
     from steptwin.m1486.microsteps import FULL_STEP
-    from steptwin.m1486.variants import DEFAULT
-    from steptwin.m1486.variants import variant as variant_of
+    from steptwin.m1486.variants import DEFAULT, variant
 
-    model = M1486Model(DEFAULT if variant is None else variant_of(variant))
+    if "microsteps" in given:
+        raise Misuse("--microsteps is not for the M1486: it divides its full steps by M itself")
+    model = M1486Model(DEFAULT if options.variant is None else variant(options.variant))
     return Calculator(model), Mechanics(**{**given, "microsteps": FULL_STEP}).scale()
 
 
-def _given(calculator: Calculator, scale: Scale, texts: Mapping[str, str]) -> dict[str, float]:
+def _values(calculator: Calculator, scale: Scale, given: Mapping[str, object]) -> dict[str, float]:
     """Values in the units of the quantities. Raises `Misuse`."""
     from steptwin.calc import read_quantity
 
     values: dict[str, float] = {}
-    for name, text in texts.items():
+    for name, text in given.items():
         quantity = calculator.quantities.get(name)
         if quantity is None:
             can = ", ".join(calculator.quantities)
-            raise Misuse(f"--{name.replace('_', '-')} is not for the {calculator.model.title}: its quantities are {can}")
+            raise Misuse(f"{option_of(name)} is not for the {calculator.model.title}: its quantities are {can}")
         try:
-            value, unit = read_quantity(text, quantity.dimension)
+            value, unit = read_quantity(str(text), quantity.dimension)
             values[name] = value if unit is None else value * scale.in_pulses(unit) / quantity.pulses
         except Misuse as error:
-            raise Misuse(f"--{name.replace('_', '-')}: {error}") from None
+            raise Misuse(f"{option_of(name)}: {error}") from None
     return values
+
+
+def _print_json(result: Calculation, scale: Scale) -> None:
+    from json import dumps
+
+    from steptwin.calc import plain
+
+    typer.echo(dumps({**plain(result), "pulses_per_unit": dict(scale.pulses)}, ensure_ascii=False, indent=2))
 
 
 def _print_scale(scale: Scale, *, json: bool) -> None:

@@ -5,50 +5,38 @@ From another program: the WebSocket and REST, which docs/studio.md explains.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from steptwin.cli import completion
-from steptwin.cli.worldoptions import (
-    AllowOutside,
-    Begin,
-    Control,
-    Faults,
-    ListenAny,
-    LogFrames,
-    Name,
-    ReadyFile,
-    Seed,
-    SessionFile,
-    Speed,
-    State,
-    Strict,
-    Trace,
-)
+from steptwin.cli.optiongroups import OptionGroup, grouped
+from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldOptions, up_options
 from steptwin.errors import Misuse
 
 
-def studio(
-    world: Annotated[
-        Path | None,
-        typer.Argument(metavar="MACHINE.toml", help="The description of a world, or a session (.json). Default: a demo machine."),
-    ] = None,
+@dataclass(frozen=True, kw_only=True)
+class PageOptions(OptionGroup):
+    """The page and its service."""
+
+    heading = "Options of the page"
+
     http: Annotated[
         str | None,
         typer.Option(metavar="HOST:PORT", help="Where the page is. Default: 127.0.0.1:8488, or the next free port."),
-    ] = None,
+    ] = None
     remote: Annotated[
         bool, typer.Option("--remote", help="Permit an --http address that others can reach, without TLS; with tokens.")
-    ] = False,
-    certificate: Annotated[Path | None, typer.Option(metavar="FILE", help="TLS: the certificate (PEM).")] = None,
-    key: Annotated[Path | None, typer.Option(metavar="FILE", help="TLS: its key (PEM).")] = None,
+    ] = False
+    certificate: Annotated[Path | None, typer.Option(metavar="FILE", help="TLS: the certificate (PEM).")] = None
+    key: Annotated[Path | None, typer.Option(metavar="FILE", help="TLS: its key (PEM).")] = None
     tokens: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Lines ROLE NAME TOKEN; roles are viewer, operator, engineer. Default: new tokens."),
-    ] = None,
-    audit: Annotated[Path | None, typer.Option(metavar="FILE", help="Append who did what to a file of JSON lines.")] = None,
+    ] = None
+    audit: Annotated[Path | None, typer.Option(metavar="FILE", help="Append who did what to a file of JSON lines.")] = None
     device: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,22 +47,21 @@ def studio(
             "Several times for several. Without MACHINE.toml there is no world then.",
             autocompletion=completion.devices,
         ),
+    ] = None
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page where there is a desktop.")] = True
+
+
+@grouped
+def studio(
+    world: Annotated[
+        Path | None,
+        typer.Argument(metavar="MACHINE.toml", help="The description of a world, or a session (.json). Default: a demo machine."),
     ] = None,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page where there is a desktop.")] = True,
-    speed: Speed = "1",
-    name: Name = None,
-    session: SessionFile = None,
-    trace: Trace = None,
-    fault: Faults = None,
-    seed: Seed = None,
-    state: State = None,
-    begin: Begin = None,
+    *,
     ready_file: ReadyFile = None,
-    control: Control = None,
-    listen_any: ListenAny = False,
-    log_frames: LogFrames = False,
-    strict: Strict = False,
-    allow_outside: AllowOutside = False,
+    page: PageOptions,
+    live: LiveOptions,
+    options: WorldOptions,
 ) -> None:
     """Show a world or devices in a browser, until Ctrl-C.
 
@@ -88,35 +75,18 @@ def studio(
         if error.name is None or error.name.partition(".")[0] not in ("fastapi", "uvicorn", "websockets", "starlette"):
             raise
         raise Misuse("the studio needs the extra 'studio': pip install 'steptwin[studio]'") from None
-    from steptwin.commands.up_world import UpOptions
-    from steptwin.files.timedinputs import parse_duration
-
+    if page.device and world is None:
+        for group in (live, options):
+            group.refuse("devices without a world: give a MACHINE.toml too")
     own = StudioOptions(
-        http=http,
-        remote=remote,
-        certificate=certificate,
-        key=key,
-        tokens=tokens,
-        audit=audit,
-        browser=browser,
-        devices=tuple(device or ()),
+        http=page.http,
+        remote=page.remote,
+        certificate=page.certificate,
+        key=page.key,
+        tokens=page.tokens,
+        audit=page.audit,
+        browser=page.browser,
+        devices=tuple(page.device or ()),
     )
-    options = UpOptions(
-        world=world,
-        moment=None if begin is None else parse_duration(begin, "--from"),
-        seed=seed,
-        state=state,
-        speed=speed,
-        name=name,
-        session=session,
-        trace=trace,
-        faults=tuple(fault or ()),
-        ready_file=ready_file,
-        control=control,
-        listen_any=listen_any,
-        log_frames=log_frames,
-        strict=strict,
-        allow_outside=allow_outside,
-    )
-    if not run_studio(own, options):
+    if not run_studio(own, up_options(world, ready_file, live, options)):
         raise typer.Exit(1)

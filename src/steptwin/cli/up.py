@@ -11,22 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from steptwin.cli.commands import PageFormat, PageSection, show
-from steptwin.cli.worldoptions import (
-    AllowOutside,
-    Begin,
-    Control,
-    Faults,
-    ListenAny,
-    LogFrames,
-    Name,
-    ReadyFile,
-    Seed,
-    SessionFile,
-    Speed,
-    State,
-    Strict,
-    Trace,
-)
+from steptwin.cli.optiongroups import grouped
+from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldOptions, up_options
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -34,27 +20,18 @@ if TYPE_CHECKING:
     from steptwin.world.reader import Key
 
 
+@grouped
 def up(
     world: Annotated[
         Path | None,
         typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a session (.json) to continue."),
     ] = None,
-    speed: Speed = "1",
-    name: Name = None,
-    session: SessionFile = None,
-    trace: Trace = None,
-    fault: Faults = None,
-    seed: Seed = None,
-    state: State = None,
-    begin: Begin = None,
+    *,
     ready_file: ReadyFile = None,
-    control: Control = None,
-    listen_any: ListenAny = False,
-    log_frames: LogFrames = False,
-    strict: Strict = False,
-    allow_outside: AllowOutside = False,
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
     form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
+    live: LiveOptions,
+    options: WorldOptions,
 ) -> None:
     """Run a world in real time until Ctrl-C or until one of its scripts stops it; other programs connect to its lines.
 
@@ -65,28 +42,9 @@ def up(
         return
     if world is None:
         raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
-    from steptwin.commands.up_world import UpOptions
     from steptwin.commands.up_world import up as run_up
-    from steptwin.files.timedinputs import parse_duration
 
-    options = UpOptions(
-        world=world,
-        moment=None if begin is None else parse_duration(begin, "--from"),
-        seed=seed,
-        state=state,
-        speed=speed,
-        name=name,
-        session=session,
-        trace=trace,
-        faults=tuple(fault or ()),
-        ready_file=ready_file,
-        control=control,
-        listen_any=listen_any,
-        log_frames=log_frames,
-        strict=strict,
-        allow_outside=allow_outside,
-    )
-    if not run_up(options):
+    if not run_up(up_options(world, ready_file, live, options)):
         raise typer.Exit(1)
 
 

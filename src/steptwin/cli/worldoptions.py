@@ -1,60 +1,104 @@
-"""The options of commands that run a world in real time: `up` and `studio`."""
+"""The options of commands that run a world: `run`, `up` and `studio`."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-Speed = Annotated[
-    str,
-    typer.Option(help="Virtual seconds per second: 0.1, 1, 10; 'max' for worlds without external clients; 0 starts paused."),
-]
+from steptwin.cli.optiongroups import OptionGroup
 
-Name = Annotated[str | None, typer.Option(help="Name by which --device finds it. Default: that of the file.")]
-
-SessionFile = Annotated[Path | None, typer.Option(help="Write a session for 'steptwin replay' when it ends.")]
-
-Trace = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FILE",
-        help="Write a trace to a file or into a directory; 'ring N' keeps the last N records for 'save'; 'off' keeps none. "
-        "Default: that of the description.",
-    ),
-]
+if TYPE_CHECKING:
+    from steptwin.commands.up_world import UpOptions
+    from steptwin.machine import Nanos
 
 Faults = Annotated[
     list[str] | None,
     typer.Option(help="Fault active from the start, such as 'crc nth=3'; repeatable. See steptwin fault --kinds."),
 ]
-
-Seed = Annotated[int | None, typer.Option(help="Random seed. Default: that of the description.")]
-
-State = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="Directory of the non-volatile memory. Default: that of the description, or none."),
-]
-
-Begin = Annotated[
-    str | None,
-    typer.Option("--from", metavar="TIME", help="Session: continue from this moment, such as 2.5s. Default: its end."),
-]
-
 ReadyFile = Annotated[Path | None, typer.Option(help="JSON file with the end points, written when all of them are open.")]
-
-Control = Annotated[
-    str | None,
-    typer.Option(metavar="HOST:PORT", help="Also open the control endpoint on this loopback TCP address."),
-]
-
-ListenAny = Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")]
-
-LogFrames = Annotated[
+LogTraffic = Annotated[
     bool, typer.Option("--log-frames", help="Print the traffic of every line with time, direction, bytes and meaning.")
 ]
 
-Strict = Annotated[bool, typer.Option("--strict", help="Exit code 1 also for a wait that timed out.")]
 
-AllowOutside = Annotated[bool, typer.Option("--allow-outside", help="Permit files outside the folder of the description.")]
+@dataclass(frozen=True, kw_only=True)
+class WorldOptions(OptionGroup):
+    """How a world begins, and what is kept of it."""
+
+    heading = "Options of worlds"
+
+    fault: Faults = None
+    seed: Annotated[int | None, typer.Option(help="Random seed. Default: that of the description.")] = None
+    state: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Directory of the non-volatile memory. Default: that of the description, or none."),
+    ] = None
+    session: Annotated[Path | None, typer.Option(help="Write a session for 'steptwin replay' when it ends.")] = None
+    from_: Annotated[
+        str | None,
+        typer.Option("--from", metavar="TIME", help="Of a session: continue from this moment, such as 2.5s. Default: its end."),
+    ] = None
+    strict: Annotated[bool, typer.Option("--strict", help="Exit code 1 also for a wait that timed out.")] = False
+    allow_outside: Annotated[
+        bool, typer.Option("--allow-outside", help="Permit files outside the folder of the description.")
+    ] = False
+
+    @property
+    def moment(self) -> Nanos | None:
+        """The moment of a session to continue from. Raises `Misuse`."""
+        from steptwin.files.timedinputs import parse_duration
+
+        return None if self.from_ is None else parse_duration(self.from_, "--from")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveOptions(OptionGroup):
+    """Of a world in real time."""
+
+    heading = "Options of real time"
+
+    speed: Annotated[
+        str,
+        typer.Option(help="Virtual seconds per second: 0.1, 1, 10; 'max' for worlds without external clients; 0 starts paused."),
+    ] = "1"
+    name: Annotated[str | None, typer.Option(help="Name by which --device finds it. Default: that of the file.")] = None
+    trace: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write a trace to a file or into a directory; 'ring N' keeps the last N records for 'save'; 'off' keeps none. "
+            "Default: that of the description.",
+        ),
+    ] = None
+    control: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Also open the control endpoint on this loopback TCP address."),
+    ] = None
+    listen_any: Annotated[bool, typer.Option("--listen-any", help="Permit addresses that other computers can reach.")] = False
+    log_frames: LogTraffic = False
+
+
+def up_options(world: Path | None, ready_file: Path | None, live: LiveOptions, options: WorldOptions) -> UpOptions:
+    """Raises `Misuse`."""
+    from steptwin.commands.up_world import UpOptions
+
+    return UpOptions(
+        world=world,
+        moment=options.moment,
+        seed=options.seed,
+        state=options.state,
+        speed=live.speed,
+        name=live.name,
+        session=options.session,
+        trace=live.trace,
+        faults=tuple(options.fault or ()),
+        ready_file=ready_file,
+        control=live.control,
+        strict=options.strict,
+        listen_any=live.listen_any,
+        log_frames=live.log_frames,
+        allow_outside=options.allow_outside,
+    )

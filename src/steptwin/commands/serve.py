@@ -20,7 +20,7 @@ from steptwin.world.small import Whole
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeOptions:
-    """The options common to both controllers; see ``steptwin serve mic488 --help``."""
+    """The twin and its line, as given; see ``steptwin serve mic488 --help``."""
 
     name: str
     links: Mapping[str, str | None] = field(default_factory=dict)

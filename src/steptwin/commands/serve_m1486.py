@@ -17,10 +17,9 @@ from steptwin.world.kinds.m1486.small import m1486_world
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ServeM1486(ServeOptions):
-    """The command's options as given; see ``steptwin serve m1486 --help``."""
+class ServeM1486:
+    """The chips, as given; see ``steptwin serve m1486 --help``."""
 
-    name: str = "m1486"
     variant: str = DEFAULT.name
     chain: str = "F"
     interface: str = "sd"
@@ -28,23 +27,23 @@ class ServeM1486(ServeOptions):
     program: Path | None = None
 
 
-def serve_m1486(options: ServeM1486) -> None:
+def serve_m1486(twin: ServeOptions, chips: ServeM1486) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
-    check_links(options)
-    serve(options, partial(describe_m1486, options), describe_m1486(replace(options, faults=())))
+    check_links(twin)
+    serve(twin, partial(describe_m1486, twin, chips), describe_m1486(replace(twin, faults=()), chips))
 
 
-def describe_m1486(options: ServeM1486, named: Named = str) -> str:
+def describe_m1486(twin: ServeOptions, chips: ServeM1486, named: Named = str) -> str:
     """The description of the world to serve. Raises `Misuse` for invalid options."""
-    check_line_timing(options.line_timing, "real")
-    kind = variant(options.variant)
-    baud_pins(kind, options.baud)
-    addresses, wires = parse_addresses(options.chain), [parse_wire(wire) for wire in options.wires]
-    chain = Chain(variant=kind, addresses=addresses, interface=interface(options.interface), wires=wires)
-    check_chain(chain, has_program=options.program is not None)
+    check_line_timing(twin.line_timing, "real")
+    kind = variant(chips.variant)
+    baud_pins(kind, twin.baud)
+    addresses, wires = parse_addresses(chips.chain), [parse_wire(wire) for wire in chips.wires]
+    chain = Chain(variant=kind, addresses=addresses, interface=interface(chips.interface), wires=wires)
+    check_chain(chain, has_program=chips.program is not None)
     values = {
         "variant": kind.name,
-        "interface": options.interface,
-        "program": None if options.program is None else named(options.program),
+        "interface": chips.interface,
+        "program": None if chips.program is None else named(chips.program),
     }
-    return m1486_world(options.whole(), addresses, values, placed_wires(chain))
+    return m1486_world(twin.whole(), addresses, values, placed_wires(chain))

@@ -22,10 +22,9 @@ MOST_GAP_MS = 10_000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ServeMic488(ServeOptions):
-    """The command's options as given; see ``steptwin serve mic488 --help``."""
+class ServeMic488:
+    """The controllers, as given; see ``steptwin serve mic488 --help``."""
 
-    name: str = "mic488"
     firmware: str = "1.70"
     units: str | None = None
     config: Path | None = None
@@ -38,38 +37,38 @@ class ServeMic488(ServeOptions):
     demo: bool = False
 
 
-def serve_mic488(options: ServeMic488) -> None:
+def serve_mic488(twin: ServeOptions, controllers: ServeMic488) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. Raises `Misuse` or another `SteptwinError` with a text for the user."""
-    check_links(options, options.vision)
-    serve(options, partial(describe_mic488, options), describe_mic488(replace(options, faults=())))
+    check_links(twin, controllers.vision)
+    serve(twin, partial(describe_mic488, twin, controllers), describe_mic488(replace(twin, faults=()), controllers))
 
 
-def describe_mic488(options: ServeMic488, named: Named = str) -> str:
+def describe_mic488(twin: ServeOptions, controllers: ServeMic488, named: Named = str) -> str:
     """The description of the world to serve. Raises `Misuse` for invalid options."""
-    check_line_timing(options.line_timing, "real", "strict")
-    if options.baud is not None and options.baud not in BAUDS:
-        raise Misuse(f"--baud {options.baud}: permitted are {', '.join(map(str, BAUDS))} bit/s")
-    if options.demo and options.config is not None:
-        raise Misuse(f"--demo and --config {options.config}: the demo has a configuration of its own; give one of the two")
-    if options.gap_ms is not None and not 0.0 < options.gap_ms <= MOST_GAP_MS:
-        raise Misuse(f"--gap {options.gap_ms:g}: permitted are more than 0 and at most {MOST_GAP_MS:g} ms")
-    units: list[int] | list[None] = [None] if options.units is None else parse_units(options.units)
-    if options.vision is not None and len(units) > 1:
+    check_line_timing(twin.line_timing, "real", "strict")
+    if twin.baud is not None and twin.baud not in BAUDS:
+        raise Misuse(f"--baud {twin.baud}: permitted are {', '.join(map(str, BAUDS))} bit/s")
+    if controllers.demo and controllers.config is not None:
+        raise Misuse(f"--demo and --config {controllers.config}: the demo has a configuration of its own; give one of the two")
+    if controllers.gap_ms is not None and not 0.0 < controllers.gap_ms <= MOST_GAP_MS:
+        raise Misuse(f"--gap {controllers.gap_ms:g}: permitted are more than 0 and at most {MOST_GAP_MS:g} ms")
+    units: list[int] | list[None] = [None] if controllers.units is None else parse_units(controllers.units)
+    if controllers.vision is not None and len(units) > 1:
         raise Misuse("--vision is for a single unit: a vision system belongs to one controller")
-    banks = known_firmware(options.firmware).banks
-    programs = parse_banks("--program", options.programs, banks)
-    positions = parse_banks("--positions", options.positions, banks)
-    gap = None if options.gap_ms is None else duration_text(round(options.gap_ms * MILLISECOND))
+    banks = known_firmware(controllers.firmware).banks
+    programs = parse_banks("--program", controllers.programs, banks)
+    positions = parse_banks("--positions", controllers.positions, banks)
+    gap = None if controllers.gap_ms is None else duration_text(round(controllers.gap_ms * MILLISECOND))
     values = {
-        "firmware": options.firmware,
-        "config": None if options.config is None else named(options.config),
+        "firmware": controllers.firmware,
+        "config": None if controllers.config is None else named(controllers.config),
         "programs": {bank: named(file) for bank, file in programs.items()} or None,
         "positions": {bank: named(file) for bank, file in positions.items()} or None,
-        "statement_time": None if options.statement_time == STATEMENT_TIME else duration_text(options.statement_time),
-        "lenient": options.lenient or None,
-        "vision": options.vision,
+        "statement_time": None if controllers.statement_time == STATEMENT_TIME else duration_text(controllers.statement_time),
+        "lenient": controllers.lenient or None,
+        "vision": controllers.vision,
     }
-    return mic488_world(options.whole(gap=gap), units, values, demo=options.demo)
+    return mic488_world(twin.whole(gap=gap), units, values, demo=controllers.demo)
 
 
 def parse_units(text: str) -> list[int]:

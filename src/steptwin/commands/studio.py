@@ -26,7 +26,7 @@ from steptwin.access.tokens import AccessGate, Token, read_tokens
 from steptwin.commands.auditfile import AuditFile
 from steptwin.commands.demo import demo_world
 from steptwin.commands.keptsettings import keep_settings
-from steptwin.commands.studio_devices import check_without_world, serve_without_world
+from steptwin.commands.studio_devices import serve_without_world
 from steptwin.commands.up_world import Running, UpOptions, up, up_with
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
@@ -80,8 +80,7 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
         if options.world is not None:
             return up(options, page.open)
         if own.devices:
-            check_without_world(options)
-            asyncio.run(serve_without_world(options, page.open_without_world))
+            asyncio.run(serve_without_world(options.ready_file, page.open_without_world))
             return True
         with demo_world(options) as world:
             return up_with(world, options, page.open)
