@@ -1,4 +1,4 @@
-"""What an axis does when it is told: drive and stop, velocity and position, direct and by trigger, jog.
+"""What an axis does when it is commanded: drive and stop, velocity and position.
 
 Default configuration: 1 pulse per unit, ACC = DEC = 1000 u/s², VMAX = 1000 u/s.
 """
@@ -8,21 +8,12 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mic488_rig import EN, STOP, Rig, coil_pdu, controller, real_words, word_pdu
+from mic488_rig import EN, STOP, Rig, controller, real_words
 
 from steptwin.machine import SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.motion import Profile
 from steptwin.motion.pulses import pulse_runs
-
-
-@pytest.fixture
-def rig() -> Rig:
-    """A controller with M1 enabled."""
-    rig = Rig()
-    rig.enable(1)
-    return rig
-
 
 # ---------------------------------------------------------------------- drive on and off
 
@@ -378,110 +369,6 @@ def test_more_than_64_khz_is_clamped_and_reported() -> None:
     assert len(rig.events("speed-clamped")) == 3
 
 
-# ---------------------------------------------------------------------- trigger mode
-
-
-def test_trigger_example_of_the_manual() -> None:
-    """Three axes to 10, 15 and 20 together."""
-    rig = Rig()
-    rig.enable(1, 2, 3)
-    rig.word("AXIS_CTR_MODE", 1)
-    for axis, target in ((1, 10.0), (2, 15.0), (3, 20.0)):
-        rig.set("POS_ABS", target, axis)
-    rig.wait(1.0)
-    assert [rig.status(axis) for axis in (1, 2, 3)] == [1, 1, 1]
-    rig.word("AXIS_POS_ABS_TRIG", 7)
-    assert [rig.status(axis) for axis in (1, 2, 3, 4)] == [3, 3, 3, 0]
-    started = {axis.profile.start for axis in rig.device.axes[:3]}
-    assert started == {SECOND}
-    for axis in (1, 2, 3):
-        rig.until(axis, 4)
-    assert [rig.position(axis) for axis in (1, 2, 3)] == [10.0, 15.0, 20.0]
-
-
-def test_mic_16_a_trigger_consumes_values_of_its_axes_and_reads_back_its_mask(rig: Rig) -> None:
-    rig.enable(1, 2)
-    rig.word("AXIS_CTR_MODE", 1)
-    rig.set("POS_REL", 10.0, 1)
-    rig.set("POS_REL", 20.0, 2)
-    rig.word("AXIS_POS_REL_TRIG", 1)
-    rig.until(1, 4)
-    assert rig.position(2) == 0.0
-    rig.word("AXIS_POS_REL_TRIG", 3)
-    rig.wait(5.0)
-    assert (rig.position(1), rig.position(2)) == (10.0, 20.0)
-    assert rig.word("AXIS_POS_REL_TRIG") == 3
-    assert rig.word("AXIS_POS_ABS_TRIG") == 0
-    rig.word("AXIS_POS_REL_TRIG", 3)
-    rig.wait(5.0)
-    assert (rig.position(1), rig.position(2)) == (10.0, 20.0)
-
-
-def test_mic_16_a_trigger_without_a_new_value_is_told(rig: Rig) -> None:
-    rig.enable(1, 2)
-    rig.word("AXIS_CTR_MODE", 1)
-    rig.set("POS_REL", 10.0, 1)
-    rig.word("AXIS_POS_REL_TRIG", 3)
-    assert [(event.axis, event.text) for event in rig.events("trigger-empty")] == [
-        (2, "trigger of M2 without a new value of POS_REL")
-    ]
-    rig.until(1, 4)
-    rig.word("AXIS_POS_REL_TRIG", 1)
-    assert (rig.status(), [event.axis for event in rig.events("trigger-empty")]) == (4, [2, 1])
-
-
-def test_mic_16_values_are_kept_where_it_is_configured() -> None:
-    rig = Rig(controller(trigger_keeps=1))
-    rig.enable(1)
-    rig.word("AXIS_CTR_MODE", 1)
-    rig.set("POS_REL", 10.0)
-    for position in (10.0, 20.0):
-        rig.word("AXIS_POS_REL_TRIG", 3)
-        rig.until(1, 4)
-        assert rig.position() == position
-    assert {event.axis for event in rig.events("trigger-empty")} == {2}
-
-
-def test_mic_16_each_kind_has_its_own_stored_value_and_the_last_one_counts(rig: Rig) -> None:
-    rig.word("AXIS_CTR_MODE", 1)
-    rig.set("VEL_ABS", 100.0)
-    rig.set("VEL_ABS", 200.0)
-    rig.set("VEL_REL", 50.0)
-    rig.set("POS_ABS", 5000.0)
-    rig.word("AXIS_VEL_ABS_TRIG", 1)
-    rig.wait(1.0)
-    assert rig.velocity() == 200.0
-    rig.word("AXIS_VEL_REL_TRIG", 1)
-    rig.wait(1.0)
-    assert rig.velocity() == 250.0
-    rig.word("AXIS_POS_ABS_TRIG", 1)
-    rig.until(1, 4)
-    assert rig.position() == 5000.0
-
-
-def test_triggers_mean_nothing_in_direct_mode(rig: Rig) -> None:
-    rig.word("AXIS_CTR_MODE", 1)
-    rig.set("POS_ABS", 100.0)
-    rig.word("AXIS_CTR_MODE", 0)
-    rig.word("AXIS_POS_ABS_TRIG", 1)
-    rig.wait(1.0)
-    assert rig.status() == 1
-    rig.set("POS_ABS", 5.0)
-    assert rig.status() == 3
-
-
-def test_homing_does_not_wait_for_a_trigger(rig: Rig) -> None:
-    rig.word("AXIS_CTR_MODE", 1)
-    rig.set("HOME", -100.0)
-    assert rig.status() == 6
-
-
-def test_jog_does_not_wait_for_a_trigger(rig: Rig) -> None:
-    rig.word("AXIS_CTR_MODE", 1)
-    rig.jog(1, +1, True)
-    assert rig.status() == 2
-
-
 # ---------------------------------------------------------------------- position register
 
 
@@ -522,64 +409,6 @@ def test_a_counter_wraps_as_32_bits_do_and_relative_moves_cross_the_border(rig: 
     rig.set("VEL_ABS", -1000)
     rig.wait(1.0)
     assert rig.position() == 2**31 - 500
-
-
-# ---------------------------------------------------------------------- jog
-
-
-def test_jog_runs_while_the_bit_is_on_and_ramps_down_with_acc(rig: Rig) -> None:
-    rig.set("ACC", 500.0)
-    rig.ask(word_pdu(rig.base + 17, 250))
-    rig.jog(1, -1, True)
-    rig.wait(1.0)
-    assert (rig.status(), rig.velocity()) == (2, -250.0)  # MIC-31: jogging shows status 2
-    rig.jog(1, -1, False)
-    rig.wait_ns(SECOND // 2 - 1)
-    assert rig.status() == 2
-    rig.wait_ns(1)
-    assert (rig.status(), rig.velocity()) == (1, 0.0)
-
-
-def test_jog_speed_is_the_configured_velocity_until_written(rig: Rig) -> None:
-    rig.jog(1, +1, True)
-    rig.wait(2.0)
-    assert rig.velocity() == 1000.0
-
-
-def test_mic_18_of_both_jog_bits_the_last_write_wins(rig: Rig) -> None:
-    rig.ask(word_pdu(rig.base + 17, 100))
-    rig.jog(1, +1, True)
-    rig.wait(1.0)
-    rig.jog(1, -1, True)
-    rig.wait(1.0)
-    assert rig.velocity() == -100.0
-    rig.jog(1, +1, False)  # the direction that bit started is over already
-    rig.wait(1.0)
-    assert rig.velocity() == -100.0
-    rig.jog(1, -1, False)
-    rig.wait(1.0)
-    assert rig.status() == 1
-
-
-def test_mic_18_clearing_a_bit_stops_no_motion_it_did_not_start(rig: Rig) -> None:
-    rig.jog(1, +1, True)
-    rig.set("VEL_ABS", 300.0)
-    rig.jog(1, +1, False)
-    rig.wait(2.0)
-    assert rig.velocity() == 300.0
-    rig.set("POS_ABS", 0.0)
-    rig.jog(1, +1, False)
-    rig.jog(1, -1, False)
-    assert rig.status() == 3
-
-
-def test_jog_bits_of_every_axis() -> None:
-    rig = Rig()
-    rig.enable(1, 2, 3, 4)
-    for address in (2008, 2011, 2012, 2015):
-        assert rig.ask(coil_pdu(address, True)) == coil_pdu(address, True)
-    rig.wait(1.0)
-    assert [rig.velocity(axis) for axis in (1, 2, 3, 4)] == [1000.0, -1000.0, 1000.0, -1000.0]
 
 
 # ---------------------------------------------------------------------- pulses are whole
@@ -677,14 +506,6 @@ def test_mic_40_a_soft_limit_written_during_a_motion_acts_at_once(rig: Rig) -> N
     rig.set("POSLIM_R", 2000.0)
     rig.until(1, 10)
     assert rig.position() == 2000.0
-
-
-def test_mic_41_the_sign_of_the_jog_speed_is_ignored(rig: Rig) -> None:
-    rig.write_words(rig.base + 17, *real_words(-250.0))
-    for direction in (+1, -1):
-        rig.jog(1, direction, True)
-        rig.wait(2.0)
-        assert rig.velocity() == direction * 250.0
 
 
 def test_mic_42_a_relative_move_across_the_end_of_dint_wraps() -> None:

@@ -14,14 +14,6 @@ OFF, ON, VELOCITY, POSITION, REACHED, LIMIT_L, LIMIT_R = 0, 1, 2, 3, 4, 9, 10
 KL, KR = "IN1", "IN2"
 
 
-@pytest.fixture
-def rig() -> Rig:
-    """M1 enabled, no switches."""
-    rig = Rig()
-    rig.enable(1)
-    return rig
-
-
 def with_switches(limit_mode: int = 3, **config: float) -> Rig:
     rig = Rig(controller(AxisConfig(limit_mode=limit_mode, in_kl=0, in_kr=1, **config)))  # type: ignore[arg-type]
     rig.enable(1)

@@ -29,6 +29,9 @@ LATE_NS = 700 * 1_000_000
 NOISE = 0x13
 BAUD = 4800
 
+KNOWN = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 4, "qualification": 1}
+"""Settings of a chip."""
+
 
 @dataclass
 class Fault:
@@ -142,6 +145,11 @@ class ChipWire(VirtualWire):
 
     def codes(self, address: int | None = None) -> list[str]:
         return [event.code for one, event in self.happened if address in (None, one)]
+
+
+def typed(wire: ChipWire) -> str:
+    """What was sent, CR as a blank."""
+    return b"".join(data for _, data in wire.sent).decode().replace("\r", " ")
 
 
 def chip_line(wire: ChipWire, log: Callable[[str], object] | None = None) -> ThreadLine[ChipRequest, bytes]:

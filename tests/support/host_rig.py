@@ -185,6 +185,13 @@ class Wire(VirtualWire):
 
 
 INTERVAL = 10 * MILLISECOND
+TIMEOUT = 300 * MILLISECOND
+
+
+def fill(wire: Wire) -> None:
+    """Write its own number into each user register."""
+    for number in range(500):
+        wire.twin.user[number] = number
 
 
 def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchanger[Query, bytes], dict[str, object]]:

@@ -1,0 +1,175 @@
+"""Chips that do not answer, restart or cannot be stopped, and lines that are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from chip_rig import KNOWN, ChipWire, chip_driver
+
+from steptwin.drivers import SentLate, Unconfirmed
+from steptwin.drivers.m1486 import (
+    M1486,
+    Busy,
+    ChipReason,
+    ChipSettings,
+    DoubtfulMove,
+    NoEcho,
+    PositionUnknown,
+    Restarted,
+)
+from steptwin.machine import SECOND
+
+
+def test_who_does_not_echo_is_told() -> None:
+    wire = ChipWire("B", (7,))
+    with pytest.raises(NoEcho, match="chip 3 does not echo: it is off, has another address or baud rate"):
+        chip_driver(wire, 3)
+
+
+@pytest.mark.parametrize("call", [lambda c: c.move_to(0.25), lambda c: c.move_by(-0.25), lambda c: c.position()])
+def test_a_chip_that_was_switched_off_is_not_moved_with_what_it_was_set_to(call: Callable[[M1486], object]) -> None:
+    """With M1 it would drop f16 as wrong data, and R would make the default move of a thousand steps."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(microstep=4)
+    chip.set_position(100.0)
+    wire.chip.power_cycle(wire.now)
+    with pytest.raises(Restarted, match="chip 7 was switched off or reset meanwhile"):
+        call(chip)
+    assert wire.true() == 0
+    assert chip.settings == ChipSettings()
+    assert chip.counter() == 0
+    with pytest.raises(PositionUnknown):
+        chip.position()
+
+
+def test_after_a_restart_a_busy_chip_is_not_held_by_an_earlier_kill() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.set_function(51, False)
+    chip.run(1)
+    chip.stop()
+    wire.sleep(1.0)
+    wire.chip.power_cycle(wire.now)
+    with pytest.raises(Restarted):
+        chip.variable()
+    chip.set_function(51, False)
+    chip.run(1)
+    with pytest.raises(Busy, match="chip 7 is not done with a run without end: wait for its end or stop it"):
+        chip.variable()
+
+
+def test_after_a_restart_the_motion_before_it_is_over() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.run(1)
+    wire.sleep(1.0)
+    wire.chip.power_cycle(wire.now)
+    with pytest.raises(Restarted):
+        chip.flags()
+    assert chip.wait().reason is ChipReason.REST
+
+
+def test_a_chip_that_is_switched_off_between_the_distance_and_the_run_does_not_move() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(microstep=4)
+
+    def cycle(data: bytes) -> None:
+        if data == b"r":
+            wire.before_each = None
+            wire.chip.power_cycle(wire.now)
+
+    wire.before_each = cycle
+    with pytest.raises(Restarted):
+        chip.move_by(0.25)
+    wire.sleep(5.0)
+    assert wire.true() == 0
+
+
+def test_a_cut_line_is_told() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.run(1)
+    wire.severed = True
+    with pytest.raises(Unconfirmed, match="chip 7 could not be stopped: it cannot be reached and continues its last command"):
+        chip.stop()
+    assert chip.wait(1.0, check=False).reason in (ChipReason.COMMUNICATION, ChipReason.STOPPED)
+    wire.severed = False
+    chip.stop()
+    wire.sleep(1.0)
+    assert not wire.moving()
+
+
+def test_a_line_that_is_cut_when_a_move_begins_leaves_it_in_doubt() -> None:
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+
+    def cut(data: bytes) -> None:
+        wire.severed = wire.severed or (data == b"\r" and wire.sent[-1][1] == b"r")
+
+    wire.before_each = cut
+    with pytest.raises(DoubtfulMove, match="it is unknown whether chip 7 has begun a move") as caught:
+        chip.move_by(10.0)
+    assert caught.value.uncertain
+    wire.before_each, wire.severed = None, False
+    wire.sleep(2.0)
+    assert chip.counter() == wire.true() == 0
+
+
+def test_a_move_that_was_sent_too_late_is_stopped_and_said_to_be_so() -> None:
+    """The process is suspended while it writes the CR of the command that moves."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    chip.configure(**KNOWN)
+    begin = wire.true()
+
+    def suspend(data: bytes) -> None:
+        if data == b"\r" and wire.sent[-1][1] == b"r":
+            wire.before_each = None
+            wire.sleep(70.0)
+
+    wire.before_each = suspend
+    with pytest.raises(SentLate, match="was sent more than"):
+        chip.move_by(500.0)
+    wire.sleep(2.0)
+    assert not wire.moving()
+    assert 0 <= wire.true() - begin < 64 * 30
+    assert chip.wait(check=False).reason is ChipReason.STOPPED
+
+
+def test_a_chip_that_cannot_be_told_to_stop_is_told_with_the_first_cause() -> None:
+    """That nothing came back to Kill, whatever was tried afterwards."""
+    wire = ChipWire("B", (7,))
+    chip = chip_driver(wire, 7)
+    wire.severed = True
+    with pytest.raises(Unconfirmed) as caught:
+        chip.stop()
+    assert "(memory: no answer to 'chip 7: k' within 0.5 s" in str(caught.value)
+    assert "does not echo" not in str(caught.value)
+    assert "does not echo" in str(caught.value.__cause__)
+
+
+def test_what_is_not_stored_takes_no_time_of_the_memory() -> None:
+    """An E type writes commands into its EEPROM; C75 acts when it is received."""
+    wire = ChipWire("E1")
+    chip = chip_driver(wire)
+    wire.sleep(5.0)
+    notes = chip._driver._unit.notes
+    chip.recover()
+    assert notes.ready_at <= wire.now
+    chip.set_flag(80, True)
+    assert notes.ready_at > wire.now
+
+
+def test_an_end_says_how_long_it_was_waited_for() -> None:
+    wire = ChipWire("B")
+    chip = chip_driver(wire)
+    chip.configure(**KNOWN)
+    chip.move_by(100.0)
+    wire.sleep(0.1)
+    begin = wire.now
+    end = chip.wait()
+    assert end.after_s == pytest.approx((wire.now - begin) / SECOND, abs=0.05)
+    assert 0.1 < end.after_s < 10.0
