@@ -76,6 +76,11 @@ class Drive(Protocol):
         ...
 
     @property
+    def is_energised(self) -> bool:
+        """Whether its motor has current. A change is followed by `MotionController.changed`."""
+        ...
+
+    @property
     def offset_p(self) -> int:
         """The position that the controller shows, less the pulses counted since power-on; 0 where it is not traced."""
         ...

@@ -83,7 +83,7 @@ def test_what_a_trace_does_not_take() -> None:
     trace.add(TraceRecord(5, "a", "event", "x", ""))
     with pytest.raises(Misuse, match="a: a record of 4 ns after one of 5 ns"):
         trace.add(TraceRecord(4, "a", "event", "x", ""))
-    with pytest.raises(Misuse, match="no kind of record 'edges': kinds are plan, load, coordinate, edge"):
+    with pytest.raises(Misuse, match="no kind of record 'edges': kinds are plan, load, free, coordinate, edge"):
         trace.of("edges")
     trace.add(TraceRecord(5, "a", "event", "x", [1]))
     with pytest.raises(Misuse, match=r"\[1\] cannot be in a trace"):

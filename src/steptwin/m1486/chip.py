@@ -404,7 +404,7 @@ class M1486Chip(Stateful):
     def power_cycle(self, now: Nanos) -> None:
         """Off and on again. Pins stay tied as they are, and the motor stands where it stood."""
         self.advance(now)
-        self.is_shut_down = False
+        self._awake()
         self.event("power-on", "power-on", now)
         self._read_pins()
         self._start_anew(now)
@@ -470,14 +470,19 @@ class M1486Chip(Stateful):
         self.motor.stop_at_once(now)
         self.uart.clear()
         self.is_shut_down = True
+        self.motor.drive.is_energised = False
         self._rst_high_since = None
+
+    def _awake(self) -> None:
+        self.is_shut_down = False
+        self.motor.drive.is_energised = True
 
     def _end_shutdown(self, now: Nanos) -> None:
         """RST has been high for long enough. The address pins are not read; M-31: the program begins again, as with RST."""
         self._rst_high_since = None
         if not self.io["SD"]:
             return
-        self.is_shut_down = False
+        self._awake()
         self.event("restart", "shutdown is over: the program begins again", now)
         self.io.tie_low(False, now)
         self.uart.set_baud(self.variant.baud(*self.io.baud_pins()))

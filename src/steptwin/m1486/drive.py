@@ -75,6 +75,7 @@ class ChipDrive(Stateful):
         "distance_u",
         "endless",
         "grid_u",
+        "is_energised",
         "is_stopping",
         "is_valid",
         "microstep",
@@ -94,6 +95,7 @@ class ChipDrive(Stateful):
     def __init__(self, variant: Variant, interface: Interface, now: Nanos) -> None:
         self._clock = variant.clock
         self.revision = 0
+        self.is_energised = True
         self.reset_settings(variant, interface)
         self._curve = self._speed_curve()
         self.motion = MotionMode.REST

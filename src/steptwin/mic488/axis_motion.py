@@ -154,6 +154,11 @@ class AxisMotion(Stateful):
         """Whether motion commands move it: with EN on, or where EN is not wired (MIC-8)."""
         return self.enabled or not self.config.en_wired
 
+    @property
+    def is_energised(self) -> bool:
+        """Whether the motor has current, as far as the drive is switched by EN: always, where that is not wired."""
+        return self.can_move
+
     def coordinate_p(self, now: Nanos) -> int:
         """Position register in pulses (MIC-14: the pulse count), a DINT that wraps."""
         coordinate = self.profile.count(now) + self.offset_p

@@ -19,6 +19,7 @@ from steptwin.subject.payloads import (
     EdgePayload,
     FaultPayload,
     FramePayload,
+    FreePayload,
     InputPayload,
     LoadPayload,
     NotePayload,
@@ -112,6 +113,7 @@ _MAKE: Mapping[str, Callable[[TraceRecord], Payload]] = complete(
     {
         "plan": lambda record: PlanPayload(record.subject, _value(record)),
         "load": lambda record: LoadPayload(record.subject, _value(record)),
+        "free": lambda record: FreePayload(record.subject, _value(record)),
         "coordinate": lambda record: CoordinatePayload(record.subject, _value(record)),
         "edge": lambda record: EdgePayload(record.subject, _value(record)),
         "frame": _of_frame,
@@ -161,6 +163,7 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "coordinate": lambda data: CoordinatePayload(data["axis"], data["origin"]),
         "sample": lambda data: SamplePayload(data["axis"], data["position"], data["unit"], data["velocity"]),
         "load": _read_load,
+        "free": lambda data: FreePayload(data["axis"], read_plan(data["plan"])),
         "edge": lambda data: EdgePayload(data["pin"], data["level"]),
         "frame": lambda data: FramePayload(data["client"], data["direction"], bytes.fromhex(data["data"]), data["words"]),
         "statement": lambda data: StatementPayload(data["program"], data["line"]),

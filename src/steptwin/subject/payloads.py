@@ -86,6 +86,22 @@ class LoadPayload:
 
 
 @dataclass(frozen=True, slots=True)
+class FreePayload:
+    """The motion of the load of an axis without current, until the next ``load`` or ``free`` of the axis."""
+
+    kind: ClassVar[str] = "free"
+    axis: str
+    plan: MotionPlan
+
+    @property
+    def text(self) -> str:
+        return f"axis {self.axis}: load moves without current"
+
+    def plain(self) -> dict[str, object]:
+        return {"axis": self.axis, "plan": plain_plan(self.plan)}
+
+
+@dataclass(frozen=True, slots=True)
 class EdgePayload:
     """A pin has a new level: 0, 1, volts."""
 
@@ -292,6 +308,7 @@ Payload: TypeAlias = (
     | CoordinatePayload
     | SamplePayload
     | LoadPayload
+    | FreePayload
     | EdgePayload
     | FramePayload
     | StatementPayload

@@ -65,6 +65,7 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
             "axis": _TEXT,
             "pieces": {"type": "array", "items": members({"time_ns": _MOMENT, "follows": _FLAG, "pulses": _WHOLE})},
         },
+        "free": {"axis": _TEXT, "plan": _PLAN},
         "edge": {"pin": _TEXT, "level": _REAL},
         "frame": {
             "client": _TEXT,

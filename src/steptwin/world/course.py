@@ -10,7 +10,8 @@ reverses: the loss is a whole number of electrical periods (four full steps). If
 stop, the rotor springs back to it; if it is beyond the stop, the rotor leaves the stop when the field has returned that far.
 
 Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a course is a list of
-such pieces.
+such pieces. While no current drives the rotor of a `Build.is_free` axis, its motion (`steptwin.world.free`) is in the place
+of the field, and the load keeps its distance to the rotor.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from steptwin.machine import SECOND, Nanos
-from steptwin.motion import Segment
+from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, profile_of
 from steptwin.world.motor import StepperMotor
 
@@ -42,6 +43,8 @@ class Build:
     period_p: int = 1
     """Electrical period of the motor (four full steps): pulses are lost in multiples of it."""
     motor: StepperMotor | None = None
+    is_free: bool = False
+    """Whether the load moves the rotor while no current does."""
 
     @property
     def ideal(self) -> bool:
@@ -61,7 +64,7 @@ class MechanicalState(NamedTuple):
 
 
 class CoursePiece(NamedTuple):
-    """From ``begin`` on the rotor is the field and ``rotor``, or at ``rotor``; likewise the load."""
+    """From ``begin`` on the rotor is the field (or the free motion) and ``rotor``, or at ``rotor``; likewise the load."""
 
     begin: Nanos
     direction: int
@@ -85,18 +88,30 @@ class LoadPiece(NamedTuple):
 
 
 class Course:
-    """The way of an axis from ``begin`` on while ``plan`` is in force; immutable. ``blocked``: nothing moves the rotor."""
+    """The way of an axis from ``begin`` on while ``plan`` is in force; immutable.
 
-    __slots__ = ("_laid", "_now", "_state", "begin", "blocked", "build", "plan")
+    ``blocked``: nothing moves the rotor. ``free``: its motion without current, in pulses of the drive.
+    """
+
+    __slots__ = ("_laid", "_now", "_state", "begin", "blocked", "build", "free", "plan")
 
     def __init__(
-        self, build: Build, plan: Plan, begin: Nanos, state: MechanicalState, *, blocked: bool = False, jump: float = 0.0
+        self,
+        build: Build,
+        plan: Plan,
+        begin: Nanos,
+        state: MechanicalState,
+        *,
+        blocked: bool = False,
+        jump: float = 0.0,
+        free: Profile | None = None,
     ) -> None:
         """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``."""
         self.build = build
         self.plan = plan
         self.begin = begin
         self.blocked = blocked
+        self.free = free
         self._laid: list[CoursePiece] = []
         motor = build.motor
         if motor is not None and not motor.follows(jump) and profile_of(plan).moving(begin):
@@ -116,7 +131,7 @@ class Course:
     def is_exact(self) -> bool:
         """Whether not a pulse is lost, before or on this course."""
         begin = self._state
-        if self.blocked or begin.rotor != self.field(self.begin):
+        if self.blocked or self.free is not None or begin.rotor != self.field(self.begin):
             return False
         build, profile = self.build, profile_of(self.plan)
         if build.ideal or not profile.segments:
@@ -128,12 +143,24 @@ class Course:
     def field(self, now: Nanos) -> int:
         return self.build.sign * self.plan.count(now) + self.build.zero
 
+    def moves(self, now: Nanos) -> bool:
+        """Whether what the rotor follows moves."""
+        return (profile_of(self.plan) if self.free is None else self.free).moving(now)
+
+    def leads(self, now: Nanos) -> bool:
+        """Whether the rotor goes with that."""
+        return self._piece(now).rotor_follows
+
+    def _lead(self, now: Nanos) -> int:
+        """What the rotor follows: the field, or the free motion."""
+        return self.field(now) if self.free is None else self.build.sign * self.free.count(now) + self.build.zero
+
     def at(self, now: Nanos) -> MechanicalState:
         """Where everything is at ``now``, not before ``begin``."""
         piece = self._piece(now)
-        field = self.field(now) if piece.rotor_follows or piece.load_follows else 0
-        rotor = piece.rotor + field if piece.rotor_follows else piece.rotor
-        load = piece.load + field if piece.load_follows else piece.load
+        lead = self._lead(now) if piece.rotor_follows or piece.load_follows else 0
+        rotor = piece.rotor + lead if piece.rotor_follows else piece.rotor
+        load = piece.load + lead if piece.load_follows else piece.load
         return MechanicalState(rotor, load, piece.stalled, piece.behind)
 
     def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
@@ -144,7 +171,7 @@ class Course:
             end = self.pieces[i + 1].begin if i + 1 < len(self.pieces) else None
             follows, value = (piece.rotor_follows, piece.rotor) if rotor else (piece.load_follows, piece.load)
             if piece.begin > after:
-                here = value + self.field(piece.begin) if follows else value
+                here = value + self._lead(piece.begin) if follows else value
                 if (here - position) * direction >= 0:
                     return piece.begin
             if follows and piece.direction == direction:
@@ -178,12 +205,15 @@ class Course:
     def _piece(self, now: Nanos) -> CoursePiece:
         return self.pieces[max(bisect_right(self.pieces, now, key=attrgetter("begin")) - 1, 0)]
 
-    def _time(self, field: int, after: Nanos) -> Nanos | None:
-        return self.plan.pulse_time((field - self.build.zero) * self.build.sign, after)
+    def _time(self, lead: int, after: Nanos) -> Nanos | None:
+        return (self.plan if self.free is None else self.free).pulse_time((lead - self.build.zero) * self.build.sign, after)
 
     # ------------------------------------------------------------------ laying out the pieces
 
     def _lay(self, begin: Nanos) -> None:
+        if self.free is not None:
+            self._lay_free(self.free)
+            return
         profile = profile_of(self.plan)
         at = profile.start
         for s, end in zip(profile.segments, profile.ends, strict=True):
@@ -197,6 +227,16 @@ class Course:
             if not self.blocked and (not self._now.stalled or motor is None or motor.holds()):
                 self._catch(rest)
             self._stand(rest, 1)
+
+    def _lay_free(self, free: Profile) -> None:
+        """The rotor goes with the free motion, the load keeps its distance to it."""
+        rotor, load, stalled, behind = self._state
+        away = load - rotor
+        for moment, direction in free.legs(self.begin):
+            self._laid.append(CoursePiece(moment, direction * self.build.sign, True, 0, True, away, stalled, behind))
+        if free.end is not None:
+            rest = self._lead(free.end)
+            self._laid.append(CoursePiece(max(free.end, self.begin), 1, False, rest, False, rest + away, stalled, behind))
 
     def _segment(self, s: Segment, begin: Nanos, end: Nanos | None) -> None:
         """What happens while the field goes one way."""

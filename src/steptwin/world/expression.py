@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from operator import eq, ge, gt, le, lt, ne
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -263,7 +264,7 @@ class SignalCondition:
         return due
 
 
-def crossing(signal: Signal, level: float, now: Nanos) -> Nanos | None:
+def crossing(signal: Signal, level: float | Fraction, now: Nanos) -> Nanos | None:
     """First whole nanosecond after ``now`` at which the signal is on another side of ``level`` (below, at, above)."""
     begin = now
     for turn in signal.turns(now):
@@ -274,11 +275,11 @@ def crossing(signal: Signal, level: float, now: Nanos) -> Nanos | None:
     return _first_other(signal, level, begin, now + FARTHEST_NS)
 
 
-def _side(value: float, level: float) -> int:
+def _side(value: float, level: float | Fraction) -> int:
     return (value > level) - (value < level)
 
 
-def _first_other(signal: Signal, level: float, begin: Nanos, end: Nanos) -> Nanos | None:
+def _first_other(signal: Signal, level: float | Fraction, begin: Nanos, end: Nanos) -> Nanos | None:
     side = _side(signal.value(begin), level)
     if _side(signal.value(end), level) == side:
         return None

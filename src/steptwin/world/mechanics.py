@@ -7,15 +7,17 @@ time; otherwise each plan gives a `Course` in closed form. Positions in pulses o
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Drive, Nanos
+from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import profile_of
 from steptwin.state import Plain, Stateful
 from steptwin.world.course import Build, Course, LoadPiece, MechanicalState
+from steptwin.world.free import FreeMotion, slow_from
 from steptwin.world.kernel import Kernel
 
 _OUTDATED = -1
@@ -72,16 +74,22 @@ class Mechanism(Stateful):
 
     __slots__ = (
         "_blocked",
+        "_brake",
+        "_catch_due",
         "_changes",
         "_coupled",
         "_course",
         "_due",
         "_encoders",
+        "_falls",
+        "_had_current",
+        "_is_free",
         "_kernel",
         "_lost",
         "_name",
         "_reported",
         "_reported_course",
+        "_rest_due",
         "_revision",
         "_simple",
         "_stall_due",
@@ -108,9 +116,19 @@ class Mechanism(Stateful):
         """The next moment at which the motor stalls or synchronises again."""
         self._lost = 0
         self._blocked = False
+        self._brake = 0.0
+        """Torque of the brake, N·m."""
+        self._had_current = True
+        self._is_free = False
+        """Whether no current holds the rotor: none flows, or the rotor is too fast for it."""
+        self._catch_due: Nanos | None = None
+        """When current takes hold of a free rotor."""
+        self._falls = False
+        self._rest_due: Nanos | None = None
+        """When a free rotor that moves comes to rest."""
         self._changes = 0
-        self._reported: tuple[LoadPiece, ...] = (LoadPiece(kernel.now, True, 0),)
-        """The position of the load as reported last."""
+        self._reported: tuple[LoadPiece, ...] | None = (LoadPiece(kernel.now, True, 0),)
+        """The position of the load as reported last; None while it moves freely."""
         self._reported_course: Course | None = None
         """The course that was reported."""
         self._simple = build.ideal
@@ -121,6 +139,8 @@ class Mechanism(Stateful):
             raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
         self._revision = drive.revision
         self._course = Course(build, drive.plan, kernel.now, MechanicalState(here, here))
+        if build.is_free:
+            self._renew(drive, kernel.now)
 
     @property
     def _drive(self) -> Drive:
@@ -131,9 +151,15 @@ class Mechanism(Stateful):
     def course(self, now: Nanos) -> Course:
         """The course at ``now``, which is the kernel's moment or later."""
         drive = self._drive
-        if drive.revision != self._revision:
+        if drive.revision != self._revision or self._is_switched(drive, now):
             self._renew(drive, now)
         return self._course
+
+    def _is_switched(self, drive: Drive, now: Nanos) -> bool:
+        """Whether current has been switched, or takes hold of a free rotor."""
+        if not self.build.is_free:
+            return False
+        return drive.is_energised is not self._had_current or (self._catch_due is not None and self._catch_due <= now)
 
     def at(self, now: Nanos) -> MechanicalState:
         return self.course(now).at(now)
@@ -157,12 +183,14 @@ class Mechanism(Stateful):
     def update(self, now: Nanos) -> None:
         if not self._simple:
             drive = self._drive
-            if drive.revision != self._revision:
+            if drive.revision != self._revision or self._is_switched(drive, now):
                 self._renew(drive, now)
             elif self._due is not None and self._due <= now:
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
                 self._watch_motor(now)
+            if self._rest_due is not None and self._rest_due <= now:
+                self._watch_fall(now, None)
             self._report_load(now)
 
     def _report_load(self, now: Nanos) -> None:
@@ -171,16 +199,22 @@ class Mechanism(Stateful):
         if course is self._reported_course:
             return
         self._reported_course = course
+        free = course.free
+        if free is not None and free.segments:
+            self._reported = None
+            state = course.at(now)
+            moved = Profile(free.start, free.base + (state.load - state.rotor) * self.build.sign, free.segments, free.final_p)
+            self._kernel.report(self.machine, "free", str(self.number), moved)
+            return
         pieces = _from(course.load_pieces(), now)
-        if pieces != _from(self._reported, now):
+        if self._reported is None or pieces != _from(self._reported, now):
             self._reported = pieces
             self._kernel.report(self.machine, "load", str(self.number), pieces)
 
     def deadline(self) -> Nanos | None:
-        """Courses are computed in advance: only followers of the axis have to be notified."""
-        if self._due is None or self._stall_due is None:
-            return self._stall_due if self._due is None else self._due
-        return min(self._due, self._stall_due)
+        """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
+        dues = (self._due, self._stall_due, self._catch_due, self._rest_due)
+        return min((due for due in dues if due is not None), default=None)
 
     def _watch_motor(self, now: Nanos) -> None:
         """Report that the motor has stalled or has synchronised again."""
@@ -204,14 +238,77 @@ class Mechanism(Stateful):
                 # After power-off a controller counts from 0 again.
                 counted_anew = self.build.sign * (plan.count(now) - before.plan.count(now))
                 state = state._replace(behind=state.behind + counted_anew)
-        jump = profile_of(plan).velocity(now) - profile_of(before.plan).velocity(now)
+        led = profile_of(before.plan) if before.free is None else before.free
+        jump = profile_of(plan).velocity(now) - led.velocity(now)
         self._revision = drive.revision
-        self._course = Course(self.build, plan, now, state, blocked=self._blocked, jump=jump)
+        free = self._free(drive, before, state, now) if self.build.is_free else None
+        self._course = Course(self._braked(), plan, now, state, blocked=self._blocked, jump=jump, free=free)
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
         if self.build.motor is not None:
             self._watch_motor(now)
+        if self.build.is_free:
+            self._watch_fall(now, free)
+
+    # ------------------------------------------------------------------ without current
+
+    def _free(self, drive: Drive, before: Course, state: MechanicalState, now: Nanos) -> Profile | None:
+        """The motion of a rotor that no current holds; None where it does. Also when it will."""
+        motor, build = self.build.motor, self.build
+        if motor is None:
+            return None
+        led = profile_of(before.plan) if before.free is None else before.free
+        moves = before.leads(now) and not self._blocked
+        velocity = led.velocity(now) if moves else 0.0
+        self._had_current, self._catch_due = drive.is_energised, None
+        is_too_fast = self._is_free and not motor.follows(velocity)
+        self._is_free = not drive.is_energised or is_too_fast
+        if not self._is_free:
+            return None
+        base = (state.rotor - build.zero) * build.sign
+        away = state.load - state.rotor
+        ends = sorted((stop - away - build.zero) * build.sign for stop in (build.low, build.high) if stop is not None)
+        motion = FreeMotion(
+            inertia=motor.inertia,
+            load=motor.load * build.sign,
+            friction=motor.friction + self._brake,
+            low=ends[0] if ends else None,
+            high=ends[-1] if ends else None,
+        )
+        if self._blocked:
+            return at_rest(now, base)
+        found = motion.profile(now, base, led.phase(now) if moves else 0.0, velocity)
+        if drive.is_energised:
+            self._catch_due = slow_from(found, now, motor.catch_p)
+        return found
+
+    def _braked(self) -> Build:
+        """What a powered motor has to move: the friction of the brake, too."""
+        motor = self.build.motor
+        if motor is None or self._brake == 0.0:
+            return self.build
+        return replace(self.build, motor=replace(motor, friction=motor.friction + self._brake))
+
+    def _watch_fall(self, now: Nanos, free: Profile | None) -> None:
+        """Report that a rotor without current begins to move, and that it rests again."""
+        falls = free is not None and free.moving(now)
+        if falls is not self._falls:
+            self._falls = falls
+            lost = self.lost(now)
+            text = f"{self._name} moves without current" if falls else f"{self._name} stands, {lost} pulses behind"
+            facts = ("axis", self.number), ("falls", falls), ("lost", lost)
+            self._kernel.report(self.machine, "event", "fall", text, *facts)
+        self._rest_due = free.end if free is not None and falls else None
+
+    def brake(self, torque: float, now: Nanos) -> None:
+        """Let a brake act on the rotor with ``torque`` N·m."""
+        if torque == self._brake:
+            return
+        state = self.at(now)
+        self._brake = torque
+        self._renew(self._drive, now, state)
+        self._kernel.mark()
 
     # ------------------------------------------------------------------ encoders
 
@@ -233,7 +330,7 @@ class Mechanism(Stateful):
             if not exact or self._coupled:
                 self._coupled = True
                 encoder.device.follow_shaft(encoder.axis, Shaft(course, encoder.on_load), now)
-            if not own and profile_of(course.plan).moving(now):
+            if not own and course.moves(now):
                 self._due = now + FOLLOW_NS
 
     def _is_own(self, encoder: EncoderBuild) -> bool:

@@ -29,7 +29,7 @@ from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.paths import ArcSegment
 
-KINDS = ("plan", "load", "coordinate", "edge", "frame", "statement", "event", "input", "fault")
+KINDS = ("plan", "load", "free", "coordinate", "edge", "frame", "statement", "event", "input", "fault")
 DIGEST_BYTES = 16
 
 

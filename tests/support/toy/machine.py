@@ -68,13 +68,14 @@ class Bare(Stateful):
 
 
 class ToyAxis(Stateful):
-    __slots__ = ("plan", "revision")
+    __slots__ = ("is_energised", "plan", "revision")
     FIXED: ClassVar[frozenset[str]] = frozenset({"revision"})
     offset_p = 0
 
     def __init__(self) -> None:
         self.plan: Profile = at_rest(0, 0)
         self.revision = 0
+        self.is_energised = True
 
     def follow(self, plan: Profile) -> None:
         self.plan = plan

@@ -27,6 +27,8 @@ class AxisTrack:
     plans: list[Plan] = field(default_factory=list)
     loads: list[LoadPiece] = field(default_factory=list)
     """Positions of the load by moment, if it does not follow the pulses throughout."""
+    free: dict[Nanos, Profile] = field(default_factory=dict)
+    """Motions of the load without current, by the moments of ``loads`` in whose place they are."""
     origins: list[tuple[Nanos, int]] = field(default_factory=list)
     """By how many pulses the coordinate is above the count, by moments."""
 
@@ -63,6 +65,14 @@ class AxisTrack:
         self.times.append(begin)
         self.plans.append(type(profile)(profile.start, profile.base + above_p, profile.segments, profile.final_p))
 
+    def place(self, time: Nanos, loads: list[LoadPiece], free: Profile | None = None) -> None:
+        """From ``time`` on the load is otherwise than was known before: at ``loads``, or it moves freely."""
+        while self.loads and self.loads[-1].begin >= time:
+            self.free.pop(self.loads.pop().begin, None)
+        self.loads += loads
+        if free is not None:
+            self.free[time] = free
+
     def true(self) -> AxisTrack | None:
         """The motion of the load, ``zero_p`` included; None where it is not known, or can only be that of the drive."""
         mechanics = self.view.mechanics
@@ -72,8 +82,8 @@ class AxisTrack:
         track = AxisTrack(self.machine, view)
         for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
             past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
-            _, follows, pulses = self.loads[past] if past >= 0 else LoadPiece(begin, True, 0)
-            profile = profile_of(self.plan(begin)) if follows else at_rest(begin, pulses)
+            since, follows, pulses = self.loads[past] if past >= 0 else LoadPiece(begin, True, 0)
+            profile = profile_of(self.plan(begin)) if follows else self.free.get(since) or at_rest(begin, pulses)
             off = mechanics.zero_p + (pulses if follows else 0)
             track.add(begin, profile, off)
         return track
@@ -182,10 +192,9 @@ def sort_out(
             _axis(axes, machine, subject, views).times.append(time)
             axes[machine, subject].plans.append(value)
         elif isinstance(value, tuple) and kind == "load":
-            loads = _axis(axes, machine, subject, views).loads
-            while loads and loads[-1].begin >= time:
-                loads.pop()
-            loads += [LoadPiece(*one) for one in value]
+            _axis(axes, machine, subject, views).place(time, [LoadPiece(*one) for one in value])
+        elif isinstance(value, Profile) and kind == "free":
+            _axis(axes, machine, subject, views).place(time, [LoadPiece(time, False, value.base)], value)
         elif isinstance(value, int) and kind == "coordinate":
             _axis(axes, machine, subject, views).origins.append((time, value))
         elif isinstance(value, (int, float)) and kind == "edge":
@@ -197,6 +206,7 @@ def sort_out(
     for track in axes.values():
         _stand_before(track, begin)
     rests = [profile_of(track.plans[-1]).end for track in axes.values()]
+    rests += [free.end for track in axes.values() for begin, free in track.free.items() if begin == track.loads[-1].begin]
     at_rest_by = max((rest for rest in rests if rest is not None), default=begin)
     last, changed = max(last, at_rest_by), max(changed, at_rest_by)
     end = last if until is None else until

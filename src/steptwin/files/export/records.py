@@ -165,7 +165,7 @@ def _record(data: dict[str, Any]) -> TraceRecord:
 
 def _is_value(kind: str, value: object) -> bool:
     """Whether exports can show the value in a record of this kind; those of other kinds are shown as text."""
-    if kind == "plan":
+    if kind in ("plan", "free"):
         return isinstance(value, Profile | StepTrain)
     return kind not in _VALUES or fits(value, _VALUES[kind])
 

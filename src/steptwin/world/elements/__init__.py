@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from steptwin.errors import Misuse
 from steptwin.world.element import AnyElement
 from steptwin.world.elements.axis import AXIS
+from steptwin.world.elements.brake import BRAKE
 from steptwin.world.elements.button import BUTTON
 from steptwin.world.elements.conveyor import CONVEYOR
 from steptwin.world.elements.counter import COUNTER
@@ -17,6 +18,7 @@ from steptwin.world.elements.latch import LATCH
 from steptwin.world.elements.relay import RELAY
 from steptwin.world.elements.source import SOURCE
 from steptwin.world.elements.timer import TIMER
+from steptwin.world.elements.transducer import TRANSDUCER
 from steptwin.world.elements.vacuum import VACUUM
 from steptwin.world.elements.wire import WIRE
 from steptwin.world.faults.kinds import KINDS, add_kinds, remove_kinds
@@ -52,5 +54,5 @@ def failing(kind: FaultKind) -> tuple[str, ...]:
     return tuple(element.name for element in ELEMENTS.values() if kind in element.faults)
 
 
-for _one in (AXIS, WIRE, BUTTON, SOURCE, GATE, LATCH, TIMER, COUNTER, RELAY, CYLINDER, CONVEYOR, VACUUM):
+for _one in (AXIS, WIRE, BUTTON, SOURCE, GATE, LATCH, TIMER, COUNTER, RELAY, CYLINDER, CONVEYOR, VACUUM, BRAKE, TRANSDUCER):
     register(_one)

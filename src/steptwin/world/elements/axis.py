@@ -17,6 +17,7 @@ from steptwin.world.elements.motor import MOTOR, MotorSpec, read_motor
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
 from steptwin.world.kernel import Kernel
 from steptwin.world.mechanics import Mechanism
+from steptwin.world.names import Unknown
 from steptwin.world.reader import Key, TomlText, optional
 from steptwin.world.scale import Scale, motor_of, scale_of
 from steptwin.world.sense import TableRows
@@ -104,6 +105,7 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
         play=pulses(spec.backlash),
         period_p=scale.period_p,
         motor=None if spec.motor is None else motor_of(spec.motor, spec.kind, scale),
+        is_free=spec.motor is not None and spec.motor.when_off == "free",
     )
     mechanism = Mechanism(kernel, machine, number, build, spec.name)
     kernel.add_part(mechanism)
@@ -121,6 +123,14 @@ def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> Non
 
 def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:
     fit_encoder(fitted, spec.encoder, site.parts.built(AXIS), site)
+
+
+def find_axis(name: str, site: Site) -> BuiltAxis:
+    """The axis called ``name``."""
+    found = site.parts.built(AXIS).get(name)
+    if found is None:
+        raise Unknown(name, f"no axis is called {name!r}")
+    return found
 
 
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:

@@ -20,7 +20,7 @@ from steptwin.world.board import Board
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit, Contact
 from steptwin.world.element import Reference, Table
-from steptwin.world.elements.axis import AXIS
+from steptwin.world.elements.axis import AXIS, find_axis
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.elements.logic import BoardPart, BoardSpec, Inner, Joint, with_terminals
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
@@ -291,9 +291,7 @@ def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     if spec.axis is None:
         own = ConstantDrive(Fraction(str(spec.speed)), board.kernel.now)
         return Conveyor(board, spec, own, Fraction(PICOMETRES), own)
-    axis = site.parts.built(AXIS).get(spec.axis)
-    if axis is None:
-        raise Unknown(spec.axis, f"no axis is called {spec.axis!r}")
+    axis = find_axis(spec.axis, site)
     return Conveyor(board, spec, axis.mechanism, axis.scale.pulses_per_unit / Fraction(str(spec.mm_per_unit)), None)
 
 

@@ -8,7 +8,7 @@ from steptwin.world.element import Table
 from steptwin.world.reader import Key, TomlText, optional, read_table
 from steptwin.world.sense import TableRows, check_sense
 from steptwin.world.tomlplaces import Path
-from steptwin.world.values import number, points, whole
+from steptwin.world.values import number, points, whole, word
 
 _not_negative = number(0.0)
 
@@ -26,6 +26,7 @@ class MotorSpec:
     force: float
     start_speed: float | None
     full_steps: int | None
+    when_off: str
     path: Path = ()
 
 
@@ -40,6 +41,7 @@ MOTOR = TableRows(
         optional(number(), "load", "constant N·m; positive pulls towards lower positions", 0.0),
         optional(number(), "force", "constant N on a linear axis; positive pulls towards lower positions", 0.0),
         optional(_not_negative, "start_speed", "rev/min it starts with at once and is caught at; default any, caught at rest"),
+        optional(word("holds", "free"), "when_off", "without current: holds (self-locking), or free: its load moves it", "holds"),
         optional(whole(4, 10_000), "full_steps", "full steps per revolution; default 200"),
     ),
     only={"mass": ("linear",), "friction_force": ("linear",), "force": ("linear",)},
@@ -58,4 +60,6 @@ def read_motor(text: TomlText, axis: Path, table: Table) -> MotorSpec | None:
     check_sense(text, path, MOTOR, table["motor"], table.get("kind", "linear"))
     if motor.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in motor.torque):
         text.wrong((*path, "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
+    if motor.when_off == "free" and not motor.inertia and not motor.mass:
+        text.wrong((*path, "when_off"), "D007", "what moves freely needs an inertia or a mass")
     return motor

@@ -99,6 +99,35 @@ export type SubjectEvent = {
   /** Virtual time, as decimal text [ns] */
   time_ns: string;
   machine: string;
+  kind: "free";
+  axis: string;
+  /** Numbers for the position at any moment; docs/control.md has the formulas. */
+  plan: {
+    /** Virtual time, as decimal text [ns] */
+    start_ns: string;
+    base: number;
+    final: number;
+    segments: ((number | null)[] | {
+      end_s: number | null;
+      direction: number;
+      way: (number | null)[];
+      course: (number | null)[];
+      half: number;
+      end_p: number;
+    })[];
+    microstepping?: (number | null)[];
+    divisions?: number[][];
+  };
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
   kind: "edge";
   pin: string;
   level: number;
@@ -535,7 +564,7 @@ export type FollowRequest = {
   id?: string | number | null;
   version?: 1;
   /** Kinds of events; all but frames without. */
-  kinds?: ("plan" | "coordinate" | "sample" | "load" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored")[] | null;
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored")[] | null;
   /** Names of machines, lines, or 'world'; all without. */
   machines?: string[] | null;
   /** Numbers of axes as text; events of other axes are left out. */

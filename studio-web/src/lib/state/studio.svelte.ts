@@ -36,6 +36,7 @@ const FOLLOWED: readonly EventKind[] = [
   "coordinate",
   "sample",
   "load",
+  "free",
   "edge",
   "status",
   "note",

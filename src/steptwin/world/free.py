@@ -1,0 +1,103 @@
+"""The motion of a rotor and its load that no motor drives: with weight, friction and brake, until it rests or stands at a stop.
+
+The acceleration is constant between reversals and stops, so the motion is a profile, in closed form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil, inf, sqrt
+
+from steptwin.machine import SECOND, Nanos
+from steptwin.motion import Profile, Segment
+from steptwin.motion.profile import cruise, ramp
+
+
+@dataclass(frozen=True, slots=True)
+class FreeMotion:
+    """What acts on a rotor, in pulses of its drive. Torques in N·m, ``inertia`` in N·m per pulse/s², above 0.
+
+    ``load`` is positive if it pulls towards lower positions, ``friction`` acts against motion, and as much of it as is needed at
+    rest. Stops are inelastic.
+    """
+
+    inertia: float
+    load: float
+    friction: float
+    low: int | None
+    high: int | None
+
+    def profile(self, now: Nanos, base: int, phase: float, velocity: float) -> Profile:
+        """The motion from ``base`` + ``phase`` pulses with ``velocity`` pulses/s at ``now``."""
+        segments = tuple(self._segments(base, phase, velocity))
+        if not segments:
+            return Profile(now, base, (), phase)
+        last = segments[-1]
+        end = 0.0 if last.end_s == inf else self._stopped(base, last.position(last.end_s), last.direction)
+        return Profile(now, base, segments, end)
+
+    def _stop(self, base: int, direction: int) -> float | None:
+        """The stop in a direction, from ``base``."""
+        stop = self.high if direction > 0 else self.low
+        return None if stop is None else float(stop - base)
+
+    def _stopped(self, base: int, position: float, direction: int) -> float:
+        """``position``, but not beyond the stop."""
+        stop = self._stop(base, direction)
+        return position if stop is None else min(position, stop) if direction > 0 else max(position, stop)
+
+    def _rate(self, direction: int) -> float:
+        """The acceleration while it moves in ``direction``, pulses/s²."""
+        return (-self.load - direction * self.friction) / self.inertia
+
+    def _segments(self, base: int, position: float, velocity: float) -> Iterator[Segment]:
+        begin_s = 0.0
+        while True:
+            direction = 1 if velocity > 0.0 else -1 if velocity < 0.0 else -1 if self.load > 0.0 else 1
+            if velocity == 0.0 and abs(self.load) <= self.friction:
+                return
+            stop = self._stop(base, direction)
+            if stop is not None and (stop - position) * direction <= 0.0:
+                if velocity == 0.0:
+                    return
+                position, velocity = stop, 0.0
+                continue
+            found = self._segment(begin_s, position, velocity, direction, stop)
+            yield found
+            if found.end_s == inf:
+                return
+            begin_s, position = found.end_s, self._stopped(base, found.position(found.end_s), direction)
+            velocity = 0.0
+
+    def _segment(self, begin_s: float, p: float, v: float, direction: int, stop: float | None) -> Segment:
+        """From velocity ``v`` in one direction to rest, to ``stop``, or for ever."""
+        rate = self._rate(direction)
+        if rate * direction < 0.0:
+            way = v * v / (2.0 * abs(rate))
+            if stop is None or (stop - p) * direction >= way:
+                return ramp(begin_s, p, v, 0.0, abs(rate))
+            left = direction * sqrt(v * v - 2.0 * abs(rate) * (stop - p) * direction)
+            found = ramp(begin_s, p, v, left, abs(rate))
+        elif rate == 0.0:
+            found = cruise(begin_s, inf, p, v)
+        else:
+            found = Segment(inf, begin_s, p, v, 0.5 * rate, 0.0, direction)
+        if stop is not None:
+            found.end_s = (ceil(found.when(stop) * SECOND) + 1) / SECOND  # so that it has come to the stop, whatever is rounded
+        return found
+
+
+def slow_from(profile: Profile, now: Nanos, speed: float) -> Nanos | None:
+    """First moment from ``now`` on at which a free motion is not faster than ``speed`` pulses/s; None if it never is."""
+    if abs(profile.velocity(now)) <= speed:
+        return now
+    for s, end in zip(profile.segments, profile.ends, strict=True):
+        if end == inf:
+            return None
+        until = profile.start + int(end)
+        if until > now:
+            # At the end of each segment it stands.
+            is_slowing = s.c2 * s.direction < 0.0 and abs(s.velocity(s.end_s)) < speed
+            return max(now, profile.start + ceil(s.when_speed(speed) * SECOND)) if is_slowing else until
+    return now
