@@ -179,3 +179,72 @@ def test_every_statement_of_a_loop_is_executed_where_that_is_asked_for() -> None
     world.programs["m"].execute_all(True, world.now)
     lines = [line for *_, line in executed(world, 0.006)]
     assert lines in ([3, 6] * 3, [6, 3] * 3)
+
+
+# ---------------------------------------------------------------------- names
+
+
+NAMED = "#go IN6\n#speed 60\nx = 2.5\n$D4 = 70000\nWAIT IN7 = ON\n"
+
+
+def test_names_of_a_wbc_program_mean_what_they_mean_to_its_statements() -> None:
+    """Constants, aliases, variables, registers and predefined names, without regard to case (reference WBC 2 to 4)."""
+    text = '[[mic488]]\nname = "m"\nprogram = "p"\nstart = true\n'
+    world = World.from_toml(text, {"p": NAMED.encode()})
+    programs = world.programs["m"]
+    assert programs.read("speed", 0) == 60.0
+    world.run_to(100 * MILLISECOND)
+    names = {name: programs.read(name, world.now) for name in ("X", "x", "Speed", "GO", "$D4", "OUT1", "RISFALL", "y", "@HOME")}
+    assert names == {
+        "X": 2.5, "x": 2.5, "Speed": 60.0, "GO": 0.0, "$D4": 70000.0, "OUT1": 0.0, "RISFALL": 3.0, "y": None, "@HOME": None,
+    }  # fmt: skip
+    world.machines["m"].set_pin("IN6", 1.0, world.now)
+    world.run_to(120 * MILLISECOND)
+    assert programs.read("go", world.now) == 1.0  # after the 10 ms of its filter
+    world.machines["m"].set_pin("IN7", 1.0, world.now)
+    world.run_to(200 * MILLISECOND)
+    assert programs.stack(world.now) == ()  # the program has ended
+    assert programs.read("speed", world.now) is None
+    assert programs.place(0) is None
+
+
+def test_names_of_an_m1486_are_its_pins_and_points() -> None:
+    world = two()
+    chip = world.programs["c"]
+    world.run_to(100 * MILLISECOND)
+    world.machines["c"].set_pin("B3", 0.0, world.now)
+    names = {name: chip.read(name, world.now) for name in ("b3", "B4", "Variable", "register1", "U20", "lamp")}
+    variable = chip.variables(world.now)["variable"]
+    assert names == {"b3": 0.0, "B4": 1.0, "Variable": variable, "register1": 0.0, "U20": float(ord("B")), "lamp": None}
+
+
+def test_what_a_statement_takes() -> None:
+    """WBC-6 and M-19: 1 ms, half of it for a chip with 24 MHz."""
+    text = '[[line]]\nname = "l"\nkind = "m1486"\n[[mic488]]\nname = "m"\n[[m1486]]\nname = "c"\nline = "l"\nvariant = "B2x"\n'
+    programs = World.from_toml(text).programs
+    assert {name: one.statement_time for name, one in programs.items()} == {"m": MILLISECOND, "c": MILLISECOND // 2}
+
+
+def test_depth_and_returns_of_a_chip() -> None:
+    """One level of subroutines (manual: '). Each command of its comes back."""
+    world = two()
+    chip = world.programs["c"]
+    depths = set()
+    for _ in range(12):
+        world.run_to(world.now + MILLISECOND)
+        depths.add((chip.depth(), len(chip.stack(world.now))))
+    assert depths == {(0, 1), (1, 2)}
+    assert all(chip.comes_back(Place("program", number)) for number in range(len(chip.statements("program"))))
+    assert chip.texts["program"].name == "c.m1486"
+
+
+def test_a_chip_without_a_text() -> None:
+    world = World.from_toml('[[line]]\nname = "l"\nkind = "m1486"\n[[m1486]]\nname = "c"\nline = "l"\n')
+    chip = world.programs["c"]
+    assert (chip.texts, list(chip.statements("program")), chip.labels("program"), chip.stack(0), chip.depth()) == (
+        {},
+        [],
+        {},
+        [],
+        0,
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import tomllib
 from collections.abc import Mapping
 
 import pytest
@@ -11,12 +12,14 @@ from steptwin.errors import Misuse, Refusal, SourceErrors
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.mic488.config import read_config
+from steptwin.mic488.inifile import IniFile
 from steptwin.subject.commands import ControlProgram
 from steptwin.subject.world import WorldSubject
 from steptwin.world import script as do
 from steptwin.world.actions import Download
 from steptwin.world.programs import StatementFollower
-from steptwin.world.programtexts import WorldPrograms
+from steptwin.world.programtexts import WorldPrograms, configuration_text, program_texts
 
 WORLD = """
 [world]
@@ -48,8 +51,9 @@ name = "alone"
 FILES = {"a.prg": b"LOOP:\n$R0 = $R0 + 1\nDELAY 0.1\nJUMP LOOP\n", "p.csv": b"HOME;1;2;3;4\n"}
 
 
-def world(files: Mapping[str, bytes] = FILES) -> World:
-    return World.from_toml(WORLD, files)
+def world(files: Mapping[str, bytes] = FILES, more: str = "") -> World:
+    """``more``: keys of the MIC488."""
+    return World.from_toml(WORLD.replace('positions = "p.csv"', f'positions = "p.csv"\n{more}'), files)
 
 
 def start(there: World) -> None:
@@ -206,3 +210,74 @@ def test_statements_are_those_of_the_present_texts() -> None:
     follower.close()
     assert [row for row in seen if row[0] == "drum"] == [("drum", "program", 3), ("drum", "program", 4)]
     assert ("table", "program 3", 3) in seen
+
+
+# ---------------------------------------------------------------------- what editors need
+
+CONFIG = b"[Axis0]\r\nGear=100\r\nUnit=3\r\n"
+
+
+def configured() -> World:
+    return world({**FILES, "m.cfg": CONFIG}, 'config = "m.cfg"')
+
+
+def test_the_texts_of_all_controllers() -> None:
+    """Banks 0 to 5 of the MIC488 with firmware 1.70 (MIC-28), the one program of each chip."""
+    rows = WorldPrograms(configured()).list()
+    places = [*(f"program {bank}" for bank in range(6)), *(f"positions {bank}" for bank in range(6))]
+    assert [(row["machine"], row["place"]) for row in rows] == [
+        *(("table", place) for place in places), ("drum", "program"), ("feeder", "program"), ("alone", "program"),
+    ]  # fmt: skip
+    assert [(row["place"], row["name"]) for row in rows if not row["empty"]] == [("program 0", "a.prg"), ("positions 0", "p.csv")]
+
+
+def test_files_of_an_editor_server_are_a_description_of_their_own() -> None:
+    """It reads back as a world: types, texts in their places, the configuration."""
+    there = configured()
+    there.apply_input(Download("drum", "program", "w5000\n"))
+    files = dict(WorldPrograms(there).files())
+    toml = files.pop("steptwin:///world.toml").decode()
+    assert files == {
+        "steptwin:///table/config.cfg": CONFIG,
+        "steptwin:///table/program-0.prg": FILES["a.prg"],
+        "steptwin:///table/positions-0.csv": FILES["p.csv"],
+        "steptwin:///drum/program.m1486": b"w5000\n",
+    }
+    tables = tomllib.loads(toml)
+    (table,), chips = tables["mic488"], tables["m1486"]
+    assert table["config"] == "table/config.cfg"
+    assert table["programs"] == {str(bank): f"table/program-{bank}.prg" for bank in range(6)}
+    assert table["positions"] == {"0": "table/positions-0.csv"}  # empty tables would be those of all banks
+    assert [(chip.get("variant"), chip["program"]) for chip in chips] == [
+        ("B", "drum/program.m1486"), ("E1", "feeder/program.m1486"), (None, "alone/program.m1486"),
+    ]  # fmt: skip
+
+
+def test_positions_have_a_place_even_while_none_are_there() -> None:
+    empty = World.from_toml('[[mic488]]\nname = "m"\nfirmware = "1.40"\n')
+    (table,) = tomllib.loads(WorldPrograms(empty).files()["steptwin:///world.toml"].decode())["mic488"]
+    assert (table["firmware"], len(table["programs"]), table["positions"]) == ("1.40", 8, {"0": "m/positions-0.csv"})
+
+
+def test_the_configuration_of_a_controller_is_its_file() -> None:
+    there = configured()
+    source = configuration_text(there, "table")
+    assert source is not None
+    assert (source.name, source.text) == ("m.cfg", CONFIG.decode())
+    assert configuration_text(there, "drum") is None
+    with pytest.raises(Misuse, match="there is no controller 'nobody': there are table, drum, feeder, alone"):
+        configuration_text(there, "nobody")
+    with pytest.raises(Misuse, match="there is no controller 'nobody': there are table, drum, feeder, alone"):
+        program_texts(there, "nobody")
+
+
+@pytest.mark.parametrize("more", ["", '\nconfig = "m.cfg"'])
+def test_keys_of_the_description_are_in_the_configuration(more: str) -> None:
+    """What a table sets besides the file, and a controller without one, is written as a file would have it."""
+    text = f'[[mic488]]\nname = "m"{more}\n[mic488.M1]\nacc = 12.5\nlimit_mode = "KL"\nin_kl = "IN3"\n'
+    source = configuration_text(World.from_toml(text, {"m.cfg": CONFIG}), "m")
+    assert source is not None
+    assert source.name == "m.cfg"
+    axis = read_config(IniFile.of_text(source.text)).axes[0]
+    gear, unit = (100.0, 3) if more else (1.0, 0)
+    assert (axis.acc, axis.limit_mode, axis.in_kl, axis.gear, axis.unit) == (12.5, 1, 2, gear, unit)
