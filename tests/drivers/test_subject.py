@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from host_rig import Wire, async_driver, run_virtual, task_line
+from host_rig import Wire, async_driver, driver, run_virtual, task_line
+from mic488_rig import loaded
 from tests.conftest import until
 
 from steptwin.controllerstate import ProgramActivity, read_state
+from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import M1486, Busy
+from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject
@@ -26,6 +29,7 @@ from steptwin.files.world import World
 from steptwin.live.remote import RemoteSubject
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import SECOND
+from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import ControllerStatus
 from steptwin.subject import commands as command
 from steptwin.subject.commands import row_of
@@ -589,3 +593,130 @@ def test_tasks_have_the_same() -> None:
             assert [event.text for event in following.take().events] == ["M1: on at rest"]
 
     run_virtual(wire, play())
+
+
+# ---------------------------------------------------------------------- parts of subjects
+
+
+def test_units_are_known_without_asking(table: DeviceSubject, drum: DeviceSubject, rig: Rig) -> None:
+    sent = rig.world.now
+    mic, chip = table._driver, drum._driver
+    units = {point: mic.unit_of(point) for point in ("table.M1_POS_ACT", "table.M1_ACC", "table.ENC2_IMP", "table.IN1", "time")}
+    assert units == {"table.M1_POS_ACT": "mm", "table.M1_ACC": "mm/s²", "table.ENC2_IMP": "imp", "table.IN1": "", "time": "s"}
+    units = {point: mic.unit_of(f"table.{point}") for point in ("M2_VEL_ACT", "M2_STATUS", "AIN1", "M1.velocity")}
+    assert units == {"M2_VEL_ACT": "imp/s", "M2_STATUS": "", "AIN1": "V", "M1.velocity": "mm/s"}
+    assert [chip.unit_of(f"drum.{point}") for point in ("counter", "Velocity", "B3", "variable")] == [
+        "microstep", "microstep/s", "", "",
+    ]  # fmt: skip
+    for subject, message in ((mic, "no point 'x'"), (chip, "'x' is not a point of an M1486: there are position, velocity")):
+        with pytest.raises(Misuse, match=message):
+            subject.unit_of(f"{subject.name}.x")
+    assert rig.world.now == sent
+
+
+def test_a_device_that_was_lost_is_unknown_until_it_is_asked_again(table: DeviceSubject, drum: DeviceSubject, rig: Rig) -> None:
+    """An unknown sample of each axis; then all axes anew, as at first."""
+    for subject, axes in ((table._driver, 4), (drum._driver, 1)):
+        following = subject.follow(filter_of(["sample"]), 99)
+        finish(subject.poll())
+        assert len(following.take().events) == axes
+        finish(subject.poll())
+        assert following.take().events == []
+        newest = [event.payload for event in subject.samples()]
+        assert len(newest) == axes
+        subject.forget()
+        unknown = [event.payload for event in following.take().events]
+        assert [event.payload for event in subject.samples()] == unknown
+        assert [(one.axis, one.position, one.velocity) for one in unknown] == [
+            (str(axis), None, None) for axis in range(1, axes + 1)
+        ]
+        assert [one.unit for one in unknown] == [one.unit for one in newest]
+        finish(subject.poll())
+        assert [event.payload for event in following.take().events] == newest
+
+
+def test_after_a_loss_the_same_device_is_there(rig: Rig) -> None:
+    mic, chip = Mic488Part(rig.mic._driver), M1486Part(rig.chip._driver)
+    finish(mic.reconnect())
+    finish(chip.reconnect())
+
+
+def test_after_a_loss_another_controller_is_there() -> None:
+    """Its registers are elsewhere."""
+    wire = Wire(firmware="1.23")
+    part = Mic488Part(driver(wire, firmware=None)._driver)
+    finish(part.reconnect())
+    wire.twins[1] = Mic488Device(wire.config, "1.70")
+    wire.open()
+    with pytest.raises(Refusal, match=r"memory: another controller is there: firmware 1\.70 instead of 1\.23"):
+        finish(part.reconnect())
+
+
+def test_held_jogs_are_those_of_the_drivers(rig: Rig) -> None:
+    mic, chip = Mic488Part(rig.mic._driver), M1486Part(rig.chip._driver)
+    rig.mic.enable(1)
+    rows = (
+        (mic.held_jog(command.Jog("table", 1, -3.0)), "table.M1.velocity", -3.0),
+        (chip.held_jog(command.Jog("drum", 1, -300.0)), "drum.velocity", -300.0 * 64),
+    )
+    for held, point, velocity in rows:
+        finish(held.__aenter__())
+        assert finish(held.hold())
+        rig.time.sleep(0.05)
+        assert rig.world.read(point) == velocity
+        assert held.end is None
+        finish(held.__aexit__(None, None, None))
+        assert held.end is not None
+    with pytest.raises(Misuse, match="axis = 2: an M1486 has axis 1 only"):
+        chip.held_jog(command.Jog("drum", 2, 50.0))
+
+
+def test_settings_are_kept_as_json(rig: Rig) -> None:
+    """Of a MIC488 a snapshot that can be written back; of a chip what it sends, and the settings that this driver has made."""
+    mic, chip = Mic488Part(rig.mic._driver), M1486Part(rig.chip._driver)
+    rig.mic.set("M1_ACC", 77.0)
+    rig.chip.configure(velocity=900)
+    rig.chip.command("t80")
+    found = json.loads(finish(mic.settings_text()))
+    assert "77.0" in json.dumps(found)
+    shown = json.loads(finish(chip.settings_text()))
+    assert (shown["format"], shown["settings"]["velocity"], shown["settings"]["acceleration"]) == (
+        "steptwin M1486 settings 1", 900, None,
+    )  # fmt: skip
+    assert shown["flags"]["80"] is True
+    assert finish(chip.settings_text()).count("\n") > 10  # for people
+
+
+def test_the_description_and_the_time_as_commands(table: DeviceSubject, rig: Rig) -> None:
+    assert table.do(command.Describe()).value == table.description.plain()
+    rig.time.sleep(2.5)
+    time = table.do(command.Time()).value
+    assert isinstance(time, dict)
+    assert (time["world"], time["time_ns"], time["paused"], time["speed"]) == (
+        "table",
+        str(round(time["time_s"] * SECOND)),
+        False,
+        1.0,
+    )
+    assert time["time_s"] == pytest.approx(2.5, abs=0.1)
+
+
+def test_what_a_program_does_is_an_event(table: DeviceSubject, rig: Rig) -> None:
+    rig.world.mic488["table"].device.load_program(0, loaded("WAIT IN5 = ON\n")[0])
+    following = table.follow(filter_of(["status"]), 99)
+    table.do(command.ControlProgram("table", "start"))
+    rig.time.sleep(1.0)
+    (event,) = following.take().events
+    assert (event.text, event.payload.facts) == ("program: running", (("state", 1),))
+    table.do(command.ControlProgram("table", "pause"))
+    rig.time.sleep(1.0)
+    assert [event.text for event in following.take().events] == ["program: paused"]
+    table.do(command.ControlProgram("table", "stop"))
+    rig.time.sleep(1.0)
+    assert [event.text for event in following.take().events] == ["program: stopped"]
+
+
+@pytest.mark.parametrize("request_", [b"", b"\x03", b"\x03\x00\x00\x00", b"\x10\x00\x00\x00\x01\x02\x00"])
+def test_a_request_that_is_none_is_not_sent(table: DeviceSubject, request_: bytes) -> None:
+    with pytest.raises(Misuse, match=f"pdu = {request_.hex()}: "):
+        table.do(do.Request("bus", 1, request_, SECOND))
