@@ -176,3 +176,44 @@ def test_m_12_a_return_that_is_overwritten_is_wrong_data(commands: int, answer: 
     bench.pin(B3=0)
     assert bench.finish().startswith(answer)
     assert any("after the call has been overwritten" in text for text in bench.wrong) is not bool(answer)
+
+
+def test_m_12_a_condition_forgets_a_label_that_is_overwritten_after_it_was_looked_at() -> None:
+    """A has 108 bytes: U takes 2, I 4, T and J 2. Label 1 is lost with byte 109; the condition behind it is still there."""
+    for commands, is_there in ((98, True), (99, False)):
+        bench = Bench("A")
+        bench.do("@1", "u20", "@2", "i80h1", *["d"] * commands, "t80")
+        sent = bench.send("j2") + bench.run(ms=10)
+        assert sent.startswith(b"\x41") is is_there
+        assert any("no label 1" in text for text in bench.wrong) is not is_there
+
+
+def test_a_file_is_held_as_long_as_its_commands_and_labels_are() -> None:
+    memory = memory_of("A")
+    memory.store(b"\x05" * 100)
+    memory.enable()
+    memory.open_file()
+    memory.label(3)
+    memory.store(b"\x01\x02")
+    memory.label(4)
+    memory.store(b"\x03" * 8)
+    begin = memory.end
+    file = memory.close_file()
+    assert file == StoredFile(b"\x01\x02" + b"\x03" * 8, {3: 0, 4: 2})
+    assert memory.holds(begin, file)
+    assert memory.holds(begin, StoredFile(b"\x01\x02", {3: 0}))
+    for other in (
+        StoredFile(b"\x01\x04", {3: 0}),
+        StoredFile(b"\x01\x02", {3: 1}),
+        StoredFile(b"\x01\x02", {5: 0}),
+        StoredFile(b"\x01\x02" + b"\x03" * 9, {}),  # longer than what is there
+    ):
+        assert not memory.holds(begin, other)
+    for _ in range(98):
+        memory.store(b"\x07")
+        assert memory.holds(begin, file)
+    memory.label(4)  # another command has the label now
+    assert not memory.holds(begin, file)
+    for byte in file.code:
+        memory.store(bytes((byte,)))
+    assert not memory.holds(begin, StoredFile(file.code, {}))  # a round later the same bytes are there

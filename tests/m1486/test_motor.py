@@ -540,3 +540,15 @@ def test_the_position_counter_has_24_bits() -> None:
     bench.do("=16000000", "f15999936", "v20000", "a65000", "r", "c100")
     assert bench.counter == 0
     assert bench.true == 15_999_936
+
+
+@pytest.mark.parametrize(("letter", "direction"), [("f", 1), ("b", -1)])
+def test_the_shortest_move_is_announced_with_its_direction_and_distance(letter: str, direction: int) -> None:
+    """One minimum microstep, 1/64 of a full step."""
+    bench = Bench()
+    bench.do("m64", f"{letter}1", "r")
+    (event,) = bench.events("moves")
+    assert {fact: value for fact, value in event.facts if fact in ("direction", "distance")} == {
+        "direction": direction, "distance": direction,
+    }  # fmt: skip
+    assert bench.true == direction

@@ -186,6 +186,7 @@ def test_what_cannot_be_read_is_pointed_at(text: str, found: list[tuple[str, str
         ("F-640", "-640 has a sign", "F moves in positive, B in negative direction"),
         ("V-640", "-640 has a sign", "numbers have no sign"),
         ("F" + "1" * 5000, "a number of 5000 digits", "no number has more than 8"),
+        ("F" + "1" * 19, "a number of 19 digits", "no number has more than 8"),
     ],
 )
 def test_what_is_no_number_is_explained(text: str, message: str, hint: str) -> None:

@@ -209,7 +209,6 @@ class ProgramExecution(Stateful):
         self._burst += commands
         self.ready = now
         if self._burst >= BURST:
-            self._burst = 0
             self.ready = now + BURST_NS
 
     def _look_at(self, place: int, now: Nanos) -> None:
