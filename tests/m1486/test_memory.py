@@ -198,8 +198,8 @@ def test_a_file_is_held_as_long_as_its_commands_and_labels_are() -> None:
     memory.label(4)
     memory.store(b"\x03" * 8)
     begin = memory.end
-    file = memory.close_file()
-    assert file == StoredFile(b"\x01\x02" + b"\x03" * 8, {3: 0, 4: 2})
+    file = StoredFile(b"\x01\x02" + b"\x03" * 8, {3: 0, 4: 2})
+    assert memory.close_file() == file
     assert memory.holds(begin, file)
     assert memory.holds(begin, StoredFile(b"\x01\x02", {3: 0}))
     for other in (
