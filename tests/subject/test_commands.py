@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
 from steptwin.subject import commands as command
+from steptwin.subject import debugcommands as debug
 from steptwin.subject.commands import COMMANDS, plain_command, read_command
 from steptwin.subject.schema import schema
 from steptwin.world import script as do
@@ -78,6 +79,26 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "snapshots"}, command.ListSnapshots()),
     ({"do": "restore", "name": "before"}, command.RestoreSnapshot("before")),
     ({"do": "drop_snapshot", "name": "before"}, command.DropSnapshot("before")),
+    ({"do": "debug"}, debug.Debug()),
+    (
+        {"do": "breakpoint", "machine": "a", "program": "program 0", "line": 3, "condition": "n > 2", "hits": "5", "log": "{n}"},
+        debug.SetBreakpoint(machine="a", program="program 0", line=3, condition="n > 2", hits="5", log="{n}"),
+    ),
+    ({"do": "breakpoint", "label": "MAIN"}, debug.SetBreakpoint(label="MAIN")),
+    ({"do": "breakpoint", "machine": "a", "value": "IN3"}, debug.SetBreakpoint(machine="a", value="IN3")),
+    ({"do": "clear_breakpoint", "breakpoint": 2}, debug.ClearBreakpoint(2)),
+    ({"do": "breakpoints"}, debug.ListBreakpoints()),
+    ({"do": "stop_on", "events": ["limit"]}, debug.StopOn(("limit",))),
+    ({"do": "step_program", "machine": "a", "way": "over"}, debug.StepProgram("a", "over")),
+    ({"do": "run"}, debug.RunProgram()),
+    ({"do": "run", "way": "backwards"}, debug.RunProgram("backwards")),
+    ({"do": "look_at", "to_ns": "5"}, debug.LookAt(5)),
+    ({"do": "branch"}, debug.Branch()),
+    ({"do": "stack", "machine": "a"}, debug.Stack("a")),
+    ({"do": "values", "machine": "a", "scope": "Pins"}, debug.Values("a", "Pins")),
+    ({"do": "evaluate", "machine": "a", "expression": "n + 1"}, debug.Evaluate("a", "n + 1")),
+    ({"do": "set_value", "machine": "a", "name": "n", "expression": "7"}, debug.SetValue("a", "n", "7")),
+    ({"do": "program_source", "machine": "a", "program": "program"}, debug.ProgramSource("a", "program")),
 ]
 
 

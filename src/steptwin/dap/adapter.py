@@ -14,12 +14,12 @@ from steptwin.dap.launch import Launch, open_world, read_launch
 from steptwin.debug.debugger import Debugger, Travel
 from steptwin.debug.observer import Logged
 from steptwin.debug.points import AnyPoint
-from steptwin.debug.scopes import SCOPES
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Location, SetPoint, Stop, StopReason, Value
 from steptwin.durations import duration
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.world import World
 from steptwin.machine import SECOND
+from steptwin.subject.debugcommands import SCOPES
 
 Body: TypeAlias = Mapping[str, object]
 Send: TypeAlias = Callable[[str, Body], None]

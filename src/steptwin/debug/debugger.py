@@ -1,27 +1,32 @@
 """A debugger of the programs in a world, forwards and backwards in time.
 
 It stands between two moments of the world. Before the world goes on, a second one, the scout, goes ahead and finds the moment at
-which the run is to stop; then the world is run to the end of the moment before it. So the world itself is only run, as ever. The
-scout is also what is looked at in the past, to which it is brought by a state and the inputs since (`steptwin.world.history`).
+which the run is to stop (`steptwin.debug.scout`); then the world is run to the end of the moment before it. So the world itself
+is only run, as ever. The scout is also what is looked at in the past, to which it is brought by a state and the inputs since
+(`steptwin.world.history`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from typing import TypeAlias, TypeVar
 
 from steptwin.debug import scopes
 from steptwin.debug.expression import number_text
-from steptwin.debug.observer import Begun, Logged, Observer
-from steptwin.debug.points import AnyPoint, Points, Watch
-from steptwin.debug.values import Events, LabelPoint, Location, Scope, SetPoint, StackFrame, Stop, StopReason, Value
+from steptwin.debug.observer import Logged
+from steptwin.debug.points import AnyPoint, Points
+from steptwin.debug.scout import Goal, Parts, Scout
+from steptwin.debug.values import Events, Location, Scope, SetPoint, StackFrame, Stop, StopReason, Value
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject.time import next_due
-from steptwin.world.history import History, Past
-from steptwin.world.plant import Plant
+from steptwin.world.actions import ExternalInput
+from steptwin.world.history import History
+from steptwin.world.plant import Plant, PlantSnapshot
 from steptwin.world.programs import Place, Programs
+
+T = TypeVar("T")
 
 LONGEST_SLICE_NS: Nanos = SECOND // 4
 STATEMENTS_AT_ONCE = 256
@@ -31,25 +36,24 @@ Travel: TypeAlias = Generator[None, None, Stop]
 """A run in parts: after each of them something else can be done, or the run be ended by `close`."""
 
 
-class _Goal(NamedTuple):
-    """What a step looks for: a statement of one of these controllers, at most ``depth`` deep in calls where that is given."""
-
-    machines: Collection[str] = ()
-    depth: int | None = None
-
-    def reached(self, begun: Begun) -> bool:
-        return begun.machine in self.machines and (self.depth is None or begun.depth <= self.depth)
-
-
 class Debugger:
-    """Debugs the programs of ``world``, whose time nobody else advances meanwhile. Raises `Misuse` for a world without a program
-    whose text is known, and for one with programs whose statements take no time.
+    """Debugs the programs of ``world``. Raises `Misuse` for a world without a program whose text is known, and for one with
+    programs whose statements take no time.
 
     Methods that go forwards or backwards (``step_in``) give the `Stop`; those of the other form (``stepping_in``) do the same in
-    parts (`Travel`).
+    parts (`Travel`). They need a world whose time nobody else advances. One that goes on by itself asks `ahead` before it does.
+
+    ``history``: the past of the world, where it is kept already. ``apply_input`` and ``go_back`` act on a world that others use,
+    too.
     """
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(
+        self,
+        world: Plant,
+        history: History | None = None,
+        apply_input: Callable[[ExternalInput], None] | None = None,
+        go_back: Callable[[PlantSnapshot], None] | None = None,
+    ) -> None:
         debugged = {name: programs for name, programs in world.programs.items() if programs.texts}
         if not debugged:
             raise Misuse(f"{world.spec.name}: no controller has a program whose text is known")
@@ -60,33 +64,40 @@ class Debugger:
         shortest = min(programs.statement_time for programs in debugged.values())
         self._slice = min(LONGEST_SLICE_NS, STATEMENTS_AT_ONCE * shortest)
         self._points = Points(world.programs)
-        self.on_log: Callable[[Logged], None] = lambda logged: None
-        """Called with the text of log points, once for each time that they are passed."""
-        self._logged: Nanos = world.now
-        """Up to this moment they have been."""
+        self._apply_input = apply_input or world.apply_input
+        self._go_back = go_back or self._take_back
         world.settle_all()
         for programs in world.programs.values():
             programs.execute_all(True, world.now)
-        self._history = History(world)
-        self._past = Past(self._history)
-        self._scout = self._past.world
-        for programs in self._scout.programs.values():
-            programs.execute_all(True, self._scout.now)
-        self._observer = Observer(self._scout, self._points)
+        self._is_own_history = history is None
+        self._history = History(world) if history is None else history
+        self._history.take()
+        self._scout = Scout(self._history, self._points)
         self._is_past = False
 
     def close(self) -> None:
         """Debug no more; the world goes on as ever."""
-        self._history.close()
+        if self._is_own_history:
+            self._history.close()
+        self._world.settle_all()
         for programs in self._world.programs.values():
             programs.execute_all(False, self._world.now)
+
+    @property
+    def on_log(self) -> Callable[[Logged], None]:
+        """Called with the text of log points, once for each time that they are passed."""
+        return self._scout.on_log
+
+    @on_log.setter
+    def on_log(self, on_log: Callable[[Logged], None]) -> None:
+        self._scout.on_log = on_log
 
     # ------------------------------------------------------------------ where it stands
 
     @property
     def view(self) -> Plant:
         """The world as it is where the debugger stands; to look at only."""
-        return self._scout if self._is_past else self._world
+        return self._scout.world if self._is_past else self._world
 
     @property
     def now(self) -> Nanos:
@@ -155,23 +166,24 @@ class Debugger:
             ago = (self.present - self.now) / SECOND
             raise Misuse(f"{name} cannot be set {ago:.9g} s before the present: branch, so that what came later has not happened")
         value = scopes.evaluate(self._world, machine, text).number or 0.0
-        self._world.apply_input(scopes.setting(self._world, machine, name, value))
-        self._changed()
+        self._apply_input(scopes.setting(self._world, machine, name, value))
+        self._scout.changed(self.now)
         return Value(name, number_text(value), value, is_settable=True)
 
     def branch(self) -> None:
         """Have the world go on from here: what came later has not happened."""
         if self._is_past:
-            self._world.restore(self._scout.snapshot(with_inputs=False))
-            self._history.gone_back()
-            self._is_past = False
-            self._changed()
+            self._go_back(self._scout.world.snapshot(with_inputs=False))
+            self.gone_back()
 
-    def _changed(self) -> None:
-        """What comes later will be different."""
-        self._points.forget_after(self.now)
-        self._logged = min(self._logged, self.now)
-        self._past.forget()
+    def _take_back(self, snapshot: PlantSnapshot) -> None:
+        self._world.restore(snapshot)
+        self._history.gone_back()
+
+    def gone_back(self) -> None:
+        """The world has gone back to its present moment."""
+        self._is_past = False
+        self._scout.changed(self.now)
 
     # ------------------------------------------------------------------ breakpoints
 
@@ -181,7 +193,25 @@ class Debugger:
 
     def set_events(self, events: Iterable[Events]) -> None:
         """Stop at these events and no others."""
-        self._observer.codes = frozenset(code for event in events for code in event.codes)
+        self._scout.stop_at([code for event in events for code in event.codes])
+
+    # ------------------------------------------------------------------ what steps look for
+
+    def into(self, machine: str) -> Goal:
+        """The next statement of a controller."""
+        self._programs(machine)
+        return Goal((machine,))
+
+    def over(self, machine: str) -> Goal:
+        """The next statement that is not in a call or interrupt which begins here."""
+        programs = self._programs(machine)
+        stack = programs.stack(self.now)
+        comes_back = not stack or programs.comes_back(stack[0].place)
+        return Goal((machine,), programs.depth() if comes_back else None)
+
+    def out(self, machine: str) -> Goal:
+        """The statement after the call in which the program is."""
+        return Goal((machine,), self._programs(machine).depth() - 1)
 
     # ------------------------------------------------------------------ forwards
 
@@ -206,42 +236,33 @@ class Debugger:
         return _finished(self.running_to_entry())
 
     def running(self, until: Nanos | None = None) -> Travel:
-        return self._forwards(_Goal(), StopReason.STEP, until)
+        return self.forwards(Goal(), until)
 
     def stepping_in(self, machine: str) -> Travel:
-        self._programs(machine)
-        return self._forwards(_Goal((machine,)), StopReason.STEP)
+        return self.forwards(self.into(machine))
 
     def stepping_over(self, machine: str) -> Travel:
-        programs = self._programs(machine)
-        stack = programs.stack(self.now)
-        comes_back = not stack or programs.comes_back(stack[0].place)
-        return self._forwards(_Goal((machine,), programs.depth() if comes_back else None), StopReason.STEP)
+        return self.forwards(self.over(machine))
 
     def stepping_out(self, machine: str) -> Travel:
-        return self._forwards(_Goal((machine,), self._programs(machine).depth() - 1), StopReason.STEP)
+        return self.forwards(self.out(machine))
 
     def running_to_entry(self) -> Travel:
-        return self._forwards(_Goal(self.threads), StopReason.ENTRY)
+        return self.forwards(Goal(self.threads, None, StopReason.ENTRY))
 
-    def _forwards(self, goal: _Goal, reason: StopReason, until: Nanos | None = None) -> Travel:
-        self._observer.stepping = goal.machines
+    def forwards(self, goal: Goal, until: Nanos | None = None) -> Travel:
+        """Go on to the goal, or to what else is a reason to stop, at most to a moment."""
         start = self.now
         if not self._is_past:
             self._history.take()
-        yield from self._look_at(start)
+        yield from self._scout.look_at(start)
         while until is None or self._scout.now < until:
             begin = self._scout.now
             end = self._slice_end(begin, until)
             if end is None:
                 yield from self._stand_at(begin)
                 return Stop(StopReason.IDLE, self.now, text=self._why_idle())
-            self._observer.clear()
-            found = yield from self._go_ahead(end)
-            stop = yield from self._first_stop(goal, reason, start)
-            if stop is None or (found is not None and found.time < stop.time):
-                stop = found
-            self._pass_logs(self._scout.now if stop is None else stop.time)
+            stop = yield from self._scout.find(end, goal, start)
             if stop is not None:
                 yield from self._stand_at(stop.time)
                 return stop
@@ -256,7 +277,7 @@ class Debugger:
         end = begin + self._slice
         if begin < self.present:
             end = min(end, self.present)
-        elif (due := next_due(self._scout)) is not None:
+        elif (due := next_due(self._scout.world)) is not None:
             end = max(end, due)
         elif until is None:
             return None
@@ -264,78 +285,27 @@ class Debugger:
             end = until
         return end if until is None else min(end, until)
 
-    def _go_ahead(self, end: Nanos) -> Generator[None, None, Stop | None]:
-        """Bring the scout to a moment, or to the first one at which a data breakpoint is hit or the world is stopped."""
-        self._observer.is_on = True
-        try:
-            return (yield from self._observe(end))
-        finally:
-            self._observer.is_on = False
+    # ------------------------------------------------------------------ a world that goes on by itself
 
-    def _observe(self, end: Nanos) -> Generator[None, None, Stop | None]:
-        scout, watches = self._scout, self._points.watches
-        before = [self._watched(watch) for watch in watches]
-        while scout.now < end:
-            moment = end
-            if watches:
-                due = next_due(scout)
-                moment = end if due is None else min(max(due, scout.now + 1), end)
-            if scout.now < self.present:
-                yield from self._past.go_on(min(moment, self.present))
-            else:
-                stopped = scout.run_to(moment)
-                self._past.forget()
-                if stopped is not None and scout.now < moment:
-                    return Stop(StopReason.WORLD, scout.now, text=stopped)
-            after = [self._watched(watch) for watch in watches]
-            for watch, old, new in zip(watches, before, after, strict=True):
-                if watch.is_hit(old, new):
-                    text = watch.expression.text if watch.has_condition else f"{watch.name}: {old:.9g} → {new:.9g}"
-                    return Stop(StopReason.DATA, scout.now, watch.machine, text, (watch.number,))
-            before = after
-        return None
+    def ahead(self, until: Nanos, goal: Goal, after: Nanos) -> Stop | None:
+        """The first reason to stop between the present and ``until``, after another moment; the world is brought to it, or to
+        ``until``, before the next call."""
+        scout = self._scout
+        self._is_past = False
+        if not scout.looks_for(goal):
+            return None
+        stop = _finished(scout.catch_up(goal))
+        while stop is None and scout.now < until:
+            stop = _finished(scout.find(min(scout.now + self._slice, until), goal, after))
+        if stop is not None:
+            scout.stopped()
+        return stop
 
-    def _watched(self, watch: Watch) -> float | None:
-        return watch.value(lambda name: scopes.read(self._scout, watch.machine, name))
-
-    def _first_stop(self, goal: _Goal, reason: StopReason, after: Nanos) -> Generator[None, None, Stop | None]:
-        """The first of what was observed that is a reason to stop after a moment."""
-        found = [stop for stop in self._stops(goal, reason) if stop.stop.time > after]
-        for candidate in sorted(found, key=lambda candidate: candidate.stop.time):
-            stop = yield from self._decided(candidate)
-            if stop is not None:
-                return stop
-        return None
-
-    def _stops(self, goal: _Goal, reason: StopReason) -> list[_Candidate]:
-        """What was observed, each with the stop that it is a reason for."""
-        found = [_Candidate(_stop_at(begun), begun) for begun in self._observer.begun if begun.hit or begun.undecided]
-        found += [
-            _Candidate(Stop(reason, begun.stand, begun.machine))
-            for begun in self._observer.begun
-            if goal.reached(begun) and not begun.hit
-        ]
-        events = self._observer.happened
-        return [*found, *(_Candidate(Stop(StopReason.EXCEPTION, event.time, event.machine, event.text)) for event in events)]
-
-    def _decided(self, candidate: _Candidate) -> Generator[None, None, Stop | None]:
-        """The stop, unless all conditions turn out not to hold where the world stands before the statement."""
-        begun = candidate.begun
-        if begun is None or begun.hit:
-            return candidate.stop
-        was = self._scout.now
-        yield from self._look_at(begun.stand)
-        names = _names(self._scout, begun.machine)
-        hit = tuple(point for point in begun.undecided if point.holds(names) and point.counts(begun.time))
-        yield from self._look_at(was)
-        return None if not hit else _stop_at(begun._replace(hit=hit))
-
-    def _pass_logs(self, until: Nanos) -> None:
-        """Log what was passed for the first time."""
-        for logged in self._observer.logged:
-            if self._logged < logged.time <= until:
-                self.on_log(logged)
-        self._logged = max(self._logged, until)
+    def stand(self) -> None:
+        """Look at the present, at which the world stands now."""
+        self._is_past = False
+        self._history.take()
+        _finished(self._scout.look_at(self.present))
 
     # ------------------------------------------------------------------ backwards
 
@@ -352,11 +322,10 @@ class Debugger:
         return _finished(self.going(moment))
 
     def stepping_back(self, machine: str) -> Travel:
-        self._programs(machine)
-        return self._backwards(_Goal((machine,)), StopReason.STEP)
+        return self._backwards(self.into(machine))
 
     def running_back(self) -> Travel:
-        return self._backwards(_Goal(), StopReason.STEP)
+        return self._backwards(Goal())
 
     def going(self, moment: Nanos) -> Travel:
         if not self.begin <= moment <= self.present:
@@ -367,21 +336,13 @@ class Debugger:
         yield from self._stand_at(moment)
         return Stop(StopReason.PAUSE, self.now)
 
-    def _backwards(self, goal: _Goal, reason: StopReason) -> Travel:
-        self._observer.stepping = goal.machines
+    def _backwards(self, goal: Goal) -> Travel:
         before = upper = self.now
         if not self._is_past:
             self._history.take()
         while upper > self.begin:
             lower = max(self._history.state_at(upper - 1)[0].now, upper - self._slice)
-            yield from self._look_at(lower)
-            self._observer.clear()
-            found: Stop | None = None
-            while (hit := (yield from self._go_ahead(upper))) is not None and hit.time < before:
-                found = hit
-            stop = (yield from self._last_stop(goal, reason, before)) or found
-            if stop is not None and found is not None and found.time > stop.time:
-                stop = found
+            stop = yield from self._scout.find_back(lower, upper, goal, self.begin, before)
             if stop is not None:
                 yield from self._stand_at(stop.time)
                 return stop
@@ -390,14 +351,6 @@ class Debugger:
         yield from self._stand_at(self.begin)
         return Stop(StopReason.BEGIN, self.now, text="no older moment is kept")
 
-    def _last_stop(self, goal: _Goal, reason: StopReason, before: Nanos) -> Generator[None, None, Stop | None]:
-        found = [stop for stop in self._stops(goal, reason) if self.begin <= stop.stop.time < before]
-        for candidate in sorted(found, key=lambda candidate: candidate.stop.time, reverse=True):
-            stop = yield from self._decided(candidate)
-            if stop is not None:
-                return stop
-        return None
-
     # ------------------------------------------------------------------ the two worlds
 
     def pause(self) -> Stop:
@@ -405,20 +358,10 @@ class Debugger:
         _finished(self._going(max(self.begin, min(self._scout.now, self.present))))
         return Stop(StopReason.PAUSE, self.now)
 
-    def _look_at(self, moment: Nanos) -> Generator[None, None, None]:
-        """Bring the scout to a moment that has been, or ahead of the world."""
-        if moment <= self.present:
-            yield from self._past.go(moment)
-            return
-        yield from self._past.go(self.present)
-        while self._scout.now < moment:
-            self._scout.run_to(moment)
-        self._past.forget()
-
-    def _stand_at(self, moment: Nanos) -> Generator[None, None, None]:
+    def _stand_at(self, moment: Nanos) -> Parts:
         """Look at a moment that has been, or run the world to one that comes."""
         if moment < self.present:
-            yield from self._look_at(moment)
+            yield from self._scout.look_at(moment)
             self._is_past = True
             return
         self._is_past = False
@@ -436,25 +379,7 @@ class Debugger:
         return f"nothing will happen any more: {' and '.join(waiting)} waits for ever"
 
 
-class _Candidate(NamedTuple):
-    """A reason to stop; ``begun`` where conditions may be undecided."""
-
-    stop: Stop
-    begun: Begun | None = None
-
-
-def _stop_at(begun: Begun) -> Stop:
-    points = begun.hit or begun.undecided
-    is_label = all(isinstance(point.asked, LabelPoint) for point in points)
-    reason = StopReason.FUNCTION if is_label else StopReason.BREAKPOINT
-    return Stop(reason, begun.stand, begun.machine, points=tuple(point.number for point in begun.hit))
-
-
-def _names(world: Plant, machine: str) -> Callable[[str], float]:
-    return lambda name: scopes.read(world, machine, name)
-
-
-def _finished(travel: Travel) -> Stop:
+def _finished(travel: Generator[None, None, T]) -> T:
     while True:
         try:
             next(travel)

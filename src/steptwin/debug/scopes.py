@@ -11,13 +11,13 @@ from steptwin.debug.values import Scope, Value
 from steptwin.errors import Misuse
 from steptwin.machine import MotionController
 from steptwin.points import LivePoint
+from steptwin.subject.debugcommands import SCOPES
 from steptwin.world.actions import ExternalInput, SetVariable
 from steptwin.world.kind import AnyKind
 from steptwin.world.plant import Plant
 from steptwin.world.script import Set, Write
 
-VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = "Variables", "Axes", "Pins", "Controller", "Registers", "World"
-SCOPES = (VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS)
+VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = SCOPES
 
 
 def scope(world: Plant, machine: str, name: str) -> Scope:

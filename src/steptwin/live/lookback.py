@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 
 from steptwin.errors import Refusal, SteptwinError
@@ -45,6 +46,10 @@ class Lookback:
         self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
 
     async def close(self) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """Keep the past no longer."""
         self._timer.cancel()
         self._live.history = None
         self._history.close()
@@ -59,14 +64,16 @@ class Lookback:
         if self._looks >= MOST_LOOKS:
             raise Refusal(f"{MOST_LOOKS} viewers look back already, which is the most")
         self._looks += 1
-        return Look(Past(self._history), self._go_back, self._closed)
+        return Look(Past(self._history), partial(take_back, self._live, self._pace), self._closed)
 
     def _closed(self) -> None:
         self._looks -= 1
 
-    def _go_back(self, snapshot: PlantSnapshot) -> None:
-        inputs = tuple(given for given in self._live.world.inputs if given.time <= snapshot.now)
-        self._pace.go_back(replace(snapshot, inputs=inputs))
+
+def take_back(live: LiveWorld, pace: Pace, snapshot: PlantSnapshot) -> None:
+    """A world goes back to a state of its past; time stands there. Raises `Refusal`."""
+    inputs = tuple(given for given in live.world.inputs if given.time <= snapshot.now)
+    pace.go_back(replace(snapshot, inputs=inputs))
 
 
 class Look:

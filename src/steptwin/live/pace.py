@@ -67,7 +67,10 @@ class Pace:
         self._show = show
         self._has_clients = has_clients
         self._turn: asyncio.Handle | None = None
+        self._is_held = False
+        """Whether the gate of the world has ended a step."""
         cell.clock.stop(live.now)
+        live.on_gate = self._hold
 
     def begin(self, speed: float) -> None:
         """Start time at ``speed``; 0: paused."""
@@ -82,8 +85,25 @@ class Pace:
         """Pause."""
         self._halt()
         if not self.is_paused:
-            self.is_paused = True
-            self._say(_STANDS)
+            self._stand()
+        self._gate_stands()
+
+    def _stand(self) -> None:
+        self.is_paused = True
+        self._say(_STANDS)
+
+    def _hold(self) -> None:
+        """The gate of the world has stopped it."""
+        self._is_held = True
+        self.close()
+        self._cell.close()
+        self._cell.clock.stop(self._live.now)
+        if not self.is_paused:
+            self._stand()
+
+    def _gate_stands(self) -> None:
+        if self._live.gate is not None:
+            self._live.gate.stands()
 
     def resume(self, speed: float | None = None) -> None:
         """Continue, at ``speed`` if given; while time runs, only the speed changes. Raises `Misuse`."""
@@ -113,6 +133,8 @@ class Pace:
         self._cell.clock.stop(self._live.now)
 
     def _go(self) -> None:
+        if self._live.gate is not None:
+            self._live.gate.goes()
         if self.speed == inf:
             self._turn = asyncio.get_running_loop().call_soon(self._run_freely)
             return
@@ -122,11 +144,15 @@ class Pace:
 
     def _run_freely(self) -> None:
         """Run without a clock, in slices."""
-        world = self._live.world
-        world.run(for_=SLICE_NS / SECOND)
+        world, end = self._live.world, self._live.now + SLICE_NS
+        self._turn = None
+        if self._live.gate is None:
+            world.run(for_=SLICE_NS / SECOND)
+            end = world.now
+        self._live.advance(end)
         self._cell.clock.stop(world.now)
-        self._live.advance(world.now)
-        self._turn = None if world.stopped else asyncio.get_running_loop().call_soon(self._run_freely)
+        if not self.is_paused and world.stopped is None:
+            self._turn = asyncio.get_running_loop().call_soon(self._run_freely)
 
     def close(self) -> None:
         if self._turn is not None:
@@ -154,7 +180,9 @@ class Pace:
         live = self._live
         world = live.world
         until = perf_counter() + PART_S
-        moves = False
+        moves = self._is_held = False
+        if live.gate is not None:
+            live.gate.goes()
         try:
             while True:
                 if condition is not None and world.holds(condition):
@@ -165,6 +193,8 @@ class Pace:
                     return None
                 dues = [end, live.deadline(), None if condition is None else condition.due(live.now)]
                 live.advance(max(live.now, min(due for due in dues if due is not None)))
+                if self._is_held:
+                    return False
                 moves = True
         finally:
             self._cell.clock.stop(live.now)
@@ -206,6 +236,8 @@ class Pace:
             came = False if end is None else self.step(end, condition, following)
         finally:
             following.close()
+        if came is not None:
+            self._gate_stands()
         rest = {} if came is not None else {"to_ns": str(end)}
         return {
             **self.where(),

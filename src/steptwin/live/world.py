@@ -43,6 +43,26 @@ class Companion(Protocol):
     def advance(self, now: Nanos) -> None: ...
 
 
+class Gate(Protocol):
+    """Is asked before a world goes on, so that it stops where somebody debugs it."""
+
+    def ahead(self, until: Nanos) -> tuple[Nanos, bool]:
+        """The world is at the present; up to where it may go, at most to ``until``, and whether it is to stop there."""
+        ...
+
+    def goes(self) -> None:
+        """Time goes on from now."""
+        ...
+
+    def stands(self) -> None:
+        """Time stands at the present, because of what `ahead` gave or otherwise."""
+        ...
+
+    def gone_back(self) -> None:
+        """The world has gone back to the present moment; what was later has not happened."""
+        ...
+
+
 class LiveWorld:
     """A world that a `Cell` advances in real time."""
 
@@ -71,6 +91,9 @@ class LiveWorld:
         """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
         """Called when a script has stopped the world."""
+        self.gate: Gate | None = None
+        self.on_gate: Callable[[], None] = lambda: None
+        """Called where the gate has stopped the world."""
 
     @property
     def now(self) -> Nanos:
@@ -135,6 +158,8 @@ class LiveWorld:
             port.join()
         if self.history is not None:
             self.history.gone_back()
+        if self.gate is not None:
+            self.gate.gone_back()
         self.stale = True
 
     def session(self) -> sessions.Session:
@@ -153,9 +178,29 @@ class LiveWorld:
 
     def advance(self, now: Nanos) -> None:
         world = self.world
-        if not self.stale and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
+        if self.gate is not None:
+            self._advance_gated(self.gate, now)
+        elif not self.stale and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
             world.now, world.is_settled = now, True  # as `Plant.advance` where nothing is due
-            return
+        else:
+            self._advance(now)
+
+    def _advance_gated(self, gate: Gate, now: Nanos) -> None:
+        """Advance in parts, between which the companion acts: the gate cannot foresee that."""
+        while True:
+            acts = None if self.companion is None else self.companion.deadline()
+            part = now if acts is None else min(now, max(acts, self.now + 1))
+            free, stops = gate.ahead(part)
+            self._advance(free)
+            if stops:
+                self.on_gate()
+                gate.stands()
+                return
+            if part == now or self.world.stopped is not None:
+                return
+
+    def _advance(self, now: Nanos) -> None:
+        world = self.world
         while (due := self._due()) is not None and due <= now:
             world.advance(due)
             if world.stopped is not None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from steptwin.live.cell import Cell
+from steptwin.live.debugging import Debugging
 from steptwin.live.pace import Pace
 from steptwin.live.world import LiveWorld
 from steptwin.subject import commands as command
@@ -25,7 +26,12 @@ class WorldControl:
         self.subject = live.subject
         self._of_pace = pace.actions()
         self.subject.dispatcher.add(
-            {**self._of_pace, command.Time: lambda _: pace.where(), command.EndPoints: lambda _: end_points()}
+            {
+                **self._of_pace,
+                **Debugging(live, cell, pace).actions(),
+                command.Time: lambda _: pace.where(),
+                command.EndPoints: lambda _: end_points(),
+            }
         )
 
     @property

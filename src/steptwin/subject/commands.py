@@ -6,7 +6,7 @@ message of the control endpoint is a command as JSON: ``{"do": NAME, FIELD: VALU
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -14,6 +14,9 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
+from steptwin.subject.commandrow import MACHINE, NOTHING, CommandRow
+from steptwin.subject.debugcommands import ROWS as DEBUG_ROWS
+from steptwin.subject.debugcommands import DebugCommand
 from steptwin.subject.fields import (
     CHARACTERS,
     FAULT,
@@ -216,26 +219,14 @@ Command: TypeAlias = (
     | ListSnapshots
     | RestoreSnapshot
     | DropSnapshot
+    | DebugCommand
 )
 
 
 # ---------------------------------------------------------------------- the table
 
 
-@dataclass(frozen=True, slots=True)
-class CommandRow:
-    """A command: its name, its class, its fields, and what its answer is."""
-
-    name: str
-    kind: Callable[..., Command]
-    meaning: str
-    answer: str
-    fields: tuple[Field, ...] = ()
-
-
-_MACHINE = Field("machine", TEXT, "The name of a machine.")
 _AXIS = Field("axis", whole(1, 64), "The number of an axis.")
-_NOTHING = "null"
 UNITS = "units of the data sheet"
 """Of fields that are in the unit of their axis."""
 
@@ -261,8 +252,8 @@ _ROWS = (
         '{"MACHINE.PIN": LEVEL, ...}',
         (Field("machine", TEXT, "The name of a machine; all of them without.", None),),
     ),
-    CommandRow("state", State, "The present state of a machine.", "the state, alike for all kinds", (_MACHINE,)),
-    CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (_MACHINE,)),
+    CommandRow("state", State, "The present state of a machine.", "the state, alike for all kinds", (MACHINE,)),
+    CommandRow("encoders", Encoders, "The encoders of a machine.", "a list of axis, counts, turned_by", (MACHINE,)),
     CommandRow("faults", ListFaults, "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)"),
     CommandRow(
         "fault_kinds",
@@ -285,32 +276,32 @@ _ROWS = (
         ),
     ),
     CommandRow(
-        "unfollow", Unfollow, "No more events.", _NOTHING, (Field("follow", ID, "The id of the request.", attribute="id"),)
+        "unfollow", Unfollow, "No more events.", NOTHING, (Field("follow", ID, "The id of the request.", attribute="id"),)
     ),
-    CommandRow("set", do.Set, "Inputs take levels, all of them or none.", _NOTHING, (Field("levels", LEVELS, "0, 1, volts."),)),
+    CommandRow("set", do.Set, "Inputs take levels, all of them or none.", NOTHING, (Field("levels", LEVELS, "0, 1, volts."),)),
     CommandRow(
         "press",
         do.Press,
         "Press a button.",
-        _NOTHING,
+        NOTHING,
         (
             Field("button", TEXT, "The name of a button."),
             Field("for_ns", TIME, "How long; until it is released without.", None, "ns", "duration"),
         ),
     ),
-    CommandRow("release", do.Release, "Release a button.", _NOTHING, (Field("button", TEXT, "The name of a button."),)),
+    CommandRow("release", do.Release, "Release a button.", NOTHING, (Field("button", TEXT, "The name of a button."),)),
     CommandRow(
         "write",
         do.Write,
         "Registers take values by name, as a Modbus master writes them.",
-        _NOTHING,
+        NOTHING,
         (Field("values", LEVELS, "Registers by MACHINE.REGISTER.", unit=UNITS),),
     ),
     CommandRow(
         "send",
         do.Send,
         "Characters go to a line.",
-        _NOTHING,
+        NOTHING,
         (Field("line", TEXT, "The name of a line."), Field("text", CHARACTERS, "Characters, one byte each.", attribute="data")),
     ),
     CommandRow(
@@ -325,48 +316,48 @@ _ROWS = (
             Field("within_ns", TIME, "How long the answer is waited for.", SECOND, "ns", "within"),
         ),
     ),
-    CommandRow("power_cycle", do.PowerCycle, "Switch a machine off and on again.", _NOTHING, (_MACHINE,)),
+    CommandRow("power_cycle", do.PowerCycle, "Switch a machine off and on again.", NOTHING, (MACHINE,)),
     CommandRow(
         "turn",
         do.Turn,
         "Turn the encoder shaft of an axis.",
-        _NOTHING,
-        (_MACHINE, _AXIS, Field("counts", whole(-(2**31), 2**31 - 1), "By how much.", unit="encoder counts")),
+        NOTHING,
+        (MACHINE, _AXIS, Field("counts", whole(-(2**31), 2**31 - 1), "By how much.", unit="encoder counts")),
     ),
     CommandRow(
         "couple",
         do.Couple,
         "What turns the encoder shaft of an axis without mechanics.",
-        _NOTHING,
-        (_MACHINE, _AXIS, Field("to", choice(*do.COUPLINGS), "What turns it.", attribute="coupling")),
+        NOTHING,
+        (MACHINE, _AXIS, Field("to", choice(*do.COUPLINGS), "What turns it.", attribute="coupling")),
     ),
     CommandRow("fault", do.SetFault, "Something goes wrong from now on.", "name", (Field("fault", FAULT, "Which."),)),
-    CommandRow("clear_fault", do.ClearFault, "Remove a fault.", _NOTHING, (Field("name", TEXT, "The name of a fault."),)),
+    CommandRow("clear_fault", do.ClearFault, "Remove a fault.", NOTHING, (Field("name", TEXT, "The name of a fault."),)),
     CommandRow(
         "expect", do.Expect, "A condition must hold; else that is reported.", "holds", (Field("condition", TEXT, "Which."),)
     ),
-    CommandRow("note", do.Note, "A text for the record.", _NOTHING, (Field("text", TEXT, "The text."),)),
+    CommandRow("note", do.Note, "A text for the record.", NOTHING, (Field("text", TEXT, "The text."),)),
     CommandRow(
         "see",
         See,
         "A record of a vision system comes to a controller.",
-        _NOTHING,
-        (_MACHINE, *(Field(name, number(), f"The {name} of the record.") for name in ("number", "x", "y", "angle"))),
+        NOTHING,
+        (MACHINE, *(Field(name, number(), f"The {name} of the record.") for name in ("number", "x", "y", "angle"))),
     ),
     CommandRow(
         "enable",
         Enable,
         "Switch a drive on or off.",
-        _NOTHING,
-        (_MACHINE, _AXIS, Field("on", FLAG, "Whether it is to be on.", True)),
+        NOTHING,
+        (MACHINE, _AXIS, Field("on", FLAG, "Whether it is to be on.", True)),
     ),
     CommandRow(
         "move",
         Move,
         "Begin to move.",
-        _NOTHING,
+        NOTHING,
         (
-            _MACHINE,
+            MACHINE,
             _AXIS,
             Field("to", number(), "To this position.", None, UNITS),
             Field("by", number(), "By this distance.", None, UNITS),
@@ -376,37 +367,37 @@ _ROWS = (
         "home",
         Home,
         "Begin to home.",
-        _NOTHING,
-        (_MACHINE, _AXIS, Field("velocity", number(), "Its sign chooses the switch.", unit=f"{UNITS}/s")),
+        NOTHING,
+        (MACHINE, _AXIS, Field("velocity", number(), "Its sign chooses the switch.", unit=f"{UNITS}/s")),
     ),
     CommandRow(
         "jog",
         Jog,
         "Begin to move without end.",
-        _NOTHING,
-        (_MACHINE, _AXIS, Field("velocity", number(), "Velocity with its sign.", unit=f"{UNITS}/s")),
+        NOTHING,
+        (MACHINE, _AXIS, Field("velocity", number(), "Velocity with its sign.", unit=f"{UNITS}/s")),
     ),
     CommandRow(
         "stop",
         StopAxes,
         "Stop as fast as the controller does, with a ramp or without.",
-        _NOTHING,
-        (_MACHINE, Field("axis", whole(1, 64), "The number of an axis; all without.", None)),
+        NOTHING,
+        (MACHINE, Field("axis", whole(1, 64), "The number of an axis; all without.", None)),
     ),
     CommandRow(
         "program",
         ControlProgram,
         "Start, pause or stop the program of a machine.",
-        _NOTHING,
-        (_MACHINE, Field("action", choice("start", "pause", "stop"), "What to do.")),
+        NOTHING,
+        (MACHINE, Field("action", choice("start", "pause", "stop"), "What to do.")),
     ),
     CommandRow(
         "download",
         Download,
         "Put a text into the program memory of a controller: a MIC488 has it at once, to an M1486 it is typed, and runs then.",
-        _NOTHING,
+        NOTHING,
         (
-            _MACHINE,
+            MACHINE,
             Field("place", TEXT, "Where, such as program 0, positions 0 (MIC488, by bank), program (M1486)."),
             Field("text", PROGRAM, "The text. One with errors is refused with what is wrong."),
         ),
@@ -440,7 +431,7 @@ _ROWS = (
         (Field("name", TEXT, "The name of a snapshot."),),
     ),
     CommandRow(
-        "drop_snapshot", DropSnapshot, "Keep a state no longer.", _NOTHING, (Field("name", TEXT, "The name of a snapshot."),)
+        "drop_snapshot", DropSnapshot, "Keep a state no longer.", NOTHING, (Field("name", TEXT, "The name of a snapshot."),)
     ),
     CommandRow(
         "save",
@@ -449,6 +440,7 @@ _ROWS = (
         "as time; file, inputs, digest, or files, records for the last records",
         (Field("file", TEXT, "Absolute path."),),
     ),
+    *DEBUG_ROWS,
 )
 
 COMMANDS: Mapping[str, CommandRow] = {row.name: row for row in _ROWS}

@@ -22,6 +22,7 @@ from steptwin.subject.payloads import (
     FreePayload,
     InputPayload,
     LoadPayload,
+    LogPayload,
     NotePayload,
     PacePayload,
     Payload,
@@ -31,6 +32,7 @@ from steptwin.subject.payloads import (
     SamplePayload,
     StatementPayload,
     StatusPayload,
+    StoppedPayload,
     is_shown,
 )
 from steptwin.tables import complete
@@ -154,6 +156,11 @@ def _read_pace(data: Mapping[str, Any]) -> PacePayload:
     return PacePayload(data["paused"], None if data["speed"] in ("max", None) else data["speed"])
 
 
+def _read_stopped(data: Mapping[str, Any]) -> StoppedPayload:
+    hit = tuple(data["breakpoints"])
+    return StoppedPayload(data["reason"], data["what"], hit, data["program"], data["line"], data["past"])
+
+
 _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
     "kind of event",
     KINDS,
@@ -175,6 +182,8 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "fault": lambda data: FaultPayload(data["fault"], data["words"]),
         "pace": _read_pace,
         "restored": lambda data: RestoredPayload(data["snapshot"]),
+        "stopped": _read_stopped,
+        "log": lambda data: LogPayload(data["words"], data["program"], data["line"]),
     },
 )
 

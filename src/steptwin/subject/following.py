@@ -10,8 +10,9 @@ from typing import NamedTuple
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import KINDS
 
-USUAL = frozenset(KINDS) - {"frame", "statement"}
-"""What is followed where no kinds are named: frames are as frequent as requests, statements as milliseconds."""
+USUAL = frozenset(KINDS) - {"frame", "statement", "stopped", "log"}
+"""What is followed where no kinds are named: frames are as frequent as requests, statements as milliseconds; a debugger is there
+for those who name its events."""
 
 
 @dataclass(frozen=True, slots=True)

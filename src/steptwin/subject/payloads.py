@@ -303,6 +303,58 @@ class RestoredPayload:
         return {"snapshot": self.snapshot}
 
 
+@dataclass(frozen=True, slots=True)
+class StoppedPayload:
+    """A debugger stands at the event's moment, which may be in the past while time stands at the present.
+
+    ``reason``: ``entry``, ``step``, ``breakpoint``, ``function breakpoint`` (a label), ``data breakpoint``, ``exception`` (an
+    event), ``pause``, ``begin`` (the oldest moment that is kept). ``breakpoints``: those that were hit. ``program`` and ``line``
+    of the statement that comes next, of the event's machine; None where no program is the reason.
+    """
+
+    kind: ClassVar[str] = "stopped"
+    axis: ClassVar[None] = None
+    reason: str
+    what: str = ""
+    breakpoints: tuple[int, ...] = ()
+    program: str | None = None
+    line: int | None = None
+    past: bool = False
+
+    @property
+    def text(self) -> str:
+        where = "" if self.line is None else f" in line {self.line} of {self.program}"
+        return f"stopped: {self.reason}{where}{', ' if self.what else ''}{self.what}"
+
+    def plain(self) -> dict[str, object]:
+        return {
+            "reason": self.reason,
+            "what": self.what,
+            "breakpoints": list(self.breakpoints),
+            "program": self.program,
+            "line": self.line,
+            "past": self.past,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class LogPayload:
+    """The text of a breakpoint that logs, when it was passed."""
+
+    kind: ClassVar[str] = "log"
+    axis: ClassVar[None] = None
+    words: str
+    program: str
+    line: int
+
+    @property
+    def text(self) -> str:
+        return f"{self.program}, line {self.line}: {self.words}"
+
+    def plain(self) -> dict[str, object]:
+        return {"words": self.words, "program": self.program, "line": self.line}
+
+
 Payload: TypeAlias = (
     PlanPayload
     | CoordinatePayload
@@ -320,6 +372,8 @@ Payload: TypeAlias = (
     | FaultPayload
     | PacePayload
     | RestoredPayload
+    | StoppedPayload
+    | LogPayload
 )
 KINDS: tuple[str, ...] = tuple(payload.kind for payload in get_args(Payload))
 SHOWN_KINDS = frozenset({"status", "note", "report", "button", "input", "fault", "pace", "restored"})

@@ -81,6 +81,15 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
         "input": {"what": _TEXT, "value": {}},
         "fault": {"fault": _TEXT, "words": _TEXT},
         "restored": {"snapshot": {"anyOf": [_TEXT, {"type": "null"}], "description": "Its name; null without one."}},
+        "stopped": {
+            "reason": _TEXT,
+            "what": _TEXT,
+            "breakpoints": {"type": "array", "items": _WHOLE},
+            "program": _TEXT_OR_NULL,
+            "line": {"type": ["integer", "null"]},
+            "past": _FLAG,
+        },
+        "log": {"words": _TEXT, "program": _TEXT, "line": _WHOLE},
         "pace": {"paused": _FLAG, "speed": {"anyOf": [_REAL, {"const": "max"}, {"type": "null"}]}},
     },
 )

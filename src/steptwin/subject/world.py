@@ -48,6 +48,8 @@ class WorldSubject:
         lines = {name: line.name for name, (line, _) in world.parts.line_of.items()}
         self.numbering = Numbering(lines)
         self.followers = Followers(self._followed)
+        self.on_followed: Callable[[], None] = lambda: None
+        """Called when other kinds of events are followed than before."""
         self.snapshots = Snapshots()
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self._words: dict[str, LineWords] = {}
@@ -184,9 +186,9 @@ class WorldSubject:
         """Restore a snapshot, with its name if it has one, and notify followers."""
         self.world.restore(snapshot)
         self.numbering.moved(self.world.now)
-        self._publish(self.world.now, WORLD, RestoredPayload(name))
+        self.publish(self.world.now, WORLD, RestoredPayload(name))
         for plan in self.plans(filter_of(["plan"])):
-            self._publish(plan.time, plan.machine, plan.payload)
+            self.publish(plan.time, plan.machine, plan.payload)
 
     def _faults(self) -> object:
         return [
@@ -221,9 +223,9 @@ class WorldSubject:
 
     def paced(self, pace: PacePayload) -> None:
         """Report that time was paused or resumed."""
-        self._publish(self.world.now, WORLD, pace)
+        self.publish(self.world.now, WORLD, pace)
 
-    def _publish(self, time: Nanos, machine: str, payload: Payload) -> None:
+    def publish(self, time: Nanos, machine: str, payload: Payload) -> None:
         if self.followers:
             self.followers.publish(self.numbering.event(time, machine, payload))
 
@@ -237,10 +239,10 @@ class WorldSubject:
         payload = payload_of(record)
         if isinstance(payload, PlanPayload):
             payload = self._with_origin(record.machine, payload)
-        self._publish(record.time, record.machine, payload)
+        self.publish(record.time, record.machine, payload)
 
     def _executed(self, record: TraceRecord) -> None:
-        self._publish(record.time, record.machine, payload_of(record))
+        self.publish(record.time, record.machine, payload_of(record))
 
     def _with_origin(self, machine: str, payload: PlanPayload) -> PlanPayload:
         drive = self.world.machines[machine].axes[int(payload.axis) - 1]
@@ -248,6 +250,7 @@ class WorldSubject:
 
     def _followed(self) -> None:
         """Subscribe to the world only while it is followed, to frames and statements only while they are wanted."""
+        self.on_followed()
         watchers = self.world.trace.watchers
         if bool(self.followers) is not self._is_watching:
             self._is_watching = not self._is_watching
@@ -273,4 +276,4 @@ class WorldSubject:
                 line.unfollow_frames(self._words.pop(line.name))
 
     def _framed(self, line: str, frame: FrameLine) -> None:
-        self._publish(frame.time, line, FramePayload(frame.link, frame.direction.value, frame.raw, frame.meaning))
+        self.publish(frame.time, line, FramePayload(frame.link, frame.direction.value, frame.raw, frame.meaning))

@@ -101,7 +101,7 @@ class History:
         """Keep the present state, unless one of this moment is there."""
         if self._states and self._states[-1].snapshot.now == self.world.now:
             return
-        self._states.append(_State(self.world.snapshot(with_inputs=False), self._dropped + len(self._inputs)))
+        self._states.append(_State(self.world.snapshot(with_inputs=False), self.inputs_so_far))
         if len(self._states) > self._most:
             del self._states[self._least_missed()]
 
@@ -120,7 +120,7 @@ class History:
     def _forget_oldest(self) -> None:
         if self._states:
             del self._states[0]
-        until = self._states[0].inputs if self._states else self._dropped + len(self._inputs)
+        until = self._states[0].inputs if self._states else self.inputs_so_far
         while self._dropped < until:
             self._bytes -= size_of(self._inputs.popleft().what)
             self._dropped += 1
@@ -142,6 +142,11 @@ class History:
             raise Misuse(f"to_ns = {moment}: the past is kept from {self.begin} to {self.world.now} ns")
         return self._states[index - 1]
 
+    @property
+    def inputs_so_far(self) -> int:
+        """How many there have been."""
+        return self._dropped + len(self._inputs)
+
     def keeps_inputs_from(self, number: int) -> bool:
         """Whether the inputs after the first ``number`` are still kept."""
         return number >= self._dropped
@@ -150,7 +155,9 @@ class History:
         """The inputs after the first ``number``. Raises `Misuse` where they are no longer kept."""
         if not self.keeps_inputs_from(number):
             raise Misuse(f"the past is kept from {self.begin} to {self.world.now} ns")
-        return list(islice(self._inputs, number - self._dropped, None))
+        newest = list(islice(reversed(self._inputs), self.inputs_so_far - number))
+        newest.reverse()
+        return newest
 
 
 class Past:
@@ -171,6 +178,17 @@ class Past:
     def forget(self) -> None:
         """Have the next `go` begin with a state: the world has been used for something else."""
         self._branch = -1
+
+    @property
+    def is_in_step(self) -> bool:
+        """Whether it is at the present moment and has been brought there; inputs of this moment may be missing still."""
+        history = self._history
+        return self._branch == history.branch and self.world.now == history.world.now
+
+    @property
+    def lacks_inputs(self) -> bool:
+        """Whether inputs have come since."""
+        return self._inputs != self._history.inputs_so_far
 
     def go(self, moment: Nanos) -> Iterator[None]:
         """Bring it to a moment, in parts between which something else can be done. Raises `Misuse` for a moment that is not kept,

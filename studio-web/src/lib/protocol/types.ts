@@ -1,6 +1,6 @@
 // Made from docs/studio.schema.json by `npm run protocol`; not to be changed by hand.
 
-export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest;
+export type Request = DescribeRequest | ReadRequest | PinsRequest | StateRequest | EncodersRequest | FaultsRequest | FaultKindsRequest | TimeRequest | EndPointsRequest | FollowRequest | UnfollowRequest | SetRequest | PressRequest | ReleaseRequest | WriteRequest | SendRequest | RequestRequest | PowerCycleRequest | TurnRequest | CoupleRequest | FaultRequest | ClearFaultRequest | ExpectRequest | NoteRequest | SeeRequest | EnableRequest | MoveRequest | HomeRequest | JogRequest | StopRequest | ProgramRequest | DownloadRequest | PauseRequest | ResumeRequest | StepRequest | SnapshotRequest | SnapshotsRequest | RestoreRequest | DropSnapshotRequest | SaveRequest | DebugRequest | BreakpointRequest | ClearBreakpointRequest | BreakpointsRequest | StopOnRequest | StepProgramRequest | RunRequest | LookAtRequest | BranchRequest | StackRequest | ValuesRequest | EvaluateRequest | SetValueRequest | ProgramSourceRequest | HelloRequest | ResyncRequest | WatchRequest | UnwatchRequest | TakeControlRequest | ReleaseControlRequest | RenewRequest | LetGoRequest | StopAllRequest | LookRequest | GoBackRequest | ProgramsRequest | ProgramTextRequest | PortsRequest | ConnectRequest | DisconnectRequest | AuditRequest | CalculatorRequest | CalculateRequest | GearRequest | ConfigurationRequest | EditConfigurationRequest;
 
 /** Every request has exactly one. */
 export type Answer = {
@@ -252,6 +252,37 @@ export type SubjectEvent = {
   kind: "restored";
   /** Its name; null without one. */
   snapshot: string | null;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "stopped";
+  reason: string;
+  what: string;
+  breakpoints: number[];
+  program: string | null;
+  line: number | null;
+  past: boolean;
+  /** The command or the event that led to it. */
+  cause: number | null;
+  /** As text; it adds nothing to the rest. */
+  text: string;
+} | {
+  /** Commands and events are numbered together; 0: a plan from before. */
+  number: number;
+  /** Virtual time, as decimal text [ns] */
+  time_ns: string;
+  machine: string;
+  kind: "log";
+  words: string;
+  program: string;
+  line: number;
   /** The command or the event that led to it. */
   cause: number | null;
   /** As text; it adds nothing to the rest. */
@@ -564,7 +595,7 @@ export type FollowRequest = {
   id?: string | number | null;
   version?: 1;
   /** Kinds of events; all but frames without. */
-  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored")[] | null;
+  kinds?: ("plan" | "coordinate" | "sample" | "load" | "free" | "edge" | "frame" | "statement" | "status" | "note" | "report" | "button" | "input" | "fault" | "pace" | "restored" | "stopped" | "log")[] | null;
   /** Names of machines, lines, or 'world'; all without. */
   machines?: string[] | null;
   /** Numbers of axes as text; events of other axes are left out. */
@@ -923,6 +954,166 @@ export type SaveRequest = {
   version?: 1;
   /** Absolute path. */
   file: string;
+};
+
+/** What can be debugged: controllers with their programs, the lines in which breakpoints can be, labels. Answer: machines, events, scopes, time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on). */
+export type DebugRequest = {
+  do: "debug";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Time stops before a line is executed, at a label or interrupt of any program, or when a value changes. Answer: number, problem (why it is nowhere; null), lines of the statements, and what was given. */
+export type BreakpointRequest = {
+  do: "breakpoint";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine?: string | null;
+  /** A program of it, such as program 0 (MIC488, by bank), program (M1486). */
+  program?: string | null;
+  /** The first statement in this line or after it. */
+  line?: number | null;
+  /** A label or interrupt: MAIN, INT_IN3, label 2. */
+  label?: string | null;
+  /** A name in an expression. */
+  value?: string | null;
+  /** An expression that must hold. */
+  condition?: string | null;
+  /** At which of the times that it holds: 5, >= 5, % 5. */
+  hits?: string | null;
+  /** Instead of a stop, followers receive this text, with the values of what is in braces. */
+  log?: string | null;
+};
+
+/** Remove a breakpoint. Answer: null. */
+export type ClearBreakpointRequest = {
+  do: "clear_breakpoint";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Its number. */
+  breakpoint: number;
+};
+
+/** The breakpoints that are set. Answer: a list of number, problem (why it is nowhere; null), lines of the statements, and what was given. */
+export type BreakpointsRequest = {
+  do: "breakpoints";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** Events of controllers at which time stops; those named before are replaced. Answer: null. */
+export type StopOnRequest = {
+  do: "stop_on";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Which; none with an empty list. */
+  events: ("program-error" | "wrong-data" | "position-error" | "limit")[];
+};
+
+/** Time goes on to the next statement, to the one after a call (over), or to the one after the call in which the program is (out); or the debugger goes to the statement before (back). The event stopped says where. Answer: time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on). */
+export type StepProgramRequest = {
+  do: "step_program";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** Which step. */
+  way: "in" | "over" | "out" | "back";
+};
+
+/** Go on from where the debugger stands, through the past to the present and on, or back, to the next reason to stop. Answer: time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on). */
+export type RunRequest = {
+  do: "run";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Which way. */
+  way?: "forwards" | "backwards" | null;
+};
+
+/** The debugger goes to a moment of the past; the world stands at the present. Answer: time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on). */
+export type LookAtRequest = {
+  do: "look_at";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** Which moment. [ns] */
+  to_ns: string | number;
+};
+
+/** The world goes back to the moment of the past at which the debugger stands; what came later has not happened. Answer: time_ns, present_ns, begin_ns (the oldest moment that can be gone to), past, going (whether time goes on). */
+export type BranchRequest = {
+  do: "branch";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+};
+
+/** The statement that comes next, or is waited in, then those to which it returns; empty where no program runs. Answer: a list of name (the label before it), program, source, line, column, end_line, end_column. */
+export type StackRequest = {
+  do: "stack";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+};
+
+/** A group of values where the debugger stands. Answer: a list of name, value (as text, with its unit), number (null where it is none), settable. */
+export type ValuesRequest = {
+  do: "values";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** Which group. */
+  scope: "Variables" | "Axes" | "Pins" | "Controller" | "Registers" | "World";
+};
+
+/** The value of an expression where the debugger stands. Answer: name, value (as text, with its unit), number (null where it is none), settable. */
+export type EvaluateRequest = {
+  do: "evaluate";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** Names of the program and signals of the world, as in docs/debugger.md. */
+  expression: string;
+};
+
+/** A variable, an input or a register takes a value, at the present only. Answer: name, value (as text, with its unit), number (null where it is none), settable. */
+export type SetValueRequest = {
+  do: "set_value";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** Which. */
+  name: string;
+  /** Its value. */
+  expression: string;
+};
+
+/** The text of a program. Answer: program, source (the name of its file), text. */
+export type ProgramSourceRequest = {
+  do: "program_source";
+  /** Comes back with the answer. */
+  id?: string | number | null;
+  version?: 1;
+  /** The name of a machine. */
+  machine: string;
+  /** Which, such as program 0. */
+  program: string;
 };
 
 /** The first request of a connection. Its answer is followed by the whole state. */
@@ -1630,6 +1821,20 @@ export interface Requests {
   restore: { request: RestoreRequest; answer: unknown };
   drop_snapshot: { request: DropSnapshotRequest; answer: unknown };
   save: { request: SaveRequest; answer: unknown };
+  debug: { request: DebugRequest; answer: unknown };
+  breakpoint: { request: BreakpointRequest; answer: unknown };
+  clear_breakpoint: { request: ClearBreakpointRequest; answer: unknown };
+  breakpoints: { request: BreakpointsRequest; answer: unknown };
+  stop_on: { request: StopOnRequest; answer: unknown };
+  step_program: { request: StepProgramRequest; answer: unknown };
+  run: { request: RunRequest; answer: unknown };
+  look_at: { request: LookAtRequest; answer: unknown };
+  branch: { request: BranchRequest; answer: unknown };
+  stack: { request: StackRequest; answer: unknown };
+  values: { request: ValuesRequest; answer: unknown };
+  evaluate: { request: EvaluateRequest; answer: unknown };
+  set_value: { request: SetValueRequest; answer: unknown };
+  program_source: { request: ProgramSourceRequest; answer: unknown };
   hello: { request: HelloRequest; answer: HelloAnswer };
   resync: { request: ResyncRequest; answer: ResyncAnswer };
   watch: { request: WatchRequest; answer: WatchAnswer };

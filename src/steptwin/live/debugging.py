@@ -1,0 +1,414 @@
+"""The debugger of a world that runs in real time (`steptwin.subject.debugcommands`).
+
+It is there while somebody follows its events. Before the world goes on, the debugger goes ahead (`Debugger.ahead`) and says up to
+where it may; so time stops at a breakpoint, and `Pause` and `Resume` do what they always do. While time stands it can look at the
+past, as far as that is kept.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from time import perf_counter
+from typing import NamedTuple
+
+from steptwin.debug.debugger import Debugger, Travel
+from steptwin.debug.observer import Logged
+from steptwin.debug.points import AnyPoint
+from steptwin.debug.scout import Goal
+from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, SetPoint, Stop, StopReason, Value
+from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.live.cell import Cell
+from steptwin.live.lookback import PART_S, Lookback, take_back
+from steptwin.live.pace import Pace
+from steptwin.live.world import LiveWorld
+from steptwin.machine import Nanos
+from steptwin.subject import debugcommands as command
+from steptwin.subject.dispatch import Action
+from steptwin.subject.payloads import LogPayload, StoppedPayload
+from steptwin.tables import complete
+from steptwin.world.actions import Download
+from steptwin.world.plant import WORLD, PlantSnapshot, RecordedInput
+
+_EVENTS = complete("event", command.EVENTS, "codes", {event.code: event for event in Events})
+
+
+class _Breakpoint(NamedTuple):
+    wanted: command.SetBreakpoint
+    point: AnyPoint
+
+
+class Debugging:
+    """Of ``live``; ``pace`` is that of its time."""
+
+    def __init__(self, live: LiveWorld, cell: Cell, pace: Pace) -> None:
+        self._live = live
+        self._cell = cell
+        self._pace = pace
+        self._breakpoints: dict[int, _Breakpoint] = {}
+        """They stay while nobody follows, and time does not stop at them then."""
+        self._set: dict[int, SetPoint] = {}
+        """What became of them."""
+        self._next = 1
+        self._events: tuple[str, ...] = ()
+        self._open: _OpenDebugger | None = None
+        live.subject.on_followed = self._followed
+
+    def _followed(self) -> None:
+        if self._open is not None and not self._is_followed:
+            self._open.close()
+            self._open = None
+
+    @property
+    def _is_followed(self) -> bool:
+        return StoppedPayload.kind in self._live.subject.followers.kinds
+
+    def _opened(self) -> _OpenDebugger:
+        """Raises `Refusal` where nobody would learn of a stop, and `Misuse` for a world that cannot be debugged."""
+        if self._open is None:
+            if not self._is_followed:
+                raise Refusal(f"nobody would learn where time stops: follow events of kind {StoppedPayload.kind!r} first")
+            self._open = _OpenDebugger(self._live, self._cell, self._pace, self._set_all, self._numbers)
+            self._open.debugger.set_events([_EVENTS[name] for name in self._events])
+            self._set_all()
+        return self._open
+
+    # ------------------------------------------------------------------ breakpoints
+
+    def _set_all(self) -> None:
+        """Have the debugger stop at all breakpoints; their lines are looked for in the present texts."""
+        if self._open is not None:
+            found = self._open.debugger.set_breakpoints([one.point for one in self._breakpoints.values()])
+            self._set = dict(zip(self._breakpoints, found, strict=True))
+
+    def _add(self, wanted: command.SetBreakpoint) -> object:
+        self._opened()
+        if len(self._breakpoints) >= command.MOST_BREAKPOINTS:
+            raise Misuse(f"{command.MOST_BREAKPOINTS} breakpoints are set, as many as may be")
+        same = next((number for number, one in self._breakpoints.items() if one.wanted == wanted), None)
+        if same is not None:
+            return self._plain(same)
+        number, self._next = self._next, self._next + 1
+        self._breakpoints[number] = _Breakpoint(wanted, _point(wanted))
+        self._set_all()
+        if problem := self._set[number].problem:
+            self._remove(number)
+            raise Misuse(f"breakpoint: {problem}")
+        return self._plain(number)
+
+    def _clear(self, wanted: command.ClearBreakpoint) -> None:
+        if wanted.number not in self._breakpoints:
+            known = ", ".join(map(str, self._breakpoints)) or "none"
+            raise Misuse(f"there is no breakpoint {wanted.number}; there are {known}")
+        self._remove(wanted.number)
+
+    def _remove(self, number: int) -> None:
+        del self._breakpoints[number]
+        self._set.pop(number, None)
+        self._set_all()
+
+    def _numbers(self, points: Sequence[int]) -> tuple[int, ...]:
+        """Of breakpoints, by their numbers in the debugger."""
+        return tuple(number for number, found in self._set.items() if found.number in points)
+
+    def _plain(self, number: int) -> dict[str, object]:
+        found = self._set.get(number)
+        given = {name: value for name, value in asdict(self._breakpoints[number].wanted).items() if name != "line"}
+        line = self._breakpoints[number].wanted.line if found is None or found.line is None else found.line
+        return {"number": number, **given, "line": line, "problem": found.problem or None if found is not None else None}
+
+    def _stop_on(self, wanted: command.StopOn) -> None:
+        self._opened().debugger.set_events([_EVENTS[name] for name in wanted.events])
+        self._events = wanted.events
+
+    # ------------------------------------------------------------------ commands
+
+    def actions(self) -> dict[type, Action]:
+        return {
+            command.Debug: lambda _: self._opened().describe(),
+            command.SetBreakpoint: self._add,
+            command.ClearBreakpoint: self._clear,
+            command.ListBreakpoints: lambda _: [self._plain(number) for number in self._breakpoints],
+            command.StopOn: self._stop_on,
+            command.StepProgram: lambda wanted: self._opened().step(wanted),
+            command.RunProgram: lambda wanted: self._opened().run(wanted),
+            command.LookAt: lambda wanted: self._opened().look_at(wanted.to),
+            command.Branch: lambda _: self._opened().branch(),
+            command.Stack: lambda wanted: self._opened().stack(wanted.machine),
+            command.Values: self._values,
+            command.Evaluate: lambda wanted: _plain_value(self._looked_at().evaluate(wanted.machine, wanted.expression)),
+            command.SetValue: self._set_value,
+            command.ProgramSource: self._source,
+        }
+
+    def _looked_at(self) -> Debugger:
+        return self._opened().looked_at
+
+    def _values(self, wanted: command.Values) -> object:
+        return [_plain_value(value) for value in self._looked_at().scope(wanted.machine, wanted.scope).values]
+
+    def _set_value(self, wanted: command.SetValue) -> object:
+        return _plain_value(self._looked_at().set_value(wanted.machine, wanted.name, wanted.expression))
+
+    def _source(self, wanted: command.ProgramSource) -> object:
+        texts = self._opened().debugger.texts(wanted.machine)
+        if wanted.program not in texts:
+            raise Misuse(f"{wanted.machine} has no program {wanted.program!r}; there are {', '.join(texts) or 'none'}")
+        source = texts[wanted.program]
+        return {"program": wanted.program, "source": source.name, "text": source.text}
+
+
+class _OpenDebugger:
+    """A debugger at work: the gate of its world.
+
+    ``on_new_text`` is called when a controller has another program; ``numbers`` gives those of breakpoints.
+    """
+
+    def __init__(
+        self,
+        live: LiveWorld,
+        cell: Cell,
+        pace: Pace,
+        on_new_text: Callable[[], None],
+        numbers: Callable[[Sequence[int]], tuple[int, ...]],
+    ) -> None:
+        self._live = live
+        self._cell = cell
+        self._pace = pace
+        self._on_new_text = on_new_text
+        self._numbers = numbers
+        self._lookback = Lookback(live, cell, pace) if live.history is None else None
+        self.debugger = Debugger(live.world, live.history, live.apply_input, self._take_back)
+        self.debugger.on_log = self._log
+        self._goal = Goal()
+        self._after = live.now
+        """When time began to go on."""
+        self._begin: Nanos | None = None
+        """Where in the past that was, when it is about to."""
+        self._goes = False
+        self._stop: Stop | None = None
+        """Why time is about to stand."""
+        self._travel: Travel | None = None
+        """A way through the past."""
+        self._then: Goal | None = None
+        """What to look for when it has come to the present."""
+        live.world.input_watchers.append(self._given)
+        live.gate = self
+        if pace.is_paused:
+            self.debugger.stand()
+        else:
+            self.goes()
+
+    def close(self) -> None:
+        self._end_travel()
+        self._cell.enter()
+        self._live.gate = None
+        self._live.world.input_watchers.remove(self._given)
+        self.debugger.close()
+        if self._lookback is not None:
+            self._lookback.end()
+        self._live.stale = True
+        self._cell.leave()
+
+    def _given(self, given: RecordedInput) -> None:
+        if isinstance(given.what, Download):
+            self._on_new_text()
+
+    # ------------------------------------------------------------------ the gate
+
+    def ahead(self, until: Nanos) -> tuple[Nanos, bool]:
+        if not self._goes:
+            return until, False
+        stop = self.debugger.ahead(until, self._goal, self._after)
+        if stop is None or stop.reason is StopReason.WORLD:  # a script that stops the world does so by itself
+            return until, False
+        self._stop = stop
+        return stop.time, True
+
+    def goes(self) -> None:
+        self._end_travel()
+        if not self._goes:
+            self._goes = True
+            self._after = self._live.now if self._begin is None else self._begin
+            self._stop = self._begin = None
+
+    def stands(self) -> None:
+        if self._travel is not None:
+            self._end_travel()
+            self._say(self.debugger.pause())
+        elif self._goes:
+            self._goes = False
+            self._goal = Goal()
+            self.debugger.stand()
+            self._say(self._stop or Stop(StopReason.PAUSE, self._live.now))
+
+    def gone_back(self) -> None:
+        self._end_travel()
+        self.debugger.gone_back()
+        self.debugger.stand()
+        self._say(Stop(StopReason.PAUSE, self._live.now))
+
+    # ------------------------------------------------------------------ commands
+
+    def step(self, wanted: command.StepProgram) -> object:
+        debugger = self._standing
+        if wanted.way == "back":
+            self._go(debugger.stepping_back(wanted.machine))
+        else:
+            goals = {"in": debugger.into, "over": debugger.over, "out": debugger.out}
+            self._forwards(goals[wanted.way](wanted.machine))
+        return self.place()
+
+    def run(self, wanted: command.RunProgram) -> object:
+        debugger = self._standing
+        if wanted.way == command.BACKWARDS:
+            self._go(debugger.running_back())
+        else:
+            self._forwards(Goal())
+        return self.place()
+
+    def look_at(self, moment: Nanos) -> object:
+        self._go(self._standing.going(moment))
+        return self.place()
+
+    def branch(self) -> object:
+        debugger = self._standing
+        if not debugger.is_past:
+            raise Refusal("the debugger stands at the present: there is nothing to go back to")
+        debugger.branch()
+        return self.place()
+
+    def _take_back(self, snapshot: PlantSnapshot) -> None:
+        take_back(self._live, self._pace, snapshot)
+
+    @property
+    def looked_at(self) -> Debugger:
+        if self._travel is not None:
+            raise Refusal("the debugger is on its way through the past: pause it first")
+        return self.debugger
+
+    @property
+    def _standing(self) -> Debugger:
+        if self._goes:
+            raise Refusal("time goes on: pause it first")
+        return self.looked_at
+
+    # ------------------------------------------------------------------ through the past
+
+    def _forwards(self, goal: Goal) -> None:
+        debugger = self.debugger
+        if debugger.is_past:
+            self._begin = debugger.now
+            self._go(debugger.forwards(goal, debugger.present), goal)
+        else:
+            self._goal = goal
+            self._pace.resume()
+
+    def _go(self, travel: Travel, then: Goal | None = None) -> None:
+        self._travel, self._then = travel, then
+        asyncio.get_running_loop().call_soon(self._part, travel)
+
+    def _end_travel(self) -> None:
+        if self._travel is not None:
+            self._travel.close()
+            self._travel = self._begin = None
+
+    def _part(self, travel: Travel) -> None:
+        if travel is not self._travel:
+            return
+        until = perf_counter() + PART_S
+        try:
+            while perf_counter() < until:
+                next(travel)
+        except StopIteration as end:
+            self._travel = None
+            self._arrived(end.value)
+        except SteptwinError as error:
+            self._travel = None
+            self._say(replace(self.debugger.pause(), text=str(error)))
+        else:
+            asyncio.get_running_loop().call_later(PART_S, self._part, travel)
+
+    def _arrived(self, stop: Stop) -> None:
+        if stop.reason is StopReason.LIMIT and self._then is not None and not self.debugger.is_past:
+            self._forwards(self._then)
+        else:
+            self._begin = None
+            self._say(stop)
+
+    # ------------------------------------------------------------------ what is said
+
+    def place(self) -> dict[str, object]:
+        debugger = self.debugger
+        return {
+            "time_ns": str(debugger.now),
+            "present_ns": str(debugger.present),
+            "begin_ns": str(debugger.begin),
+            "past": debugger.is_past,
+            "going": self._goes or self._travel is not None,
+        }
+
+    def describe(self) -> object:
+        machines = [{"name": name, "programs": self._programs(name)} for name in self.debugger.threads]
+        events = [{"name": event.code, "title": event.title} for event in Events]
+        return {"machines": machines, "events": events, "scopes": list(command.SCOPES), **self.place()}
+
+    def _programs(self, machine: str) -> Sequence[dict[str, object]]:
+        debugger, programs = self.debugger, self._live.world.programs_of(machine)
+        return [
+            {
+                "program": name,
+                "source": source.name,
+                "lines": sorted(set(debugger.statement_lines(machine, name))),
+                "labels": list(programs.labels(name)),
+            }
+            for name, source in debugger.texts(machine).items()
+        ]
+
+    def stack(self, machine: str) -> object:
+        return [
+            {
+                "name": name,
+                "program": at.text,
+                "source": at.source,
+                "line": at.line,
+                "column": at.column,
+                "end_line": at.end_line,
+                "end_column": at.end_column,
+            }
+            for name, at in self.looked_at.stack(machine)
+        ]
+
+    def _say(self, stop: Stop) -> None:
+        debugger = self.debugger
+        frames = () if stop.machine is None else debugger.stack(stop.machine)
+        at = frames[0].location if frames else None
+        said = StoppedPayload(
+            stop.reason.value,
+            stop.text,
+            self._numbers(stop.points),
+            None if at is None else at.text,
+            None if at is None else at.line,
+            debugger.is_past,
+        )
+        self._live.subject.publish(debugger.now, stop.machine or WORLD, said)
+
+    def _log(self, logged: Logged) -> None:
+        at = self.debugger.location(logged.machine, logged.place)
+        self._live.subject.publish(logged.time, logged.machine, LogPayload(logged.text, at.text, at.line))
+
+
+def _point(wanted: command.SetBreakpoint) -> AnyPoint:
+    condition, hits = wanted.condition, wanted.hits
+    if wanted.label is not None:
+        return LabelPoint(label=wanted.label, condition=condition, hits=hits)
+    machine = wanted.machine or ""
+    if wanted.value is not None:
+        return DataPoint(machine=machine, name=wanted.value, condition=condition)
+    line, program = wanted.line or 0, wanted.program or ""
+    return LinePoint(machine=machine, text=program, line=line, condition=condition, hits=hits, log=wanted.log)
+
+
+def _plain_value(value: Value) -> dict[str, object]:
+    return {"name": value.name, "value": value.text, "number": value.number, "settable": value.is_settable}

@@ -1,0 +1,25 @@
+"""The row of a command in the table of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from steptwin.subject.fields import TEXT, Field
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRow:
+    """A command: its name, its class, its fields, and what its answer is."""
+
+    name: str
+    kind: Callable[..., Any]
+    meaning: str
+    answer: str
+    fields: tuple[Field, ...] = ()
+
+
+MACHINE = Field("machine", TEXT, "The name of a machine.")
+NOTHING = "null"
+"""The answer of a command without a result."""

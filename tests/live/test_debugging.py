@@ -1,0 +1,307 @@
+"""The debugger of a world that goes on in real time, in the virtual time of the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+
+from steptwin.errors import Misuse, Refusal
+from steptwin.files.session import session_of
+from steptwin.files.world import World
+from steptwin.live import debugging as module
+from steptwin.live.cell import Cell
+from steptwin.live.clock import Clock
+from steptwin.live.pace import Pace
+from steptwin.live.world import LiveWorld
+from steptwin.live.world_control import WorldControl
+from steptwin.machine import MILLISECOND, SECOND
+from steptwin.subject.commands import read_command
+from steptwin.subject.events import Event
+from steptwin.subject.following import filter_of
+
+Run = Callable[..., Any]
+
+PROGRAM = b"""n = 0
+MAIN:
+    n = n + 1
+    JUMP PART
+    DELAY 0.1
+    CFGINT_IN3 = RIS
+JUMP MAIN
+
+PART:
+    OUT2 = ON
+    OUT2 = OFF
+RETURN
+
+INT_IN3:
+    OUT3 = ON
+    OUT4 = ON
+RETURN
+"""
+TEXT = '[[mic488]]\nname = "table"\nprogram = "count.prg"\nstart = true\n'
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However slow this machine is now."""
+    monkeypatch.setattr(module, "PART_S", 3600.0)
+
+
+class Rig:
+    """A live world in the virtual time of the loop, with a client that follows its debugger."""
+
+    def __init__(self, text: str = TEXT, program: bytes = PROGRAM) -> None:
+        loop = asyncio.get_running_loop()
+        self.world = World.from_toml(text, {"count.prg": program})
+        self.live = LiveWorld(self.world)
+        self.cell = Cell(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
+        self.pace = Pace(self.live, self.cell, lambda _: None, has_clients=True)
+        self.control = WorldControl(self.cell, self.live, self.pace, lambda: ["here"])
+        self.following = self.control.follow(filter_of(["stopped", "log"]), 1000)
+        self.pace.begin(1.0)
+
+    def do(self, what: str, /, **fields: object) -> Any:
+        return self.control.do(read_command(what, fields)).value
+
+    def line(self, **fields: object) -> Any:
+        return self.do("breakpoint", machine="table", program="program 0", **fields)
+
+    async def event(self) -> Event:
+        """The next one."""
+        came = asyncio.Event()
+        self.following.on_event = came.set
+        if not len(self.following):
+            await came.wait()
+        return self.following.take(1).events[0]
+
+    async def stop(self) -> tuple[str, object]:
+        payload: Any = (await self.event()).payload
+        assert payload.kind == "stopped"
+        return payload.reason, payload.line
+
+    def value(self, expression: str) -> float:
+        return self.do("evaluate", machine="table", expression=expression)["number"]
+
+
+def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
+    async def played() -> None:
+        rig = Rig()
+        await play(rig)
+        rig.following.close()
+        assert rig.live.gate is None
+        rig.pace.close()
+        rig.cell.close()
+        session = session_of(rig.world)
+        assert session.replay().trace.digest() == session.digest
+
+    run(played())
+
+
+def test_time_stops_before_the_line_of_a_breakpoint_and_goes_on(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        await asyncio.sleep(1)
+        assert rig.line(line=9)["line"] == 10
+        assert await rig.stop() == ("breakpoint", 10)
+        assert rig.pace.is_paused
+        assert rig.do("pins", machine="table")["table.OUT2"] == 0
+        stack = rig.do("stack", machine="table")
+        assert [(frame["name"], frame["line"]) for frame in stack[:2]] == [("PART", 10), ("MAIN", 5)]
+        count, now = rig.value("n"), rig.world.now
+        assert count > 5
+        await asyncio.sleep(5)
+        assert rig.world.now == now
+        rig.do("resume")
+        assert await rig.stop() == ("breakpoint", 10)
+        assert rig.value("n") == count + 1
+        assert 100 * MILLISECOND < rig.world.now - now < 110 * MILLISECOND
+
+    scene(run, play)
+
+
+def test_steps_take_as_long_as_their_statements(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        rig.line(line=4)
+        assert await rig.stop() == ("breakpoint", 4)
+        loop = asyncio.get_running_loop()
+        rig.do("step_program", machine="table", way="over")
+        assert await rig.stop() == ("step", 5)
+        begun = loop.time()
+        rig.do("step_program", machine="table", way="over")
+        assert await rig.stop() == ("step", 6)
+        assert loop.time() - begun >= 0.1
+        for line in (7, 3, 4):
+            rig.do("step_program", machine="table", way="over")
+            assert (await rig.stop())[1] == line
+        rig.do("step_program", machine="table", way="in")
+        assert await rig.stop() == ("step", 10)
+        rig.do("step_program", machine="table", way="out")
+        assert await rig.stop() == ("step", 5)
+
+    scene(run, play)
+
+
+def test_the_past_can_be_looked_at_and_gone_on_from(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        rig.line(line=3)
+        for _ in range(4):
+            assert await rig.stop() == ("breakpoint", 3)
+            rig.do("resume")
+        assert await rig.stop() == ("breakpoint", 3)
+        there, count = rig.world.now, rig.value("n")
+        rig.do("step_program", machine="table", way="back")
+        assert await rig.stop() == ("step", 7)
+        place = rig.do("debug")
+        assert place["past"]
+        assert place["present_ns"] == str(there)
+        rig.do("run", way="backwards")
+        assert await rig.stop() == ("breakpoint", 3)
+        assert rig.value("n") == count - 1
+        with pytest.raises(Misuse, match="branch"):
+            rig.do("set_value", machine="table", name="n", expression="7")
+        rig.do("run")
+        assert await rig.stop() == ("breakpoint", 3)
+        assert not rig.do("debug")["past"]
+        assert rig.world.now == there
+        rig.do("run", way="backwards")
+        await rig.stop()
+        rig.do("run")
+        await rig.stop()
+        rig.do("run")
+        assert await rig.stop() == ("breakpoint", 3)
+        assert rig.world.now > there
+        assert rig.value("n") == count + 1
+
+    scene(run, play)
+
+
+def test_a_branch_takes_the_world_back(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        rig.line(line=3)
+        await rig.stop()
+        rig.do("resume")
+        await rig.stop()
+        rig.do("run", way="backwards")
+        await rig.stop()
+        then = int(rig.do("debug")["time_ns"])
+        rig.do("branch")
+        assert await rig.stop() == ("pause", None)
+        assert rig.world.now == then
+        rig.do("set_value", machine="table", name="n", expression="40 + 2")
+        rig.do("resume")
+        await rig.stop()
+        assert rig.value("n") == 43
+
+    scene(run, play)
+
+
+def test_the_past_begins_where_debugging_began(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        await asyncio.sleep(3)
+        rig.line(line=3)
+        await rig.stop()
+        rig.do("clear_breakpoint", breakpoint=1)
+        rig.do("run", way="backwards")
+        payload: Any = (await rig.event()).payload
+        assert (payload.reason, payload.what) == ("begin", "no older moment is kept")
+        assert rig.do("debug")["begin_ns"] == rig.do("debug")["time_ns"] == str(3 * SECOND)
+        with pytest.raises(Misuse, match="the past is kept from 3000000000"):
+            rig.do("look_at", to_ns="2999999999")
+
+    scene(run, play)
+
+
+def test_inputs_from_outside_are_seen(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        watch = rig.do("breakpoint", machine="table", value="IN3")["number"]
+        label = rig.do("breakpoint", label="INT_IN3")["number"]
+        await asyncio.sleep(0.5)
+        rig.do("set", levels={"table.IN3": 1})
+        hits = []
+        for _ in range(2):
+            event = await rig.event()
+            payload: Any = event.payload
+            hits.append((payload.reason, payload.breakpoints))
+            assert rig.world.now <= 511 * MILLISECOND, "the input has a filter of 10 ms"
+            rig.do("resume")
+        assert sorted(hits) == [("data breakpoint", (watch,)), ("function breakpoint", (label,))]
+
+    scene(run, play)
+
+
+def test_a_step_of_time_ends_at_a_breakpoint(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        rig.do("pause")
+        rig.line(line=3)
+        await asyncio.sleep(0.1)
+        rig.following.take()
+        answer = rig.do("step", for_ns="10000000000")
+        assert not answer["came"]
+        assert (await rig.stop()) == ("breakpoint", 3)
+        assert rig.world.now < 200 * MILLISECOND
+        rig.do("clear_breakpoint", breakpoint=1)
+        rig.do("step", for_ns="1000000000")
+        assert (await rig.stop()) == ("pause", None)
+
+    scene(run, play)
+
+
+def test_logs_and_conditions(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        rig.line(line=3, log="n is {n}")
+        rig.line(line=5, condition="n = 3")
+        first: Any = (await rig.event()).payload
+        assert (first.words, first.line) == ("n is 0", 3)
+        assert [(await rig.event()).payload.text for _ in range(2)] == [
+            "program 0, line 3: n is 1",
+            "program 0, line 3: n is 2",
+        ]
+        assert await rig.stop() == ("breakpoint", 5)
+        assert rig.value("n") == 3
+
+    scene(run, play)
+
+
+def test_whoever_does_not_follow_is_not_stopped_for(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        number = rig.line(line=3)["number"]
+        await rig.stop()
+        rig.following.close()
+        rig.do("resume")
+        await asyncio.sleep(3)
+        assert not rig.pace.is_paused
+        with pytest.raises(Refusal, match="follow events of kind 'stopped'"):
+            rig.do("debug")
+        assert [one["number"] for one in rig.do("breakpoints")] == [number]
+        rig.following = rig.control.follow(filter_of(["stopped"]), 10)
+        rig.do("debug")
+        assert await rig.stop() == ("breakpoint", 3)
+
+    scene(run, play)
+
+
+def test_what_cannot_be_is_refused(run: Run) -> None:
+    async def play(rig: Rig) -> None:
+        for fields, message in (
+            ({"line": 3, "label": "MAIN"}, "one of line, label and value"),
+            ({"line": 3, "machine": "table"}, "line needs program"),
+            ({"label": "MAIN", "log": "x"}, "label takes no log"),
+            ({"label": "NOWHERE"}, "no label is called 'NOWHERE'"),
+            ({"line": 99, "machine": "table", "program": "program 0"}, "no statement is in line 99"),
+            ({"line": 3, "machine": "table", "program": "program 7"}, "no text 'program 7'"),
+        ):
+            with pytest.raises(Misuse, match=message):
+                rig.do("breakpoint", **fields)
+        assert rig.do("breakpoints") == []
+        with pytest.raises(Refusal, match="time goes on"):
+            rig.do("step_program", machine="table", way="in")
+        with pytest.raises(Misuse, match="no breakpoint 5"):
+            rig.do("clear_breakpoint", breakpoint=5)
+        rig.do("pause")
+        with pytest.raises(Refusal, match="at the present"):
+            rig.do("branch")
+
+    scene(run, play)
