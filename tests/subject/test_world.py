@@ -20,7 +20,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.motion.plain import read_plan
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.contract import ElementPart, SignalPart, read_description
+from steptwin.subject.contract import DrawingPart, ElementPart, SignalPart, SwitchPart, read_description
 from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import respond
 from steptwin.subject.events import Event
@@ -509,11 +509,15 @@ def test_the_description_has_the_geometry_of_axes() -> None:
 def test_elements_are_described_with_terminals_and_signals() -> None:
     world = World.from_toml(
         '[[mic488]]\nname = "a"\n[[button]]\nname = "b"\nto = "both.in2"\n[[cylinder]]\nname = "clamp"\nextend = "a.OUT1"\n'
-        'stroke = 40.0\n[[gate]]\nname = "both"\nkind = "and"\ninputs = 2\n[[wire]]\nfrom = "clamp.extended"\nto = "both.in1"\n'
+        'stroke = 40.0\n[[cylinder.switch]]\nposition = 20.0\nwidth = 2.0\nto = "a.IN3"\n'
+        '[[gate]]\nname = "both"\nkind = "and"\ninputs = 2\n[[wire]]\nfrom = "clamp.extended"\nto = "both.in1"\n'
     )
     description = describe(world)
     assert description.elements == (
         ElementPart("both", "gate", ("in1", "in2"), ("out",), ()),
-        ElementPart("clamp", "cylinder", ("extend",), ("extended", "retracted"), (SignalPart("position", "mm", 0.0, 40.0),)),
-    )
+        ElementPart(
+            "clamp", "cylinder", ("extend",), ("extended", "retracted"), (SignalPart("position", "mm", 0.0, 40.0),),
+            DrawingPart("rod", 40.0, ("position",), 0.0, (SwitchPart("a.IN3", 19.0, 21.0),)),
+        ),
+    )  # fmt: skip
     assert read_description(json.loads(json.dumps(description.plain()))) == description

@@ -105,6 +105,21 @@ class SignalPart:
 
 
 @dataclass(frozen=True, slots=True)
+class DrawingPart:
+    """How an element is drawn: a track from 0 to ``length`` mm with what moves along it."""
+
+    shape: str
+    """``rod``: the place is that of the end of a rod, which comes out of its body at 0. ``belt``: places are those of the fronts
+    of workpieces on a belt that moves away from 0."""
+    length: float
+    places: tuple[str, ...]
+    """Signals of the element, mm along the track; unknown where there is nothing."""
+    size: float
+    """Length of a body, mm: it ends so far before its place."""
+    switches: tuple[SwitchPart, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ElementPart:
     """An element around the controllers that is no axis and no button. Its terminals and signals are read as ``NAME.SIGNAL``."""
 
@@ -115,6 +130,7 @@ class ElementPart:
     outputs: tuple[str, ...]
     signals: tuple[SignalPart, ...]
     """Those that are no terminals."""
+    drawing: DrawingPart | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,12 +218,18 @@ def read_description(data: Mapping[str, Any]) -> Description:
             tuple(one["inputs"]),
             tuple(one["outputs"]),
             tuple(SignalPart(**signal) for signal in one["signals"]),
+            None if one["drawing"] is None else _read_drawing(one["drawing"]),
         )
         for one in data["elements"]
     )
     lines = tuple(LinePart(**one) for one in data["lines"])
     commands = tuple(data["commands"])
     return Description(data["name"], machines, axes, tuple(data["buttons"]), elements, lines, commands, version=data["version"])
+
+
+def _read_drawing(data: Mapping[str, Any]) -> DrawingPart:
+    switches = tuple(SwitchPart(**switch) for switch in data["switches"])
+    return DrawingPart(data["shape"], data["length"], tuple(data["places"]), data["size"], switches)
 
 
 def _read_control(data: Mapping[str, Any]) -> ControlDescription:

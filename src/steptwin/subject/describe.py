@@ -5,11 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.contract import Description, ElementPart, LinePart, MachinePart, MechanicsPart, SignalPart, SwitchPart
+from steptwin.subject.contract import (
+    Description,
+    DrawingPart,
+    ElementPart,
+    LinePart,
+    MachinePart,
+    MechanicsPart,
+    SignalPart,
+    SwitchPart,
+)
 from steptwin.subject.controls import controls_of
+from steptwin.world.drawing import Drawing, SensorZone
+from steptwin.world.elements import ELEMENTS
 from steptwin.world.elements.axis import AXIS, MECHANICS
 from steptwin.world.elements.button import BUTTON
-from steptwin.world.elements.switch import SwitchSpec
 from steptwin.world.kind import Terminals
 from steptwin.world.plant import Plant
 
@@ -40,31 +50,32 @@ def _mechanics(world: Plant, name: str) -> MechanicsPart:
     place = fitted.mechanism.machine, str(fitted.mechanism.number)
     points = tuple(f"{name}.{what}" for what in MECHANICS)
     spec = fitted.spec
-    switches = tuple(_switch(one) for one in spec.switches)
+    switches = tuple(_switch(one.zone) for one in spec.switches)
     scale = fitted.mechanism.build.sign * float(fitted.scale.pulses_per_unit)
     return MechanicsPart(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale)
 
 
 def _elements(world: Plant) -> Iterator[ElementPart]:
     for kind, built in world.parts.elements.items():
-        if kind in (AXIS.name, BUTTON.name):
-            continue
-        for name in built:
-            terminals = world.parts.terminals.get(name, Terminals())
-            inputs = tuple(pin.lower() for pin in (*terminals.digital_inputs, *terminals.analog_inputs))
-            outputs = tuple(pin.lower() for pin in terminals.outputs)
-            signals = world.parts.element_signals(name) or {}
-            others = tuple(
-                SignalPart(signal, of.unit, *(of.bounds or (None, None)))
-                for signal, of in signals.items()
-                if signal not in (*inputs, *outputs)
-            )
-            yield ElementPart(name, kind, inputs, outputs, others)
+        if kind not in (AXIS.name, BUTTON.name):
+            yield from (_element(world, kind, name) for name in built)
 
 
-def _switch(spec: SwitchSpec) -> SwitchPart:
-    pin = ".".join(spec.target)
-    if spec.position is None:
-        return SwitchPart(pin, spec.above, spec.below)
-    half = spec.width / 2
-    return SwitchPart(pin, spec.position - half, spec.position + half, spec.period)
+def _element(world: Plant, kind: str, name: str) -> ElementPart:
+    drawn = ELEMENTS[kind].drawing
+    drawing = None if drawn is None else _drawing(drawn(world.parts.elements[kind][name]))
+    terminals = world.parts.terminals.get(name, Terminals())
+    inputs = tuple(pin.lower() for pin in (*terminals.digital_inputs, *terminals.analog_inputs))
+    outputs = tuple(pin.lower() for pin in terminals.outputs)
+    signals = world.parts.element_signals(name) or {}
+    others = {signal: of for signal, of in signals.items() if signal not in (*inputs, *outputs)}
+    parts = tuple(SignalPart(signal, of.unit, *(of.bounds or (None, None))) for signal, of in others.items())
+    return ElementPart(name, kind, inputs, outputs, parts, drawing)
+
+
+def _drawing(drawing: Drawing) -> DrawingPart:
+    return DrawingPart(drawing.shape, drawing.length, drawing.places, drawing.size, tuple(map(_switch, drawing.sensors)))
+
+
+def _switch(zone: SensorZone) -> SwitchPart:
+    return SwitchPart(".".join(zone.target), zone.low, zone.high, zone.period)

@@ -17,6 +17,7 @@ from steptwin.world.sense import TableRows
 from steptwin.world.tomlplaces import Path
 
 if TYPE_CHECKING:
+    from steptwin.world.drawing import Drawing
     from steptwin.world.kind import Terminals
     from steptwin.world.signals import SignalOf
     from steptwin.world.site import Site
@@ -80,6 +81,8 @@ class Element(Generic[S, B]):
     """Its own inputs and outputs, as pins of a machine: others join ``NAME.TERMINAL``. `Site.board` has their levels."""
     signals: Callable[[B], Mapping[str, SignalOf]] | None = None
     """Signals for conditions, by name. Exactly the elements with a ``name`` have signals."""
+    drawing: Callable[[B], Drawing] | None = None
+    """How it is drawn, where there is more to see than levels and numbers."""
     lanes: Callable[[S], tuple[str, ...]]
     """Subjects of the edges that it records in traces."""
     faults: tuple[FaultKind, ...] = ()

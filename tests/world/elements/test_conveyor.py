@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,6 +49,22 @@ def test_a_workpiece_is_carried_past_a_sensor() -> None:
     assert edges(world, "belt.sensor1") == [(0, 0), (2400, 1), (2720 + 1e-6, 0)]
     assert happened(world) == [(0, "belt.1 is on belt"), (3200, "belt.1 leaves belt")]
     assert [world.read(f"belt.{name}") for name in ("fed", "count", "delivered")] == [1, 0, 1]
+
+
+def test_the_places_of_workpieces_are_signals_but_no_conditions() -> None:
+    world = World.from_toml(TEXT)
+    world.mic488["a"].write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.run(until=1.0)
+    world.press("feeder", "10 ms")
+    world.run(until=2.0)
+    assert [world.read(f"belt.place{n}") for n in (1, 2)] == [250.0, 125.0]
+    assert isnan(world.read("belt.place3"))
+    # The first leaves at 400 mm; the second is the first then.
+    world.run(until=3.4)
+    assert world.read("belt.place1") == 300.0
+    with pytest.raises(Misuse, match="conditions need a sensor"):
+        world.run(until="belt.place1 > 350")
 
 
 def integrated(runs: list[tuple[int, bool]], feeds: list[int], end: int) -> tuple[list[tuple[int, bool]], int]:

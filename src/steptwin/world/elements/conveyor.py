@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from math import floor
+from math import ceil, floor, nan
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -19,6 +19,7 @@ from steptwin.world.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_
 from steptwin.world.board import Board
 from steptwin.world.chance import Chance
 from steptwin.world.contacts import Circuit, Contact
+from steptwin.world.drawing import BELT, Drawing, SensorZone
 from steptwin.world.element import Reference, Table
 from steptwin.world.elements.axis import AXIS, find_axis
 from steptwin.world.elements.contact import CONTACT_KEYS
@@ -36,6 +37,8 @@ from steptwin.world.tomlplaces import Path
 from steptwin.world.values import INPUT_PIN, OUTPUT_PIN, NameOf, number, positive_time
 
 RUN, FEED = "RUN", "FEED"
+MOST_PLACES = 24
+"""Limit of the workpieces of a conveyor whose places are signals."""
 PICOMETRES = 10**9
 """In a millimetre: places of a belt that no axis moves."""
 
@@ -201,6 +204,12 @@ class Conveyor(BoardPart):
         self.load.take(piece)
         self.board.kernel.mark()
 
+    def front(self, number: int, now: Nanos) -> float:
+        """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
+        there are fewer."""
+        pieces = self.load.pieces
+        return float((self.drive.place(now) - pieces[number].origin) / self.per_mm) if number < len(pieces) else nan
+
     def report(self, text: str, name: str, what: str) -> None:
         """Something has happened to a workpiece."""
         kernel = self.board.kernel
@@ -340,9 +349,29 @@ def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> 
     kernel.add_part(Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane))
 
 
+def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
+    """Signals with the places of as many workpieces as there is room for."""
+    return tuple(f"place{n + 1}" for n in range(min(MOST_PLACES, ceil(spec.length / spec.workpiece) + 1)))
+
+
+def _drawing(conveyor: Conveyor) -> Drawing:
+    spec = conveyor.spec
+    sensors = tuple(SensorZone(sensor.target, sensor.at, sensor.at) for sensor in spec.sensors)
+    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece, sensors)
+
+
+def _refuse_place() -> None:
+    raise Misuse("the place of a workpiece can be watched, but conditions need a sensor: [[conveyor.sensor]]")
+
+
 def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
     kernel = (conveyor.board.kernel,)
+    places = {
+        name: SignalOf(kernel, partial(conveyor.front, n), unit="mm", bounds=(0.0, conveyor.spec.length), check=_refuse_place)
+        for n, name in enumerate(_place_names(conveyor.spec))
+    }
     return {
+        **places,
         "count": SignalOf(kernel, lambda now: float(len(conveyor.load.pieces))),
         "fed": SignalOf(kernel, lambda now: float(conveyor.fed)),
         "delivered": SignalOf(kernel, lambda now: float(conveyor.delivered)),
@@ -365,6 +394,7 @@ CONVEYOR = with_terminals(
     ),
     make=_make,
     signals=_signals,
+    drawing=_drawing,
     connect=_connect,
     faults=(
         FaultKind(

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.world.board import Board
+from steptwin.world.drawing import ROD, Drawing
 from steptwin.world.element import Reference
 from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Inner, Joint, with_terminals
 from steptwin.world.elements.switch import SWITCH, SwitchSpec, lane_of, put_switch, read_switches, zone_of
@@ -123,6 +124,10 @@ class Cylinder(BoardPart):
     def stroke(self) -> float:
         return self._spec.stroke
 
+    @property
+    def drawing(self) -> Drawing:
+        return Drawing(ROD, self.stroke, ("position",), sensors=tuple(one.zone for one in self._spec.switches))
+
     def position(self, now: Nanos) -> float:
         """In units of the stroke, 0 retracted."""
         return self._spec.stroke * (self.travel.place(now) / self.travel.full)
@@ -185,6 +190,7 @@ CYLINDER = with_terminals(
     ),
     make=lambda spec, site: Cylinder(site.board(spec.name), spec),
     signals=_signals,
+    drawing=lambda cylinder: cylinder.drawing,
     faults=(
         STUCK_OUTPUT,
         FaultKind(

@@ -12,6 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.state import Stateful
 from steptwin.world.board import Board
+from steptwin.world.drawing import Drawing
 from steptwin.world.element import Element, NamedSpec, Reference, Row, Table
 from steptwin.world.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.world.faults.table import ElementEffect, Parameter, ParameterForm, whole
@@ -134,10 +135,11 @@ def with_terminals(
     faults: Sequence[FaultKind] = (),
     inner: Inner[S, P] | None = None,
     connect: Callable[[S, P, Site], None] | None = None,
+    drawing: Callable[[P], Drawing] | None = None,
 ) -> Element[S, P]:
     """An element with a name and terminals. Each terminal is a signal, each output a lane.
 
-    ``signals`` are those besides. ``connect`` is as in `Element`.
+    ``signals`` are those besides. ``connect`` and ``drawing`` are as in `Element`.
     """
 
     def read(text: TomlText, row: Row, table: Table) -> S:
@@ -182,6 +184,7 @@ def with_terminals(
         connect=connect,
         terminals=lambda found: found.terminals,
         signals=all_signals,
+        drawing=drawing,
         lanes=lambda found: (
             *(f"{found.name}.{output.lower()}" for output in found.terminals.outputs),
             *(() if inner is None else inner.lanes(found)),

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from steptwin.machine import Nanos
 from steptwin.world.contacts import Carriage, Switch, Zone
+from steptwin.world.drawing import SensorZone
 from steptwin.world.element import Table
 from steptwin.world.elements.contact import CONTACT_KEYS
 from steptwin.world.kernel import Kernel
@@ -37,6 +38,14 @@ class SwitchSpec:
     bounce: Nanos
     bounces: int
     path: Path = ()
+
+    @property
+    def zone(self) -> SensorZone:
+        """Where it is on, as it is drawn."""
+        if self.position is None:
+            return SensorZone(self.target, self.above, self.below)
+        half = self.width / 2
+        return SensorZone(self.target, self.position - half, self.position + half, self.period)
 
 
 SWITCH = TableRows(

@@ -333,6 +333,18 @@ export type Description = {
       low: number | null;
       high: number | null;
     })[];
+    drawing: {
+      shape: string;
+      length: number;
+      places: string[];
+      size: number;
+      switches: ({
+        pin: string;
+        low: number | null;
+        high: number | null;
+        period: number | null;
+      })[];
+    } | null;
   })[];
   lines: ({
     name: string;

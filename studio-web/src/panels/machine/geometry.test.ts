@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Mechanics } from "../../lib/state/model";
-import { trackOf, zonesOf } from "./geometry";
+import { bodyOf, trackOf, zonesOf } from "./geometry";
 
 const axis = (more: Partial<Mechanics>): Mechanics =>
   ({ name: "x", unit: "mm", kind: "linear", travel: null, switches: [], ...more }) as Mechanics;
@@ -21,7 +21,7 @@ test("zones without an end go to the end of the track", () => {
     { pin: "a.IN1", low: null, high: 0, period: null },
     { pin: "a.IN2", low: 75, high: null, period: null },
   ];
-  expect(zonesOf(axis({ switches }), { low: -100, high: 100, hasStops: true })).toEqual([
+  expect(zonesOf(switches, { low: -100, high: 100, hasStops: true })).toEqual([
     { pin: "a.IN1", from: 0, to: 0.5 },
     { pin: "a.IN2", from: 0.875, to: 1 },
   ]);
@@ -29,7 +29,13 @@ test("zones without an end go to the end of the track", () => {
 
 test("marks come again", () => {
   const switches = [{ pin: "a.IN1", low: 0, high: 1, period: 10 }];
-  expect(zonesOf(axis({ switches }), { low: 0, high: 40, hasStops: true }).map(({ from }) => from)).toEqual([
+  expect(zonesOf(switches, { low: 0, high: 40, hasStops: true }).map(({ from }) => from)).toEqual([
     0, 0.25, 0.5, 0.75, 1,
   ]);
+});
+
+test("a rod comes out of its body, a workpiece ends behind its front", () => {
+  expect(bodyOf({ shape: "rod", length: 60, size: 0 }, 15)).toEqual([0, 0.25]);
+  expect(bodyOf({ shape: "belt", length: 400, size: 40 }, 200)).toEqual([0.4, 0.5]);
+  expect(bodyOf({ shape: "belt", length: 400, size: 40 }, 20)).toEqual([0, 0.05]);
 });

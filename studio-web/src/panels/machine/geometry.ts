@@ -1,5 +1,7 @@
 import type { Mechanics } from "../../lib/state/model";
 
+export type Sensor = Mechanics["switches"][number];
+
 export interface Zone {
   /** Fractions of the track. */
   from: number;
@@ -26,7 +28,7 @@ export function trackOf({ travel, switches }: Mechanics, seen: readonly [number,
 }
 
 /** Where switches are on, on a track; a mark that comes again as often as it does there. */
-export function zonesOf({ switches }: Mechanics, { low, high }: Track): Zone[] {
+export function zonesOf(switches: readonly Sensor[], { low, high }: Track): Zone[] {
   const MOST = 200;
   const part = (place: number) => Math.min(1, Math.max(0, (place - low) / (high - low)));
   return switches.flatMap(({ pin, low: from, high: to, period }): Zone[] => {
@@ -45,4 +47,13 @@ export function zonesOf({ switches }: Mechanics, { low, high }: Track): Zone[] {
 /** Places around a dial, in turns. */
 export function turnOf(unit: string): number {
   return unit === "degree" ? 360 : 1;
+}
+
+/** Where a body is drawn, from and to as fractions of the track. */
+export function bodyOf(
+  { shape, length, size }: { shape: string; length: number; size: number },
+  place: number,
+): [number, number] {
+  const part = (at: number) => Math.min(1, Math.max(0, at / length));
+  return [shape === "rod" ? 0 : part(place - size), part(place)];
 }

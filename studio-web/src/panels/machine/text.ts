@@ -5,6 +5,9 @@ export const t = texts(
     title: "Machine",
     none: "The description of this world has no mechanics.",
     position: "{axis} place",
+    counted: "counted",
+    countedHelp:
+      "The position that the controller counts. Its zero is where it was homed or set, that of the drawing is the zero of the mechanics.",
     lost: "{count} steps lost",
     stalled: "stalled",
     press: "Press {button}",
@@ -24,6 +27,9 @@ export const t = texts(
     title: "Maszyna",
     none: "Opis tego świata nie ma mechaniki.",
     position: "położenie {axis}",
+    counted: "licznik",
+    countedHelp:
+      "Pozycja liczona przez sterownik. Jej zero jest tam, gdzie oś bazowano lub ustawiono; zero rysunku to zero mechaniki.",
     lost: "zgubione kroki: {count}",
     stalled: "utyk",
     press: "Naciśnij {button}",
