@@ -151,3 +151,34 @@ def test_files_in_other_encodings(run: Run, tmp_path: Path) -> None:
         file = tmp_path / f"{encoding}.txt"
         file.write_bytes("R ; zpět".replace("ě", "é").encode(encoding))
         assert run(file)[0] == 0
+
+
+def test_a_world_is_checked_with_its_files(run: Run, program: Callable[..., Path]) -> None:
+    file = program('[[mic488]]\nname = "a"\nprogram = "a.prg"\n[[axis]]\nname = "x"\ndrive = "b.M1"\n', "w.toml")
+    program("M1 = ON\nMOVE M1\n", "a.prg")
+    code, out, _ = run(file)
+    assert code == 1
+    assert f"{file}:1:1: error D010: a file has errors: {file.parent / 'a.prg'}:2:1: error W137: WBC has no MOVE" in out
+    assert f"{file}:6:1: error D009: nothing is called 'b'" in out
+    assert out.endswith(f"{file}: 2 errors, 0 warnings\n")
+    sound = program('[[mic488]]\nname = "a"\n', "sound.toml")
+    assert run(sound) == (0, f"{sound}: 0 errors, 0 warnings\n", "")
+    outside = program('[[mic488]]\nname = "a"\nprogram = "../a.prg"\n', "outside.toml")
+    assert "../a.prg is outside the folder of the description" in run(outside)[1]
+
+
+def test_a_position_table_is_checked(run: Run, program: Callable[..., Path]) -> None:
+    file = program("PICK;1;2;3;4\nPICK;1;2;x;x\n", "t.csv")
+    code, out, _ = run(file)
+    assert (code, out.splitlines()[-1]) == (1, "2 positions")
+    assert f"{file}:2:1: error W152: PICK is already the name of row 0" in out
+    assert run(file, "--variant", "B")[2] == "steptwin: --variant is not for position tables\n"
+
+
+def test_a_configuration_is_checked(run: Run, program: Callable[..., Path]) -> None:
+    file = program("[Axis0]\nGear=100\nAcc=-1\n", "t.cfg")
+    code, out, _ = run(file, "--json")
+    data = json.loads(out)
+    assert (data["language"], data["firmware"]) == ("config", "1.70")
+    assert [(one["line"], one["severity"]) for one in data["diagnostics"] if one["line"] == 3] == [(3, "error")]
+    assert code == 1

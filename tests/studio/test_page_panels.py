@@ -509,7 +509,7 @@ def test_the_program_shows_the_line_it_is_at(start_studio: Callable[..., Process
     expect(now).to_have_count(1)
     shown = now.inner_text()
     expect(now).not_to_have_text(shown)  # it goes on
-    expect(page.get_by_role("row", name=re.compile("^place"))).to_be_visible()
+    expect(page.get_by_role("row", name=re.compile("^done"))).to_be_visible()
     button(page, "Stop the program of table").click()
     until(lambda: studio.master.words(10003)[0] == 0, "the master sees that it has stopped")
     expect(now).to_have_count(0)
@@ -527,6 +527,7 @@ def test_the_machine_is_drawn_and_its_button_pressed(start_studio: Callable[...,
     expect(place).not_to_have_text("–")
     shown = place.inner_text()
     expect(place).not_to_have_text(shown)  # the program moves it
+    expect(page.get_by_label("infeed, conveyor").locator(".belt").first).to_be_visible()  # a workpiece
     press = button(page, "Press part")
     press.hover()
     page.mouse.down()

@@ -122,7 +122,7 @@ class World(Plant):
         files: dict[str, bytes] = {}
         for name, key in spec.files():
             try:
-                files[name] = read_bytes(_beside(place.parent, name, allow_outside=allow_outside))
+                files[name] = read_beside(place.parent, name, allow_outside=allow_outside)
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
         where = None if state is None else Path(state)
@@ -314,6 +314,11 @@ def _revived(kind: type[World], name: str, snapshot: PlantSnapshot, keep_inputs:
     world = kind(read_world(name, text, seed, overrides), files, keep_inputs=keep_inputs)
     world.restore(snapshot)
     return world
+
+
+def read_beside(folder: Path, name: str, *, allow_outside: bool = False) -> bytes:
+    """A file that a description in this folder names. Raises `Misuse` for one elsewhere, or that cannot be read."""
+    return read_bytes(_beside(folder, name, allow_outside=allow_outside))
 
 
 def _beside(folder: Path, name: str, *, allow_outside: bool) -> Path:

@@ -1,11 +1,13 @@
-// The demo machine takes parts on one side of the table and lays them down in a row on the other.
+// The demo machine takes workpieces off one conveyor with a suction cup and puts them on another.
 
-#gripper OUT1
+#ejector OUT1
 #busy OUT2
+#infeed OUT3
+#outfeed OUT4
+#isHeld IN10
+#isThere IN11
 #up 5
 #down 45
-#gripTime 0,3
-#pitch 30
 
 M1 = ON
 M2 = ON
@@ -18,31 +20,30 @@ WAITPOS
 HOME M1 -60
 HOME M2 -60
 WAITPOS
+outfeed = ON
+SET done = 0
 
 MAIN:
-SET place = 0
-WHILE place < 5
-    busy = ON
+    infeed = ON
     PABS M1 30
     PABS M2 130
+    WAIT isThere = ON
+    infeed = OFF
     WAITPOS
+    busy = ON
     JUMP LOWER
-    gripper = ON
-    DELAY gripTime
+    ejector = ON
+    WAIT isHeld = ON
     JUMP RAISE
-    SET target = place * pitch
-    target = target + 90
-    PABS M1 target
+    PABS M1 210
     PABS M2 40
     WAITPOS
     JUMP LOWER
-    gripper = OFF
-    DELAY gripTime
+    ejector = OFF
+    WAIT isHeld = OFF
     JUMP RAISE
     busy = OFF
-    place = place + 1
-    DELAY 1
-ENDWHILE
+    done = done + 1
 JUMP MAIN
 
 LOWER:

@@ -14,10 +14,10 @@ from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import Completions, DocumentLink, Fold, Hover, OutlineItem, SemanticToken, TokenKind
 from steptwin.lsp.files import name_of, relative
 from steptwin.lsp.positions import LineIndex
-from steptwin.lsp.world.check import diagnose
 from steptwin.lsp.world.items import ItemBuilder, keys_of
 from steptwin.lsp.world.outline import Outline, Table
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
+from steptwin.world.check import diagnose
 from steptwin.world.elements import ELEMENTS
 from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS

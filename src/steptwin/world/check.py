@@ -1,4 +1,4 @@
-"""Everything that is wrong with a world: as it is said when the world is started."""
+"""All errors in the description of a world and in the files that it names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steptwin.world.plant import Plant
 from steptwin.world.reader import WorldError
 
 LONGEST_MESSAGE = 500
-"""What is wrong with a program that a world names can be long; the program says it itself."""
+"""Limit of a message, in characters: the errors in a program that a description names are many, and shown in the program too."""
 
 
 def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Sequence[Diagnostic]:
