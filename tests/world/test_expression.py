@@ -3,7 +3,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
@@ -13,6 +13,8 @@ from steptwin.world.expression import SignalCondition, crossing, names, parse
 
 
 class Level:
+    unit = ""
+
     def __init__(self, value: float) -> None:
         self.level = value
         self.continuous = False
@@ -34,10 +36,11 @@ class Moving:
     """The count or velocity of a profile that goes there and back."""
 
     continuous = True
+    unit = "mm"
 
-    def __init__(self, *, velocity: bool = False) -> None:
-        out = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 200.0, 300.0, 80.0)
-        self.profile = plan_position(MotionState.of(out, SECOND // 2), -40, 200.0, 300.0, 80.0)
+    def __init__(self, *, velocity: bool = False, first: int = 100, then: int = -40) -> None:
+        out = plan_position(MotionState(0, 0, 0.0, 0.0), first, 200.0, 300.0, 80.0)
+        self.profile = plan_position(MotionState.of(out, SECOND // 2), then, 200.0, 300.0, 80.0)
         self.velocity = velocity
 
     def bring(self, now: Nanos) -> tuple[object, ...]:
@@ -94,11 +97,14 @@ def test_conditions(text: str, truth: bool) -> None:
         ("(a", r"ends too early: expected '\)'"),
         ("3", "expected one of == != <= >= < >"),
         ("a = 3", "column 3: found '=', expected the end"),
-        ("a + 3", r"column 3: found '\+', expected the end"),
+        ("a + 3", "ends too early: expected one of == != <= >= < >"),
+        ("a + 3 and b", "found 'and', expected one of == != <= >= < >"),
+        ("a > 3 +", "ends too early: expected a signal or a number"),
+        ("abs(a > 3", "found '>', expected '\\)'"),
         ("__import__('os')", r"found '\(', expected"),
         ("not", "ends too early"),
         ("a < and", "found 'and', expected a signal or a number"),
-        ("- a", "found 'a', expected a number"),
+        ("- a", "ends too early: expected one of"),
         ("not " * 3000 + "a", "'not' and parentheses are nested more than 64 deep"),
         ("(" * 3000 + "a" + ")" * 3000, "'not' and parentheses are nested more than 64 deep"),
     ],
@@ -108,9 +114,77 @@ def test_what_is_no_condition_is_misuse(text: str, message: str) -> None:
         parse(text)
 
 
-def test_two_moving_signals_cannot_be_compared() -> None:
-    with pytest.raises(Misuse, match=r"x\.position and x\.velocity both move: compare with a number"):
-        SignalCondition("x.position > x.velocity", SIGNALS.__getitem__)
+@pytest.mark.parametrize(
+    ("text", "truth"),
+    [
+        ("a + b == 1", True),
+        ("2 * a - 3 * (b - 1) > 4.5", True),
+        ("-a < -0.5 and abs(b - a) == 1", True),
+        ("(a + 1) / 4 == 0.5", True),
+        ("a / b > 1e300", True),
+        ("b / b == 1", False),
+        ("(a > 0.5) and (b + 1 > 0.5)", True),
+        ("x.position == 2.4 cm and x.position < 25 mm", True),
+        ("m.M1.position - 2 * 21 == 0", True),
+    ],
+)
+def test_conditions_calculate(text: str, truth: bool) -> None:
+    assert SignalCondition(text, SIGNALS.__getitem__).holds(SECOND // 2) is truth
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x.position > 3 s", "condition 'x.position > 3 s': 3 s is compared with 'mm'"),
+        ("a > 3 mm", "3 mm is compared with what has no unit"),
+    ],
+)
+def test_units_have_to_fit(text: str, message: str) -> None:
+    with pytest.raises(Misuse, match=message):
+        SignalCondition(text, SIGNALS.__getitem__)
+
+
+def test_units_are_converted() -> None:
+    condition = SignalCondition("x.position >= 3 cm", SIGNALS.__getitem__)
+    due = condition.due(SECOND // 2)
+    assert due is not None
+    assert [Moving().value(due - 1), Moving().value(due)] == [29, 30]
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(
+        ["{x} - {y} > {n}", "abs({x} - {y}) >= {n}", "{x} + 2 * {y} < {n}", "{x} * {y} == {n}", "{x} / 3 > {y} + {n}"]
+    ),
+    st.integers(-60, 60),
+    st.integers(SECOND // 2, 3 * SECOND),
+    st.booleans(),
+)
+def test_a_comparison_of_moving_signals_changes_at_the_first_moment(form: str, n: int, now: Nanos, same: bool) -> None:
+    text = form.format(x="x.position", y="x.velocity" if same else "y.position", n=n)
+    signals = {**SIGNALS, "y.position": Moving(first=40, then=90)}
+    condition = SignalCondition(text, signals.__getitem__)
+    before, due = condition.holds(now), condition.due(now)
+    if before:
+        assert due == now
+        return
+    end = due if due is not None else 4 * SECOND
+    assert due is None or due > now
+    assert not any(condition.holds(now + (end - 1 - now) * step // 400) for step in range(401) if end > now)
+    # The moment is one at which a side of the comparison changes, so it may hold there.
+    if due is not None:
+        found = next_true(condition, now)
+        assert found is None or not condition.holds(found - 1)
+
+
+def next_true(condition: SignalCondition, now: Nanos) -> Nanos | None:
+    """The moment at which it holds, looking again at each moment at which it may."""
+    for _ in range(1000):
+        due = condition.due(now)
+        if due is None or condition.holds(due):
+            return due
+        now = due
+    return None
 
 
 def test_the_signals_of_a_condition_are_known() -> None:

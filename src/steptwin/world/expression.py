@@ -3,17 +3,17 @@
     condition   = conjunction { "or" conjunction }
     conjunction = negation { "and" negation }
     negation    = "not" negation | "(" condition ")" | comparison
-    comparison  = operand [ ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) operand ]
-    operand     = number | signal
+    comparison  = sum [ ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum ]
 
-A signal alone is true if it is not 0. Names of signals, such as ``table.M1.position``, ``table.hr:10020`` and
-``table.USER_REGISTER[12]:real``, are resolved by `Signals`.
+Sums of numbers and signals are those of `steptwin.world.quantities`. A signal alone is true if it is not 0. Names of signals,
+such as ``table.M1.position``, ``table.hr:10020`` and ``table.USER_REGISTER[12]:real``, are resolved by `Signals`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from operator import eq, ge, gt, le, lt, ne
@@ -22,13 +22,15 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.points import FARTHEST_NS
+from steptwin.world.quantities import UNIT_NAMES, Absolute, NumberLiteral, Product, Quantity, SignalName, Sum, next_change
 
 MOST_NESTED = 64
 """Limit of nesting, because the parser is recursive."""
 
 _COMPARE: dict[str, Callable[[float, float], bool]] = {"==": eq, "!=": ne, "<=": le, ">=": ge, "<": lt, ">": gt}
+_WORDS = ("and", "or", "not")
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][\w&-]*(?:\.[\w&-]+(?:\[\d+\])?(?::\w+)*)*)|(?P<sign>[=!<>]=|[<>()-])|(?P<wrong>\S))"
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][\w&-]*(?:\.[\w&-]+(?:\[\d+\])?(?::\w+)*)*)|(?P<sign>[=!<>]=|[<>()+*/-])|(?P<wrong>\S))"
 )
 
 
@@ -37,6 +39,8 @@ class Signal(Protocol):
 
     @property
     def continuous(self) -> bool: ...
+    @property
+    def unit(self) -> str: ...
     def bring(self, now: Nanos) -> tuple[Any, ...]:
         """Prepare the value at ``now``. Returns what it depends on: until one of these changes, it follows its course."""
         ...
@@ -56,20 +60,10 @@ Signals: TypeAlias = Callable[[str], Signal]
 
 
 @dataclass(frozen=True, slots=True)
-class NumberLiteral:
-    value: float
-
-
-@dataclass(frozen=True, slots=True)
-class SignalName:
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class SignalComparison:
-    left: NumberLiteral | SignalName
+    left: Quantity
     sign: str
-    right: NumberLiteral | SignalName
+    right: Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +92,8 @@ def parse(text: str) -> Node:
 def names(node: Node) -> Iterator[str]:
     """The signals of a condition."""
     if isinstance(node, SignalComparison):
-        yield from (side.text for side in (node.left, node.right) if isinstance(side, SignalName))
+        yield from node.left.names()
+        yield from node.right.names()
     elif isinstance(node, Not):
         yield from names(node.inner)
     else:
@@ -147,49 +142,106 @@ class _Parser:
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 
     def _negation(self) -> Node:
-        if self._peek().lower() in ("not", "("):
-            self._depth += 1
-            if self._depth > MOST_NESTED:
-                raise Misuse(f"condition {self._text[:40]!r}...: 'not' and parentheses are nested more than {MOST_NESTED} deep")
-            node = self._nested()
-            self._depth -= 1
-            return node
-        left = self._operand()
+        if self._peek().lower() == "not" or (self._peek() == "(" and self._is_condition()):
+            with self._deeper():
+                return self._nested()
+        left = self._sum()
         if self._peek() in _COMPARE:
             sign = self._peek()
             self._at += 1
-            return SignalComparison(left, sign, self._operand())
-        if isinstance(left, NumberLiteral):
+            return SignalComparison(left, sign, self._sum())
+        if left != SignalName(next(left.names(), "")):
             raise self._wrong(f"one of {' '.join(_COMPARE)}")
         return SignalComparison(left, "!=", NumberLiteral(0.0))
+
+    @contextmanager
+    def _deeper(self) -> Generator[None]:
+        self._depth += 1
+        if self._depth > MOST_NESTED:
+            raise Misuse(f"condition {self._text[:40]!r}...: 'not' and parentheses are nested more than {MOST_NESTED} deep")
+        yield
+        self._depth -= 1
+
+    def _is_condition(self) -> bool:
+        """Whether the parentheses that begin here have a condition in them, no sum."""
+        depth = 0
+        for _, text, _ in self._tokens[self._at :]:
+            depth += (text == "(") - (text == ")")
+            if depth == 0:
+                return False
+            if text in _COMPARE or text.lower() in _WORDS:
+                return True
+        return True
 
     def _nested(self) -> Node:
         if self._accept("not"):
             return Not(self._negation())
         self._accept("(")
         node = self._condition()
-        if not self._accept(")"):
-            raise self._wrong("')'")
+        self._close()
         return node
 
-    def _operand(self) -> NumberLiteral | SignalName:
-        minus = self._accept("-")
-        if self._at < len(self._tokens):
-            kind, text, _ = self._tokens[self._at]
-            if kind == "number":
-                self._at += 1
-                return NumberLiteral(-float(text) if minus else float(text))
-            if kind == "name" and not minus and text.lower() not in ("and", "or", "not"):
-                self._at += 1
-                return SignalName(text)
-        raise self._wrong("a number" if minus else "a signal or a number")
+    def _close(self) -> None:
+        if not self._accept(")"):
+            raise self._wrong("')'")
+
+    def _sum(self) -> Quantity:
+        found = self._product()
+        while self._peek() in ("+", "-"):
+            sign = 1 if self._accept("+") else -1
+            if sign < 0:
+                self._accept("-")
+            found = Sum(found, sign, self._product())
+        return found
+
+    def _product(self) -> Quantity:
+        found = self._factor()
+        while self._peek() in ("*", "/"):
+            divides = not self._accept("*")
+            if divides:
+                self._accept("/")
+            found = Product(found, self._factor(), divides)
+        return found
+
+    def _factor(self) -> Quantity:
+        if self._accept("-"):
+            with self._deeper():
+                inner = self._factor()
+            return inner.negative()
+        if self._accept("("):
+            with self._deeper():
+                inner = self._sum()
+            self._close()
+            return inner
+        if self._at == len(self._tokens):
+            raise self._wrong("a signal or a number")
+        kind, text, _ = self._tokens[self._at]
+        if kind == "number":
+            self._at += 1
+            return NumberLiteral(float(text), self._unit())
+        if kind != "name" or text.lower() in _WORDS:
+            raise self._wrong("a signal or a number")
+        self._at += 1
+        if text.lower() == "abs" and self._accept("("):
+            with self._deeper():
+                inner = self._sum()
+            self._close()
+            return Absolute(inner)
+        return SignalName(text)
+
+    def _unit(self) -> str:
+        """The unit after a number."""
+        if self._peek() not in UNIT_NAMES:
+            return ""
+        self._at += 1
+        return self._tokens[self._at - 1][1]
 
 
 class _Crossing(NamedTuple):
     """The moment at which a signal crosses a level; computed again at ``until``."""
 
     version: object
-    level: float
+    level: object
     due: Nanos | None
     until: Nanos
 
@@ -200,10 +252,11 @@ class SignalCondition:
     __slots__ = ("_comparisons", "_crossings", "_node", "_signals", "text")
 
     def __init__(self, text: str, signals: Signals) -> None:
-        """Raises `Misuse` for invalid text, and for a comparison of two continuous signals."""
+        """Raises `Misuse` for invalid text, for unknown signals, and for a number in a unit that its signals do not have."""
         self.text = text
-        self._node = parse(text)
-        self._signals = {name: signals(name) for name in names(self._node)}
+        node = parse(text)
+        self._signals = {name: signals(name) for name in names(node)}
+        self._node = self._converted(node)
         self._comparisons = list(self._moving(self._node))
         self._crossings: list[_Crossing | None] = [None] * len(self._comparisons)
         """The crossings computed last."""
@@ -227,24 +280,33 @@ class SignalCondition:
             return all(self._holds(part, now) for part in node.parts)
         return any(self._holds(part, now) for part in node.parts)
 
-    def _value(self, side: NumberLiteral | SignalName, now: Nanos) -> float:
-        return side.value if isinstance(side, NumberLiteral) else self._signals[side.text].value(now)
+    def _value(self, side: Quantity, now: Nanos) -> float:
+        return side.value(lambda name: self._signals[name].value(now))
 
-    def _moving(self, node: Node) -> Iterator[tuple[Signal, NumberLiteral | SignalName]]:
-        """The comparisons with a continuous signal: that signal, and the other operand."""
+    def _converted(self, node: Node) -> Node:
+        """With all numbers in the units of the signals that they are compared with."""
+        if isinstance(node, Not):
+            return Not(self._converted(node.inner))
+        if not isinstance(node, SignalComparison):
+            return type(node)(tuple(map(self._converted, node.parts)))
+        units = [self._signals[name].unit for name in (*node.left.names(), *node.right.names())]
+        unit = next((unit for unit in units if unit), "")
+        try:
+            return SignalComparison(node.left.in_unit(unit), node.sign, node.right.in_unit(unit))
+        except Misuse as error:
+            raise Misuse(f"condition {self.text!r}: {error}") from None
+
+    def _moving(self, node: Node) -> Iterator[_Comparison]:
+        """The comparisons with continuous signals."""
         if isinstance(node, Not):
             yield from self._moving(node.inner)
         elif not isinstance(node, SignalComparison):
             for part in node.parts:
                 yield from self._moving(part)
         else:
-            moving = [
-                side for side in (node.left, node.right) if isinstance(side, SignalName) and self._signals[side.text].continuous
-            ]
-            if len(moving) > 1:
-                raise Misuse(f"condition {self.text!r}: {moving[0].text} and {moving[1].text} both move: compare with a number")
-            if moving:
-                yield self._signals[moving[0].text], node.right if moving[0] is node.left else node.left
+            found = _Comparison.of(node, self._signals)
+            if found.moving:
+                yield found
 
     def due(self, now: Nanos) -> Nanos | None:
         """The next moment at which the condition may become true without an event; ``now`` if it is true; None if never."""
@@ -254,14 +316,52 @@ class SignalCondition:
         return min(dues, default=None)
 
     def _crossing(self, n: int, now: Nanos) -> Nanos | None:
-        """The moment at which a comparison changes; cached while the course of its signal is unchanged."""
-        signal, side = self._comparisons[n]
-        version, level, known = signal.version(), self._value(side, now), self._crossings[n]
+        """The moment at which a comparison changes; cached while the courses of its signals are unchanged."""
+        comparison, known = self._comparisons[n], self._crossings[n]
+        version, level = comparison.version(), comparison.level(now)
         if known is not None and version is not None and known[:2] == (version, level) and now < known.until:
             return known.due
-        due = crossing(signal, level, now)
+        due = comparison.change(now)
         self._crossings[n] = _Crossing(version, level, due, now + FARTHEST_NS // 2 if due is None else due)
         return due
+
+
+@dataclass(frozen=True, slots=True)
+class _Comparison:
+    """A comparison, its signals that move, and the others. ``alone``: one that moves is compared with what does not."""
+
+    difference: Quantity
+    moving: Mapping[str, Signal]
+    resting: Mapping[str, Signal]
+    alone: tuple[Signal, Quantity] | None
+
+    @staticmethod
+    def of(node: SignalComparison, signals: Mapping[str, Signal]) -> _Comparison:
+        left, right = tuple(node.left.names()), tuple(node.right.names())
+        moving = {name: signals[name] for name in (*left, *right) if signals[name].continuous}
+        resting = {name: signals[name] for name in (*left, *right) if not signals[name].continuous}
+        alone: tuple[Signal, Quantity] | None = None
+        if len(moving) == 1:
+            ((name, signal),) = moving.items()
+            for side, other, named in ((node.left, node.right, right), (node.right, node.left, left)):
+                if side == SignalName(name) and name not in named:
+                    alone = signal, other
+        return _Comparison(Sum(node.left, -1, node.right), moving, resting, alone)
+
+    def version(self) -> object:
+        """As `Signal.version`, of all that move."""
+        found = tuple(signal.version() for signal in self.moving.values())
+        return None if None in found else found
+
+    def level(self, now: Nanos) -> object:
+        """The values of what does not move."""
+        return tuple(signal.value(now) for signal in self.resting.values())
+
+    def change(self, now: Nanos) -> Nanos | None:
+        if self.alone is not None:
+            signal, other = self.alone
+            return crossing(signal, other.value(lambda name: self.resting[name].value(now)), now)
+        return next_change(self.difference, self.moving, lambda name: self.resting[name].value(now), now)
 
 
 def crossing(signal: Signal, level: float | Fraction, now: Nanos) -> Nanos | None:

@@ -1,0 +1,253 @@
+"""What a condition compares: numbers with units, signals, and what is calculated from them; and when a comparison changes.
+
+sum     = product { ( "+" | "-" ) product }
+product = factor { ( "*" | "/" ) factor }
+factor  = number [ unit ] | signal | "-" factor | "abs" "(" sum ")" | "(" sum ")"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from heapq import merge
+from itertools import chain
+from math import inf, nan
+from typing import Protocol, TypeAlias
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.points import FARTHEST_NS
+from steptwin.world.scale import LENGTHS, TURNS
+
+TIMES: Mapping[str, Fraction] = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
+VOLTS: Mapping[str, Fraction] = {"mV": Fraction(1, 1000), "V": Fraction(1)}
+UNITS: tuple[Mapping[str, Fraction], ...] = (LENGTHS, TURNS, TIMES, VOLTS)
+"""Units that convert into each other."""
+UNIT_NAMES = frozenset(unit for kin in UNITS for unit in kin)
+MOST_LOOKS = 100_000
+"""Intervals that are looked at in one search; then it is continued later."""
+
+Range: TypeAlias = tuple[float, float]
+"""Lowest and highest value."""
+
+
+class Quantity(Protocol):
+    """A number, a signal, or what is calculated from them."""
+
+    def names(self) -> Iterator[str]:
+        """Its signals."""
+        ...
+
+    def value(self, values: Callable[[str], float]) -> float: ...
+    def range(self, ranges: Callable[[str], Range]) -> Range:
+        """All values that it can have while signals are within their ranges, or more."""
+        ...
+
+    def negative(self) -> Quantity: ...
+    def in_unit(self, unit: str) -> Quantity:
+        """With numbers in this unit. Raises `Misuse` for a number whose unit is of another kind."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class NumberLiteral:
+    number: float
+    unit: str = ""
+
+    def names(self) -> Iterator[str]:
+        yield from ()
+
+    def value(self, values: Callable[[str], float]) -> float:
+        return self.number
+
+    def range(self, ranges: Callable[[str], Range]) -> Range:
+        return self.number, self.number
+
+    def negative(self) -> Quantity:
+        return NumberLiteral(-self.number, self.unit)
+
+    def in_unit(self, unit: str) -> Quantity:
+        if not self.unit or self.unit == unit:
+            return self
+        for kin in UNITS:
+            if unit in kin and self.unit in kin:
+                return NumberLiteral(float(Fraction(str(self.number)) * kin[self.unit] / kin[unit]))
+        there = f"compared with {unit!r}" if unit else "compared with what has no unit"
+        raise Misuse(f"{self.number:g} {self.unit} is {there}")
+
+
+@dataclass(frozen=True, slots=True)
+class SignalName:
+    text: str
+
+    def names(self) -> Iterator[str]:
+        yield self.text
+
+    def value(self, values: Callable[[str], float]) -> float:
+        return values(self.text)
+
+    def range(self, ranges: Callable[[str], Range]) -> Range:
+        return ranges(self.text)
+
+    def negative(self) -> Quantity:
+        return Product(NumberLiteral(-1.0), self)
+
+    def in_unit(self, unit: str) -> Quantity:
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """``sign`` −1: a difference."""
+
+    left: Quantity
+    sign: int
+    right: Quantity
+
+    def names(self) -> Iterator[str]:
+        yield from self.left.names()
+        yield from self.right.names()
+
+    def value(self, values: Callable[[str], float]) -> float:
+        return self.left.value(values) + self.sign * self.right.value(values)
+
+    def range(self, ranges: Callable[[str], Range]) -> Range:
+        (a, b), (c, d) = self.left.range(ranges), self.right.range(ranges)
+        return (a + c, b + d) if self.sign > 0 else (a - d, b - c)
+
+    def negative(self) -> Quantity:
+        return Product(NumberLiteral(-1.0), self)
+
+    def in_unit(self, unit: str) -> Quantity:
+        return Sum(self.left.in_unit(unit), self.sign, self.right.in_unit(unit))
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """``divides``: a quotient; one by 0 is infinite, 0/0 is no number, with which no comparison but ``!=`` is true."""
+
+    left: Quantity
+    right: Quantity
+    divides: bool = False
+
+    def names(self) -> Iterator[str]:
+        yield from self.left.names()
+        yield from self.right.names()
+
+    def value(self, values: Callable[[str], float]) -> float:
+        left, right = self.left.value(values), self.right.value(values)
+        if not self.divides:
+            return left * right
+        return left / right if right else nan if not left else inf if left > 0.0 else -inf
+
+    def range(self, ranges: Callable[[str], Range]) -> Range:
+        (a, b), (c, d) = self.left.range(ranges), self.right.range(ranges)
+        if self.divides and c <= 0.0 <= d:
+            return -inf, inf
+        ends = [x / y if self.divides else x * y for x in (a, b) for y in (c, d)]
+        return min(ends), max(ends)
+
+    def negative(self) -> Quantity:
+        return Product(NumberLiteral(-1.0), self)
+
+    def in_unit(self, unit: str) -> Quantity:
+        return Product(self.left.in_unit(unit), self.right.in_unit(unit), self.divides)
+
+
+@dataclass(frozen=True, slots=True)
+class Absolute:
+    inner: Quantity
+
+    def names(self) -> Iterator[str]:
+        yield from self.inner.names()
+
+    def value(self, values: Callable[[str], float]) -> float:
+        return abs(self.inner.value(values))
+
+    def range(self, ranges: Callable[[str], Range]) -> Range:
+        low, high = self.inner.range(ranges)
+        return (low, high) if low >= 0.0 else (-high, -low) if high <= 0.0 else (0.0, max(-low, high))
+
+    def negative(self) -> Quantity:
+        return Product(NumberLiteral(-1.0), self)
+
+    def in_unit(self, unit: str) -> Quantity:
+        return Absolute(self.inner.in_unit(unit))
+
+
+# ---------------------------------------------------------------------- when it changes
+
+
+class Course(Protocol):
+    """A signal that moves, as `steptwin.world.expression.Signal`."""
+
+    def value(self, now: Nanos) -> float: ...
+    def turns(self, now: Nanos) -> Iterator[Nanos]: ...
+
+
+def next_change(quantity: Quantity, moving: Mapping[str, Course], at_rest: Callable[[str], float], now: Nanos) -> Nanos | None:
+    """First whole nanosecond after ``now`` at which a quantity is on another side of 0 (below, at, above); None if never.
+
+    Between their turns signals are monotonic, so that the ranges of an interval follow from its ends; it is halved until
+    its range is on one side, or it is a nanosecond long.
+
+    After `MOST_LOOKS` intervals the result is a moment before which nothing changes.
+    """
+    return _Search(quantity, moving, at_rest).first(now)
+
+
+class _Search:
+    __slots__ = ("_at_rest", "_looks", "_moving", "_quantity")
+
+    def __init__(self, quantity: Quantity, moving: Mapping[str, Course], at_rest: Callable[[str], float]) -> None:
+        self._quantity = quantity
+        self._moving = moving
+        self._at_rest = at_rest
+        self._looks = 0
+
+    def first(self, now: Nanos) -> Nanos | None:
+        values = self._values(now)
+        side = self._side(values)
+        begin = now
+        for end in chain(merge(*(signal.turns(now) for signal in self._moving.values())), (now + FARTHEST_NS,)):
+            if end > begin:
+                there = self._values(end)
+                found = self._within(begin, values, end, there, side)
+                if found is not None:
+                    return found
+                begin, values = end, there
+        return None
+
+    def _values(self, now: Nanos) -> Mapping[str, float]:
+        return {name: signal.value(now) for name, signal in self._moving.items()}
+
+    def _side(self, values: Mapping[str, float]) -> int:
+        value = self._quantity.value(lambda name: values[name] if name in values else self._at_rest(name))
+        return (value > 0.0) - (value < 0.0)
+
+    def _sides(self, ends: Iterable[Mapping[str, float]]) -> set[int]:
+        """The sides of 0 that the range between the ends touches."""
+        one, other = ends
+
+        def between(name: str) -> Range:
+            if name not in one:
+                value = self._at_rest(name)
+                return value, value
+            return min(one[name], other[name]), max(one[name], other[name])
+
+        low, high = self._quantity.range(between)
+        return {side for side, touches in ((-1, low < 0.0), (0, low <= 0.0 <= high), (1, high > 0.0)) if touches}
+
+    def _within(self, begin: Nanos, first: Mapping[str, float], end: Nanos, last: Mapping[str, float], side: int) -> Nanos | None:
+        if self._sides((first, last)) == {side}:
+            return None
+        self._looks += 1
+        if end - begin == 1:
+            return None if self._side(last) == side else end
+        if self._looks > MOST_LOOKS:
+            return begin + 1
+        middle = (begin + end) // 2
+        values = self._values(middle)
+        found = self._within(begin, first, middle, values, side)
+        return self._within(middle, values, end, last, side) if found is None else found
