@@ -108,13 +108,14 @@ class _Builder:
             return name
 
         order = {name: i for i, name in enumerate(joined)}
+        named = {*joined, *(one.name for element in ELEMENTS.values() for one in element.named(self.spec.elements[element.name]))}
         for one, other, path in self._joints():
             unknown = [name for name in dict.fromkeys((one, other)) if name not in joined]
             for name in unknown:
                 if not self.spec.text.may_be_broken(name):
-                    near = self.spec.text.near(name, joined)
+                    near = self.spec.text.near(name, named)
                     there = ", ".join(joined) or "none"
-                    fix = self.spec.text.replacement(path, name, self.spec.text.meant(name, joined))
+                    fix = self.spec.text.replacement(path, name, self.spec.text.meant(name, named))
                     self.spec.text.wrong(path, "D009", f"nothing is called {name!r}{near}", f"there are {there}", fix)
             if unknown:
                 continue

@@ -310,8 +310,10 @@ class SignalCondition:
 
     def due(self, now: Nanos) -> Nanos | None:
         """The next moment at which the condition may become true without an event; ``now`` if it is true; None if never."""
-        if self.holds(now):
-            return now
+        return now if self.holds(now) else self.change(now)
+
+    def change(self, now: Nanos) -> Nanos | None:
+        """The next moment at which one of its comparisons may change without an event; None if never."""
         dues = [due for n in range(len(self._comparisons)) if (due := self._crossing(n, now)) is not None]
         return min(dues, default=None)
 

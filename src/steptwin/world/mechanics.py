@@ -73,7 +73,7 @@ class Mechanism(Stateful):
     """The mechanics of axis ``number`` (from 1) of a machine in ``kernel``: a part of the kernel, and a carriage for switches."""
 
     __slots__ = (
-        "_blocked",
+        "_blockers",
         "_brake",
         "_catch_due",
         "_changes",
@@ -115,7 +115,8 @@ class Mechanism(Stateful):
         self._stall_due: Nanos | None = None
         """The next moment at which the motor stalls or synchronises again."""
         self._lost = 0
-        self._blocked = False
+        self._blockers: tuple[str, ...] = ()
+        """What blocks the rotor."""
         self._brake = 0.0
         """Torque of the brake, N·m."""
         self._had_current = True
@@ -339,11 +340,19 @@ class Mechanism(Stateful):
 
     # ------------------------------------------------------------------ faults
 
-    def block(self, blocked: bool, now: Nanos) -> None:
-        """Block the rotor, so that pulses are lost, or release it."""
+    @property
+    def _blocked(self) -> bool:
+        return bool(self._blockers)
+
+    def block(self, blocked: bool, now: Nanos, by: str = "") -> None:
+        """Block the rotor, so that pulses are lost, or release it. It is free when nothing blocks it any more."""
+        others = tuple(name for name in self._blockers if name != by)
+        if not blocked and others:
+            self._blockers = others
+            return
         state = self.at(now)
         self._simple = False
-        self._blocked = blocked
+        self._blockers = (*others, by) if blocked else ()
         stalled = state.stalled or (not blocked and self.build.motor is not None)
         self._renew(self._drive, now, state._replace(stalled=stalled))
         self._kernel.mark()

@@ -10,6 +10,7 @@ from steptwin.world.element import AnyElement
 from steptwin.world.elements.axis import AXIS
 from steptwin.world.elements.brake import BRAKE
 from steptwin.world.elements.button import BUTTON
+from steptwin.world.elements.collision import COLLISION
 from steptwin.world.elements.conveyor import CONVEYOR
 from steptwin.world.elements.counter import COUNTER
 from steptwin.world.elements.cylinder import CYLINDER
@@ -54,5 +55,21 @@ def failing(kind: FaultKind) -> tuple[str, ...]:
     return tuple(element.name for element in ELEMENTS.values() if kind in element.faults)
 
 
-for _one in (AXIS, WIRE, BUTTON, SOURCE, GATE, LATCH, TIMER, COUNTER, RELAY, CYLINDER, CONVEYOR, VACUUM, BRAKE, TRANSDUCER):
+for _one in (
+    AXIS,
+    WIRE,
+    BUTTON,
+    SOURCE,
+    GATE,
+    LATCH,
+    TIMER,
+    COUNTER,
+    RELAY,
+    CYLINDER,
+    CONVEYOR,
+    VACUUM,
+    BRAKE,
+    TRANSDUCER,
+    COLLISION,
+):
     register(_one)

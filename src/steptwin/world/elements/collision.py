@@ -1,0 +1,142 @@
+"""``[[collision]]``: where parts of a machine touch, as a condition over its signals; what touches is reported, or jams."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from steptwin.errors import Misuse
+from steptwin.machine import Nanos
+from steptwin.world.board import Board
+from steptwin.world.elements.axis import AXIS
+from steptwin.world.elements.logic import STUCK_OUTPUT, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.world.expression import SignalCondition, names, parse
+from steptwin.world.kind import Terminals
+from steptwin.world.mechanics import Mechanism
+from steptwin.world.reader import Key, TomlText, optional
+from steptwin.world.signals import Idle, SignalOf, find_signal
+from steptwin.world.site import Site, Terminal
+from steptwin.world.spec import WorldSpec
+from steptwin.world.values import OUTPUT_PIN, text_value, word
+
+RESET, HIT = "RESET", "HIT"
+REPORT, JAM = "report", "jam"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CollisionSpec(BoardSpec):
+    when: str
+    effect: str
+    reset: Terminal | None
+
+    @property
+    def terminals(self) -> Terminals:
+        return Terminals(digital_inputs=(RESET,), outputs=(HIT,))
+
+    @property
+    def joints(self) -> Iterable[Joint]:
+        if self.reset is not None:
+            yield Joint("reset", RESET, self.reset)
+
+    @property
+    def owners(self) -> tuple[str, ...]:
+        """Machines and elements whose signals are in the condition; none for one that is wrong."""
+        try:
+            return tuple(dict.fromkeys(name.partition(".")[0] for name in names(parse(self.when))))
+        except Misuse:
+            return ()
+
+    def others(self, world: WorldSpec) -> Iterator[tuple[str, str]]:
+        drives = {axis.name: axis.drive[0] for axis in world.elements_of(AXIS)}
+        yield from (("when", drives.get(owner, owner)) for owner in self.owners)
+
+    def check(self, text: TomlText) -> None:
+        try:
+            parse(self.when)
+        except Misuse as error:
+            text.wrong((*self.path, "when"), "D003", str(error))
+
+
+class Collision(BoardPart):
+    """HIT is on while parts touch. With `JAM` the axes stand from then on; they are free again when RESET is switched on, and jam
+    again when they touch the next time."""
+
+    __slots__ = ("_axes", "_condition", "_due", "_is_jammed", "_touches", "_was_reset", "count", "spec")
+    FIXED: ClassVar[frozenset[str]] = frozenset({"_axes", "_condition", "spec"}) | BoardPart.FIXED
+
+    def __init__(self, board: Board, spec: CollisionSpec, condition: SignalCondition, axes: Mapping[str, Mechanism]) -> None:
+        super().__init__(board)
+        self.spec = spec
+        self._condition = condition
+        self._axes = axes
+        self._due: Nanos | None = None
+        """When parts may touch, or part, without an event."""
+        self._touches = False
+        self._is_jammed = False
+        self._was_reset = False
+        self.count = 0
+        """How often they touched."""
+
+    def update(self, now: Nanos) -> None:
+        touches = self._condition.holds(now)
+        if touches is not self._touches:
+            self._touches = touches
+            if touches:
+                self._touch(now)
+            else:
+                self._report(f"{self.spec.name}: apart again", touches=False)
+        is_reset = self.board.is_on(RESET)
+        if is_reset and not self._was_reset and self._is_jammed:
+            self._block(False, now)
+        self._was_reset = is_reset
+        self.board.put(HIT, float(touches))
+        self._due = self._condition.change(now)
+
+    def _touch(self, now: Nanos) -> None:
+        self.count += 1
+        self._report(f"{self.spec.name}: {' and '.join(self._axes) or 'parts'} touch", touches=True)
+        if self.spec.effect == JAM and not self._is_jammed:
+            self._block(True, now)
+
+    def _block(self, blocked: bool, now: Nanos) -> None:
+        self._is_jammed = blocked
+        for mechanism in self._axes.values():
+            mechanism.block(blocked, now, by=self.spec.name)
+
+    def _report(self, text: str, *, touches: bool) -> None:
+        kernel = self.board.kernel
+        facts = ("collision", self.spec.name), ("touches", touches), ("jams", self.spec.effect == JAM)
+        kernel.report(kernel.owner(self.board.name), "event", "collision", text, *facts)
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+
+def _make(spec: CollisionSpec, site: Site) -> Collision:
+    board = site.board(spec.name)
+
+    def signal(name: str) -> SignalOf | Idle:
+        found = find_signal(site.parts, name)
+        if any(kernel is not board.kernel for kernel in found.bring(board.kernel.now)):
+            raise Misuse(f"when: {name!r} is no quantity of a machine or an element")
+        found.watch(name)
+        return found
+
+    condition = SignalCondition(spec.when, signal)
+    built = site.parts.built(AXIS)
+    return Collision(board, spec, condition, {name: built[name].mechanism for name in spec.owners if name in built})
+
+
+COLLISION = with_terminals(
+    "collision",
+    CollisionSpec,
+    (
+        Key("when", text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'"),
+        optional(word(REPORT, JAM), "effect", "report, or jam: the axes in the condition stand from then on", REPORT),
+        optional(OUTPUT_PIN, "reset", "output joined to RESET, which frees jammed axes"),
+    ),
+    make=_make,
+    signals=lambda collision: {"count": SignalOf((collision.board.kernel,), lambda now: float(collision.count))},
+    faults=(STUCK_OUTPUT,),
+)
