@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
-from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, controller, loaded, programmed
+from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, controller, loaded, programmed, started
 
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
@@ -396,3 +396,15 @@ def test_what_the_checker_is_told_of_a_configuration(axis: AxisConfig, ends: tup
     assert setup.input_interrupts == tuple(n % 4 for n in range(20))
     assert setup.homing_ends == (ends, *[(False, False)] * 3)
     assert setup.most_speed_p == MAX_SPEED_P
+
+
+def test_a_program_says_when_it_acted_on_the_rest_of_the_controller() -> None:
+    """Axes and outputs are looked at only then: what merely computes runs on to the end of its time."""
+    control = started("x = 0\nMAIN:\nx = x + 1\nJUMP MAIN\n").device.program
+    due = control.deadline()
+    assert due is not None
+    assert control.advance(due, due + 10 * MILLISECOND) is None
+    control = started("x = 0\nx = x + 1\nOUT1 = ON\nx = 3\n").device.program
+    due = control.deadline()
+    assert due is not None
+    assert control.advance(due, due + 10 * MILLISECOND) == 3 * MILLISECOND  # WBC-6: each statement takes 1 ms

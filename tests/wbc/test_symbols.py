@@ -31,6 +31,7 @@ def found(text: str) -> list[str]:
         ("OUT1 = LEN +", ["OUT1 REGISTER WRITE", "LEN CONSTANT READ"]),
         ("WAIT PosM1 > LEN nothing", ["PosM1 REGISTER READ", "LEN CONSTANT READ"]),
         ("JUMP main now", ["main LABEL READ"]),
+        ("OUT1 = 5 + 2.5 LEN # @", ["OUT1 REGISTER WRITE", "LEN CONSTANT READ"]),
         ("MOVEPTP @a @b", ["a POSITION READ", "b POSITION READ"]),
         ("SET $R0 = SQRT(LEN", ["$R0 REGISTER WRITE", "SQRT FUNCTION READ", "LEN CONSTANT READ"]),
     ],

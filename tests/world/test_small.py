@@ -6,6 +6,7 @@ Regenerate with ``python tests/world/test_small.py`` and read the diff.
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,14 @@ def test_lines_are_sent_to_chips_as_they_have_room() -> None:
     world = World.from_toml(m1486_world(Whole(name="w"), [15], {"variant": "A"}, typed=["f6400", "r", *["u20"] * 9, "b640", "r"]))
     world.run(for_="10 s")
     assert world.m1486["chipF"].position == 6400 - 640
+
+
+def test_texts_stay_readable_and_are_toml() -> None:
+    """Letters stay what they are; TOML permits no control character, DEL among them."""
+    name = "prasa ąż \"2\" \\ \t\x7f"
+    text = mic488_world(Whole(name=name), [None], {})
+    assert 'name = "prasa ąż \\"2\\" \\\\ \\t\\u007f"' in text
+    assert tomllib.loads(text)["world"]["name"] == name
 
 
 if __name__ == "__main__":
