@@ -85,7 +85,7 @@ def test_lines_are_sent_to_chips_as_they_have_room() -> None:
 
 def test_texts_stay_readable_and_are_toml() -> None:
     """Letters stay what they are; TOML permits no control character, DEL among them."""
-    name = "prasa ąż \"2\" \\ \t\x7f"
+    name = 'prasa ąż "2" \\ \t\x7f'
     text = mic488_world(Whole(name=name), [None], {})
     assert 'name = "prasa ąż \\"2\\" \\\\ \\t\\u007f"' in text
     assert tomllib.loads(text)["world"]["name"] == name
