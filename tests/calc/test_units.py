@@ -2,25 +2,25 @@ from __future__ import annotations
 
 import pytest
 
-from steptwin.calc import Dimension, Mechanics, Scale, read_quantity, unit_of
+from steptwin.calc import Dimension, DriveMechanics, UnitScale, read_quantity, unit_of
 from steptwin.errors import Misuse
 
 
 def test_gear_from_mechanics() -> None:
     """Manual 4.9: 200 steps × 64 = 12800 pulses in a revolution. A screw of 5 mm behind a gear of 2:1."""
-    assert Mechanics(motor_steps=200, microsteps=64).scale().in_pulses("rev") == 12800
-    scale = Mechanics(motor_steps=200, microsteps=64, ratio=2, lead=5).scale()
+    assert DriveMechanics(motor_steps=200, microsteps=64).scale().in_pulses("rev") == 12800
+    scale = DriveMechanics(motor_steps=200, microsteps=64, ratio=2, lead=5).scale()
     assert [scale.in_pulses(unit) for unit in ("imp", "step", "rev", "mm", "cm", "m")] == [1, 64, 25600, 5120, 51200, 5120000]
     assert scale.in_pulses("degree") == pytest.approx(25600 / 360)
 
 
 def test_units_that_follow_from_a_gear() -> None:
-    scale = Scale.of_gear("degree", 10)
+    scale = UnitScale.of_gear("degree", 10)
     assert scale.in_pulses("rev") == pytest.approx(3600)
     with pytest.raises(Misuse, match=r"mm is not known in pulses: give the lead \[mm/rev\]; known are imp, degree, rev"):
         scale.in_pulses("mm")
     with pytest.raises(Misuse, match=r"rev is not known in pulses: give the motor's steps"):
-        Scale.of_gear("mm", 640).in_pulses("rev")
+        UnitScale.of_gear("mm", 640).in_pulses("rev")
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_what_is_no_quantity(text: str, dimension: Dimension, message: str) -> N
 @pytest.mark.parametrize("wrong", [0.0, -1.0, float("inf"), float("nan"), 1e7])
 def test_mechanics_that_cannot_be(wrong: float) -> None:
     with pytest.raises(Misuse, match=r"lead = .* mm/rev: permitted are numbers above 0"):
-        Mechanics(lead=wrong).scale()
+        DriveMechanics(lead=wrong).scale()
 
 
 def test_names_of_units() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from steptwin.commands.run_wbc import WbcRun, run
-from steptwin.commands.travels import Travel, parse_travel
+from steptwin.commands.travels import SwitchTravel, parse_travel
 from steptwin.errors import Misuse
 from steptwin.files.export import read_trace
 from steptwin.files.programbanks import ProgramErrors
@@ -151,7 +151,7 @@ def test_switches_stand_where_travel_says_or_are_assumed(play: Play, level: int)
     config = SWITCHES.format(level=level)
     assumed = play(HOMING, config=config, until_idle=True)
     assert assumed.lines[0] == "M1: KL on IN3 assumed at -5 mm (--travel M1=LOW.. changes it)"
-    told = play(HOMING, config=config, until_idle=True, travels=[Travel(1, -12.0, None)])
+    told = play(HOMING, config=config, until_idle=True, travels=[SwitchTravel(1, -12.0, None)])
     assert "assumed" not in "".join(told.lines)
     homed = [next(float(time) for time, text, _ in ran.told() if "position reached" in text) for ran in (assumed, told)]
     assert homed[0] == pytest.approx(5 / 20, abs=0.05)
@@ -196,7 +196,7 @@ def test_switches_are_assumed_where_the_program_homes_to(play: Play, homing: str
 @pytest.mark.parametrize(
     ("config", "travels", "missing"),
     [
-        (BOTH, [Travel(3, -5.0, None)], "  M3 homes to KR on IN3, which nothing operates: --travel M3=..HIGH"),
+        (BOTH, [SwitchTravel(3, -5.0, None)], "  M3 homes to KR on IN3, which nothing operates: --travel M3=..HIGH"),
         (BOTH.replace("InKR=2\n", ""), [], "  M3 homes to KR, for which the configuration has no input (InKR of [Axis2])"),
         (BOTH.replace("HomeMode=0", "HomeMode=3"), [], "  M3 homes to a mechanical stop, which only a world has"),
         (
@@ -209,7 +209,7 @@ def test_switches_are_assumed_where_the_program_homes_to(play: Play, homing: str
 )
 @pytest.mark.parametrize("until_idle", [False, True])
 def test_a_homing_that_cannot_end_is_explained(
-    play: Play, config: str, travels: list[Travel], missing: str, until_idle: bool
+    play: Play, config: str, travels: list[SwitchTravel], missing: str, until_idle: bool
 ) -> None:
     ran = play("M3 = ON\nHOME M3 20\nWAITPOS\n", config=config, travels=travels, until_idle=until_idle)
     assert missing in ran.lines
@@ -325,9 +325,9 @@ def test_what_is_no_image_is_refused(tmp_path: Path) -> None:
 
 def test_travel_as_people_type_it() -> None:
     assert parse_travel("M1=-10..250, m4=..7,M2=-1.5..") == [
-        Travel(1, -10.0, 250.0),
-        Travel(4, None, 7.0),
-        Travel(2, -1.5, None),
+        SwitchTravel(1, -10.0, 250.0),
+        SwitchTravel(4, None, 7.0),
+        SwitchTravel(2, -1.5, None),
     ]
     for text in ("M5=1..2", "M1=5", "X=1..2", "M1=a..2", "M0=1..2"):
         with pytest.raises(Misuse, match=r"^--travel .*: expected Mn=LOW\.\.HIGH, such as M1=-10\.\.250"):
@@ -342,7 +342,7 @@ def test_what_cannot_be_run(play: Play, tmp_path: Path) -> None:
     with pytest.raises(Misuse, match="no input pin 'OUT1'"):
         play("OUT1 = ON\n", inputs=parse_inputs("OUT1=1@1s"))
     with pytest.raises(Misuse, match=r"--travel M1: the configuration has no KR for this axis"):
-        play("OUT1 = ON\n", travels=[Travel(1, None, 5.0)])
+        play("OUT1 = ON\n", travels=[SwitchTravel(1, None, 5.0)])
     with pytest.raises(Misuse, match=r"names positions: give the table with --positions FILE$"):
         play("M1 = ON\nMOVEPTP @top\n")
     with pytest.raises(Misuse, match="cannot read"):

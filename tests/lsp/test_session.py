@@ -313,7 +313,7 @@ def test_outline_folds_and_calls() -> None:
     assert [section.name for section in analysis.outline()] == [
         "speed", "gripper", "ready", "MAIN", "PICK", "INT_IN1", "count", "x",
     ]  # fmt: skip
-    assert [(fold.first, fold.last) for fold in analysis.folds()] == [(7, 12), (18, 20), (14, 25), (27, 29), (1, 3)]
+    assert sorted((fold.first, fold.last) for fold in analysis.folds()) == [(1, 3), (7, 12), (14, 25), (18, 20), (27, 29)]
     caller = navigation.caller_at(made, PRG, at(PROGRAM, "JUMP PICK", "PICK"))
     assert caller is not None
     assert caller.key == "PICK"

@@ -13,7 +13,7 @@ from steptwin.live.remote import RemoteSubject
 from steptwin.live.twins import controller_of
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.monitor.session import session_at
-from steptwin.monitor.values import FollowedValues, Look, PolledValues
+from steptwin.monitor.values import FollowedValues, MonitorReading, PolledValues
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of
 from steptwin.world import script as do
@@ -48,7 +48,7 @@ def values() -> FollowedValues:
 
 
 def test_a_twin_that_is_followed_shows_what_polling_shows(twin: RemoteSubject) -> None:
-    async def both() -> tuple[Look, Look]:
+    async def both() -> tuple[MonitorReading, MonitorReading]:
         session = session_at("mic488", 5.0)
         async with session.mic:
             polled = await PolledValues(session.mic).look(NAMES[:5])

@@ -17,7 +17,7 @@ from steptwin.machine import MILLISECOND
 from steptwin.studio import session as sessions
 from steptwin.studio.hub import MOST_VIEWERS
 from steptwin.studio.requests import ALL
-from steptwin.studio.session import Session
+from steptwin.studio.session import ViewerSession
 
 
 def kinds(messages: list[dict[str, Any]]) -> list[str]:
@@ -492,7 +492,7 @@ def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
 # ---------------------------------------------------------------------- without a connection
 
 
-def rest(session: Session, studio: Studio, name: str, **fields: object) -> Any:
+def rest(session: ViewerSession, studio: Studio, name: str, **fields: object) -> Any:
     return session.receive(json.dumps({"do": name, **fields}), studio.now).result()
 
 

@@ -19,9 +19,9 @@ from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.hub import Hub, Moment, Surroundings
 from steptwin.studio.jogs import WorldJogs
-from steptwin.studio.looking import Lookback
+from steptwin.studio.looking import KeptPast
 from steptwin.studio.schema import schema
-from steptwin.studio.session import Session
+from steptwin.studio.session import ViewerSession
 from steptwin.studio.shown import Shown
 from steptwin.studio.shownworld import ShownWorld
 from steptwin.subject.world import WorldSubject
@@ -101,7 +101,7 @@ class Studio:
         *,
         tokens: bool = False,
         files: Mapping[str, bytes] | None = None,
-        lookback: Callable[[Studio], Lookback] | None = None,
+        lookback: Callable[[Studio], KeptPast] | None = None,
     ) -> None:
         self.world = World.from_toml(dedent(text), files)
         self.subject = WorldSubject(self.world)
@@ -134,8 +134,8 @@ class Studio:
         tab.read()
         return tab
 
-    def rest(self, role: Role = Role.ENGINEER) -> Session:
-        return Session(self.hub, "REST", entered=Viewer(self.hub.number(), "REST", role))
+    def rest(self, role: Role = Role.ENGINEER) -> ViewerSession:
+        return ViewerSession(self.hub, "REST", entered=Viewer(self.hub.number(), "REST", role))
 
     def run(self, for_ms: float) -> None:
         """Virtual time at its speed; jogs end at their moments, the hub ticks 30 times a second."""
@@ -165,7 +165,7 @@ class Tab:
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
-        self.session = Session(studio.hub, "127.0.0.1")
+        self.session = ViewerSession(studio.hub, "127.0.0.1")
         self.messages: list[dict[str, Any]] = []
         self._seq = -1
         self._id = 0

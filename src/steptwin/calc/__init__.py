@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from steptwin.calc.calculator import TIMES, Calculator, range_text
-from steptwin.calc.contract import Calculation, CurvePoint, Formula, Model, Part, Quantity, Setting, curve, plain
+from steptwin.calc.contract import Calculation, CurvePoint, Formula, Model, MovePart, MoveQuantity, RequiredSetting, curve, plain
 from steptwin.calc.m1486 import M1486Model
 from steptwin.calc.mic488 import Mic488Model
-from steptwin.calc.units import Dimension, Mechanics, Scale, read_quantity, unit_of
+from steptwin.calc.units import Dimension, DriveMechanics, UnitScale, read_quantity, unit_of
 from steptwin.datasheet import AxisDescription, Datasheet
 from steptwin.m1486.variants import variant
 
@@ -24,15 +24,15 @@ __all__ = [
     "Calculator",
     "CurvePoint",
     "Dimension",
+    "DriveMechanics",
     "Formula",
     "M1486Model",
-    "Mechanics",
     "Mic488Model",
     "Model",
-    "Part",
-    "Quantity",
-    "Scale",
-    "Setting",
+    "MovePart",
+    "MoveQuantity",
+    "RequiredSetting",
+    "UnitScale",
     "calculator_of",
     "curve",
     "plain",

@@ -21,9 +21,9 @@ from steptwin.calc.contract import (
     VELOCITY,
     Calculation,
     Model,
-    Part,
-    Quantity,
-    Setting,
+    MovePart,
+    MoveQuantity,
+    RequiredSetting,
 )
 from steptwin.calc.solving import is_same, solve
 from steptwin.calc.units import Dimension
@@ -35,9 +35,9 @@ from steptwin.nearmiss import NearMiss
 LONGEST_S = 366 * 24 * 3600.0
 
 
-def _time(name: str, meaning: str) -> Quantity:
+def _time(name: str, meaning: str) -> MoveQuantity:
     limits = Limits(0.0, LONGEST_S, is_low_excluded=True)
-    return Quantity(name=name, meaning=meaning, dimension=Dimension.TIME, unit="s", limits=limits, source="")
+    return MoveQuantity(name=name, meaning=meaning, dimension=Dimension.TIME, unit="s", limits=limits, source="")
 
 
 TIMES = (
@@ -56,7 +56,7 @@ class Calculator:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self.quantities: Mapping[str, Quantity] = {one.name: one for one in (*model.quantities, *TIMES)}
+        self.quantities: Mapping[str, MoveQuantity] = {one.name: one for one in (*model.quantities, *TIMES)}
 
     def calculate(self, given: Mapping[str, float], find: str | None = None) -> Calculation:
         """The move of ``given`` values by the names of quantities. With a time, ``find`` (or the only one that is left out) is
@@ -130,7 +130,7 @@ class Calculator:
     def _check_together(self, known: Mapping[str, float]) -> None:
         self.model.check(self._complete({DISTANCE: 1.0, **known}))
 
-    def _check_range(self, quantity: Quantity, value: float) -> None:
+    def _check_range(self, quantity: MoveQuantity, value: float) -> None:
         size = abs(value) if quantity.name == DISTANCE else value
         limits = quantity.limits
         low, high = limits.low or 0.0, limits.high
@@ -198,9 +198,9 @@ class Calculator:
             formulas=tuple(self.model.formulas(values, profile)),
             notes=(*notes, *self.model.notes(values, profile)),
             settings=tuple(
-                Setting(one.name, one.code, one.detail, values[one.name], one.unit)
+                RequiredSetting(one.name, one.code, one.detail, values[one.name], one.unit)
                 if values[one.name] >= 0.0 or not one.back
-                else Setting(one.name, one.back, one.detail, -values[one.name], one.unit)
+                else RequiredSetting(one.name, one.back, one.detail, -values[one.name], one.unit)
                 for one in self.model.quantities
                 if one.code
             ),
@@ -209,8 +209,8 @@ class Calculator:
             speed_pulses=speed_pulses,
         )
 
-    def _parts(self, profile: Profile) -> list[Part]:
-        parts: list[Part] = []
+    def _parts(self, profile: Profile) -> list[MovePart]:
+        parts: list[MovePart] = []
         begin, at_p = 0.0, 0.0
         speed, pulses = self.quantities[VELOCITY].pulses, self.quantities[DISTANCE].pulses
         names = {"rises": ACCELERATION, "stays": "constant velocity", "falls": DECELERATION}
@@ -218,7 +218,7 @@ class Calculator:
             shape = f"parabolic {names[course]}" if segment.c3 else names[course]
             end_p = segment.position(segment.end_s)
             first, last = abs(segment.velocity(begin)) / speed, abs(segment.velocity(segment.end_s)) / speed
-            parts.append(Part(shape, begin, segment.end_s - begin, first, last, (end_p - at_p) / pulses))
+            parts.append(MovePart(shape, begin, segment.end_s - begin, first, last, (end_p - at_p) / pulses))
             begin, at_p = segment.end_s, end_p
         return parts
 
@@ -230,7 +230,7 @@ LEAST_PART = 1e-9
 """Of a quantity whose range begins at 0, the least that is tried, relative to a pulse."""
 
 
-def _least(quantity: Quantity) -> float:
+def _least(quantity: MoveQuantity) -> float:
     low = quantity.limits.low or 0.0
     return low if low > 0.0 else LEAST_PART / quantity.pulses
 
@@ -262,7 +262,7 @@ def _seconds(seconds: float) -> str:
     return f"{seconds:.6g} s"
 
 
-def range_text(quantity: Quantity) -> str:
+def range_text(quantity: MoveQuantity) -> str:
     """What is permitted, with the unit."""
     if quantity.choices:
         return ", ".join(map(str, quantity.choices))

@@ -17,7 +17,7 @@ TIME, RISE, CONSTANT, FALL = "time", "acceleration_time", "constant_time", "dece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
+class MoveQuantity:
     """A number of a move."""
 
     name: str
@@ -58,7 +58,7 @@ class Model(Protocol):
     @property
     def title(self) -> str: ...
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[MoveQuantity, ...]:
         """All that determines a move."""
         ...
 
@@ -81,7 +81,7 @@ class Model(Protocol):
     def formulas(self, values: Mapping[str, float], profile: Profile) -> list[Formula]: ...
 
 
-class Part(NamedTuple):
+class MovePart(NamedTuple):
     """A part of a move. Velocities and distance in the units of the quantities."""
 
     name: str
@@ -92,7 +92,7 @@ class Part(NamedTuple):
     distance: float
 
 
-class Setting(NamedTuple):
+class RequiredSetting(NamedTuple):
     """What has to be set for the result."""
 
     name: str
@@ -119,10 +119,10 @@ class Calculation:
     """Highest velocity that is reached."""
     reaches: bool
     """Whether that is the velocity that was asked for."""
-    parts: tuple[Part, ...]
+    parts: tuple[MovePart, ...]
     formulas: tuple[Formula, ...]
     notes: tuple[str, ...]
-    settings: tuple[Setting, ...]
+    settings: tuple[RequiredSetting, ...]
     profile: Profile
     """In pulses, from 0 on."""
     pulses: float

@@ -17,7 +17,7 @@ from steptwin.calc.contract import (
     START,
     VELOCITY,
     Formula,
-    Quantity,
+    MoveQuantity,
 )
 from steptwin.calc.units import Dimension
 from steptwin.datasheet import Limits
@@ -52,11 +52,11 @@ class M1486Model:
 
         def quantity(
             name: str, letter: str, meaning: str, dimension: Dimension, pulses: float, default: float | None, source: str
-        ) -> Quantity:
+        ) -> MoveQuantity:
             (spec,) = (row for row in rows(letter) if row.section.startswith(("VII.2", "VII.4")) and row.values)
             permitted = spec.permitted(variant)
             is_range = isinstance(permitted, range)
-            return Quantity(
+            return MoveQuantity(
                 name=name, meaning=meaning, dimension=dimension, unit=spec.unit.replace("min. microsteps", "microstep"),
                 pulses=pulses, limits=Limits(permitted[0], permitted[-1]), choices=() if is_range else tuple(permitted),
                 default=default, code=letter, back="B" if letter == "F" else "", detail="" if letter == "F" else letter,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.calc.contract import ACCELERATION, DECELERATION, DISTANCE, VELOCITY, Formula, Quantity
+from steptwin.calc.contract import ACCELERATION, DECELERATION, DISTANCE, VELOCITY, Formula, MoveQuantity
 from steptwin.calc.units import Dimension
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
@@ -33,10 +33,10 @@ class Mic488Model:
 
         def quantity(
             name: str, meaning: str, dimension: Dimension, limits: Limits, source: str, code: str = "", same_as: str | None = None
-        ) -> Quantity:
+        ) -> MoveQuantity:
             register = f"M{axis}_{code}" if code else ""
             suffix = dimension.value
-            return Quantity(
+            return MoveQuantity(
                 name=name, meaning=meaning, dimension=dimension, unit=f"{unit}{suffix}", pulses=gear, limits=limits,
                 code=register, same_as=same_as, source=source,
             )  # fmt: skip

@@ -42,7 +42,7 @@ def _positive(name: str, value: float, unit: str) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mechanics:
+class DriveMechanics:
     """What turns pulses into motion."""
 
     motor_steps: float = 200.0
@@ -54,7 +54,7 @@ class Mechanics:
     lead: float | None = None
     """Travel in one revolution of what is driven [mm]: lead of a screw, teeth × pitch of a pulley. None: it turns."""
 
-    def scale(self) -> Scale:
+    def scale(self) -> UnitScale:
         """Pulses in each unit. Raises `Misuse` for numbers that are no mechanics."""
         _positive("motor steps", self.motor_steps, " step/rev")
         _positive("microsteps", self.microsteps, "/step")
@@ -64,17 +64,17 @@ class Mechanics:
         if self.lead is not None:
             _positive("lead", self.lead, " mm/rev")
             pulses |= {unit: rev / self.lead * part for unit, part in _IN_MM.items()}
-        return Scale(MappingProxyType(pulses))
+        return UnitScale(MappingProxyType(pulses))
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class UnitScale:
     """Pulses in each unit of distance that is known."""
 
     pulses: Mapping[str, float]
 
     @classmethod
-    def of_gear(cls, unit: str, gear: float) -> Scale:
+    def of_gear(cls, unit: str, gear: float) -> UnitScale:
         """From GEAR, the pulses in one unit; the units that follow from it are known, too. Raises `Misuse`."""
         unit = unit_of(unit)
         if not (isfinite(gear) and gear > 0.0):

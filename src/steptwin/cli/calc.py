@@ -19,10 +19,10 @@ from steptwin.cli.optiongroups import OptionGroup, grouped, option_of
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
-    from steptwin.calc import Calculation, Calculator, Scale
+    from steptwin.calc import Calculation, Calculator, UnitScale
 
 
-class Kind(enum.StrEnum):
+class CalculatedKind(enum.StrEnum):
     MIC488 = "mic488"
     M1486 = "m1486"
 
@@ -64,7 +64,7 @@ class MechanicsOptions(OptionGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mic488Options(OptionGroup):
+class Mic488MoveOptions(OptionGroup):
     heading = "Options of the MIC488"
 
     unit: Annotated[
@@ -79,7 +79,7 @@ class Mic488Options(OptionGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChipOptions(OptionGroup):
+class M1486MoveOptions(OptionGroup):
     heading = "Options of the M1486"
 
     variant: Annotated[str | None, typer.Option(metavar="TYPE", help="Type. Default: A.", autocompletion=completion.variants)] = (
@@ -89,7 +89,7 @@ class ChipOptions(OptionGroup):
 
 @grouped
 def calc(
-    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="mic488 or m1486.")],
+    kind: Annotated[CalculatedKind, typer.Argument(metavar="KIND", help="mic488 or m1486.")],
     find: Annotated[
         str | None,
         typer.Option(metavar="QUANTITY", help="The quantity that a time determines. Default: the one that is not given."),
@@ -99,8 +99,8 @@ def calc(
     *,
     quantities: QuantityOptions,
     mechanics: MechanicsOptions,
-    controller: Mic488Options,
-    chip: ChipOptions,
+    controller: Mic488MoveOptions,
+    chip: M1486MoveOptions,
 ) -> None:
     """Calculate a move: its times, or with a time the quantity that is not given; and GEAR from the mechanics.
 
@@ -108,7 +108,7 @@ def calc(
     without a unit is in the controller's own unit. Exit code 2 if a value is outside its range or a time is not possible.
     """
     known_mechanics = mechanics.given()
-    if kind is Kind.MIC488:
+    if kind is CalculatedKind.MIC488:
         chip.refuse("the MIC488")
         calculator, scale = _mic488(known_mechanics, controller)
     else:
@@ -129,8 +129,8 @@ def calc(
         typer.echo("\n\n".join(_sections(calculator, result)))
 
 
-def _mic488(given: Mapping[str, float], options: Mic488Options) -> tuple[Calculator, Scale]:
-    from steptwin.calc import Calculator, Mechanics, Mic488Model, Scale, unit_of
+def _mic488(given: Mapping[str, float], options: Mic488MoveOptions) -> tuple[Calculator, UnitScale]:
+    from steptwin.calc import Calculator, DriveMechanics, Mic488Model, UnitScale, unit_of
     from steptwin.mic488.config import UNITS
 
     unit, gear = options.unit, options.gear
@@ -144,24 +144,24 @@ def _mic488(given: Mapping[str, float], options: Mic488Options) -> tuple[Calcula
     own = own if unit is None else unit_of(unit)
     if own not in UNITS:
         raise Misuse(f"unit {own}: a MIC488 has {', '.join(UNITS)}")
-    scale = Scale.of_gear(own, gear or 1.0) if not given else Mechanics(**given).scale()
+    scale = UnitScale.of_gear(own, gear or 1.0) if not given else DriveMechanics(**given).scale()
     if gear is None and not given and own != "imp":
         raise Misuse(f"how many pulses are 1 {own} is not known: give --gear, or --microsteps and the rest of the mechanics")
     return Calculator(Mic488Model(own, scale.in_pulses(own), 1 if options.axis is None else options.axis)), scale
 
 
-def _m1486(given: Mapping[str, float], options: ChipOptions) -> tuple[Calculator, Scale]:
-    from steptwin.calc import Calculator, M1486Model, Mechanics
+def _m1486(given: Mapping[str, float], options: M1486MoveOptions) -> tuple[Calculator, UnitScale]:
+    from steptwin.calc import Calculator, DriveMechanics, M1486Model
     from steptwin.m1486.microsteps import FULL_STEP
     from steptwin.m1486.variants import DEFAULT, variant
 
     if "microsteps" in given:
         raise Misuse("--microsteps is not for the M1486: it divides its full steps by M itself")
     model = M1486Model(DEFAULT if options.variant is None else variant(options.variant))
-    return Calculator(model), Mechanics(**{**given, "microsteps": FULL_STEP}).scale()
+    return Calculator(model), DriveMechanics(**{**given, "microsteps": FULL_STEP}).scale()
 
 
-def _values(calculator: Calculator, scale: Scale, given: Mapping[str, object]) -> dict[str, float]:
+def _values(calculator: Calculator, scale: UnitScale, given: Mapping[str, object]) -> dict[str, float]:
     """Values in the units of the quantities. Raises `Misuse`."""
     from steptwin.calc import read_quantity
 
@@ -179,7 +179,7 @@ def _values(calculator: Calculator, scale: Scale, given: Mapping[str, object]) -
     return values
 
 
-def _print_json(result: Calculation, scale: Scale) -> None:
+def _print_json(result: Calculation, scale: UnitScale) -> None:
     from json import dumps
 
     from steptwin.calc import plain
@@ -187,7 +187,7 @@ def _print_json(result: Calculation, scale: Scale) -> None:
     typer.echo(dumps({**plain(result), "pulses_per_unit": dict(scale.pulses)}, ensure_ascii=False, indent=2))
 
 
-def _print_scale(scale: Scale, *, json: bool) -> None:
+def _print_scale(scale: UnitScale, *, json: bool) -> None:
     if json:
         from json import dumps
 

@@ -35,18 +35,23 @@ _SWITCHES = {"ON": True, "TRUE": True, "1": True, "OFF": False, "FALSE": False, 
 SETTABLE = "POSITION, VARIABLE, B1…B21, FLAG80…FLAG86, F40…F63, S, A, V, P, M, Q, N"
 
 
-@contextlib.contextmanager
-def opened_chip(address: DeviceAddress, *, log_frames: bool = False) -> Generator[M1486]:
+def chip_at(address: DeviceAddress, *, log_frames: bool = False) -> M1486:
+    """The driver of a chip, which is not opened."""
     from steptwin.drivers.m1486 import M1486
 
-    with M1486(
+    return M1486(
         address.place,
         address.chip,
         baud=address.baud,
         variant=address.variant,
         timeout_s=address.timeout,
         log=complain if log_frames else None,
-    ) as chip:
+    )
+
+
+@contextlib.contextmanager
+def opened_chip(address: DeviceAddress, *, log_frames: bool = False) -> Generator[M1486]:
+    with chip_at(address, log_frames=log_frames) as chip:
         yield chip
 
 

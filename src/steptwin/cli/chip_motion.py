@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
-from steptwin.cli.chip import opened_chip
+from steptwin.cli.chip import chip_at, opened_chip
 from steptwin.cli.device import SuspensionDetector, complain, print_json, print_started
 from steptwin.cli.keys import interruptible
 from steptwin.errors import Misuse
@@ -142,16 +142,7 @@ def jog(
 
 def stop(address: DeviceAddress, *, program: bool, log_frames: bool) -> None:
     """Send K. The chip is not asked before: it does not respond while it moves."""
-    from steptwin.drivers.m1486 import M1486
-
-    chip = M1486(
-        address.place,
-        address.chip,
-        baud=address.baud,
-        variant=address.variant,
-        timeout_s=address.timeout,
-        log=complain if log_frames else None,
-    )
+    chip = chip_at(address, log_frames=log_frames)
     chip.open_line()
     try:
         (chip.stop_program if program else chip.stop)()

@@ -15,7 +15,7 @@ import typer
 from steptwin.cli import completion
 from steptwin.cli.device import Json, complain
 from steptwin.cli.optiongroups import OptionGroup, grouped
-from steptwin.cli.worldoptions import WorldOptions
+from steptwin.cli.worldoptions import WorldRunOptions
 from steptwin.errors import Misuse
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class WbcOptions(OptionGroup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChipOptions(OptionGroup):
+class ChipProgramOptions(OptionGroup):
     heading = "Options of M1486 programs"
 
     variant: Annotated[
@@ -95,8 +95,8 @@ class _Run:
     as_json: bool
     program: ProgramOptions
     wbc: WbcOptions
-    chip: ChipOptions
-    world: WorldOptions
+    chip: ChipProgramOptions
+    world: WorldRunOptions
 
     def until_idle(self) -> bool:
         """Of a program. Raises `Misuse` for a condition, which only a world has."""
@@ -116,8 +116,8 @@ def run(
     *,
     program: ProgramOptions,
     wbc: WbcOptions,
-    chip: ChipOptions,
-    world: WorldOptions,
+    chip: ChipProgramOptions,
+    world: WorldRunOptions,
 ) -> None:
     """Run a program or a world in virtual time and print its moves, waits, outputs and uploads. A session is continued."""
     from steptwin.files.timedinputs import parse_duration, parse_inputs

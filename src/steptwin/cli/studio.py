@@ -13,7 +13,7 @@ import typer
 
 from steptwin.cli import completion
 from steptwin.cli.optiongroups import OptionGroup, grouped
-from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldOptions, up_options
+from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldRunOptions, up_options
 from steptwin.errors import Misuse
 
 
@@ -61,7 +61,7 @@ def studio(
     ready_file: ReadyFile = None,
     page: PageOptions,
     live: LiveOptions,
-    options: WorldOptions,
+    options: WorldRunOptions,
 ) -> None:
     """Show a world or devices in a browser, until Ctrl-C.
 

@@ -12,7 +12,7 @@ import typer
 
 from steptwin.cli.commands import PageFormat, PageSection, show
 from steptwin.cli.optiongroups import grouped
-from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldOptions, up_options
+from steptwin.cli.worldoptions import LiveOptions, ReadyFile, WorldRunOptions, up_options
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND
 
@@ -31,7 +31,7 @@ def up(
     keys: Annotated[bool, typer.Option("--keys", help="Show all keys of a description.")] = False,
     form: Annotated[PageFormat, typer.Option("--format", help="How to print the keys.")] = PageFormat.TEXT,
     live: LiveOptions,
-    options: WorldOptions,
+    options: WorldRunOptions,
 ) -> None:
     """Run a world in real time until Ctrl-C or until one of its scripts stops it; other programs connect to its lines.
 

@@ -25,7 +25,7 @@ LogTraffic = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class WorldOptions(OptionGroup):
+class WorldRunOptions(OptionGroup):
     """How a world begins, and what is kept of it."""
 
     heading = "Options of worlds"
@@ -81,7 +81,7 @@ class LiveOptions(OptionGroup):
     log_frames: LogTraffic = False
 
 
-def up_options(world: Path | None, ready_file: Path | None, live: LiveOptions, options: WorldOptions) -> UpOptions:
+def up_options(world: Path | None, ready_file: Path | None, live: LiveOptions, options: WorldRunOptions) -> UpOptions:
     """Raises `Misuse`."""
     from steptwin.commands.up_world import UpOptions
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +24,26 @@ NOTE = "note"
 """The subject of records of `InputChange`."""
 
 Print = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramRun:
+    """Options of a run that apply to any program."""
+
+    program: Path
+    limit: Nanos | None = None
+    """Ends the run at the latest; None: the default."""
+    until_idle: bool = False
+    """Whether the run also ends when only an input could cause anything further."""
+    inputs: Sequence[TimedInput] = ()
+    trace: Path | None = None
+    as_json: bool = False
+    print_world: bool = False
+
+    @property
+    def longest(self) -> Nanos:
+        """The limit, or its default."""
+        return self.limit if self.limit is not None else LIMIT_UNTIL_IDLE_NS if self.until_idle else USUAL_LIMIT_NS
 
 
 class Ending(NamedTuple):
@@ -49,10 +70,6 @@ class Outcome(NamedTuple):
     def __str__(self) -> str:
         faster = f"{self.ratio:,.0f} times faster than real time"
         return f"{self.virtual_s:.6f} s of virtual time in {self.wall_s:.3f} s: {faster}"
-
-
-def limit_of(limit: Nanos | None, *, until_idle: bool) -> Nanos:
-    return limit if limit is not None else LIMIT_UNTIL_IDLE_NS if until_idle else USUAL_LIMIT_NS
 
 
 def changes_of(inputs: Sequence[TimedInput], controller: str) -> Iterator[InputChange]:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from steptwin.commands.chips import Chain, check_chain, parse_wire, placed_wires
 from steptwin.commands.descriptions import print_world
-from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, limit_of, run_on, world_of, write
+from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, ProgramRun, run_on, world_of, write
 from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import read_text
@@ -61,19 +61,12 @@ class ChipEvent(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class M1486Run:
-    """The options of a run. ``limit`` (ns) ends it at the latest; ``until_idle`` ends it also when the program waits for ever."""
+class M1486Run(ProgramRun):
+    """The options of a run."""
 
-    program: Path
     variant: str = DEFAULT.name
     interface: str = "sd"
     wires: Sequence[str] = ()
-    limit: Nanos | None = None
-    until_idle: bool = False
-    inputs: Sequence[TimedInput] = ()
-    trace: Path | None = None
-    as_json: bool = False
-    print_world: bool = False
 
 
 def run(options: M1486Run, out: Print, warn: Print) -> bool:
@@ -102,7 +95,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
         if options.trace is not None:
             StatementFollower(world, world.trace.add)
         chips = Chips(world, len(typed))
-        limit = limit_of(options.limit, until_idle=options.until_idle)
+        limit = options.longest
         begin = time.perf_counter()
         why = run_on(world, limit, lambda: chips.due(limit), chips.are_idle, until_idle=options.until_idle)
         outcome = Outcome(Ending(limit if why == "limit" else chips.end(), why), time.perf_counter() - begin)

@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from steptwin.commands.descriptions import Named, print_world
-from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, changes_of, limit_of, run_on, world_of, write
-from steptwin.commands.travels import PlacedSwitches, Travel, place_switches
+from steptwin.commands.program_run import NOTE, Ending, Outcome, Print, ProgramRun, changes_of, run_on, world_of, write
+from steptwin.commands.travels import PlacedSwitches, SwitchTravel, place_switches
 from steptwin.datasheet import plain
 from steptwin.diagnostics import Severity, render, visible
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.files.programbanks import Findings, read_banks
 from steptwin.files.programfiles import CompanionFiles
-from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND, Nanos
@@ -54,21 +53,14 @@ _WRONG = frozenset({"program-error", "position-error", "overrun"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WbcRun:
-    """The options of a run. ``limit`` (ns) ends it at the latest; ``until_idle`` ends it also when the program waits for ever."""
+class WbcRun(ProgramRun):
+    """The options of a run."""
 
-    program: Path
     positions: Path | None = None
     config: Path | None = None
     firmware: str = DEFAULT.firmware
     statement_time: Nanos = STATEMENT_TIME
-    travels: Sequence[Travel] = ()
-    limit: Nanos | None = None
-    until_idle: bool = False
-    inputs: Sequence[TimedInput] = ()
-    trace: Path | None = None
-    as_json: bool = False
-    print_world: bool = False
+    travels: Sequence[SwitchTravel] = ()
 
 
 def run(options: WbcRun, out: Print, warn: Print) -> bool:
@@ -92,7 +84,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
             StatementFollower(world, world.trace.add)
         if is_late:
             given.start(watch.device)
-        limit = limit_of(options.limit, until_idle=options.until_idle)
+        limit = options.longest
         begin = time.perf_counter()
         why = run_on(world, limit, world.due, lambda: watch.has_ended(world.due()), until_idle=options.until_idle)
         end = limit if why == "limit" else min(watch.settled(), limit)

@@ -37,7 +37,7 @@ from steptwin.live.server import EndPoint, Server
 from steptwin.live.twins import find_device
 from steptwin.studio.connections import Computer, DeviceConnections
 from steptwin.studio.device import DeviceSurroundings
-from steptwin.studio.hub import Hub, Moment, Programs, Surroundings
+from steptwin.studio.hub import Hub, Moment, ProgramTexts, Surroundings
 from steptwin.studio.jogs import WorldJogs
 from steptwin.studio.service import Service, Tls, listen
 from steptwin.studio.shown import Shown
@@ -167,7 +167,7 @@ class _Page:
         server: Server,
         shown: Shown,
         moment: Callable[[], Moment],
-        programs: Programs,
+        programs: ProgramTexts,
         configuration: Callable[[str], SourceText | None],
         lookback: Lookback | None = None,
     ) -> None:

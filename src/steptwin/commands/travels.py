@@ -17,7 +17,7 @@ ASSUMED_FAR_S = 10.0
 """The same for KR if a program homes to both sides, so that there is travel between the switches."""
 
 
-class Travel(NamedTuple):
+class SwitchTravel(NamedTuple):
     """Positions of the switches of ``axis`` (from 1) in configured units, relative to that at power-on; None: no switch."""
 
     axis: int
@@ -35,7 +35,7 @@ class PlacedSwitches(NamedTuple):
 
 
 def place_switches(
-    config: ControllerConfig, travels: Sequence[Travel], homed: Mapping[int, frozenset[int]], driven: Collection[str]
+    config: ControllerConfig, travels: Sequence[SwitchTravel], homed: Mapping[int, frozenset[int]], driven: Collection[str]
 ) -> PlacedSwitches:
     """Place switches from ``travels``; for axes not named there, assume those that ``homed`` (`homing_sides`) needs.
 
@@ -65,7 +65,7 @@ def _contact(config: ControllerConfig, pin: int) -> str:
     return "NC" if pin < INPUTS and config.inputs[pin].level == 1 else "NO"
 
 
-def _assumed(number: int, axis: AxisConfig, sides: frozenset[int], driven: Collection[str]) -> Travel:
+def _assumed(number: int, axis: AxisConfig, sides: frozenset[int], driven: Collection[str]) -> SwitchTravel:
     """The assumed positions of KL and KR for an axis that is homed to ``sides``."""
     has_kl, has_kr = (pin < INPUTS and f"IN{pin + 1}" not in driven for pin in (axis.in_kl, axis.in_kr))
     if 0 in sides:
@@ -74,10 +74,10 @@ def _assumed(number: int, axis: AxisConfig, sides: frozenset[int], driven: Colle
     high_u = None
     if has_kr and 1 in sides:
         high_u = axis.vel * (ASSUMED_FAR_S if -1 in sides else ASSUMED_TRAVEL_S)
-    return Travel(number, low_u, high_u)
+    return SwitchTravel(number, low_u, high_u)
 
 
-def _texts(travel: Travel, axis: AxisConfig) -> Iterator[str]:
+def _texts(travel: SwitchTravel, axis: AxisConfig) -> Iterator[str]:
     for name, pin, edge_u in (("KL", axis.in_kl, travel.low_u), ("KR", axis.in_kr, travel.high_u)):
         if edge_u is not None:
             where = f"{real_text(edge_u)} {axis.unit_name}"
@@ -85,9 +85,9 @@ def _texts(travel: Travel, axis: AxisConfig) -> Iterator[str]:
             yield f"M{travel.axis}: {name} on IN{pin + 1} assumed at {where} ({example})"
 
 
-def parse_travel(text: str) -> list[Travel]:
+def parse_travel(text: str) -> list[SwitchTravel]:
     """``M1=-10..250,M2=-5..`` → switches of axes. Raises `Misuse`."""
-    travels: list[Travel] = []
+    travels: list[SwitchTravel] = []
     for part in filter(None, map(str.strip, text.split(","))):
         name, _, ends = part.partition("=")
         low, dots, high = ends.partition("..")
@@ -101,5 +101,5 @@ def parse_travel(text: str) -> list[Travel]:
             raise Misuse(f"--travel {part}: expected Mn=LOW..HIGH, such as M1=-10..250 or M1=-10..")
         if low_u is not None and high_u is not None and low_u >= high_u:
             raise Misuse(f"--travel {part}: {real_text(low_u)} must be below {real_text(high_u)}")
-        travels.append(Travel(int(number), low_u, high_u))
+        travels.append(SwitchTravel(int(number), low_u, high_u))
     return travels

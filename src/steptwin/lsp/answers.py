@@ -74,7 +74,7 @@ SHARED = frozenset({SymbolKind.POSITION})
 
 
 @dataclass(frozen=True, slots=True)
-class Location:
+class TextLocation:
     """A span of a file."""
 
     uri: str
@@ -133,6 +133,19 @@ class TokenKind(enum.Enum):
     VALUE = "enumMember"
     POSITION = "struct"
     SECTION = "namespace"
+
+
+TOKEN_KINDS = {
+    SymbolKind.CONSTANT: TokenKind.CONSTANT,
+    SymbolKind.VARIABLE: TokenKind.VARIABLE,
+    SymbolKind.REGISTER: TokenKind.REGISTER,
+    SymbolKind.LINE: TokenKind.REGISTER,
+    SymbolKind.VALUE: TokenKind.VALUE,
+    SymbolKind.FUNCTION: TokenKind.FUNCTION,
+    SymbolKind.LABEL: TokenKind.LABEL,
+    SymbolKind.POSITION: TokenKind.POSITION,
+}
+"""Of the names in programs."""
 
 
 @dataclass(frozen=True, slots=True)

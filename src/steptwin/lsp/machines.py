@@ -10,10 +10,10 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.lsp.files import relative
 from steptwin.m1486.lines import STEP_DIRECTION, Interface, interface
-from steptwin.m1486.variants import DEFAULT as DEFAULT_VARIANT
 from steptwin.m1486.variants import Variant, variant
 from steptwin.wbc.dialect import DEFAULT as DEFAULT_DIALECT
 from steptwin.wbc.dialect import Dialect, dialect_for
+from steptwin.world.kinds.m1486.table import DEFAULT_VARIANT
 from steptwin.world.kinds.mic488.table import banks_value
 
 
@@ -107,9 +107,9 @@ def _banks(world: str, table: Mapping[str, Any], key: str) -> dict[int, str]:
 
 def _chip(world: str, table: Mapping[str, Any]) -> Chip:
     try:
-        kind = variant(str(table.get("variant", "B")))
+        kind = variant(str(table.get("variant", DEFAULT_VARIANT)))
     except Misuse:
-        kind = DEFAULT_VARIANT
+        kind = variant(DEFAULT_VARIANT)
     try:
         drive = interface(str(table.get("interface", STEP_DIRECTION.name)))
     except Misuse:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from steptwin.diagnostics import Diagnostic, Span
 from steptwin.errors import Misuse
 from steptwin.lsp.analysis import Analysis
-from steptwin.lsp.answers import SHARED, CallEdge, CodeAction, Edit, Location, OutlineItem
+from steptwin.lsp.answers import SHARED, CallEdge, CodeAction, Edit, OutlineItem, TextLocation
 from steptwin.lsp.files import normal
+from steptwin.lsp.letters import has_letters
 from steptwin.lsp.session import EditorSession
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
@@ -34,27 +35,29 @@ def _use_at(session: EditorSession, uri: str, place: int) -> Use | None:
     return None if analysis is None else analysis.use_at(place)
 
 
-def definition(session: EditorSession, uri: str, place: int) -> list[Location]:
+def definition(session: EditorSession, uri: str, place: int) -> list[TextLocation]:
     """Where the name at a place is defined; of a name of a file, that file."""
     analysis = session.analysis(uri)
     if analysis is None:
         return []
-    linked = [Location(link.uri, Span(0, 0)) for link in analysis.links() if link.span.start <= place <= link.span.end]
+    linked = [TextLocation(link.uri, Span(0, 0)) for link in analysis.links() if link.span.start <= place <= link.span.end]
     use = analysis.use_at(place)
     if linked or use is None:
         return linked
     found = [
-        Location(where, span) for where, other in _texts_with(session, uri, use.symbol) for span in other.definitions(use.symbol)
+        TextLocation(where, span)
+        for where, other in _texts_with(session, uri, use.symbol)
+        for span in other.definitions(use.symbol)
     ]
-    return found or [Location(normal(uri), span) for span in analysis.also_defined(use.symbol)]
+    return found or [TextLocation(normal(uri), span) for span in analysis.also_defined(use.symbol)]
 
 
-def references(session: EditorSession, uri: str, place: int, *, with_definition: bool = True) -> list[Location]:
+def references(session: EditorSession, uri: str, place: int, *, with_definition: bool = True) -> list[TextLocation]:
     use = _use_at(session, uri, place)
     if use is None:
         return []
     return [
-        Location(where, other.span)
+        TextLocation(where, other.span)
         for where, analysis in _texts_with(session, uri, use.symbol)
         for other in analysis.uses
         if other.symbol == use.symbol and (with_definition or other.role is not SymbolRole.DEFINE)
@@ -127,7 +130,7 @@ def workspace_symbols(session: EditorSession, query: str) -> list[tuple[str, Out
     for uri in uris:
         analysis = session.analysis(uri)
         for section in () if analysis is None else _all(analysis.outline()):
-            if _has_letters(section.name.lower(), wanted):
+            if has_letters(section.name.lower(), wanted):
                 found.append((uri, section))
                 if len(found) == MOST_SYMBOLS:
                     return found
@@ -138,15 +141,6 @@ def _all(sections: Iterable[OutlineItem]) -> Iterator[OutlineItem]:
     for section in sections:
         yield section
         yield from _all(section.children)
-
-
-def _has_letters(name: str, letters: str) -> bool:
-    at = 0
-    for letter in letters:
-        at = name.find(letter, at) + 1
-        if not at:
-            return False
-    return True
 
 
 # -- calls

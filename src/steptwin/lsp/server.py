@@ -25,7 +25,7 @@ from steptwin import __version__
 from steptwin.errors import Misuse
 from steptwin.lsp import navigation
 from steptwin.lsp.analysis import Analysis
-from steptwin.lsp.answers import Location
+from steptwin.lsp.answers import TextLocation
 from steptwin.lsp.convert import SYMBOL_KINDS, TOKEN_MODIFIERS, TOKEN_TYPES, Converter, changes_of
 from steptwin.lsp.documents import TextChange
 from steptwin.lsp.files import DiskFiles, Files, normal
@@ -146,7 +146,7 @@ class EditorServer(LanguageServer):
         lines = self.session.lines(normal(uri))
         return None if lines is None else Converter(lines, self.session.encoding)
 
-    def location(self, place: Location) -> lsp.Location:
+    def location(self, place: TextLocation) -> lsp.Location:
         converter = self.converter(place.uri)
         nowhere = lsp.Range(lsp.Position(0, 0), lsp.Position(0, 0))
         return lsp.Location(self.session.shown(place.uri), nowhere if converter is None else converter.range(place.span))
@@ -393,7 +393,7 @@ def _code_action(server: EditorServer, params: lsp.CodeActionParams) -> list[lsp
 
 def _workspace_symbol(server: EditorServer, params: lsp.WorkspaceSymbolParams) -> list[lsp.WorkspaceSymbol]:
     return [
-        lsp.WorkspaceSymbol(server.location(Location(uri, section.name_span)), section.name, SYMBOL_KINDS[section.kind])
+        lsp.WorkspaceSymbol(server.location(TextLocation(uri, section.name_span)), section.name, SYMBOL_KINDS[section.kind])
         for uri, section in navigation.workspace_symbols(server.session, params.query)
     ]
 

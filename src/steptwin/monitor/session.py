@@ -14,7 +14,7 @@ from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.twins import controller_of, find_device
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import register_map
-from steptwin.monitor.values import FollowedValues, PolledValues, Values, ValueSource
+from steptwin.monitor.values import FollowedValues, MonitorSource, PolledValues, Values
 
 AGAIN_S = 1.0
 """Interval of attempts to reach a controller that does not respond, s."""
@@ -40,7 +40,7 @@ class MonitorSession:
     ``watched`` are names of registers to show besides the status. ``values`` gives both; without it the driver is polled.
     """
 
-    def __init__(self, mic: AsyncMic488, place: str, hz: float, values: ValueSource | None = None) -> None:
+    def __init__(self, mic: AsyncMic488, place: str, hz: float, values: MonitorSource | None = None) -> None:
         if not HZ[0] <= hz <= HZ[1]:
             raise Misuse(f"--hz {hz:g}: permitted are {HZ[0]:g} to {HZ[1]:g}")
         self.mic = mic

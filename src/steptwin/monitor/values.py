@@ -17,17 +17,17 @@ Values: TypeAlias = Mapping[str, tuple[Value, str]]
 """Value and unit of registers by name."""
 
 
-class Look(NamedTuple):
+class MonitorReading(NamedTuple):
     """What is known at a moment."""
 
     status: Mic488Status
     values: Values
 
 
-class ValueSource(Protocol):
+class MonitorSource(Protocol):
     """Errors are those of drivers; the next look begins anew."""
 
-    async def look(self, names: Sequence[str]) -> Look:
+    async def look(self, names: Sequence[str]) -> MonitorReading:
         """The status, and the values of registers by name."""
         ...
 
@@ -40,9 +40,9 @@ class PolledValues:
     def __init__(self, mic: AsyncMic488) -> None:
         self._mic = mic
 
-    async def look(self, names: Sequence[str]) -> Look:
+    async def look(self, names: Sequence[str]) -> MonitorReading:
         status = await self._mic.status()
-        return Look(status, await self._mic.get_shown(*names) if names else {})
+        return MonitorReading(status, await self._mic.get_shown(*names) if names else {})
 
     async def close(self) -> None:
         """The driver is closed by its owner."""
@@ -58,20 +58,20 @@ class FollowedValues:
         self._watch: TwinWatch | None = None
         self._names: tuple[str, ...] = ()
 
-    async def look(self, names: Sequence[str]) -> Look:
+    async def look(self, names: Sequence[str]) -> MonitorReading:
         return await asyncio.to_thread(self._look, tuple(names))  # a twin that hangs must not keep keys from acting
 
     async def close(self) -> None:
         self._drop()
 
-    def _look(self, names: tuple[str, ...]) -> Look:
+    def _look(self, names: tuple[str, ...]) -> MonitorReading:
         try:
             found = self._watched(names).look()
         except BaseException:
             self._drop()
             raise
         known = {name: (value, unit) for name, (value, unit) in found.items() if value is not None}
-        return Look(_status(known), {name: known[name] for name in names if name in known})
+        return MonitorReading(_status(known), {name: known[name] for name in names if name in known})
 
     def _watched(self, names: tuple[str, ...]) -> TwinWatch:
         """A watch of what the status has, and of the registers."""

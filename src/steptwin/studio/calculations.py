@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.calc import TIMES, Calculator, Mechanics, Quantity, calculator_of, plain
+from steptwin.calc import TIMES, Calculator, DriveMechanics, MoveQuantity, calculator_of, plain
 from steptwin.errors import Refusal
 from steptwin.studio.machines import Sheets
 
@@ -36,10 +36,10 @@ class Calculations:
 
 def gear(motor_steps: float, microsteps: float, ratio: float, lead: float | None) -> Mapping[str, float]:
     """Pulses in each unit. Raises `Misuse`."""
-    return dict(Mechanics(motor_steps=motor_steps, microsteps=microsteps, ratio=ratio, lead=lead).scale().pulses)
+    return dict(DriveMechanics(motor_steps=motor_steps, microsteps=microsteps, ratio=ratio, lead=lead).scale().pulses)
 
 
-def _quantity(one: Quantity) -> Mapping[str, object]:
+def _quantity(one: MoveQuantity) -> Mapping[str, object]:
     return {
         "name": one.name,
         "meaning": one.meaning,

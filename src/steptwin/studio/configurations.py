@@ -14,7 +14,7 @@ from steptwin.studio.machines import Sheets
 from steptwin.world.programtexts import FINDING
 
 
-class Kind(Protocol):
+class ConfigurationFormat(Protocol):
     """How the file of a kind of controller becomes a form."""
 
     def form(self, text: str, name: str, sheet: Datasheet) -> Form: ...
@@ -31,7 +31,7 @@ class _Mic488:
         return with_values(text, name, changes)
 
 
-KINDS: Mapping[str, Kind] = {"mic488": _Mic488()}
+KINDS: Mapping[str, ConfigurationFormat] = {"mic488": _Mic488()}
 """By kind of controller; others have no configuration file."""
 
 
@@ -54,7 +54,7 @@ class Configurations:
         name = f"{machine}.cfg"
         return _plain(kind.form(kind.with_values(text, name, changes), name, sheet))
 
-    def _kind(self, machine: str) -> tuple[Kind, Datasheet]:
+    def _kind(self, machine: str) -> tuple[ConfigurationFormat, Datasheet]:
         sheet = self._sheets.of(machine)
         if sheet.kind not in KINDS:
             raise Refusal(f"{machine} is of the kind {sheet.kind}, which has no configuration file: it is set up by commands")

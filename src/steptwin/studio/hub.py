@@ -23,9 +23,9 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.studio.calculations import Calculations
 from steptwin.studio.configurations import Configurations
 from steptwin.studio.jogs import Held, Jogs
-from steptwin.studio.looking import Lookback
+from steptwin.studio.looking import KeptPast
 from steptwin.studio.machines import Sheets
-from steptwin.studio.programs import Programs
+from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.requests import OF_THE_PAST, REQUESTS, permit_of
 from steptwin.studio.streams import Streams
 from steptwin.studio.tools import tools
@@ -149,11 +149,11 @@ class Surroundings:
     audit: Audit
     program: str
     """Version of steptwin."""
-    programs: Programs
+    programs: ProgramTexts
     connections: Connections
     configuration: Callable[[str], SourceText | None] = lambda machine: None
     """The configuration file of a controller by name; None without one."""
-    lookback: Lookback | None = None
+    lookback: KeptPast | None = None
     """The past, where one is kept."""
     on_internal: Callable[[Exception], object] = lambda error: None
 

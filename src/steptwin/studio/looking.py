@@ -9,8 +9,8 @@ from typing import Protocol
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.machine import Nanos
-from steptwin.studio.programs import Programs
-from steptwin.studio.shownworld import World, present_of
+from steptwin.studio.programs import ProgramTexts
+from steptwin.studio.shownworld import PlannedSubject, present_of
 from steptwin.studio.watches import Watched
 from steptwin.subject.commands import Command, Encoders, ListFaults, ReadPins, ReadPoints, State
 from steptwin.subject.contract import Result
@@ -20,13 +20,13 @@ OF_A_MOMENT = frozenset({ReadPoints, ReadPins, State, Encoders, ListFaults})
 """Commands whose answer is about a moment."""
 
 
-class Look(Protocol):
+class PastMoment(Protocol):
     """A moment of the past, in a world that goes nowhere by itself."""
 
     @property
-    def subject(self) -> World: ...
+    def subject(self) -> PlannedSubject: ...
     @property
-    def programs(self) -> Programs: ...
+    def programs(self) -> ProgramTexts: ...
     @property
     def now(self) -> Nanos: ...
 
@@ -41,13 +41,13 @@ class Look(Protocol):
     def close(self) -> None: ...
 
 
-class Lookback(Protocol):
+class KeptPast(Protocol):
     """The past of a world that is kept."""
 
     @property
     def begin(self) -> Nanos: ...
 
-    def open(self) -> Look:
+    def open(self) -> PastMoment:
         """For one more viewer. Raises `Refusal` where there are too many."""
         ...
 
@@ -55,9 +55,9 @@ class Lookback(Protocol):
 class Looking:
     """Of one viewer; at the present until `go`."""
 
-    def __init__(self, lookback: Lookback | None) -> None:
+    def __init__(self, lookback: KeptPast | None) -> None:
         self._lookback = lookback
-        self._look: Look | None = None
+        self._look: PastMoment | None = None
         self._going: Later[None] | None = None
         self.is_changed = False
         """Whether the viewer has to be sent `message`."""
@@ -94,7 +94,7 @@ class Looking:
             self.is_changed = True
             self.unsent.clear()
 
-    async def _there(self) -> Look:
+    async def _there(self) -> PastMoment:
         """When it has got to the moment that was wanted last."""
         while self._going is not None and not self._going.is_done:
             try:
@@ -110,7 +110,7 @@ class Looking:
         look = await self._there()
         return look.subject.do(wanted)
 
-    async def programs(self) -> Programs:
+    async def programs(self) -> ProgramTexts:
         return (await self._there()).programs
 
     async def go_back(self) -> None:
@@ -141,7 +141,7 @@ class Looking:
         return json.dumps([[index, _value(look, point)] for index, point in enumerate(points)], separators=(",", ":"))
 
 
-def _value(look: Look | None, point: str) -> float | None:
+def _value(look: PastMoment | None, point: str) -> float | None:
     """Of a moment; None where nothing is known, as of a device, of which no past is kept."""
     try:
         return None if look is None else look.subject.read(point)[0].value

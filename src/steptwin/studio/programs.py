@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 
-class Programs(Protocol):
+class ProgramTexts(Protocol):
     """The texts of programs that the controllers of a subject were given, as plain values."""
 
     def list(self) -> Sequence[Mapping[str, object]]: ...

@@ -19,7 +19,7 @@ from steptwin.machine import Nanos
 from steptwin.studio.eventloop import result_of
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
-from steptwin.studio.session import Session
+from steptwin.studio.session import ViewerSession
 from steptwin.subject.dispatch import LONGEST_REQUEST, Message, failure
 from steptwin.subject.schema import definitions, request_schema
 
@@ -47,7 +47,7 @@ class Rest:
     def __init__(self, hub: Hub, clock: Callable[[], Nanos]) -> None:
         self._hub = hub
         self._clock = clock
-        self._sessions: dict[tuple[Role, str | None], Session] = {}
+        self._sessions: dict[tuple[Role, str | None], ViewerSession] = {}
 
     def add_to(self, app: FastAPI) -> None:
         for name, row in ALL.items():
@@ -146,14 +146,14 @@ class Rest:
             return answer, DONE
         return answer, FORBIDDEN if session.viewer.role < permit_of(name).role else STATUS[error["code"]]
 
-    def _session(self, request: Request) -> Session:
+    def _session(self, request: Request) -> ViewerSession:
         """Raises `Refusal` for a missing or wrong token."""
         scheme, _, given = request.headers.get("authorization", "").partition(" ")
         role, name = self._hub.around.gate.enter(given.strip() if scheme.lower() == "bearer" else None)
         found = self._sessions.get((role, name))
         if found is None:
             viewer = Viewer(self._hub.number(), name or "REST", role)
-            found = self._sessions[role, name] = Session(self._hub, viewer.name, entered=viewer)
+            found = self._sessions[role, name] = ViewerSession(self._hub, viewer.name, entered=viewer)
         return found
 
 

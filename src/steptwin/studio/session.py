@@ -21,9 +21,9 @@ from steptwin.studio import requests as ask
 from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
-from steptwin.studio.programs import Programs
+from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.requests import OF_CONNECTION, OF_THE_PAST, REQUESTS, check_name, permit_of, read_request
-from steptwin.studio.streams import Batch, Place
+from steptwin.studio.streams import Batch, StreamPosition
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, read_command
@@ -57,7 +57,7 @@ class Wanted(NamedTuple):
     act: Callable[[Identity], Awaitable[Result]]
 
 
-class Session:
+class ViewerSession:
     """The session of a connection, or of a client of REST (``is_rest``), whose viewer ``entered`` exists from the beginning."""
 
     def __init__(self, hub: Hub, peer: str, *, entered: Viewer | None = None) -> None:
@@ -79,14 +79,27 @@ class Session:
         self._watches: dict[int, Watched] = {}
         self._watch_numbers = count(1)
         self._follows: dict[object, tuple[Filter, int]] = {}
-        self._place: Place | None = None
+        self._place: StreamPosition | None = None
         self._left_over: list[Batch] = []
         """Pending events from before the last change of the followed kinds."""
         self._missed = 0
         self._events_due: Nanos = 0
         self._now: Nanos = 0
         self._looking = Looking(hub.around.lookback)
-        self._asking: Mapping[object, Callable[[Any], Awaitable[object]]] = {
+        self._asking = self._asking_actions()
+        self._own = self._own_actions()
+        self._of_subject: Mapping[object, Callable[[Any, Identity], Awaitable[Result]]] = {
+            command.Jog: lambda wanted, _: self._jog(wanted),
+            command.StopAxes: lambda wanted, _: hub.stop(wanted),
+            command.Follow: self._follow,
+            command.Unfollow: lambda wanted, _: self._unfollow(wanted),
+        }
+        """Commands of a subject that mean something else, or more, in the studio."""
+
+    def _asking_actions(self) -> Mapping[object, Callable[[Any], Awaitable[object]]]:
+        """Of requests that ask the subject, which may answer later."""
+        hub = self._hub
+        return {
             ask.StopAll: lambda _: hub.stop_all(),
             ask.LookAt: self._look_at,
             ask.GoBack: self._go_back,
@@ -96,31 +109,23 @@ class Session:
             ask.Connect: self._connect,
             ask.Disconnect: lambda wanted: hub.around.connections.disconnect(wanted.machine),
         }
-        """Requests for which the subject is asked, which may answer later."""
-        self._own: Mapping[object, Callable[[Any], object]] = complete(
-            "request",
-            [row.kind for row in REQUESTS.values() if row.kind not in self._asking],
-            "action",
-            {
-                ask.Hello: self._hello,
-                ask.Resync: self._resync,
-                ask.Watch: self._watch,
-                ask.Unwatch: self._unwatch,
-                ask.TakeControl: lambda wanted: hub.take_control(self.viewer, over=wanted.over),
-                ask.ReleaseControl: lambda _: hub.release_control(self.viewer),
-                ask.Renew: lambda wanted: hub.renew(self.viewer, wanted.lease),
-                ask.LetGo: lambda wanted: hub.let_go(self.viewer, wanted.lease),
-                **hub.tools,
-                ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
-            },
-        )
-        self._of_subject: Mapping[object, Callable[[Any, Identity], Awaitable[Result]]] = {
-            command.Jog: lambda wanted, _: self._jog(wanted),
-            command.StopAxes: lambda wanted, _: hub.stop(wanted),
-            command.Follow: self._follow,
-            command.Unfollow: lambda wanted, _: self._unfollow(wanted),
+
+    def _own_actions(self) -> Mapping[object, Callable[[Any], object]]:
+        """Of all other requests of the studio."""
+        hub = self._hub
+        actions: Mapping[object, Callable[[Any], object]] = {
+            ask.Hello: self._hello,
+            ask.Resync: self._resync,
+            ask.Watch: self._watch,
+            ask.Unwatch: self._unwatch,
+            ask.TakeControl: lambda wanted: hub.take_control(self.viewer, over=wanted.over),
+            ask.ReleaseControl: lambda _: hub.release_control(self.viewer),
+            ask.Renew: lambda wanted: hub.renew(self.viewer, wanted.lease),
+            ask.LetGo: lambda wanted: hub.let_go(self.viewer, wanted.lease),
+            **hub.tools,
+            ask.ReadAudit: lambda wanted: [entry.plain() for entry in hub.around.audit.last(wanted.most)],
         }
-        """Commands of a subject that mean something else, or more, in the studio."""
+        return complete("request", [row.kind for row in REQUESTS.values() if row.kind not in self._asking], "action", actions)
 
     # ------------------------------------------------------------------ requests
 
@@ -266,7 +271,7 @@ class Session:
         for watched in self._watches.values():
             watched.forget()
 
-    async def _programs(self) -> Programs:
+    async def _programs(self) -> ProgramTexts:
         return await self._looking.programs() if self._looking.is_back else self._hub.around.programs
 
     async def _list_programs(self, _: ask.ListPrograms) -> object:

@@ -19,7 +19,7 @@ from steptwin.subject.following import Filter, Followers, Following
 TIME = "time"
 
 
-class Part(Protocol):
+class ShownSubject(Protocol):
     """A world, or a device."""
 
     @property
@@ -37,7 +37,7 @@ class Part(Protocol):
     async def begin_jog(self, wanted: command.Jog) -> Held: ...
 
 
-class WorldPart(Part, Protocol):
+class WorldPart(ShownSubject, Protocol):
     def result_of(self, value: object) -> Result: ...
     def present(self) -> Mapping[str, Any]: ...
 
@@ -52,7 +52,7 @@ class Shown:
 
     def __init__(self, world: WorldPart | None, clock: Callable[[], Nanos], numbering: Numbering) -> None:
         self._world = world
-        self._parts: list[Part] = [] if world is None else [world]
+        self._parts: list[ShownSubject] = [] if world is None else [world]
         self.now = clock
         self.numbering = numbering
         self._followings: list[Following] = []
@@ -62,13 +62,13 @@ class Shown:
 
     # ------------------------------------------------------------------ parts
 
-    def add(self, part: Part) -> None:
+    def add(self, part: ShownSubject) -> None:
         self._parts.append(part)
         for following in self._followings:
             part.followers.add(following)
         self._describe()
 
-    def remove(self, part: Part) -> None:
+    def remove(self, part: ShownSubject) -> None:
         self._parts.remove(part)
         for following in self._followings:
             part.followers.remove(following)
@@ -89,7 +89,7 @@ class Shown:
             commands=tuple(name for name in COMMANDS if name in can),
         )
 
-    def _part_called(self, machine: str) -> Part:
+    def _part_called(self, machine: str) -> ShownSubject:
         """Raises `Misuse`."""
         part = self._of_machine.get(machine) or self._world
         if part is None:
@@ -98,9 +98,9 @@ class Shown:
             raise Misuse(f"no machine is called {machine!r}{NearMiss().hint(machine, names)}; {known}")
         return part
 
-    def _part_of(self, wanted: Command) -> Part:
+    def _part_of(self, wanted: Command) -> ShownSubject:
         """Raises `Misuse`, and `Refusal` where nobody can do it."""
-        found: list[Part] = []
+        found: list[ShownSubject] = []
         for field in row_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
             if field.name == "machine" and value is not None:
@@ -135,9 +135,9 @@ class Shown:
         found = {one.point: one for part, own in groups for one in part.read(*own)}
         return self._in_order(points, found)
 
-    def _by_part(self, points: Iterable[str]) -> list[tuple[Part, list[str]]]:
+    def _by_part(self, points: Iterable[str]) -> list[tuple[ShownSubject, list[str]]]:
         """Raises `Misuse`. Points of machines that are gone, and the time, are left out."""
-        groups: dict[int, tuple[Part, list[str]]] = {}
+        groups: dict[int, tuple[ShownSubject, list[str]]] = {}
         for point in points:
             owner = point.partition(".")[0]
             if point != TIME and (owner not in self._gone or owner in self._of_machine):

@@ -12,7 +12,7 @@ from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
 
 
-class World(Protocol):
+class PlannedSubject(Protocol):
     """A subject in this process with plans: `steptwin.subject.world.WorldSubject`, or what lets its time go on."""
 
     @property
@@ -22,7 +22,7 @@ class World(Protocol):
     def plans(self, what: Filter) -> list[Event]: ...
 
 
-def present_of(world: World) -> dict[str, Any]:
+def present_of(world: PlannedSubject) -> dict[str, Any]:
     """``state`` by machine and ``faults``."""
     states = {part.name: world.do(command.State(part.name)).value for part in world.description.machines}
     return {"state": states, "faults": world.do(command.ListFaults()).value}
@@ -33,7 +33,7 @@ class ShownWorld:
 
     lost = None
 
-    def __init__(self, world: World, followers: Followers, jogs: Jogs) -> None:
+    def __init__(self, world: PlannedSubject, followers: Followers, jogs: Jogs) -> None:
         self._world = world
         self.followers = followers
         self.begin_jog = jogs.begin

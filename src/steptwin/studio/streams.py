@@ -36,7 +36,7 @@ class Stream:
 
     def __init__(self, filters: Filters) -> None:
         self.filters = filters
-        self.places: set[Place] = set()
+        self.places: set[StreamPosition] = set()
         self._texts: deque[str] = deque()
         self._begin = 0
         """The number of the first stored event."""
@@ -83,7 +83,7 @@ class Stream:
         return self._begin
 
 
-class Place:
+class StreamPosition:
     """The position of a viewer in a stream. ``bound``: limit of its pending events."""
 
     __slots__ = ("_missed", "bound", "next", "stream")
@@ -123,7 +123,7 @@ class Streams:
         self.on_event: Callable[[], None] | None = None
         """Called when an event arrives in an empty queue."""
 
-    def enter(self, filters: Iterable[Filter], bound: int) -> Place:
+    def enter(self, filters: Iterable[Filter], bound: int) -> StreamPosition:
         """Join a stream with the events from now on."""
         wanted = frozenset(filters)
         self.flush()
@@ -131,11 +131,11 @@ class Streams:
         if stream is None:
             stream = self._streams[wanted] = Stream(wanted)
             self._follow()
-        place = Place(stream, min(bound, MOST_WAITING))
+        place = StreamPosition(stream, min(bound, MOST_WAITING))
         stream.places.add(place)
         return place
 
-    def leave(self, place: Place) -> None:
+    def leave(self, place: StreamPosition) -> None:
         stream = place.stream
         stream.places.discard(place)
         if not stream.places and self._streams.pop(stream.filters, None) is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from steptwin.access.roles import LOOK
-from steptwin.calc import Formula, Part, Setting
+from steptwin.calc import Formula, MovePart, RequiredSetting
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
 from steptwin.studio.requestrow import RequestRow
@@ -107,10 +107,10 @@ _MOVE = members(
         "times": _NUMBERS,
         "peak": _NUMBER,
         "reaches": {**_FLAG, "description": "Whether the peak is the velocity."},
-        "parts": _list(members({name: _TEXT if name == "name" else _NUMBER for name in Part._fields})),
+        "parts": _list(members({name: _TEXT if name == "name" else _NUMBER for name in MovePart._fields})),
         "formulas": _list(members(dict.fromkeys(Formula._fields, _TEXT))),
         "notes": _list(_TEXT),
-        "settings": _list(members({name: _NUMBER if name == "value" else _TEXT for name in Setting._fields})),
+        "settings": _list(members({name: _NUMBER if name == "value" else _TEXT for name in RequiredSetting._fields})),
         "curve": {
             "type": "array",
             "items": {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.studio.hub import Hub
-from steptwin.studio.session import Session
+from steptwin.studio.session import ViewerSession
 from steptwin.subject.dispatch import Message, failure
 
 Scope: TypeAlias = MutableMapping[str, Any]
@@ -45,7 +45,7 @@ class Viewers:
         """One connection, from its beginning to its end."""
         await receive()  # that it wants to connect
         await send({"type": "websocket.accept"})
-        session = Session(self._hub, _peer(scope))
+        session = ViewerSession(self._hub, _peer(scope))
         connection = _Connection(session, send, self._clock, scope["state"]["abort"])
         self._connections.add(connection)
         if self._ticking is None:
@@ -80,7 +80,7 @@ class Viewers:
 class _Connection:
     """A connection. Answers are sent in order; a separate task sends messages, so that only that task waits for a slow reader."""
 
-    def __init__(self, session: Session, send: Send, clock: Callable[[], Nanos], abort: Callable[[], None]) -> None:
+    def __init__(self, session: ViewerSession, send: Send, clock: Callable[[], Nanos], abort: Callable[[], None]) -> None:
         self._session = session
         self._send = send
         self._clock = clock

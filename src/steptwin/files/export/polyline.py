@@ -21,7 +21,7 @@ _MOST_POINTS = 200
 """Of one segment."""
 
 
-class Curve(NamedTuple):
+class PolylineCurve(NamedTuple):
     """Points of position (pulses) and velocity (pulses/s), in time; two at one moment where the velocity jumps."""
 
     times: list[Nanos]
@@ -45,7 +45,7 @@ class PolylinePiece(NamedTuple):
         return self.profile.base + self.segment.position(t_s), self.segment.velocity(t_s)
 
 
-def curve(track: AxisTrack, begin: Nanos, until: Nanos, resolution: Nanos = 0) -> Curve:
+def curve(track: AxisTrack, begin: Nanos, until: Nanos, resolution: Nanos = 0) -> PolylineCurve:
     """The motion of ``track`` from ``begin`` to ``until``. What happens within ``resolution`` gets no points between."""
     pieces = [piece for plan, a, b in track.stretches(begin, until) for piece in pieces_of(profile_of(plan), a, b)]
     ends = [(piece.look(piece.begin), piece.look(piece.end)) for piece in pieces]
@@ -53,7 +53,7 @@ def curve(track: AxisTrack, begin: Nanos, until: Nanos, resolution: Nanos = 0) -
     speeds = [v for pair in ends for _, v in pair]
     position_slack = _range(positions) / _POSITION_STEPS
     speed_slack = _range([0.0, *speeds]) / _SPEED_STEPS
-    points = Curve([], [], [])
+    points = PolylineCurve([], [], [])
     for piece, ((p0, v0), (p1, v1)) in zip(pieces, ends, strict=True):
         _add(points, piece.begin, p0, v0)
         if piece.segment is not None and piece.end - piece.begin > resolution:
@@ -92,7 +92,7 @@ def _points(piece: PolylinePiece, *courses: tuple[float, float, float]) -> int:
     return min(max(ceil(sqrt(most)), 1), _MOST_POINTS)
 
 
-def _add(points: Curve, time: Nanos, position: float, velocity: float) -> None:
+def _add(points: PolylineCurve, time: Nanos, position: float, velocity: float) -> None:
     times, positions, velocities = points
     if times and times[-1] == time and velocities[-1] == velocity and positions[-1] == position:
         return

@@ -174,61 +174,83 @@ def sort_out(
     if unknown:
         raise Misuse(f"no machine {unknown[0]!r} in the trace: there are {', '.join(trace.machines) or 'none'}")
     chosen = [name for name in trace.machines if machines is None or name in machines]
-    order = {name: i for i, name in enumerate(chosen)}
-    axes: dict[tuple[str, str], AxisTrack] = {}
-    pins: dict[tuple[str, str], PinTrack] = {}
-    marks: list[TraceRecord] = []
-    last = changed = begin
+    sorting, included = _Sorting(views, begin), frozenset(chosen)
     for record in trace:
-        time, machine, kind, subject, value, _ = record
-        if machine not in order:
+        if record.machine not in included:
             continue
-        if until is not None and time > until:
+        if until is not None and record.time > until:
             break
-        last = max(last, time)
+        sorting.add(record)
+    return sorting.recording(chosen, until)
+
+
+class _Sorting:
+    """The tracks while records are added in order, from any moment; marks only from ``begin`` on."""
+
+    def __init__(self, views: AxisViews, begin: Nanos) -> None:
+        self._views = views
+        self._begin = begin
+        self._axes: dict[tuple[str, str], AxisTrack] = {}
+        self._pins: dict[tuple[str, str], PinTrack] = {}
+        self._marks: list[TraceRecord] = []
+        self._last = self._changed = begin
+
+    def add(self, record: TraceRecord) -> None:
+        time, machine, kind, subject, value, _ = record
+        self._last = max(self._last, time)
         if not subject.startswith("AIN"):
-            changed = max(changed, time)
+            self._changed = max(self._changed, time)
         if isinstance(value, (Profile, StepTrain)) and kind == "plan":
-            _axis(axes, machine, subject, views).times.append(time)
-            axes[machine, subject].plans.append(value)
-        elif isinstance(value, tuple) and kind == "load":
-            _axis(axes, machine, subject, views).place(time, [LoadPiece(*one) for one in value])
-        elif isinstance(value, Profile) and kind == "free":
-            _axis(axes, machine, subject, views).place(time, [LoadPiece(time, False, value.base)], value)
-        elif isinstance(value, int) and kind == "coordinate":
-            _axis(axes, machine, subject, views).origins.append((time, value))
-        elif isinstance(value, (int, float)) and kind == "edge":
-            track = pins.setdefault((machine, subject), PinTrack(machine, subject))
+            track = self._axis(machine, subject)
             track.times.append(time)
-            track.levels.append(float(value))
-        elif time >= begin:
-            marks.append(record)
-    for track in axes.values():
-        _stand_before(track, begin)
-    rests = [profile_of(track.plans[-1]).end for track in axes.values()]
-    rests += [free.end for track in axes.values() for begin, free in track.free.items() if begin == track.loads[-1].begin]
-    at_rest_by = max((rest for rest in rests if rest is not None), default=begin)
-    last, changed = max(last, at_rest_by), max(changed, at_rest_by)
-    end = last if until is None else until
-    if end < begin:
-        raise Misuse(f"the window of time ends at {end} ns and begins at {begin} ns: it must not end before it begins")
-    return Recording(
-        begin,
-        end,
-        chosen,
-        sorted(axes.values(), key=lambda track: (order[track.machine], _numbers(track.view.name))),
-        sorted(pins.values(), key=lambda track: (order[track.machine], _numbers(track.pin))),
-        marks,
-        end if None in rests else min(changed if changed > begin else last, end),
-    )
+            track.plans.append(value)
+        elif isinstance(value, tuple) and kind == "load":
+            self._axis(machine, subject).place(time, [LoadPiece(*one) for one in value])
+        elif isinstance(value, Profile) and kind == "free":
+            self._axis(machine, subject).place(time, [LoadPiece(time, False, value.base)], value)
+        elif isinstance(value, int) and kind == "coordinate":
+            self._axis(machine, subject).origins.append((time, value))
+        elif isinstance(value, (int, float)) and kind == "edge":
+            pin = self._pins.setdefault((machine, subject), PinTrack(machine, subject))
+            pin.times.append(time)
+            pin.levels.append(float(value))
+        elif time >= self._begin:
+            self._marks.append(record)
 
+    def _axis(self, machine: str, subject: str) -> AxisTrack:
+        track = self._axes.get((machine, subject))
+        if track is None:
+            view = self._views.get((machine, subject)) or plain_view(subject)
+            track = self._axes[machine, subject] = AxisTrack(machine, view)
+        return track
 
-def _axis(axes: dict[tuple[str, str], AxisTrack], machine: str, subject: str, views: AxisViews) -> AxisTrack:
-    track = axes.get((machine, subject))
-    if track is None:
-        view = views.get((machine, subject)) or plain_view(subject)
-        track = axes[machine, subject] = AxisTrack(machine, view)
-    return track
+    def recording(self, machines: list[str], until: Nanos | None) -> Recording:
+        """Raises `Misuse` for a window that ends before it begins."""
+        for track in self._axes.values():
+            _stand_before(track, self._begin)
+        rests = self._rests()
+        at_rest_by = max((rest for rest in rests if rest is not None), default=self._begin)
+        last, changed = max(self._last, at_rest_by), max(self._changed, at_rest_by)
+        end = last if until is None else until
+        if end < self._begin:
+            raise Misuse(f"the window of time ends at {end} ns and begins at {self._begin} ns: it must not end before it begins")
+        order = {name: i for i, name in enumerate(machines)}
+        return Recording(
+            self._begin,
+            end,
+            machines,
+            sorted(self._axes.values(), key=lambda track: (order[track.machine], _numbers(track.view.name))),
+            sorted(self._pins.values(), key=lambda track: (order[track.machine], _numbers(track.pin))),
+            self._marks,
+            end if None in rests else min(changed if changed > self._begin else last, end),
+        )
+
+    def _rests(self) -> list[Nanos | None]:
+        """When each axis, and each load that moves without its drive, comes to rest; None: never."""
+        drives = [profile_of(track.plans[-1]).end for track in self._axes.values()]
+        return drives + [
+            free.end for track in self._axes.values() for begin, free in track.free.items() if begin == track.loads[-1].begin
+        ]
 
 
 def _stand_before(track: AxisTrack, begin: Nanos) -> None:

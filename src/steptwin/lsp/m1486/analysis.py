@@ -9,6 +9,7 @@ from itertools import pairwise
 from steptwin.diagnostics import Diagnostic, Span
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import (
+    TOKEN_KINDS,
     CallEdge,
     Completions,
     Fold,
@@ -20,6 +21,7 @@ from steptwin.lsp.answers import (
     Signature,
     TokenKind,
 )
+from steptwin.lsp.folding import NestedFolds, runs
 from steptwin.lsp.m1486 import items, texts
 from steptwin.lsp.m1486.hints import hints
 from steptwin.lsp.positions import LineIndex
@@ -32,13 +34,6 @@ from steptwin.m1486.syntax import Command, JumpCondition, ParsedProgram, format_
 from steptwin.m1486.variants import Variant
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
-_TOKENS = {
-    SymbolKind.LABEL: TokenKind.LABEL,
-    SymbolKind.REGISTER: TokenKind.REGISTER,
-    SymbolKind.LINE: TokenKind.REGISTER,
-    SymbolKind.FUNCTION: TokenKind.FUNCTION,
-    SymbolKind.VARIABLE: TokenKind.VARIABLE,
-}
 _OPENING = {"[": "]", "L": "E"}
 
 
@@ -136,31 +131,16 @@ class M1486Analysis(Analysis):
         return OutlineItem(name, SymbolKind.CONTROLLER, span, command.span)
 
     def folds(self) -> Sequence[Fold]:
-        found: list[Fold] = []
-        opened: list[tuple[str, int]] = []
+        blocks = NestedFolds()
         for _, command in self._commands:
             line = self.lines.line_of(command.span.start)
             if command.key in _OPENING:
-                opened.append((_OPENING[command.key], line))
-            elif any(closing == command.key for closing, _ in opened):
-                while opened:
-                    closing, first = opened.pop()
-                    if closing == command.key:
-                        if line > first:
-                            found.append(Fold(first, line))
-                        break
-        return [*found, *self._comments()]
-
-    def _comments(self) -> Iterator[Fold]:
-        first: int | None = None
-        for number in range(len(self.lines.starts) + 1):
-            is_comment = number < len(self.lines.starts) and self.lines.line(number).lstrip().startswith(";")
-            if is_comment and first is None:
-                first = number
-            elif not is_comment and first is not None:
-                if number - first > 1:
-                    yield Fold(first, number - 1, FoldKind.COMMENT)
-                first = None
+                blocks.begin(_OPENING[command.key], line)
+            else:
+                blocks.end(command.key, line)
+        texts = (self.lines.line(number) for number in range(len(self.lines.starts)))
+        comments = [FoldKind.COMMENT if text.lstrip().startswith(";") else None for text in texts]
+        return [*blocks.folds, *runs(comments)]
 
     def formatted(self) -> str | None:
         """Capitals, no blanks, comments in a column; a last line end stays as it is."""
@@ -179,7 +159,7 @@ class M1486Analysis(Analysis):
             for span in spans:
                 if span.end > span.start >= letter.end and self.lines.line_of(span.start) == self.lines.line_of(span.end):
                     use = by_start.get(span.start)
-                    kind = TokenKind.NUMBER if use is None else _TOKENS[use.symbol.kind]
+                    kind = TokenKind.NUMBER if use is None else TOKEN_KINDS[use.symbol.kind]
                     found.append(SemanticToken(span, kind, use is not None and use.role is not SymbolRole.READ))
         for number, start in enumerate(self.lines.starts):
             content = self.lines.line(number)

@@ -9,6 +9,7 @@ from functools import cached_property
 from steptwin.diagnostics import Diagnostic, Span
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import (
+    TOKEN_KINDS,
     CallEdge,
     Completions,
     Fold,
@@ -20,6 +21,7 @@ from steptwin.lsp.answers import (
     Signature,
     TokenKind,
 )
+from steptwin.lsp.folding import NestedFolds, runs
 from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.table import UsedRows
 from steptwin.lsp.wbc import items, names
@@ -38,15 +40,6 @@ from steptwin.wbc.statements import KEYWORDS, OPENING, ROW_MOTIONS
 from steptwin.wbc.symbols import name_problem, uses
 from steptwin.wbc.tree import Broken, ConstantDefinition, DecimalNumber, Identifier, KeywordStatement, Label, SourceLine
 
-_TOKENS = {
-    SymbolKind.CONSTANT: TokenKind.CONSTANT,
-    SymbolKind.VARIABLE: TokenKind.VARIABLE,
-    SymbolKind.REGISTER: TokenKind.REGISTER,
-    SymbolKind.VALUE: TokenKind.VALUE,
-    SymbolKind.FUNCTION: TokenKind.FUNCTION,
-    SymbolKind.LABEL: TokenKind.LABEL,
-    SymbolKind.POSITION: TokenKind.POSITION,
-}
 _WORDS = {NUMBER: TokenKind.NUMBER, COMPARISON: TokenKind.OPERATOR, OPERATOR: TokenKind.OPERATOR}
 _RENAMED = (SymbolKind.CONSTANT, SymbolKind.VARIABLE, SymbolKind.LABEL, SymbolKind.POSITION)
 
@@ -220,7 +213,7 @@ class WbcAnalysis(Analysis):
     def folds(self) -> Sequence[Fold]:
         """Blocks, the lines below labels, and comments and constants of several lines."""
         found: list[Fold] = []
-        blocks: list[tuple[str, int]] = []
+        blocks = NestedFolds()
         lines = self._edited.program.lines
         label: int | None = None
         for number, line in enumerate(lines):
@@ -230,16 +223,11 @@ class WbcAnalysis(Analysis):
                 _fold(found, label, self._last_code(number))
                 label = number
             elif keyword in OPENING:
-                blocks.append((keyword or "", number))
-            elif keyword in ("ENDIF", "ENDWHILE") and any(opened == keyword[3:] for opened, _ in blocks):
-                while blocks:
-                    opened, first = blocks.pop()
-                    if opened == keyword[3:]:
-                        _fold(found, first, number)
-                        break
+                blocks.begin(f"END{keyword}", number)
+            elif keyword is not None:
+                blocks.end(keyword, number)
         _fold(found, label, self._last_code(len(lines)))
-        found += _runs(lines)
-        return found
+        return [*found, *blocks.folds, *runs([_fold_kind(line) for line in lines])]
 
     def _last_code(self, before: int) -> int:
         """The last line before another that is no comment and not empty."""
@@ -263,7 +251,10 @@ class WbcAnalysis(Analysis):
                 span, use = Span(word.start, word.end), by_start.get(word.start)
                 if use is not None:
                     yield SemanticToken(
-                        span, _TOKENS[use.symbol.kind], use.role is not SymbolRole.READ, use.symbol.kind is SymbolKind.CONSTANT
+                        span,
+                        TOKEN_KINDS[use.symbol.kind],
+                        use.role is not SymbolRole.READ,
+                        use.symbol.kind is SymbolKind.CONSTANT,
                     )
                 elif word.kind in _WORDS:
                     yield SemanticToken(span, _WORDS[word.kind])
@@ -302,21 +293,8 @@ def _fold(found: list[Fold], first: int | None, last: int) -> None:
         found.append(Fold(first, last))
 
 
-def _runs(lines: Sequence[SourceLine]) -> Iterator[Fold]:
-    """Comments and constants that follow each other."""
-    kinds = [
-        FoldKind.COMMENT
-        if line.statement is None and line.comment is not None
-        else FoldKind.REGION
-        if isinstance(line.statement, ConstantDefinition)
-        else None
-        for line in lines
-    ]
-    first = 0
-    for number in range(1, len(kinds) + 1):
-        if number < len(kinds) and kinds[number] is kinds[first]:
-            continue
-        kind = kinds[first]
-        if kind is not None and number - first > 1:
-            yield Fold(first, number - 1, kind)
-        first = number
+def _fold_kind(line: SourceLine) -> FoldKind | None:
+    """Of lines that are folded with their neighbours: comments and constants."""
+    if isinstance(line.statement, ConstantDefinition):
+        return FoldKind.REGION
+    return FoldKind.COMMENT if line.statement is None and line.comment is not None else None

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from steptwin.diagnostics import Span
 from steptwin.lsp.answers import Completion, CompletionKind, Completions, Signature
+from steptwin.lsp.letters import has_letters
 from steptwin.lsp.wbc import names as n
 from steptwin.lsp.wbc.names import Names
 from steptwin.wbc import steps as s
@@ -132,19 +133,9 @@ def items(line: str, column: int, start: int, names: Names, used: Sequence[str])
     code, begin, end = found
     typed = line[begin:column].upper()
     maker = _Maker(Span(start + begin, start + end), names, used, typed)
-    wanted = [item for item in maker.items(context(tokens(code, 0))) if _fits(typed, item.label.upper())]
+    wanted = [item for item in maker.items(context(tokens(code, 0))) if has_letters(item.label.upper(), typed)]
     wanted.sort(key=lambda item: (item.rank, not item.label.upper().startswith(typed)))
     return Completions(wanted[:MOST_ITEMS], len(wanted) <= MOST_ITEMS)
-
-
-def _fits(typed: str, label: str) -> bool:
-    """Whether the letters typed come in the label in their order."""
-    at = 0
-    for letter in typed:
-        at = label.find(letter, at) + 1
-        if not at:
-            return False
-    return True
 
 
 class _Maker:

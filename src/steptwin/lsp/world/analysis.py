@@ -15,7 +15,7 @@ from steptwin.lsp.answers import Completions, DocumentLink, Fold, Hover, Outline
 from steptwin.lsp.files import name_of, relative
 from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.world.items import ItemBuilder, keys_of
-from steptwin.lsp.world.outline import Outline, Table
+from steptwin.lsp.world.outline import Table, WorldOutline
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 from steptwin.world.check import diagnose
 from steptwin.world.elements import ELEMENTS
@@ -56,7 +56,7 @@ class WorldAnalysis(Analysis):
     def __init__(self, uri: str, lines: LineIndex, around: Around) -> None:
         super().__init__(uri, lines)
         self._around = around
-        self._outline = Outline(lines)
+        self._outline = WorldOutline(lines)
 
     @cached_property
     def _found(self) -> Sequence[Diagnostic]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from steptwin.diagnostics import Span
 from steptwin.lsp.answers import Completion, CompletionKind, Completions
-from steptwin.lsp.world.outline import Outline, Table
+from steptwin.lsp.world.outline import Table, WorldOutline
 from steptwin.symbols import SymbolKind
 from steptwin.world.kind import AnyKind
 from steptwin.world.kinds import KINDS
@@ -40,7 +40,7 @@ def keys_of(table: Table) -> Sequence[Key]:
 class ItemBuilder:
     """For one text. ``files`` gives the names of files beside it by ending."""
 
-    def __init__(self, outline: Outline, controllers: Mapping[str, AnyKind], files: Iterable[str]) -> None:
+    def __init__(self, outline: WorldOutline, controllers: Mapping[str, AnyKind], files: Iterable[str]) -> None:
         self._outline = outline
         self._controllers = controllers
         self._files = tuple(files)

@@ -45,7 +45,7 @@ class Table:
         return self.names[-1] if self.names else ""
 
 
-class Outline:
+class WorldOutline:
     """Of one text."""
 
     def __init__(self, lines: LineIndex) -> None:
