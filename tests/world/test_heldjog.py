@@ -6,11 +6,13 @@ from textwrap import dedent
 from typing import Any
 
 import pytest
+from mic488_rig import loaded
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.later import start
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.mic488.status import AxisStatus
 from steptwin.motion.divisions import profile_of
 from steptwin.studio.jogs import Held, WorldJogs
 from steptwin.subject.commands import Enable, Home, Jog, StopAxes
@@ -294,3 +296,49 @@ def test_what_cannot_be_jogged_is_refused() -> None:
     rig.run(50)
     with pytest.raises(Refusal, match="not at rest"):
         rig.begin(Jog("drum", 1, 6400.0))
+    with pytest.raises(Misuse, match="drum: no axis 2: an M1486 has one, 1"):
+        chip().begin(Jog("drum", 2, 6400.0))
+    with pytest.raises(Misuse, match=r"velocity 1\.28006e\+06 microstep/s, V20001: "):
+        chip().begin(Jog("drum", 1, 20001 * 64.0))
+    with pytest.raises(Refusal, match="drum is on no line, so no commands can be sent to it"):
+        Rig('[[m1486]]\nname = "drum"\n').begin(Jog("drum", 1, 6400.0))
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ((("a", "AXIS_CTR_MODE", 1.0),), r"a waits for triggers \(AXIS_CTR_MODE\), so an axis cannot be jogged"),
+        ((("a", "PROGRAM_CTRL", 1.0),), "a runs its program: pause or stop it before an axis is jogged"),
+    ],
+)
+def test_a_mic488_that_something_else_commands_is_not_jogged(values: tuple[tuple[str, str, float], ...], text: str) -> None:
+    rig = Rig(MIC.format(acc=1000.0, timing="") + "\n")
+    rig.world.mic488["a"].device.load_program(0, loaded("WAIT IN5 = ON\n")[0])
+    rig.subject.do(Enable("a", 1))
+    rig.subject.do(do.Write(values))
+    rig.run(100)
+    with pytest.raises(Refusal, match=text):
+        rig.begin(Jog("a", 1, 10.0))
+    assert rig.position("a.M1.velocity") == 0
+    with pytest.raises(Misuse, match="a: no axis 5: a MIC488 has 1 to 4"):
+        rig.begin(Jog("a", 5, 10.0))
+
+
+def test_a_mic488_with_a_position_error_is_not_jogged() -> None:
+    rig = mic()
+    rig.world.mic488["a"].device.axes[0].status = AxisStatus.ERROR
+    with pytest.raises(Refusal, match="a M1 has a position error: stop it first"):
+        rig.begin(Jog("a", 1, 10.0))
+
+
+def test_a_jog_that_is_over_asks_for_nothing_more() -> None:
+    for rig, wanted in ((mic(), Jog("a", 1, 10.0)), (chip(), Jog("drum", 1, 6400.0))):
+        held = rig.begin(wanted)
+        rig.run(3000)
+        assert held.over == "lapsed"
+        assert rig.jogs.deadline() is None
+        rig.followed.take()
+        with pytest.raises(Refusal, match="the jog has ended: lapsed"):
+            held.extend()
+        rig.run(1000)
+        assert [event for event in rig.followed.take().events if isinstance(event.payload, PlanPayload)] == []

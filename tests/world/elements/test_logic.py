@@ -318,3 +318,63 @@ def test_a_loop_that_does_not_settle_is_reported() -> None:
             '[[mic488]]\nname = "a"\n[[gate]]\nname = "it"\nkind = "not"\ninputs = ["it.out"]\n'
             '[[wire]]\nfrom = "it.out"\nto = "a.IN1"'
         ).run(for_=0.01)
+
+
+# ---------------------------------------------------------------------- joints in the table of an element
+
+JOINED = """
+[[mic488]]
+name = "a"
+[[mic488]]
+name = "b"
+[[{kind}]]
+name = "it"
+{keys}
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "moves", "outputs"),
+    [
+        ("relay", 'coil = "a.OUT3"', ["OUT3"], {"no": [1.0], "nc": [0.0]}),
+        ("timer", 'kind = "off-delay"\ntime = "1 h"\ninput = "a.OUT3"', ["OUT3", "-OUT3"], {"out": [1.0, 1.0]}),
+        ("latch", 'set = "a.OUT3"\nreset = "b.OUT4"', ["OUT3", "-OUT3", "OUT4"], {"out": [1.0, 1.0, 0.0]}),
+        (
+            "counter",
+            'preset = 2\nup = "a.OUT3"\ndown = "b.OUT4"\nreset = "a.OUT5"',
+            ["OUT3", "-OUT3", "OUT3", "OUT4", "-OUT3", "OUT3", "OUT5"],
+            {"out": [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0], "count": [1.0, 1.0, 2.0, 1.0, 1.0, 2.0, 0.0]},
+        ),
+        ("gate", 'kind = "xor"\ninputs = ["a.OUT3", "b.OUT4"]', ["OUT3", "OUT4", "-OUT3"], {"out": [1.0, 0.0, 1.0]}),
+    ],
+)
+def test_inputs_are_joined_by_the_keys_of_the_table(
+    kind: str, keys: str, moves: list[str], outputs: dict[str, list[float]]
+) -> None:
+    """Each key joins the input of its name, with outputs of any controller; OUT4 is that of b."""
+    there = World.from_toml(JOINED.format(kind=kind, keys=keys))
+    shown: dict[str, list[float]] = {name: [] for name in outputs}
+    for move in moves:
+        pin = move.removeprefix("-")
+        there.mic488["b" if pin == "OUT4" else "a"].write(pin, 0 if move.startswith("-") else 1)
+        there.run(for_=0.001)
+        for name, seen in shown.items():
+            seen.append(there.read(f"it.{name}"))
+    assert shown == outputs
+
+
+def test_a_conveyor_is_joined_by_its_keys() -> None:
+    there = World.from_toml(
+        JOINED.format(kind="conveyor", keys='length = 400.0\nspeed = 100.0\nrun = "a.OUT3"\nfeed = "b.OUT4"\nworkpiece = 10.0')
+    )
+    there.mic488["b"].write("OUT4", 1)
+    there.run(for_=1.0)
+    assert [str(record.value) for record in there.trace.of("event") if record.subject == "workpiece"] == ["it.1 is on it"]
+    there.mic488["a"].write("OUT3", 1)
+    there.run(for_=5.0)
+    assert [str(record.value) for record in there.trace.of("event") if record.subject == "workpiece"][1:] == ["it.1 leaves it"]
+
+
+def test_joints_are_checked() -> None:
+    with pytest.raises(WorldError, match="OUT99"):
+        World.from_toml(JOINED.format(kind="relay", keys='coil = "a.OUT99"'))
