@@ -443,3 +443,30 @@ def test_values_are_at_most_so_long() -> None:
 
 def test_a_motor_without_masses_needs_no_length() -> None:
     assert World.from_toml(AXIS + MOTOR + "inertia = 0.001\n", name="w.toml").axis["x"].position == 0.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ('kind = "on-dely"', 'kind = "on-delay"'),
+        ('tiem = "1 s"', 'time = "1 s"'),
+        ('inputt = "a.OUT1"', 'input = "a.OUT1"'),
+    ],
+)
+def test_near_words_and_keys_have_a_fix_that_mends_the_text(wrong: str, right: str) -> None:
+    """The fix replaces the word alone, at its place in the text: the same word stands elsewhere too."""
+    keys = ('kind = "on-delay"', 'time = "1 s"', 'input = "a.OUT1"')
+    good = '[[mic488]]\nname = "a"\n[[timer]]\nname = "on-dely"\n' + "\n".join(keys) + "\n"
+    World.from_toml(good)
+    text = good.replace(right, wrong)
+    with pytest.raises(WorldError) as caught:
+        World.from_toml(text)
+    (fix,) = (finding.fix for finding in caught.value.findings if finding.fix is not None)
+    assert text[: fix.span.start] + fix.text + text[fix.span.end :] == good
+
+
+@pytest.mark.parametrize("wrong", ['kind = "sometimes"', "kind = 5"])
+def test_words_that_are_near_nothing_have_no_fix(wrong: str) -> None:
+    with pytest.raises(WorldError) as caught:
+        World.from_toml(f'[[timer]]\nname = "t"\ntime = "1 s"\n{wrong}\n')
+    assert [(finding.code, finding.fix) for finding in caught.value.findings] == [("D003", None)]

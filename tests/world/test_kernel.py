@@ -359,3 +359,16 @@ def test_names_are_given_once() -> None:
     kernel, one, _ = two_controllers()
     with pytest.raises(Misuse, match="there is a machine 'one' already"):
         kernel.add("one", one)
+
+
+def test_a_kernel_in_which_nothing_has_changed_is_settled() -> None:
+    kernel = Kernel()
+    assert not kernel.stale
+    assert kernel.deadline() is None
+    with pytest.raises(Misuse, match="no machine 'x': there are none"):
+        kernel.replace("x", Relay())
+    kernel.add("a", Relay())
+    with pytest.raises(Misuse, match="no machine 'x': there are a"):
+        kernel.replace("x", Relay())
+    with pytest.raises(Misuse, match=r"wire to a\.A: a delay of -1 ns is negative"):
+        Wire(PinName("a", "B"), PinName("a", "A"), delay=-1)

@@ -5,6 +5,7 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import Division, Microstepping, StepTrain
+from steptwin.motion.paths import Circular
 from steptwin.world.trace import Trace, TraceRecord, encode
 
 PLAN = plan_position(MotionState(5, 10, 0.0, 0.0), 5000, 1000.0, 2000.0, 800.0)
@@ -112,3 +113,37 @@ def test_a_trace_goes_back_to_a_mark_and_forward_again(keep: bool) -> None:
     assert (trace.digest(), len(trace)) == (late, 8)
     trace.rewind(start)
     assert take(trace, 1, 2, 3, 4) == late == take(plain, 1, 2, 3, 4)
+
+
+def test_every_number_of_an_arc_is_in_the_digest() -> None:
+    """Motion along a circle, of which an axis has one coordinate (`steptwin.motion.paths`)."""
+
+    def digest(*, centre_p: float = 100.0, radius_p: float = 500.0, angle_q: float = 0.25, turn_q: float = 0.001) -> str:
+        way = plan_position(MotionState(5, 0, 0.0, 0.0), 700, 1000.0, 2000.0, 800.0)
+        trace = Trace(["a"])
+        trace.add(TraceRecord(5, "a", "plan", "1", Circular(centre_p, radius_p, angle_q, turn_q).profile(way, 600, None)))
+        return trace.digest()
+
+    digests = [digest(), digest(centre_p=101.0), digest(radius_p=501.0), digest(angle_q=0.26), digest(turn_q=-0.001)]
+    assert len(set(digests)) == len(digests)
+    assert digest() == digests[0]
+
+
+def test_records_by_kind() -> None:
+    trace = Trace(["a", "b"])
+    kinds = ("plan", "coordinate", "load", "edge", "frame", "statement", "event", "input", "fault")
+    for time, kind in enumerate(kinds):
+        trace.add(TraceRecord(time, "b" if kind == "input" else "a", kind, kind, ""))
+    views = (trace.loads, trace.edges, trace.frames, trace.statements, trace.events, trace.inputs, trace.faults)
+    assert [[record.subject for record in view()] for view in views] == [[kind] for kind in kinds[2:]]
+    assert [record.subject for record in trace.inputs("b")] == ["input"]
+    assert list(trace.inputs("a")) == list(trace.edges("b")) == []
+
+
+def test_a_world_of_which_nothing_is_recorded_has_no_digest() -> None:
+    trace = Trace(["a"])
+    trace.add(TraceRecord(1, "a", "edge", "OUT1", 1.0))
+    trace.stop()
+    assert list(trace) == []
+    with pytest.raises(Misuse, match="nothing is recorded of this world: it has no digest"):
+        trace.digest()
