@@ -275,7 +275,7 @@ def test_whoever_does_not_follow_is_not_stopped_for(run: Run) -> None:
         assert not rig.pace.is_paused
         with pytest.raises(Refusal, match="follow events of kind 'stopped'"):
             rig.do("debug")
-        assert [one["number"] for one in rig.do("breakpoints")] == [number]
+        assert [one["number"] for one in rig.do("breakpoints")["breakpoints"]] == [number]
         rig.following = rig.control.follow(filter_of(["stopped"]), 10)
         rig.do("debug")
         assert await rig.stop() == ("breakpoint", 3)
@@ -295,7 +295,7 @@ def test_what_cannot_be_is_refused(run: Run) -> None:
         ):
             with pytest.raises(Misuse, match=message):
                 rig.do("breakpoint", **fields)
-        assert rig.do("breakpoints") == []
+        assert rig.do("breakpoints") == {"breakpoints": [], "stop_on": [], "stop": None}
         with pytest.raises(Refusal, match="time goes on"):
             rig.do("step_program", machine="table", way="in")
         with pytest.raises(Misuse, match="no breakpoint 5"):

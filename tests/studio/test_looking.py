@@ -5,11 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from tests.support.studio_rig import Studio, Tab
+from tests.support.studio_rig import OPERATOR, VIEWER, Studio, Tab
 
 from steptwin.errors import Refusal
 from steptwin.later import Later
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.subject.debugcommands import (
+    Branch,
+    ClearBreakpoint,
+    ListBreakpoints,
+    LookAt,
+    RunProgram,
+    SetBreakpoint,
+    SetValue,
+    StepProgram,
+    StopOn,
+)
 from steptwin.subject.world import WorldSubject
 from steptwin.world.history import History, Past
 from steptwin.world.programtexts import WorldPrograms
@@ -129,6 +140,41 @@ def test_who_looks_back_changes_nothing_but_may_stop(studio: Studio) -> None:
     assert tab.ok("stop_all")["failed"] == {}
     tab.ok("look")
     tab.ok("move", machine="table", axis=1, to=3)
+
+
+def test_a_debugger_steps_from_the_past_but_values_are_not_set_there(studio: Studio) -> None:
+    asked: list[object] = []
+    kinds: tuple[type, ...] = (SetBreakpoint, ClearBreakpoint, StopOn, StepProgram, RunProgram, LookAt, Branch, SetValue)
+    studio.subject.dispatcher.add(dict.fromkeys(kinds, asked.append))
+    tab, other = studio.open(), studio.open("Anna")
+    tab.ok("look", to_ns=str(SECOND))
+    tab.read()
+    forwards = {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
+    may = set(tab.newest("past")["may"])
+    assert forwards <= may
+    assert "set_value" not in may
+    tab.ok("step_program", machine="table", way="over")
+    tab.ok("breakpoint", label="MAIN")
+    assert asked == [StepProgram("table", "over"), SetBreakpoint(label="MAIN")]
+    assert tab.error("set_value", machine="table", name="n", expression="1")[1].startswith("set_value: the past is looked at")
+    # It needs control, as what else changes the machine.
+    assert other.error("run")[0] == "refusal"
+    other.ok("take_control", over=True)
+    other.ok("run")
+    assert asked[2:] == [RunProgram("forwards")]
+    assert tab.error("run")[1].startswith("run needs control, which Anna")
+
+
+def test_a_viewer_sees_breakpoints_and_sets_none() -> None:
+    studio = Studio(tokens=True)
+    studio.subject.dispatcher.add({ListBreakpoints: lambda _: {"breakpoints": []}, RunProgram: lambda _: None})
+    tab = studio.open(token=VIEWER)
+    may = set(tab.messages[0]["hello"]["may"])
+    assert {"breakpoints", "stack", "values", "evaluate"} <= may
+    assert not {"breakpoint", "step_program", "run", "set_value", "branch"} & may
+    assert tab.ok("breakpoints") == {"breakpoints": []}
+    assert tab.error("run")[1].startswith("run is for the role operator")
+    studio.open(token=OPERATOR).ok("run")
 
 
 def test_the_whole_state_and_the_past_with_it(studio: Studio) -> None:

@@ -118,6 +118,13 @@ class Debugging:
         line = self._breakpoints[number].wanted.line if found is None or found.line is None else found.line
         return {"number": number, **given, "line": line, "problem": found.problem or None if found is not None else None}
 
+    def _list(self) -> object:
+        return {
+            "breakpoints": [self._plain(number) for number in self._breakpoints],
+            "stop_on": list(self._events),
+            "stop": None if self._open is None else self._open.stopped,
+        }
+
     def _stop_on(self, wanted: command.StopOn) -> None:
         self._opened().debugger.set_events([_EVENTS[name] for name in wanted.events])
         self._events = wanted.events
@@ -129,7 +136,7 @@ class Debugging:
             command.Debug: lambda _: self._opened().describe(),
             command.SetBreakpoint: self._add,
             command.ClearBreakpoint: self._clear,
-            command.ListBreakpoints: lambda _: [self._plain(number) for number in self._breakpoints],
+            command.ListBreakpoints: lambda _: self._list(),
             command.StopOn: self._stop_on,
             command.StepProgram: lambda wanted: self._opened().step(wanted),
             command.RunProgram: lambda wanted: self._opened().run(wanted),
@@ -191,6 +198,8 @@ class _OpenDebugger:
         """Why time is about to stand."""
         self._travel: Travel | None = None
         """A way through the past."""
+        self.stopped: dict[str, object] | None = None
+        """What was said of the present stop; None while time goes on."""
         self._then: Goal | None = None
         """What to look for when it has come to the present."""
         live.world.input_watchers.append(self._given)
@@ -228,6 +237,7 @@ class _OpenDebugger:
 
     def goes(self) -> None:
         self._end_travel()
+        self.stopped = None
         if not self._goes:
             self._goes = True
             self._after = self._live.now if self._begin is None else self._begin
@@ -307,6 +317,7 @@ class _OpenDebugger:
 
     def _go(self, travel: Travel, then: Goal | None = None) -> None:
         self._travel, self._then = travel, then
+        self.stopped = None
         asyncio.get_running_loop().call_soon(self._part, travel)
 
     def _end_travel(self) -> None:
@@ -392,7 +403,9 @@ class _OpenDebugger:
             None if at is None else at.line,
             debugger.is_past,
         )
-        self._live.subject.publish(debugger.now, stop.machine or WORLD, said)
+        machine = stop.machine or WORLD
+        self.stopped = {"time_ns": str(debugger.now), "machine": machine, **said.plain()}
+        self._live.subject.publish(debugger.now, machine, said)
 
     def _log(self, logged: Logged) -> None:
         at = self.debugger.location(logged.machine, logged.place)

@@ -22,7 +22,7 @@ from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
 from steptwin.studio.programs import ProgramTexts
-from steptwin.studio.requests import OF_CONNECTION, OF_THE_PAST, REQUESTS, check_name, permit_of, read_request
+from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, check_name, permit_of, read_request
 from steptwin.studio.streams import Batch, StreamPosition
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
@@ -199,7 +199,7 @@ class ViewerSession:
 
     async def _permitted(self, wanted: Wanted, permit: Permit, identity: Identity) -> Result:
         hub = self._hub
-        if self._looking.is_back and permit.control and wanted.name not in OF_THE_PAST:
+        if self._looking.is_back and permit.control and wanted.name not in IN_THE_PAST:
             raise Refusal(f"{wanted.name}: the past is looked at, which cannot be changed: look at the present first")
         takes = check(wanted.name, permit, self.viewer, hub.control) and not self.is_rest
         if takes:
@@ -385,7 +385,7 @@ class ViewerSession:
         return {one.number: one.take(now) for one in self._watches.values() if one.is_due(now)}
 
     def _past(self) -> str:
-        may = [name for name in self._hub.may(self.viewer.role) if name in OF_THE_PAST or not permit_of(name).control]
+        may = [name for name in self._hub.may(self.viewer.role) if name in IN_THE_PAST or not permit_of(name).control]
         return json.dumps({"seq": next(self._seq), "past": self._looking.message(may)}, separators=(",", ":"))
 
     def _events(self, now: Nanos, time: Nanos) -> str:

@@ -197,7 +197,12 @@ ROWS = (
         NOTHING,
         (Field("breakpoint", whole(1, 1 << 53), "Its number.", attribute="number"),),
     ),
-    CommandRow("breakpoints", ListBreakpoints, "The breakpoints that are set.", f"a list of {_BREAKPOINT}"),
+    CommandRow(
+        "breakpoints",
+        ListBreakpoints,
+        "What time stops at, and why the debugger stands.",
+        f"breakpoints: a list of {_BREAKPOINT}; stop_on; stop: as the event stopped, null while time goes on",
+    ),
     CommandRow(
         "stop_on",
         StopOn,

@@ -1010,7 +1010,7 @@ export type ClearBreakpointRequest = {
   breakpoint: number;
 };
 
-/** The breakpoints that are set. Answer: a list of number, problem (why it is nowhere; null), lines of the statements, and what was given. */
+/** What time stops at, and why the debugger stands. Answer: breakpoints: a list of number, problem (why it is nowhere; null), lines of the statements, and what was given; stop_on; stop: as the event stopped, null while time goes on. */
 export type BreakpointsRequest = {
   do: "breakpoints";
   /** Comes back with the answer. */

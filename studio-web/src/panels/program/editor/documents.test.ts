@@ -27,6 +27,7 @@ test("the difference of two texts leaves alone what is alike at both ends", () =
 test("a line of the twin is found in a text that was changed", () => {
   const file = open("A\nB\nC", "A\nnew\nB\nC");
   expect([1, 2, 3].map((line) => file.lineHere(line))).toEqual([1, 3, 4]);
+  expect([1, 3, 4].map((line) => file.lineInTwin(line))).toEqual([1, 2, 3]);
   expect(file.isChanged).toBe(true);
   file.twinHas(null);
   expect([2, 99].map((line) => file.lineHere(line))).toEqual([2, 4]);

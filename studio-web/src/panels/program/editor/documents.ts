@@ -73,6 +73,14 @@ export class OpenText implements WorkspaceFile {
     return this.sinceTwin.mapPos(from, 1);
   }
 
+  /** The line of the text in the twin, from 1, of one in the present text. */
+  lineInTwin(line: number): number {
+    const { doc } = this.state;
+    const from = doc.line(Math.min(Math.max(line, 1), doc.lines)).from;
+    const there = this.sinceTwin.invertedDesc.mapPos(from, 1);
+    return this.inTwin.lineAt(Math.min(there, this.inTwin.length)).number;
+  }
+
   /** The line in the present text, from 1, of one in the twin. */
   lineHere(line: number): number {
     const { doc } = this.state;

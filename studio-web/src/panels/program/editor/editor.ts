@@ -17,7 +17,8 @@ import {
 } from "@codemirror/lsp-client";
 import { highlightSelectionMatches, search, searchKeymap } from "@codemirror/search";
 import { EditorState, type Extension, type Text } from "@codemirror/state";
-import { EditorView, drawSelection, highlightActiveLine, keymap, lineNumbers } from "@codemirror/view";
+import { EditorView, drawSelection, highlightActiveLine, keymap } from "@codemirror/view";
+import { breakpoints, marksAre, type GutterEvents, type Mark } from "./breakpoints";
 import { Documents, OpenText, textOf, type Finding } from "./documents";
 import { runningLine, runsAt } from "./running";
 import { look } from "./theme";
@@ -49,6 +50,8 @@ export interface EditorEvents {
   changed(): void;
   /** Whether the editor server can be asked, and why not. */
   connected(isConnected: boolean, why: string): void;
+  /** What is done beside the text. */
+  readonly gutter: GutterEvents;
   /** Another text has to be shown. */
   display(uri: string): Promise<void>;
 }
@@ -164,6 +167,12 @@ export class ProgramEditor {
     file.view.dispatch({ effects: [runsAt.of(at), ...scroll] });
   }
 
+  /** Breakpoints, by lines of the text in the twin. */
+  stopsAt(file: OpenText, points: readonly (Omit<Mark, "place"> & { line: number })[]): void {
+    const marks = points.map(({ line, kind, title }): Mark => ({ place: file.placeOfLine(line), kind, title }));
+    file.view?.dispatch({ effects: marksAre.of(marks) });
+  }
+
   /** What the twin has now. A text that was not changed here follows it. */
   twinHas(file: OpenText, text: string): void {
     const now: Text = textOf(text);
@@ -202,7 +211,7 @@ export class ProgramEditor {
 
   private extensions(uri: string, language: string, label: string, isEditable: boolean): Extension {
     return [
-      lineNumbers(),
+      breakpoints(language === "wbc" || language === "m1486" ? this.events.gutter : null),
       runningLine(),
       history(),
       drawSelection(),

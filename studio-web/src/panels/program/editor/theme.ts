@@ -13,6 +13,12 @@ export const look = EditorView.theme({
   ".cm-gutters": { backgroundColor: "var(--panel)", color: "var(--dim)", borderRight: "1px solid var(--rule)" },
   ".cm-activeLine, .cm-activeLineGutter": { backgroundColor: "var(--panel)" },
   ".cm-running": { width: "2ch", color: "var(--accent)", textAlign: "center" },
+  ".cm-breakpoints": { width: "2ch", textAlign: "center", cursor: "pointer" },
+  ".cm-breakpoints .cm-gutterElement": { minWidth: "2ch" },
+  ".cm-lineNumbers .cm-gutterElement": { cursor: "pointer" },
+  ".dot": { color: "var(--danger)" },
+  ".dot.log": { color: "var(--accent)" },
+  ".dot.wrong": { color: "var(--dim)" },
   ".now": { backgroundColor: "var(--chosen)" },
   ".cm-panels, .cm-tooltip": {
     backgroundColor: "var(--raised)",
